@@ -1,0 +1,11 @@
+//! Model text in, program out: no input or output of its own, no clock, no unsafe.
+//!
+//! The folders are the pipeline, in order: [`algebra`] is the kernel under all of them.
+#![forbid(unsafe_code)]
+
+pub mod algebra;
+pub mod ast;
+pub mod diagnostic;
+pub mod ids;
+pub mod span;
+pub mod unit;
