@@ -1,0 +1,482 @@
+//! The bond graph: a model flattened to elements, bonds and exact expressions.
+//!
+//! Components are instantiated (their parts are named `instance.part`), units are checked and converted to SI,
+//! signal blocks are unfolded, `constraint` statements have become zero compliances behind modulated transformers.
+//! Every expression reads only the symbols of [`BondGraph::variables`]: parameters, time, inputs, integrated signals,
+//! held signals, and the effort, flow and stored quantity of bonds and ports. What the modeller wrote as `R1.f` is the
+//! flow of the bond at `R1`; `w.f` of a 1-junction is the flow of any of its bonds.
+
+use std::collections::BTreeMap;
+
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::ids::{Table, id};
+use crate::span::Span;
+use crate::unit::Unit;
+
+id!(
+    /// An element or junction.
+    ElementId
+);
+id!(
+    /// A bond. Bonds are numbered for people from 1, in the order written.
+    BondId
+);
+id!(
+    /// A parameter or constant.
+    ParameterId
+);
+id!(
+    /// An input.
+    InputId
+);
+id!(
+    /// An integrated signal (`state x' = …`, and the states of `pid` and `tf`).
+    SignalId
+);
+id!(
+    /// A signal held from earlier times (`delay`, `sample`).
+    HeldId
+);
+
+/// A bond graph, flattened.
+///
+/// Invariants (see [`verify`]): every bond joins two different port places that name it back; junctions have at least
+/// one bond; a one-port has one bond; a two-port has its `in` bond with the half arrow at it and its `out` bond with the
+/// half arrow away from it; half arrows point into every `I`, `C`, `R`; every symbol in any expression is in `variables`.
+#[derive(Debug, Clone)]
+pub struct BondGraph {
+    /// Name of the model.
+    pub name: String,
+    /// Its documentation, may be empty.
+    pub doc: String,
+    /// All expressions of the graph.
+    pub exprs: Exprs,
+    /// What each symbol stands for.
+    pub variables: BTreeMap<Symbol, Variable>,
+    /// Elements and junctions, in the order in which they first stand in the text.
+    pub elements: Table<ElementId, Element>,
+    /// Bonds, in the order written.
+    pub bonds: Table<BondId, Bond>,
+    /// Parameters and constants.
+    pub parameters: Table<ParameterId, Parameter>,
+    /// Inputs.
+    pub inputs: Table<InputId, Input>,
+    /// Integrated signals.
+    pub signals: Table<SignalId, Signal>,
+    /// Delayed and sampled signals.
+    pub held: Table<HeldId, Held>,
+    /// Named expressions (`let` values), in order, fully expanded.
+    pub lets: Vec<Named>,
+    /// Outputs, in order, fully expanded.
+    pub outputs: Vec<Named>,
+    /// `prefer`, in order.
+    pub preferences: Vec<Preference>,
+    /// `causality`.
+    pub forced_causality: Vec<ForcedCausality>,
+    /// `stroke`.
+    pub forced_strokes: Vec<ForcedStroke>,
+    /// `constraint`.
+    pub constraints: Vec<Constraint>,
+    /// Time, as a symbol.
+    pub time: Symbol,
+}
+
+/// A symbol's meaning, unit and place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variable {
+    /// What it stands for.
+    pub meaning: Meaning,
+    /// Its SI unit, where known.
+    pub unit: Option<Unit>,
+}
+
+/// What a symbol stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Meaning {
+    /// Time, in s.
+    Time,
+    /// A parameter or constant.
+    Parameter(ParameterId),
+    /// An input.
+    Input(InputId),
+    /// An integrated signal.
+    Signal(SignalId),
+    /// A delayed or sampled signal.
+    Held(HeldId),
+    /// Effort of a bond.
+    Effort(BondId),
+    /// Flow of a bond.
+    Flow(BondId),
+    /// Stored quantity of a port of a storage: momentum `p` of an `I`, displacement `q` of a `C`.
+    Stored(PortRef),
+    /// Time derivative of another symbol (`x'` in an expression).
+    Rate(Symbol),
+}
+
+/// One port of an element: the place where a bond ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PortRef {
+    /// The element.
+    pub element: ElementId,
+    /// Index into [`Element::ports`].
+    pub port: u32,
+}
+
+/// An element or junction.
+#[derive(Debug, Clone)]
+pub struct Element {
+    /// Its full name, such as `motor.shaft`.
+    pub name: String,
+    /// What it is, with its law.
+    pub kind: Kind,
+    /// Its ports, in order; junctions have one for every bond, in the order written; `TF`/`GY`: `in`, then `out`.
+    pub ports: Vec<Port>,
+    /// Where it is declared.
+    pub span: Span,
+    /// The law or value as the modeller wrote it, for drawings: `k = ks`, `e = b*f^3`; empty for junctions.
+    pub label: String,
+}
+
+/// A port and its bond.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Port {
+    /// Its name if the element is a field (`el` in `gap.el`), `in`/`out` for two-ports, else empty.
+    pub name: String,
+    /// The bond that ends here.
+    pub bond: BondId,
+    /// Whether the half arrow points at this element.
+    pub inward: bool,
+}
+
+/// Kinds of elements, with their laws as expressions over the symbols of their own ports and any signals.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// 0-junction: one effort, flows sum to zero along the half arrows.
+    Zero,
+    /// 1-junction: one flow, efforts sum to zero along the half arrows.
+    One,
+    /// `Se`: the effort of its bond is `value`.
+    EffortSource {
+        /// The effort, along the half arrow as drawn.
+        value: Expr,
+    },
+    /// `Sf`: the flow of its bond is `value`.
+    FlowSource {
+        /// The flow, along the half arrow as drawn.
+        value: Expr,
+    },
+    /// `ZC`: the flow of its bond is held at `flow` (zero if none is given), its effort is a Lagrange multiplier.
+    ZeroCompliance {
+        /// The flow.
+        flow: Expr,
+    },
+    /// `rSe`: an unknown effort that makes `residual` vanish (its own flow if none is given).
+    ResidualEffort {
+        /// The residual, if one is given.
+        residual: Option<Expr>,
+    },
+    /// `rSf`: an unknown flow that makes `residual` vanish (its own effort if none is given).
+    ResidualFlow {
+        /// The residual, if one is given.
+        residual: Option<Expr>,
+    },
+    /// `De`: reads an effort, takes no flow.
+    EffortDetector,
+    /// `Df`: reads a flow, takes no effort.
+    FlowDetector,
+    /// `I`, one port or a field.
+    Inertance(Storage),
+    /// `C`, one port or a field.
+    Compliance(Storage),
+    /// `R`, one port or a field: one law a port.
+    Resistor(Vec<ResistorLaw>),
+    /// `TF`: `e_in = m e_out`, `f_out = m f_in`.
+    Transformer {
+        /// The modulus `m`.
+        modulus: Expr,
+    },
+    /// `GY`: `e_in = r f_out`, `e_out = r f_in`.
+    Gyrator {
+        /// The modulus `r`.
+        modulus: Expr,
+    },
+}
+
+/// Laws and start values of a storage, one entry a port.
+///
+/// With `X` the stored quantity (`p`, `q`) and `z` the co-energy variable (flow of an `I`, effort of a `C`).
+#[derive(Debug, Clone)]
+pub struct Storage {
+    /// The law of each port.
+    pub laws: Vec<StorageLaw>,
+    /// The symbol of the stored quantity of each port.
+    pub stored: Vec<Symbol>,
+    /// Start values, as conditions.
+    pub initial: Vec<Initial>,
+    /// The stored energy as given (`energy = …`), if it was.
+    pub energy: Option<Expr>,
+}
+
+/// The law of one port of a storage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StorageLaw {
+    /// `z = Φ(X)`, reading stored quantities (of all its ports) and signals.
+    Integral(Expr),
+    /// `X = Ψ(z)`, reading co-energy variables (of all its ports) and signals.
+    Derivative(Expr),
+    /// `0 = expr` in `X`, `z` and signals.
+    Implicit(Expr),
+    /// `X = expr` in signals (a `C` whose displacement is known), `z = law` in the stored symbol.
+    Known {
+        /// The displacement.
+        displacement: Expr,
+        /// `z` as an expression of the stored symbol.
+        law: Expr,
+    },
+}
+
+/// The law of one port of a resistor, in efforts and flows of its ports and signals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResistorLaw {
+    /// `e = expr`, which reads flows (own first of all).
+    Resistive(Expr),
+    /// `f = expr`, which reads efforts.
+    Conductive(Expr),
+    /// `0 = expr`.
+    Implicit(Expr),
+}
+
+/// A start value: a condition at the start of the run.
+#[derive(Debug, Clone, Copy)]
+pub struct Initial {
+    /// The symbol that has the value: effort or flow of the bond, or stored quantity.
+    pub symbol: Symbol,
+    /// The value, in parameters.
+    pub value: Expr,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A bond with its half arrow at `to`.
+#[derive(Debug, Clone)]
+pub struct Bond {
+    /// Where it starts.
+    pub from: PortRef,
+    /// Where its half arrow points.
+    pub to: PortRef,
+    /// Its name (`as b3`), else empty.
+    pub name: String,
+    /// Symbol of its effort.
+    pub effort: Symbol,
+    /// Symbol of its flow.
+    pub flow: Symbol,
+    /// Whether effort times flow is no power (`domain … pseudo`).
+    pub pseudo: bool,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A parameter (may be changed at run time) or constant.
+#[derive(Debug, Clone)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// Its value, a number or an expression of other parameters, in SI.
+    pub value: Expr,
+    /// Whether it is a `const`.
+    pub constant: bool,
+    /// Unit as written.
+    pub unit: Option<Unit>,
+    /// Documentation.
+    pub doc: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// An input.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// Its name.
+    pub name: String,
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// Its value when nothing is connected.
+    pub default: Expr,
+    /// Unit.
+    pub unit: Option<Unit>,
+    /// Documentation.
+    pub doc: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// An integrated signal.
+#[derive(Debug, Clone)]
+pub struct Signal {
+    /// Its name.
+    pub name: String,
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// Its rate.
+    pub rate: Expr,
+    /// Its start value, if given (`from`).
+    pub initial: Option<Expr>,
+    /// Unit.
+    pub unit: Option<Unit>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A signal read from earlier times.
+#[derive(Debug, Clone)]
+pub struct Held {
+    /// Its name, made from where it stands.
+    pub name: String,
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// The signal that is delayed or sampled.
+    pub source: Expr,
+    /// Delay or sampling period in s, in parameters; above 0.
+    pub time: Expr,
+    /// Which of the two.
+    pub kind: HeldKind,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The ways of holding a signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldKind {
+    /// `delay(u, T)`: the value at `t - T` (before that, the value at the start).
+    Delay,
+    /// `sample(u, T)`: the value at the last multiple of `T`.
+    Sample,
+}
+
+/// A named expression.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: Expr,
+    /// Unit.
+    pub unit: Option<Unit>,
+    /// Documentation.
+    pub doc: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// One entry of `prefer`.
+#[derive(Debug, Clone, Copy)]
+pub struct Preference {
+    /// The variable that shall stay independent: an effort or flow of a bond (co-energy of a storage, or common
+    /// variable of a junction).
+    pub symbol: Symbol,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// One entry of `causality`.
+#[derive(Debug, Clone, Copy)]
+pub struct ForcedCausality {
+    /// The port.
+    pub port: PortRef,
+    /// What is asked of it.
+    pub causality: PortCausality,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Causality of a port of a storage or resistor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PortCausality {
+    /// A storage that gives its co-energy variable.
+    Integral,
+    /// A storage that is given its co-energy variable.
+    Derivative,
+    /// A resistor with flow in, effort out.
+    Resistive,
+    /// A resistor with effort in, flow out.
+    Conductive,
+}
+
+/// One `stroke`.
+#[derive(Debug, Clone, Copy)]
+pub struct ForcedStroke {
+    /// The bond.
+    pub bond: BondId,
+    /// Whether the stroke sits at the `to` end (where the half arrow is); else at `from`.
+    pub at_to: bool,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A `constraint`, already built into the graph as a zero compliance behind (modulated) transformers.
+#[derive(Debug, Clone)]
+pub struct Constraint {
+    /// Its name.
+    pub name: String,
+    /// The expression that vanishes: on displacements if `holonomic`, else on flows.
+    pub expr: Expr,
+    /// Whether it is on displacements.
+    pub holonomic: bool,
+    /// The element that stands for it.
+    pub element: ElementId,
+    /// The multiplier `name.e`, in effort symbols.
+    pub multiplier: Expr,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl BondGraph {
+    /// The bond at a port.
+    pub fn bond_of(&self, port: PortRef) -> BondId {
+        self.elements[port.element].ports[port.port as usize].bond
+    }
+    /// The symbols (co-energy `z`, rate `X'`) of a storage port: (flow, effort) of an `I`, (effort, flow) of a `C`.
+    ///
+    /// `None` if the element is no storage.
+    pub fn storage_symbols(&self, port: PortRef) -> Option<(Symbol, Symbol)> {
+        let bond = &self.bonds[self.bond_of(port)];
+        match self.elements[port.element].kind {
+            Kind::Inertance(_) => Some((bond.flow, bond.effort)),
+            Kind::Compliance(_) => Some((bond.effort, bond.flow)),
+            _ => None,
+        }
+    }
+    /// The ports of all elements but junctions and two-ports, in order: where the junction structure meets the rest.
+    pub fn outer_ports(&self) -> Vec<PortRef> {
+        let outer = self.elements.iter().filter(|(_, e)| !e.kind.is_inner());
+        outer.flat_map(|(element, e)| (0..e.ports.len() as u32).map(move |port| PortRef { element, port })).collect()
+    }
+}
+
+impl Kind {
+    /// Whether it belongs to the junction structure: 0, 1, TF, GY.
+    pub fn is_inner(&self) -> bool {
+        matches!(self, Kind::Zero | Kind::One | Kind::Transformer { .. } | Kind::Gyrator { .. })
+    }
+    /// Its keyword in the language.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Kind::Zero => "0",
+            Kind::One => "1",
+            Kind::EffortSource { .. } => "Se",
+            Kind::FlowSource { .. } => "Sf",
+            Kind::ZeroCompliance { .. } => "ZC",
+            Kind::ResidualEffort { .. } => "rSe",
+            Kind::ResidualFlow { .. } => "rSf",
+            Kind::EffortDetector => "De",
+            Kind::FlowDetector => "Df",
+            Kind::Inertance(_) => "I",
+            Kind::Compliance(_) => "C",
+            Kind::Resistor(_) => "R",
+            Kind::Transformer { .. } => "TF",
+            Kind::Gyrator { .. } => "GY",
+        }
+    }
+}
