@@ -1,0 +1,79 @@
+"""What the reference programs share: a high-order integrator, linear systems, and the file they write.
+
+Nothing here knows a bond graph. Every program derives its own equations by hand and depends on mpmath only.
+"""
+import json
+import sys
+from pathlib import Path
+
+from mpmath import expm, matrix, mp, mpf, nstr
+
+mp.dps = 40
+
+
+def step(rates, t, x, h, columns):
+    """One step of Gragg's extrapolated midpoint rule, of order 2*columns. `rates(t, x)`: list of derivatives."""
+    table = []
+    for row in range(columns):
+        n = 2 * (row + 1)
+        d = h / n
+        old, new = x, [a + d * r for a, r in zip(x, rates(t, x))]
+        for k in range(1, n):
+            old, new = new, [a + 2 * d * r for a, r in zip(old, rates(t + k * d, new))]
+        smooth = [(a + b + d * r) / 2 for a, b, r in zip(old, new, rates(t + h, new))]
+        line = [smooth]
+        for k in range(row):
+            ratio = (mpf(n) / (2 * (row - k))) ** 2 - 1
+            line.append([a + (a - b) / ratio for a, b in zip(line[k], table[-1][k])])
+        table.append(line)
+    return table[-1][-1]
+
+
+def integrate(rates, x, times, h, columns, knots=()):
+    """States of x' = rates(t, x) at `times`, from t = 0. Steps of at most `h` end at every time and knot
+    (where a source jumps or bends; `rates` then takes a third argument, the middle of the present stretch)."""
+    states, t = {}, mpf(0)
+    for end in sorted({mpf(s) for s in times} | {mpf(k) for k in knots if mpf(k) < mpf(times[-1])}):
+        n = int(mp.ceil((end - t) / h))
+        here = rates if not knots else (lambda s, y, middle=(t + end) / 2: rates(s, y, middle))
+        for k in range(n):
+            x = step(here, t + k * (end - t) / n, x, (end - t) / n, columns)
+        t = end
+        states[t] = x
+    return [states[mpf(s)] for s in times]
+
+
+def twice(rates, x, times, h, columns=12, knots=(), digits=22):
+    """The states from two runs that differ in step and order, which must agree to `digits`."""
+    fine = integrate(rates, x, times, mpf(h), columns, knots)
+    agree(fine, integrate(rates, x, times, 2 * mpf(h) / 3, columns - 2, knots), digits)
+    return fine
+
+
+def linear(a, x, times):
+    """exp(A t) x for the list of rows `a`, by mpmath."""
+    a, x = matrix(a), matrix(x)
+    return [list(expm(a * mpf(t), method="taylor") * x) for t in times]
+
+
+def agree(one, other, digits=22):
+    """Stops the program unless two tables of states agree to `digits` of each column's largest magnitude."""
+    for a, b in zip(zip(*one), zip(*other)):
+        size = max(abs(v) for v in a)
+        worst = max(abs(v - w) for v, w in zip(a, b))
+        assert worst <= size * mpf(10) ** -digits, f"differ by {nstr(worst / size, 3)} of {nstr(size, 3)}"
+
+
+def write(program, times, columns, source, inputs=None):
+    """Writes reference.json beside the program. `columns`: recorded name -> one value a time."""
+    data = {"t": list(times), "values": {name: [decimal(v) for v in values] for name, values in columns.items()},
+            "tolerance": 1e-9, "source": source}
+    if inputs:
+        data["inputs"] = inputs
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(program).with_name("reference.json")
+    target.write_text(json.dumps(data, indent=1) + "\n")
+
+
+def decimal(value):
+    """17 significant digits; what is zero to rounding is written 0."""
+    return "0" if abs(value) < mpf(10) ** -30 else nstr(value, 17, strip_zeros=False)
