@@ -1,1 +1,8 @@
 //! Model text to syntax tree.
+//!
+//! The tree is plain data with a [`Span`](crate::span::Span) on every part. It says what the text says and no more:
+//! names are not looked up, units not read, files not opened.
+
+mod tree;
+
+pub use tree::*;

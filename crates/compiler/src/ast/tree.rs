@@ -1,0 +1,494 @@
+//! The syntax tree as plain data.
+
+use crate::span::{FileId, Span};
+
+/// The tree of one model text.
+///
+/// Invariant: every span lies in `file`, and no tree is deeper than [`MAX_HEIGHT`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ast {
+    /// The file that the text came from.
+    pub file: FileId,
+    /// The line `model Name "doc"`; library files may go without.
+    pub header: Option<Header>,
+    /// The statements in the order of the text.
+    pub statements: Vec<Statement>,
+}
+
+/// The greatest number of levels that an expression or a nest of statements has; deeper text is an error, and the part
+/// too deep is left out of the tree. Recursion over a tree is safe on any usual stack.
+pub const MAX_HEIGHT: usize = 256;
+
+/// `model Name "doc"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// The model's name.
+    pub name: Name,
+    /// What the model is.
+    pub doc: Option<Doc>,
+}
+
+/// A name as it stands in the text. Kinds `0` and `1`, and the label in `0 = expr`, are names too.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Name {
+    /// The name.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Quoted text that documents a declaration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Doc {
+    /// The text between the quotes, escapes resolved.
+    pub text: String,
+    /// Where it stands, with its quotes.
+    pub span: Span,
+}
+
+/// A unit as written, such as `kN/m`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnitText {
+    /// The unit, to be read by [`unit`](crate::unit).
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A statement and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statement {
+    /// From its first to its last character.
+    pub span: Span,
+    /// What it says.
+    pub kind: StatementKind,
+}
+
+/// What a statement says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StatementKind {
+    /// `param a = 1 kg, b = 2 "doc"`. Without a value only where a component declares it.
+    Param(Vec<Declaration>),
+    /// `const g = 9.81 m/s2`.
+    Const(Vec<Declaration>),
+    /// `input road : m/s = 0`; the value is the default.
+    Input(Vec<Declaration>),
+    /// `output travel = spring.q : m`.
+    Output(Vec<Declaration>),
+    /// `let name = expr`.
+    Let(Vec<Declaration>),
+    /// `let f(x, y) = expr`.
+    Function(Function),
+    /// `state x' = rate from start`.
+    State(State),
+    /// `import "file.bond"`.
+    Import(Import),
+    /// `component Name(...) { ... }`.
+    Component(Component),
+    /// `prefer w.f, spring`: what stays independent.
+    Prefer(Vec<Path>),
+    /// `causality m2 derivative, R1 conductive`.
+    Causality(Vec<ForcedCausality>),
+    /// `stroke a -> b at b`.
+    Stroke(ForcedStroke),
+    /// `constraint hinge: left = right`.
+    Constraint(Constraint),
+    /// `domain thermal pseudo { ... }`.
+    Domain(Domain),
+    /// Nodes and the bonds between them: `Sf:ground(v) -> 0:tyre -> hub`.
+    Chain(Chain),
+    /// `when cond { ... }`: reserved; an error of the parser says so.
+    When(When),
+    /// `for i in 1..n { ... }`: reserved; an error of the parser says so.
+    For(For),
+}
+
+/// A named value: `name : unit = value "doc"` (or the unit after the value).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declaration {
+    /// What is declared.
+    pub name: Name,
+    /// The unit after `:`.
+    pub unit: Option<UnitText>,
+    /// The expression after `=`.
+    pub value: Option<Expr>,
+    /// The text that follows. In a list, `a = 1, b = 2 "doc"`, the parser gives the last text to those before it that
+    /// have none.
+    pub doc: Option<Doc>,
+    /// The whole declaration.
+    pub span: Span,
+}
+
+/// `let f(x, y) = body : unit "doc"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Function {
+    /// The function's name.
+    pub name: Name,
+    /// Names of its arguments.
+    pub params: Vec<Name>,
+    /// Its value.
+    pub body: Expr,
+    /// The unit of its value.
+    pub unit: Option<UnitText>,
+    /// What it is.
+    pub doc: Option<Doc>,
+}
+
+/// `state x' = rate from start : unit "doc"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// The signal that is integrated, without the prime.
+    pub name: Name,
+    /// Its derivative in time.
+    pub rate: Expr,
+    /// Its value at the start.
+    pub start: Option<Expr>,
+    /// The unit of the signal.
+    pub unit: Option<UnitText>,
+    /// What it is.
+    pub doc: Option<Doc>,
+}
+
+/// `import "file.bond"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Import {
+    /// The path as written.
+    pub path: Doc,
+}
+
+/// `component Name(param a, b = 1; port p, q; in u; out y) "doc" { ... }`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component {
+    /// Its name, used as a kind.
+    pub name: Name,
+    /// Its parameters, with defaults.
+    pub params: Vec<Declaration>,
+    /// Its ports.
+    pub ports: Vec<Declaration>,
+    /// The signals it reads; a value is the default.
+    pub ins: Vec<Declaration>,
+    /// The signals it gives.
+    pub outs: Vec<Declaration>,
+    /// What it is.
+    pub doc: Option<Doc>,
+    /// What stands between the braces.
+    pub body: Vec<Statement>,
+}
+
+/// One entry of a `causality` statement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForcedCausality {
+    /// The element, or a port of a field.
+    pub element: Path,
+    /// What is forced.
+    pub causality: Causality,
+    /// Where the word for it stands.
+    pub span: Span,
+}
+
+/// The words of a `causality` statement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Causality {
+    /// A storage gives its co-energy variable.
+    Integral,
+    /// A storage takes its co-energy variable.
+    Derivative,
+    /// Flow in, effort out.
+    Resistive,
+    /// Effort in, flow out.
+    Conductive,
+}
+
+/// `stroke a -> b at b`, or `stroke b3 at b` for a bond with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForcedStroke {
+    /// The bond.
+    pub bond: StrokeBond,
+    /// The end with the stroke: where the effort is set from the other end.
+    pub at: Path,
+}
+
+/// How a `stroke` statement names its bond.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StrokeBond {
+    /// By its two ends, in the order of the half arrow.
+    Between(Path, Path),
+    /// By its own name.
+    Named(Name),
+}
+
+/// `constraint name: left = right "doc"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Constraint {
+    /// Its name; `name.e` is the multiplier.
+    pub name: Name,
+    /// Left of the equals sign.
+    pub left: Expr,
+    /// Right of it, mostly 0.
+    pub right: Expr,
+    /// What it is.
+    pub doc: Option<Doc>,
+}
+
+/// `domain thermal pseudo { ... }`: the statements inside are about that domain, their names belong to the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Domain {
+    /// Its name.
+    pub name: Name,
+    /// Where `pseudo` stands: effort times flow is not a power.
+    pub pseudo: Option<Span>,
+    /// What it is.
+    pub doc: Option<Doc>,
+    /// What stands between the braces.
+    pub body: Vec<Statement>,
+}
+
+/// Nodes joined by bonds: `first -> to -> to ...`. Without bonds it only declares (or names) a node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    /// The leftmost node.
+    pub first: Node,
+    /// The bonds from left to right; each begins at the node before it.
+    pub bonds: Vec<Bond>,
+}
+
+/// `-> to as name`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bond {
+    /// Where the arrow stands.
+    pub arrow: Span,
+    /// The node that the half arrow points at.
+    pub to: Node,
+    /// The bond's name.
+    pub name: Option<Name>,
+    /// What it is.
+    pub doc: Option<Doc>,
+}
+
+/// An end of a bond.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Node {
+    /// `Kind:name(args)`, where the node first stands.
+    Declared(Box<Element>),
+    /// `name`, `inst.port` or `field.port`, declared elsewhere.
+    Named(Path),
+    /// Nothing that can be read; an error has been reported here.
+    Missing(Span),
+}
+
+/// `Kind:name[ports](args) "doc"`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Element {
+    /// `0`, `1`, `Se`, ..., or the name of a component.
+    pub kind: Name,
+    /// The number of bonds in `I[3]:body`: reserved; an error of the parser says so.
+    pub width: Option<Expr>,
+    /// Its name.
+    pub name: Name,
+    /// The ports of a field, empty when none are listed.
+    pub ports: Vec<Name>,
+    /// What stands in the parentheses.
+    pub args: Vec<Arg>,
+    /// What it is.
+    pub doc: Option<Doc>,
+    /// From the kind to the closing parenthesis.
+    pub span: Span,
+}
+
+/// An argument of an element, a component or a function.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arg {
+    /// What stands before the equals sign, if one is there.
+    pub label: Option<ArgLabel>,
+    /// The value.
+    pub value: Expr,
+    /// The whole argument.
+    pub span: Span,
+}
+
+/// The left side of a named argument: `k`, `e`, `0`, `f.a`, `q0.el`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArgLabel {
+    /// `k`, `e`, `f`, `0`, `q0`, `energy`, ...
+    pub name: Name,
+    /// The port in `f.a`.
+    pub port: Option<Name>,
+    /// The whole label.
+    pub span: Span,
+}
+
+/// A name, bare or dotted: `x`, `m.e`, `gap.el.q`, `inst.sub.x.f`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// The parts between the dots, at least one.
+    pub parts: Vec<PathPart>,
+    /// The whole path.
+    pub span: Span,
+}
+
+/// One part of a path: `cell` or `cell[i]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPart {
+    /// The name.
+    pub name: Name,
+    /// The index: reserved; an error of the parser says so.
+    pub index: Option<Box<Expr>>,
+}
+
+/// An expression and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    /// The whole expression, without parentheses around it.
+    pub span: Span,
+    /// What it says.
+    pub kind: ExprKind,
+}
+
+/// What an expression says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExprKind {
+    /// `18 kN/m`.
+    Number(Number),
+    /// `"file.csv"`, escapes resolved.
+    Text(String),
+    /// `x`, `m.e`.
+    Path(Path),
+    /// `x'`, a time derivative; `x''` is a rate of a rate.
+    Rate(Box<Expr>),
+    /// `sin(x)`, `table("f.csv", x, column = 2)`.
+    Call(Call),
+    /// `[a, b]`; a matrix is a list of lists.
+    List(Vec<Expr>),
+    /// `-x`, `not x`.
+    Unary(Unary),
+    /// `a + b`.
+    Binary(Binary),
+    /// `if c then a else b`.
+    If(If),
+    /// Nothing that can be read; an error has been reported here.
+    Missing,
+}
+
+/// A number as written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Number {
+    /// Its exact decimal text: digits, perhaps a point with digits on both sides, perhaps an exponent.
+    pub text: String,
+    /// The unit that follows it.
+    pub unit: Option<UnitText>,
+}
+
+/// `function(args)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Call {
+    /// The function's name.
+    pub function: Name,
+    /// Its arguments.
+    pub args: Vec<Arg>,
+}
+
+/// `-x` or `not x`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unary {
+    /// The operator.
+    pub op: UnaryOp,
+    /// Where the operator stands.
+    pub op_span: Span,
+    /// What it is applied to.
+    pub operand: Box<Expr>,
+}
+
+/// Operators before one operand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnaryOp {
+    /// `-`
+    Neg,
+    /// `not`
+    Not,
+}
+
+/// `left op right`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Binary {
+    /// The operator.
+    pub op: BinaryOp,
+    /// Where the operator stands.
+    pub op_span: Span,
+    /// Left operand.
+    pub left: Box<Expr>,
+    /// Right operand.
+    pub right: Box<Expr>,
+}
+
+/// Operators between two operands, from loose to tight: `or`, `and`, comparison, `+ -`, `* /`, `^`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BinaryOp {
+    /// `or`
+    Or,
+    /// `and`
+    And,
+    /// `<`
+    Lt,
+    /// `<=`
+    Le,
+    /// `>`
+    Gt,
+    /// `>=`
+    Ge,
+    /// `==`
+    Eq,
+    /// `!=`
+    Ne,
+    /// `+`
+    Add,
+    /// `-`
+    Sub,
+    /// `*`
+    Mul,
+    /// `/`
+    Div,
+    /// `^`, to the right and tighter than a minus before its base
+    Pow,
+}
+
+/// `if cond then yes else no`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct If {
+    /// The condition.
+    pub cond: Box<Expr>,
+    /// Its value where the condition holds.
+    pub yes: Box<Expr>,
+    /// Its value elsewhere.
+    pub no: Box<Expr>,
+}
+
+/// `when cond { reset m.p = expr }`: reserved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct When {
+    /// The condition.
+    pub cond: Expr,
+    /// What is reset, and to what.
+    pub resets: Vec<Reset>,
+}
+
+/// `reset m.p = expr`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reset {
+    /// What is reset.
+    pub target: Path,
+    /// Its new value.
+    pub value: Expr,
+}
+
+/// `for i in from..to { ... }`: reserved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct For {
+    /// The loop variable.
+    pub variable: Name,
+    /// First value.
+    pub from: Expr,
+    /// Last value.
+    pub to: Expr,
+    /// What stands between the braces.
+    pub body: Vec<Statement>,
+}
