@@ -1,0 +1,124 @@
+//! Why a run stopped.
+
+use std::fmt;
+
+/// Why a run stopped: the time in s, the element or equation, the reason. `Display` speaks to the modeller.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Failure {
+    /// A value is NaN or infinite.
+    NotFinite {
+        /// When, in s.
+        time: f64,
+        /// Which value, such as `the rate of body.p`.
+        what: String,
+    },
+    /// A block of linear equations has no unique solution: a pivot vanished and there is no other choice.
+    Singular {
+        /// When, in s.
+        time: f64,
+        /// Which equations, by their elements or unknowns.
+        what: String,
+    },
+    /// An iteration did not converge.
+    NoConvergence {
+        /// When, in s.
+        time: f64,
+        /// What was iterated, by its elements or unknowns.
+        what: String,
+        /// Iterations made.
+        iterations: usize,
+        /// What was left of the greatest residual, in the unit of its equation.
+        residual: f64,
+    },
+    /// A law was asked for a value where it has none.
+    OutOfDomain {
+        /// When, in s.
+        time: f64,
+        /// Which law or function.
+        what: String,
+        /// Why it has none there, such as `the current -2 A is below -is`.
+        reason: String,
+    },
+    /// No step is short enough: the solution grows without bound or is not smooth here.
+    StepTooSmall {
+        /// When, in s.
+        time: f64,
+        /// The step that was still too long, in s.
+        step: f64,
+    },
+    /// Switching conditions change their side over and over without time going on.
+    Chattering {
+        /// When, in s.
+        time: f64,
+        /// Index of the switching function that changed last.
+        switch: usize,
+    },
+    /// An option of the run makes no sense.
+    BadOption {
+        /// Name of the option.
+        option: &'static str,
+        /// The value it has.
+        value: f64,
+        /// What it has to be.
+        expected: &'static str,
+    },
+    /// The receiver of the samples asked to stop.
+    Interrupted {
+        /// When, in s.
+        time: f64,
+    },
+}
+
+impl Failure {
+    /// When it happened, in s; `None` if the run never began.
+    pub fn time(&self) -> Option<f64> {
+        match self {
+            Failure::NotFinite { time, .. }
+            | Failure::Singular { time, .. }
+            | Failure::NoConvergence { time, .. }
+            | Failure::OutOfDomain { time, .. }
+            | Failure::StepTooSmall { time, .. }
+            | Failure::Chattering { time, .. }
+            | Failure::Interrupted { time } => Some(*time),
+            Failure::BadOption { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::NotFinite { time, what } => write!(
+                f,
+                "at t = {time} s {what} is not a finite number: look for a division by zero, or for a value that grows without bound"
+            ),
+            Failure::Singular { time, what } => write!(
+                f,
+                "at t = {time} s the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there"
+            ),
+            Failure::NoConvergence { time, what, iterations, residual } => write!(
+                f,
+                "at t = {time} s the iteration for {what} did not converge: after {iterations} iterations a residual of {residual:e} is left; \
+                 the law may have no solution there, or the step may be too long"
+            ),
+            Failure::OutOfDomain { time, what, reason } => {
+                write!(f, "at t = {time} s {what} is asked for a value where it has none: {reason}")
+            }
+            Failure::StepTooSmall { time, step } => write!(
+                f,
+                "at t = {time} s even a step of {step:e} s misses the tolerance: the solution grows without bound or is not smooth there"
+            ),
+            Failure::Chattering { time, switch } => write!(
+                f,
+                "at t = {time} s condition number {} changes its side over and over and time stands still: give the law a finite slope at the switch",
+                switch + 1
+            ),
+            Failure::BadOption { option, value, expected } => {
+                write!(f, "{option} is {value}, but it must be {expected}")
+            }
+            Failure::Interrupted { time } => write!(f, "stopped at t = {time} s as asked"),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
