@@ -50,8 +50,8 @@ pub enum Failure {
     Chattering {
         /// When, in s.
         time: f64,
-        /// Index of the switching function that changed last.
-        switch: usize,
+        /// Which condition changed last.
+        what: String,
     },
     /// An option of the run makes no sense.
     BadOption {
@@ -108,10 +108,9 @@ impl fmt::Display for Failure {
                 f,
                 "at t = {time} s even a step of {step:e} s misses the tolerance: the solution grows without bound or is not smooth there"
             ),
-            Failure::Chattering { time, switch } => write!(
+            Failure::Chattering { time, what } => write!(
                 f,
-                "at t = {time} s condition number {} changes its side over and over and time stands still: give the law a finite slope at the switch",
-                switch + 1
+                "at t = {time} s {what} changes its side over and over and time stands still: give the law a finite slope at the switch"
             ),
             Failure::BadOption { option, value, expected } => {
                 write!(f, "{option} is {value}, but it must be {expected}")

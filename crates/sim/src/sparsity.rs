@@ -50,6 +50,25 @@ impl Sparsity {
         &self.rows[self.starts[column]..self.starts[column + 1]]
     }
 
+    /// Columns in groups, no two of a group with a nonzero in the same row: one directional derivative gives all columns
+    /// of a group. Greedy, in order; at most as many groups as columns.
+    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let mut taken: Vec<Vec<bool>> = Vec::new();
+        for column in 0..self.states() {
+            let rows = self.column(column);
+            let free = taken.iter().position(|taken| rows.iter().all(|&row| !taken[row]));
+            let group = free.unwrap_or_else(|| {
+                groups.push(Vec::new());
+                taken.push(vec![false; self.states()]);
+                groups.len() - 1
+            });
+            groups[group].push(column);
+            rows.iter().for_each(|&row| taken[group][row] = true);
+        }
+        groups
+    }
+
     /// All nonzeros as (row, column), column by column.
     pub fn entries(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.states()).flat_map(|column| self.column(column).iter().map(move |&row| (row, column)))

@@ -25,6 +25,21 @@ pub trait System {
     /// Number of states: the length of `x`, `dx`, `v` and `jv`.
     fn states(&self) -> usize;
 
+    /// How messages name a state, as in `body.p`. Called only when a run fails.
+    fn state_name(&self, state: usize) -> String {
+        format!("state {}", state + 1)
+    }
+
+    /// How messages name a switching function, as in `the condition of valve`. Called only when a run fails.
+    fn switch_name(&self, switch: usize) -> String {
+        format!("condition {}", switch + 1)
+    }
+
+    /// How messages name a recorded value, as in `R1.e`. Called only when a run fails.
+    fn observed_name(&self, value: usize) -> String {
+        format!("recorded value {}", value + 1)
+    }
+
     /// Typical magnitude of each state, one entry a state, each at least 0; 0 where it is not known. Absolute
     /// tolerances come from it when the user gives none.
     fn scales(&self) -> &[f64];

@@ -1,0 +1,42 @@
+//! Switching functions: which side they are on, and where they change it.
+
+use crate::{Failure, System};
+
+/// The side of each switching function during the present mode.
+pub(crate) struct Sides {
+    held: Vec<bool>,
+    values: Vec<f64>,
+}
+
+impl Sides {
+    pub(crate) fn new(switches: usize) -> Sides {
+        Sides { held: vec![false; switches], values: vec![0.0; switches] }
+    }
+
+    /// Whether there is anything to watch.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// Takes the sides at `(t, x)`, as the system does in `cross_jump`.
+    pub(crate) fn take(&mut self, system: &mut dyn System, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        system.switch_values(t, x, &mut self.values)?;
+        self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
+        Ok(())
+    }
+
+    /// The first switching function that at `(t, x)` is on another side than that held; `None` if all keep theirs.
+    pub(crate) fn crossed(&mut self, system: &mut dyn System, t: f64, x: &[f64]) -> Result<Option<usize>, Failure> {
+        if self.is_empty() {
+            return Ok(None);
+        }
+        system.switch_values(t, x, &mut self.values)?;
+        if let Some(switch) = self.values.iter().position(|value| value.is_nan()) {
+            return Err(Failure::NotFinite { time: t, what: system.switch_name(switch) });
+        }
+        Ok(self.held.iter().zip(&self.values).position(|(&held, &value)| held != (value > 0.0)))
+    }
+}

@@ -1,0 +1,115 @@
+//! Methods with a step of fixed length, for reproducible runs and real time. A step only computes.
+
+mod implicit_midpoint;
+
+use crate::{Failure, Sparsity, System};
+use implicit_midpoint::ImplicitMidpoint;
+
+/// A method of fixed step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FixedMethod {
+    /// Explicit Euler: order 1, 1 evaluation of the rates a step.
+    Euler,
+    /// Heun, the explicit trapezoidal rule: order 2, 2 evaluations.
+    Heun,
+    /// The classical Runge-Kutta method: order 4, 4 evaluations.
+    Rk4,
+    /// Implicit midpoint rule: order 2, A-stable, symplectic; keeps every quadratic invariant, so also the energy of a
+    /// linear conservative machine. Newton with the exact Jacobian, at most 20 iterations a step.
+    ImplicitMidpoint,
+}
+
+/// Takes steps; all memory is taken in [`new`](FixedStep::new).
+pub struct FixedStep {
+    tableau: Option<&'static Tableau>,
+    /// Rates of each stage, one after the other.
+    stages: Vec<f64>,
+    trial: Vec<f64>,
+    midpoint: Option<ImplicitMidpoint>,
+}
+
+/// An explicit Runge-Kutta method without needless stages.
+struct Tableau {
+    /// Where in the step each stage stands.
+    nodes: &'static [f64],
+    /// Weights of the earlier rates in each stage.
+    stages: &'static [&'static [f64]],
+    /// Weights of the rates in the step.
+    weights: &'static [f64],
+}
+
+const EULER: Tableau = Tableau { nodes: &[0.0], stages: &[&[]], weights: &[1.0] };
+const HEUN: Tableau = Tableau { nodes: &[0.0, 1.0], stages: &[&[], &[1.0]], weights: &[0.5, 0.5] };
+const RK4: Tableau = Tableau {
+    nodes: &[0.0, 0.5, 0.5, 1.0],
+    stages: &[&[], &[0.5], &[0.0, 0.5], &[0.0, 0.0, 1.0]],
+    weights: &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+};
+
+impl FixedMethod {
+    fn tableau(self) -> Option<&'static Tableau> {
+        match self {
+            FixedMethod::Euler => Some(&EULER),
+            FixedMethod::Heun => Some(&HEUN),
+            FixedMethod::Rk4 => Some(&RK4),
+            FixedMethod::ImplicitMidpoint => None,
+        }
+    }
+}
+
+impl FixedStep {
+    /// A method for systems whose Jacobian has this pattern.
+    pub fn new(method: FixedMethod, sparsity: &Sparsity) -> FixedStep {
+        let tableau = method.tableau();
+        FixedStep {
+            tableau,
+            stages: vec![0.0; tableau.map_or(0, |tableau| tableau.nodes.len()) * sparsity.states()],
+            trial: vec![0.0; sparsity.states()],
+            midpoint: tableau.is_none().then(|| ImplicitMidpoint::new(sparsity)),
+        }
+    }
+
+    /// Moves `x` from `t` to `t + h`, in the system's present mode. No jump may lie inside the step. Does not allocate
+    /// unless it fails.
+    ///
+    /// # Errors
+    /// What the system reports, a state that is no longer finite, or Newton without convergence. `x` is then unchanged.
+    pub fn step(&mut self, system: &mut dyn System, t: f64, h: f64, x: &mut [f64]) -> Result<(), Failure> {
+        match (self.tableau, &mut self.midpoint) {
+            (Some(tableau), _) => self.explicit(tableau, system, t, h, x)?,
+            (None, Some(midpoint)) => midpoint.step(system, t, h, x, &mut self.trial)?,
+            (None, None) => {}
+        }
+        if let Some(state) = self.trial.iter().position(|value| !value.is_finite()) {
+            return Err(Failure::NotFinite { time: t + h, what: system.state_name(state) });
+        }
+        x.copy_from_slice(&self.trial);
+        Ok(())
+    }
+
+    fn explicit(
+        &mut self,
+        tableau: &Tableau,
+        system: &mut dyn System,
+        t: f64,
+        h: f64,
+        x: &[f64],
+    ) -> Result<(), Failure> {
+        let n = x.len();
+        for (stage, (node, weights)) in tableau.nodes.iter().zip(tableau.stages).enumerate() {
+            let (earlier, rest) = self.stages.split_at_mut(stage * n);
+            advance(x, h, weights, earlier, &mut self.trial);
+            system.rates(t + node * h, &self.trial, &mut rest[..n])?;
+        }
+        advance(x, h, tableau.weights, &self.stages, &mut self.trial);
+        Ok(())
+    }
+}
+
+/// `out = x + h · Σ weight · rates`, `rates` being one vector after the other.
+fn advance(x: &[f64], h: f64, weights: &[f64], rates: &[f64], out: &mut [f64]) {
+    for (i, out) in out.iter_mut().enumerate() {
+        let sum: f64 = weights.iter().enumerate().map(|(stage, weight)| weight * rates[stage * x.len() + i]).sum();
+        *out = x[i] + h * sum;
+    }
+}

@@ -1,0 +1,73 @@
+//! Times at equal distances.
+
+/// Distances this small, relative to the spacing, are taken for rounding.
+const SLACK: f64 = 1e-9;
+
+/// The times `from + i · every`, walked through in order. Each is the nearest number to what is meant where `1 / every`
+/// is whole: 7 · 0.01 is 0.07.
+pub(crate) struct Grid {
+    from: f64,
+    every: f64,
+    /// `1 / every` where that is whole.
+    per_second: Option<f64>,
+    next: f64,
+    index: f64,
+}
+
+impl Grid {
+    pub(crate) fn new(from: f64, every: f64) -> Grid {
+        let per_second = (1.0 / every).round();
+        let per_second = (per_second >= 1.0 && 1.0 / per_second == every).then_some(per_second);
+        Grid { from, every, per_second, next: from, index: 0.0 }
+    }
+
+    /// The first time not yet passed.
+    pub(crate) fn next(&self) -> f64 {
+        self.next
+    }
+
+    /// How much may be rounding.
+    pub(crate) fn slack(&self) -> f64 {
+        SLACK * self.every
+    }
+
+    /// Whether `t` is the next time or beyond it, to rounding.
+    pub(crate) fn is_due(&self, t: f64) -> bool {
+        self.next <= t + self.slack()
+    }
+
+    /// Passes all times up to `t`.
+    pub(crate) fn pass(&mut self, t: f64) {
+        while self.is_due(t) {
+            self.index = (self.index + 1.0).max(((t - self.from) / self.every).floor());
+            self.next = self.from + self.per_second.map_or(self.index * self.every, |rate| self.index / rate);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gives_the_nearest_numbers() {
+        let mut grid = Grid::new(0.0, 0.01);
+        let mut times = vec![];
+        while grid.next() <= 0.1 {
+            times.push(grid.next());
+            grid.pass(grid.next());
+        }
+        assert_eq!(times, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1]);
+    }
+
+    #[test]
+    fn passes_what_is_within_rounding() {
+        let mut grid = Grid::new(0.0, 0.1);
+        grid.pass(0.30000000000000004);
+        assert_eq!(grid.next(), 0.4);
+        grid.pass(0.4 - 1e-14);
+        assert_eq!(grid.next(), 0.5);
+        grid.pass(1000.0);
+        assert_eq!(grid.next(), 1000.1);
+    }
+}

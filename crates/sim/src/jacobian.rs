@@ -1,0 +1,44 @@
+//! A Jacobian from directional derivatives, a group of columns at a time.
+
+use crate::{Failure, Sparsity, System};
+
+/// Computes the nonzeros of `∂f/∂x`; all memory is taken in [`new`](Jacobian::new).
+pub(crate) struct Jacobian {
+    sparsity: Sparsity,
+    groups: Vec<Vec<usize>>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
+}
+
+impl Jacobian {
+    pub(crate) fn new(sparsity: &Sparsity) -> Jacobian {
+        let states = sparsity.states();
+        Jacobian {
+            sparsity: sparsity.clone(),
+            groups: sparsity.groups(),
+            direction: vec![0.0; states],
+            product: vec![0.0; states],
+        }
+    }
+
+    /// Calls `entry(row, column, value)` for every nonzero of the Jacobian at `(t, x)`.
+    pub(crate) fn visit(
+        &mut self,
+        system: &mut dyn System,
+        t: f64,
+        x: &[f64],
+        mut entry: impl FnMut(usize, usize, f64),
+    ) -> Result<(), Failure> {
+        for group in &self.groups {
+            self.direction.fill(0.0);
+            group.iter().for_each(|&column| self.direction[column] = 1.0);
+            system.tangent(t, x, &self.direction, &mut self.product)?;
+            for &column in group {
+                for &row in self.sparsity.column(column) {
+                    entry(row, column, self.product[row]);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! What to run and how exactly.
+
+use crate::Failure;
+use crate::fixed_step::FixedMethod;
+
+/// How to integrate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// A step of fixed length, [`Options::step`].
+    Fixed(FixedMethod),
+    /// An explicit Runge-Kutta pair of order 5(4) with variable step, for systems that are not stiff.
+    Explicit,
+    /// Backward differentiation formulas of order 1 to 5 with variable step, for stiff systems.
+    Bdf,
+    /// Explicit until the system proves stiff, then backward differentiation formulas.
+    Auto,
+}
+
+/// Absolute error allowed in a step of a variable-step method, on top of the relative one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AbsoluteTolerance {
+    /// `rtol` times the magnitude of each state: the system's scale of it or the greatest value so far.
+    Scaled,
+    /// The same number for every state, each in its own unit.
+    Same(f64),
+    /// One for each state, each in its own unit.
+    Each(Vec<f64>),
+}
+
+/// What to run and how exactly. Times in s.
+///
+/// ```
+/// use halfarrow_sim::{Method, Options};
+/// let options = Options { to: 10.0, every: Some(0.01), rtol: 1e-9, ..Options::default() };
+/// assert_eq!((options.method, options.from), (Method::Auto, 0.0));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// How to integrate.
+    pub method: Method,
+    /// Start, in s.
+    pub from: f64,
+    /// End, in s; above `from`.
+    pub to: f64,
+    /// Time between samples, in s; above 0. `None`: a sample after every step and on both sides of every jump. Start and
+    /// end are always sampled.
+    pub every: Option<f64>,
+    /// Step of a fixed-step method, in s; above 0. Only steps that end at a jump, a sample or the end are shorter.
+    /// Other methods take it for the longest step, if given.
+    pub step: Option<f64>,
+    /// Relative error allowed in a step of a variable-step method; from 1e-13 to 0.1.
+    pub rtol: f64,
+    /// Absolute error allowed in a step of a variable-step method.
+    pub atol: AbsoluteTolerance,
+}
+
+impl Default for Options {
+    /// From 0 to 1 s, `Auto`, `rtol` 1e-6, scaled absolute tolerances, every step sampled.
+    fn default() -> Options {
+        Options {
+            method: Method::Auto,
+            from: 0.0,
+            to: 1.0,
+            every: None,
+            step: None,
+            rtol: 1e-6,
+            atol: AbsoluteTolerance::Scaled,
+        }
+    }
+}
+
+impl Options {
+    /// Whether the run can be made, for a system of `states` states.
+    ///
+    /// # Errors
+    /// The first option that makes no sense.
+    pub fn check(&self, states: usize) -> Result<(), Failure> {
+        let bad = |option, value, expected| Err(Failure::BadOption { option, value, expected });
+        if !self.from.is_finite() {
+            return bad("from", self.from, "a finite time");
+        }
+        if !(self.to.is_finite() && self.to > self.from) {
+            return bad("to", self.to, "a finite time after the start");
+        }
+        if let Some(every) = self.every.filter(|&every| !(every.is_finite() && every > 0.0)) {
+            return bad("every", every, "a positive time");
+        }
+        if let Some(step) = self.step.filter(|&step| !(step.is_finite() && step > 0.0)) {
+            return bad("step", step, "a positive time");
+        }
+        match (self.method, self.step) {
+            (Method::Fixed(_), None) => bad("step", f64::NAN, "given for a method of fixed step"),
+            (Method::Fixed(_), Some(_)) => Ok(()),
+            _ => self.check_tolerances(states),
+        }
+    }
+
+    fn check_tolerances(&self, states: usize) -> Result<(), Failure> {
+        let bad = |option, value, expected| Err(Failure::BadOption { option, value, expected });
+        if !(1e-13..=0.1).contains(&self.rtol) {
+            return bad("rtol", self.rtol, "from 1e-13 to 0.1");
+        }
+        let positive = |atol: &f64| atol.is_finite() && *atol > 0.0;
+        match &self.atol {
+            AbsoluteTolerance::Scaled => Ok(()),
+            AbsoluteTolerance::Same(atol) if positive(atol) => Ok(()),
+            AbsoluteTolerance::Same(atol) => bad("atol", *atol, "above 0"),
+            AbsoluteTolerance::Each(atol) if atol.len() != states => {
+                bad("atol", atol.len() as f64, "as many values as there are states")
+            }
+            AbsoluteTolerance::Each(atol) => match atol.iter().find(|atol| !positive(atol)) {
+                Some(&atol) => bad("atol", atol, "above 0"),
+                None => Ok(()),
+            },
+        }
+    }
+}
