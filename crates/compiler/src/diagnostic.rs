@@ -162,3 +162,26 @@ impl Sources {
         self.text(span.file).get(span.start as usize..span.end as usize).unwrap_or("")
     }
 }
+
+/// The candidate that is most like a misspelt name, if one is near enough to be meant.
+///
+/// ```
+/// use halfarrow_compiler::diagnostic::nearest;
+/// assert_eq!(nearest("spirng", ["damper", "spring"]), Some("spring"));
+/// assert_eq!(nearest("x", ["damper", "spring"]), None);
+/// ```
+pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    let length = name.chars().count();
+    candidates
+        .into_iter()
+        .filter(|c| *c != name && c.chars().count().abs_diff(length) <= 3)
+        .map(|c| (edits(name, c), c))
+        .filter(|(edits, c)| *edits <= length.max(c.chars().count()) / 3)
+        .min()
+        .map(|(_, c)| c)
+}
+
+/// Edits between two names; a change of case counts as none.
+fn edits(a: &str, b: &str) -> usize {
+    strsim::osa_distance(&a.to_lowercase(), &b.to_lowercase())
+}

@@ -17,7 +17,7 @@ pub struct Ast {
 
 /// The greatest number of levels that an expression or a nest of statements has; deeper text is an error, and the part
 /// too deep is left out of the tree. Recursion over a tree is safe on any usual stack.
-pub const MAX_HEIGHT: usize = 256;
+pub const MAX_HEIGHT: usize = 640;
 
 /// `model Name "doc"`.
 #[derive(Debug, Clone, PartialEq)]
@@ -285,8 +285,10 @@ pub struct Element {
     pub width: Option<Expr>,
     /// Its name.
     pub name: Name,
-    /// The ports of a field, empty when none are listed.
+    /// The ports of a field, empty when none are listed. (An index that is a name, `cell[i]`, reads as a port.)
     pub ports: Vec<Name>,
+    /// The index in `C:cell[i + 1](...)`: reserved; an error of the parser says so.
+    pub index: Option<Expr>,
     /// What stands in the parentheses.
     pub args: Vec<Arg>,
     /// What it is.

@@ -1,0 +1,180 @@
+//! Nodes and bonds.
+
+use super::expressions::reserved;
+use super::*;
+
+impl Parser<'_> {
+    /// Nodes joined by half arrows.
+    pub(super) fn chain(&mut self) -> Chain {
+        let mut first = self.node();
+        let doc = self.doc();
+        let left_over = document(&mut first, doc);
+        self.idle_doc(left_over);
+        let mut bonds = Vec::new();
+        while self.is(TokenKind::Arrow) {
+            bonds.push(self.bond());
+        }
+        self.reversed_arrow();
+        Chain { first, bonds }
+    }
+
+    fn bond(&mut self) -> Bond {
+        let arrow = self.span();
+        self.bump();
+        let mut to = self.node();
+        let doc = self.doc();
+        let left_over = document(&mut to, doc);
+        self.idle_doc(left_over);
+        let name = if self.eat_word("as") { self.name("the name of the bond") } else { None };
+        let doc = if name.is_some() { self.doc() } else { None };
+        Bond { arrow, to, name, doc }
+    }
+
+    /// Warns of quoted text that documents nothing.
+    pub(super) fn idle_doc(&mut self, doc: Option<Doc>) {
+        if let Some(doc) = doc {
+            let title = "this text documents nothing";
+            let fault = Diagnostic::warning(codes::S011, title, doc.span, "no declaration stands before it").hint(
+                "put it where the node is declared, as in `R:damper(b) \"text\"`, or make it a comment with `//`",
+            );
+            self.remark(fault);
+        }
+    }
+
+    fn reversed_arrow(&mut self) {
+        if self.is(TokenKind::Less) && self.ahead(1).kind == TokenKind::Minus && self.adjacent(1) {
+            let span = self.span().to(self.span_of(self.ahead(1)));
+            let fault = Diagnostic::error(codes::S001, "half arrows are written to the right", span, "points left")
+                .hint("swap the two ends: `b -> a` for `a <- b`");
+            self.report(fault);
+        }
+    }
+
+    fn node(&mut self) -> Node {
+        let span = self.span();
+        if self.boundary() {
+            self.expected("a node");
+            return Node::Missing(self.gap());
+        }
+        match self.kind() {
+            TokenKind::Ident | TokenKind::Number if self.ahead(1).kind == TokenKind::Colon => self.element(None),
+            TokenKind::Ident if self.ahead(1).kind == TokenKind::LParen => self.nameless(),
+            TokenKind::Ident if self.width_follows() => {
+                let kind = self.bump();
+                self.element(Some(kind))
+            }
+            TokenKind::Ident if !RESERVED.contains(&self.text_of(self.token())) => Node::Named(self.path()),
+            TokenKind::Number => self.number_node(),
+            _ => {
+                self.expected("a node");
+                Node::Missing(span)
+            }
+        }
+    }
+
+    /// Whether `I[3]:` comes.
+    fn width_follows(&self) -> bool {
+        let mut i = 2;
+        if self.ahead(1).kind != TokenKind::LBracket {
+            return false;
+        }
+        while self.ahead(i).newlines == 0 && matches!(self.ahead(i).kind, TokenKind::Number | TokenKind::Ident) {
+            i += 1;
+        }
+        self.ahead(i).kind == TokenKind::RBracket && self.ahead(i + 1).kind == TokenKind::Colon
+    }
+
+    /// `Kind:name[ports](args)`; the kind has been read if it is given.
+    fn element(&mut self, wide: Option<Token>) -> Node {
+        let kind = wide.unwrap_or_else(|| self.bump());
+        let start = self.span_of(kind);
+        let width = if wide.is_some() { self.width() } else { None };
+        if kind.kind == TokenKind::Number && !matches!(self.text_of(kind), "0" | "1") {
+            self.no_such_junction(kind);
+        }
+        self.bump(); // the colon
+        let name = self.name("the name of the node");
+        let (ports, index) = if self.is(TokenKind::LBracket) { self.ports() } else { (Vec::new(), None) };
+        let args = if self.is(TokenKind::LParen) { self.args().0 } else { Vec::new() };
+        let span = self.since(start);
+        match name {
+            Some(name) => {
+                let kind = self.name_of(kind);
+                Node::Declared(Box::new(Element { kind, width, name, ports, index, args, doc: None, span }))
+            }
+            None => Node::Missing(span),
+        }
+    }
+
+    fn no_such_junction(&mut self, kind: Token) {
+        let title = format!("there is no junction `{}`", self.text_of(kind));
+        let fault = Diagnostic::error(codes::S010, title, self.span_of(kind), "")
+            .hint("a junction is `0` (one effort) or `1` (one flow)");
+        self.remark(fault);
+    }
+
+    fn width(&mut self) -> Option<Expr> {
+        let start = self.span();
+        let mut widths = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
+        self.remark(reserved(self.since(start), "a multibond", "write one element for each direction"));
+        widths.truncate(1);
+        widths.pop()
+    }
+
+    /// `[el, me]`, or an index.
+    fn ports(&mut self) -> (Vec<Name>, Option<Expr>) {
+        if self.plain_name_in_brackets() {
+            return (self.bracketed(TokenKind::RBracket, |p| p.name("the name of a port")), None);
+        }
+        let start = self.span();
+        let mut indices = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
+        self.remark(reserved(self.since(start), "an index", "give each element a name of its own"));
+        indices.truncate(1);
+        (Vec::new(), indices.pop())
+    }
+
+    fn plain_name_in_brackets(&self) -> bool {
+        let after = self.ahead(2).kind;
+        self.ahead(1).kind == TokenKind::RBracket
+            || (self.ahead(1).kind == TokenKind::Ident && matches!(after, TokenKind::Comma | TokenKind::RBracket))
+    }
+
+    /// `R(5)`: a kind without a name, or arguments where the node is not declared.
+    fn nameless(&mut self) -> Node {
+        let word = self.bump();
+        let start = self.span_of(word);
+        self.args();
+        let span = self.since(start);
+        let kind = self.text_of(word);
+        let fault = Diagnostic::error(codes::S010, "a node is declared as `Kind:name(...)`", span, "no `:` here")
+            .hint(format!("write `{kind}:name(...)` if `{kind}` is the kind, or `Kind:{kind}(...)` if it is the name"));
+        self.remark(fault);
+        Node::Missing(span)
+    }
+
+    /// `0` or `0a`, where a junction should have a name.
+    fn number_node(&mut self) -> Node {
+        let span = self.span();
+        if self.adjacent(1) && self.ahead(1).kind == TokenKind::Ident {
+            self.digit_name();
+        } else {
+            let token = self.bump();
+            let text = self.text_of(token);
+            let fault = Diagnostic::error(codes::S010, "a junction needs a name", span, "only its kind is given")
+                .hint(format!("write `{text}:name`"));
+            self.report(fault);
+        }
+        Node::Missing(self.since(span))
+    }
+}
+
+/// Gives the text to the node if it is declared here, else gives it back.
+fn document(node: &mut Node, doc: Option<Doc>) -> Option<Doc> {
+    match node {
+        Node::Declared(element) => {
+            element.doc = doc;
+            None
+        }
+        _ => doc,
+    }
+}
