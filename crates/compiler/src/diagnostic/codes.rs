@@ -35,6 +35,8 @@ codes! {
     S011 "quoted text that documents nothing";
     S012 "the text is too large";
     S013 "an unknown word in a statement";
+    U001 "an unknown unit";
+    U002 "a unit that cannot be read";
 }
 
 #[cfg(test)]
