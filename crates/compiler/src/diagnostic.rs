@@ -1,9 +1,11 @@
 //! What is told to the modeller: place, what, why, what to do.
 
 pub mod codes;
+mod render;
 
 use crate::span::{FileId, Span};
 pub use codes::Code;
+pub use render::{render, to_json};
 
 /// How bad it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
