@@ -1,1 +1,30 @@
-//! Exact expressions.
+//! Exact expressions: shared nodes, rationals, zero test, derivative, elimination.
+//!
+//! Every stage keeps its formulas in one pool, [`Exprs`], in which equal expressions are one entry. Numbers are exact;
+//! floats occur in values of tables and in [`Evaluator`] only.
+
+mod calculus;
+mod construct;
+mod cost;
+mod elimination;
+mod evaluate;
+mod exprs;
+mod field;
+mod fingerprint;
+mod functions;
+mod linear;
+mod node;
+mod order;
+mod properties;
+mod rational;
+mod symbol_sets;
+mod table;
+mod zero;
+
+pub use cost::Cost;
+pub use elimination::{BackSubstitution, Elimination, Pivot, SparseRow, back_substitute, eliminate};
+pub use evaluate::Evaluator;
+pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
+pub use node::{Comparison, Expr, Facts, Function, Node, Symbol};
+pub use rational::Rational;
+pub use table::{Interpolation, Outside, Table1d, TableError, TableId};

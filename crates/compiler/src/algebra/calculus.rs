@@ -1,0 +1,230 @@
+//! Derivatives and substitution.
+
+use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
+use super::node::{Comparison, Expr, Function, Node, Symbol};
+use super::table::TableId;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+impl Exprs {
+    /// The partial derivative by a symbol, all others held. At corners it is the derivative of one side; `sign` and
+    /// `floor` count as constant.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{Exprs, Facts, Function};
+    /// let mut x = Exprs::default();
+    /// let q = x.symbol("q", Facts::default());
+    /// let e = x.sym(q);
+    /// let sine = x.call(Function::Sin, &[e]);
+    /// assert_eq!(x.derivative(sine, q), x.call(Function::Cos, &[e]));
+    /// ```
+    pub fn derivative(&mut self, e: Expr, symbol: Symbol) -> Expr {
+        if let Some(&known) = self.derivatives.get(&(e, symbol)) {
+            return known;
+        }
+        let order = self.below(&[e], &|e| self.depends_on(e, symbol) && !self.derivatives.contains_key(&(e, symbol)));
+        for part in order {
+            let slope = self.derivative_of_node(part, symbol);
+            self.derivatives.insert((part, symbol), slope);
+        }
+        self.slope(e, symbol)
+    }
+
+    /// The expression with expressions in place of symbols, all at once.
+    pub fn substitute(&mut self, e: Expr, values: &BTreeMap<Symbol, Expr>) -> Expr {
+        self.substitute_all(&[e], values)[0]
+    }
+
+    /// The expressions with expressions in place of symbols, all at once; what they share is rebuilt once.
+    pub fn substitute_all(&mut self, roots: &[Expr], values: &BTreeMap<Symbol, Expr>) -> Vec<Expr> {
+        let order = self.below(roots, &|e| self.depends_on_any(e, &|s| values.contains_key(&s)));
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in order {
+            let rebuilt = match self.node(part) {
+                Node::Symbol(s) => values[s],
+                _ => self.rebuild(part, &|c| new.get(&c).copied().unwrap_or(c)),
+            };
+            new.insert(part, rebuilt);
+        }
+        roots.iter().map(|r| new.get(r).copied().unwrap_or(*r)).collect()
+    }
+
+    /// The expression made anew from other parts.
+    pub(super) fn rebuild(&mut self, e: Expr, part: &dyn Fn(Expr) -> Expr) -> Expr {
+        let all = |parts: &[Expr]| -> Vec<Expr> { parts.iter().map(|&p| part(p)).collect() };
+        match self.node(e) {
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => e,
+            Node::Add(terms) => {
+                let terms = all(terms);
+                self.add(&terms)
+            }
+            Node::Mul(factors) => {
+                let factors = all(factors);
+                self.mul(&factors)
+            }
+            &Node::Pow(base, n) => self.pow(part(base), part(n)),
+            Node::Call(f, x) => {
+                let (f, x) = (*f, all(x));
+                self.call(f, &x)
+            }
+            &Node::Compare(c, a, b) => self.compare(c, part(a), part(b)),
+            &Node::And(a, b) => self.and(part(a), part(b)),
+            &Node::Or(a, b) => self.or(part(a), part(b)),
+            &Node::Not(a) => self.not(part(a)),
+            &Node::Select(c, a, b) => self.select(part(c), part(a), part(b)),
+            &Node::Table(t, x) => self.table(t, part(x)),
+            &Node::TableSlope(t, x) => self.table_slope(t, part(x)),
+        }
+    }
+
+    fn slope(&self, e: Expr, symbol: Symbol) -> Expr {
+        self.derivatives.get(&(e, symbol)).copied().unwrap_or(ZERO)
+    }
+
+    /// The derivative of a node whose parts have theirs.
+    fn derivative_of_node(&mut self, e: Expr, symbol: Symbol) -> Expr {
+        match self.node(e).clone() {
+            Node::Symbol(s) => {
+                if s == symbol {
+                    ONE
+                } else {
+                    ZERO
+                }
+            }
+            Node::Add(terms) => {
+                let slopes: Vec<Expr> = terms.iter().map(|&t| self.slope(t, symbol)).collect();
+                self.add(&slopes)
+            }
+            Node::Mul(factors) => self.derivative_of_product(&factors, symbol),
+            Node::Pow(base, n) => self.derivative_of_power(base, n, e, symbol),
+            Node::Call(f, x) => {
+                let mut terms = Vec::new();
+                for (i, &argument) in x.iter().enumerate() {
+                    let slope = self.slope(argument, symbol);
+                    if slope != ZERO {
+                        let partial = self.partial(f, &x, i, e);
+                        terms.push(self.mul(&[partial, slope]));
+                    }
+                }
+                self.add(&terms)
+            }
+            Node::Select(c, a, b) => {
+                let (a, b) = (self.slope(a, symbol), self.slope(b, symbol));
+                self.select(c, a, b)
+            }
+            Node::Table(t, x) => {
+                let slope = self.table_slope(t, x);
+                let inner = self.slope(x, symbol);
+                self.mul(&[slope, inner])
+            }
+            Node::TableSlope(t, x) => {
+                let inner = self.slope(x, symbol);
+                let t = self.table_of_slopes(t);
+                let slope = self.table_slope(t, x);
+                self.mul(&[slope, inner])
+            }
+            Node::Number(_) | Node::Pi | Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => ZERO,
+        }
+    }
+
+    fn derivative_of_product(&mut self, factors: &[Expr], symbol: Symbol) -> Expr {
+        let mut terms = Vec::new();
+        for (i, &factor) in factors.iter().enumerate() {
+            let slope = self.slope(factor, symbol);
+            if slope != ZERO {
+                let mut parts = factors.to_vec();
+                parts[i] = slope;
+                terms.push(self.mul(&parts));
+            }
+        }
+        self.add(&terms)
+    }
+
+    fn derivative_of_power(&mut self, base: Expr, n: Expr, power: Expr, symbol: Symbol) -> Expr {
+        let (base_slope, n_slope) = (self.slope(base, symbol), self.slope(n, symbol));
+        let mut terms = Vec::new();
+        if base_slope != ZERO {
+            let less = self.add(&[n, MINUS_ONE]);
+            let lower = self.pow(base, less);
+            terms.push(self.mul(&[n, lower, base_slope]));
+        }
+        if n_slope != ZERO {
+            let log = self.call(Function::Log, &[base]);
+            terms.push(self.mul(&[power, log, n_slope]));
+        }
+        self.add(&terms)
+    }
+
+    /// The derivative of a function by its argument with this index; `value` is the call itself.
+    fn partial(&mut self, f: Function, x: &[Expr], index: usize, value: Expr) -> Expr {
+        use Function::*;
+        match f {
+            Sin => self.call(Cos, x),
+            Cos => {
+                let sine = self.call(Sin, x);
+                self.neg(sine)
+            }
+            Tan => self.one_plus_square(value, 1),
+            Asin | Acos => {
+                let square = self.one_plus_square(x[0], -1);
+                let root = self.sqrt(square);
+                let slope = self.recip(root);
+                if f == Asin { slope } else { self.neg(slope) }
+            }
+            Atan => {
+                let square = self.one_plus_square(x[0], 1);
+                self.recip(square)
+            }
+            Atan2 => {
+                let squares = [self.powi(x[0], 2), self.powi(x[1], 2)];
+                let square = self.add(&squares);
+                let other = if index == 0 { x[1] } else { self.neg(x[0]) };
+                self.div(other, square)
+            }
+            Exp => value,
+            Log => self.recip(x[0]),
+            Log10 => {
+                let ten = self.int(10);
+                let log = self.call(Log, &[ten]);
+                let scaled = self.mul(&[x[0], log]);
+                self.recip(scaled)
+            }
+            Sqrt => {
+                let root = self.recip(value);
+                self.scale(&super::Rational::new(1, 2), root)
+            }
+            Abs => self.call(Sign, x),
+            Sign | Floor => ZERO,
+            Min | Max => {
+                let first = self.compare(if f == Min { Comparison::Le } else { Comparison::Ge }, x[0], x[1]);
+                if index == 0 { self.select(first, ONE, ZERO) } else { self.select(first, ZERO, ONE) }
+            }
+            Sinh => self.call(Cosh, x),
+            Cosh => self.call(Sinh, x),
+            Tanh => self.one_plus_square(value, -1),
+            Mod if index == 0 => ONE,
+            Mod => {
+                let ratio = self.div(x[0], x[1]);
+                let whole = self.call(Floor, &[ratio]);
+                self.neg(whole)
+            }
+        }
+    }
+
+    /// `1 + sign * x^2`
+    fn one_plus_square(&mut self, x: Expr, sign: i64) -> Expr {
+        let square = self.powi(x, 2);
+        let term = self.scale(&super::Rational::from(sign), square);
+        self.add(&[ONE, term])
+    }
+
+    fn table_of_slopes(&mut self, table: TableId) -> TableId {
+        if let Some(&known) = self.slope_tables.get(&table) {
+            return known;
+        }
+        let slopes = self.table1d(table).derivative();
+        let id = self.add_table(slopes);
+        self.slope_tables.insert(table, id);
+        id
+    }
+}

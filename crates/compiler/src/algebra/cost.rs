@@ -1,0 +1,63 @@
+//! What it costs to evaluate expressions once.
+
+use super::exprs::{Exprs, MINUS_ONE, ONE};
+use super::node::{Expr, Node};
+
+/// Operations of one evaluation, shared parts counted once.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Additions and subtractions.
+    pub adds: usize,
+    /// Multiplications.
+    pub muls: usize,
+    /// Divisions.
+    pub divs: usize,
+    /// Functions, roots, tables, comparisons and choices.
+    pub calls: usize,
+}
+
+impl Cost {
+    /// All operations.
+    pub fn total(&self) -> usize {
+        self.adds + self.muls + self.divs + self.calls
+    }
+}
+
+impl Exprs {
+    /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1
+    /// is part of the addition around it.
+    pub fn cost(&self, roots: &[Expr]) -> Cost {
+        let mut cost = Cost::default();
+        for e in self.below(roots, &|_| true) {
+            self.add_cost(e, &mut cost);
+        }
+        cost
+    }
+
+    fn add_cost(&self, e: Expr, cost: &mut Cost) {
+        match self.node(e) {
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => {}
+            Node::Add(terms) => cost.adds += terms.len() - 1,
+            Node::Mul(factors) => {
+                let counted = factors.iter().filter(|&&f| f != MINUS_ONE);
+                let below = counted.clone().filter(|&&f| self.is_divisor(f)).count();
+                // a/(b c) is one product below and one division.
+                let above = counted.count() - below;
+                cost.muls += above.saturating_sub(1) + below.saturating_sub(1);
+            }
+            Node::Pow(_, n) => match self.is_number(*n).and_then(|n| n.as_integer()) {
+                Some(n) => {
+                    let size = n.unsigned_abs();
+                    cost.divs += usize::from(n < 0);
+                    cost.muls += (size.max(1).ilog2() + size.count_ones()).saturating_sub(1) as usize;
+                }
+                None => cost.calls += 1,
+            },
+            _ => cost.calls += 1,
+        }
+    }
+
+    fn is_divisor(&self, e: Expr) -> bool {
+        matches!(self.node(e), Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.signum() < 0) && *n != ONE)
+    }
+}

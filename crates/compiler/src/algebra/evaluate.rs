@@ -1,0 +1,111 @@
+//! Values in floating point.
+
+use super::exprs::Exprs;
+use super::node::{Expr, Function, Node, Symbol};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+/// Values of expressions at one point; what they share is evaluated once.
+///
+/// ```
+/// use halfarrow_compiler::algebra::{Evaluator, Exprs, Facts};
+/// let mut x = Exprs::default();
+/// let q = x.symbol("q", Facts::default());
+/// let e = x.sym(q);
+/// let square = x.powi(e, 2);
+/// let mut at = |_| 3.0;
+/// let mut values = Evaluator::new(&x, &mut at);
+/// assert_eq!((values.value(e), values.value(square)), (3.0, 9.0));
+/// ```
+pub struct Evaluator<'a> {
+    pool: &'a Exprs,
+    symbols: &'a mut dyn FnMut(Symbol) -> f64,
+    values: FxHashMap<Expr, f64>,
+}
+
+impl<'a> Evaluator<'a> {
+    /// At the point where the symbols have these values.
+    pub fn new(pool: &'a Exprs, symbols: &'a mut dyn FnMut(Symbol) -> f64) -> Self {
+        Evaluator { pool, symbols, values: FxHashMap::default() }
+    }
+
+    /// The value of an expression; NaN where it is not defined.
+    pub fn value(&mut self, e: Expr) -> f64 {
+        if let Some(&known) = self.values.get(&e) {
+            return known;
+        }
+        let values = &self.values;
+        for part in self.pool.below(&[e], &|e| !values.contains_key(&e)) {
+            let value = match self.pool.node(part) {
+                Node::Symbol(s) => (self.symbols)(*s),
+                node => node_value(self.pool, node, &|c| self.values[&c]),
+            };
+            self.values.insert(part, value);
+        }
+        self.values[&e]
+    }
+}
+
+impl Exprs {
+    /// The value of an expression at given values of its symbols; NaN where it is not defined.
+    pub fn eval(&self, e: Expr, symbols: &mut dyn FnMut(Symbol) -> f64) -> f64 {
+        Evaluator::new(self, symbols).value(e)
+    }
+
+    /// The value at the given parameters; `None` if the expression reads anything that is not given.
+    pub fn given_value(&self, e: Expr) -> Option<f64> {
+        // What a parameter is given by was there before the parameter: no cycles.
+        let mut known: BTreeMap<Symbol, f64> = BTreeMap::new();
+        let mut open: Vec<Symbol> = self.symbols_of(e).into_iter().collect();
+        while let Some(&symbol) = open.last() {
+            let given = self.facts(symbol).given?;
+            let missing: Vec<Symbol> = self.symbols_of(given).into_iter().filter(|s| !known.contains_key(s)).collect();
+            if missing.is_empty() {
+                known.insert(symbol, self.eval(given, &mut |s| known[&s]));
+                open.pop();
+            } else {
+                open.extend(missing);
+            }
+        }
+        Some(self.eval(e, &mut |s| known[&s]))
+    }
+}
+
+fn truth(value: bool) -> f64 {
+    if value { 1.0 } else { 0.0 }
+}
+
+/// The value of a node that is no symbol from the values of its parts.
+fn node_value(pool: &Exprs, node: &Node, at: &dyn Fn(Expr) -> f64) -> f64 {
+    match node {
+        Node::Number(value) => value.to_f64(),
+        Node::Pi => std::f64::consts::PI,
+        Node::Symbol(_) => f64::NAN,
+        Node::Add(terms) => terms.iter().map(|&t| at(t)).sum(),
+        Node::Mul(factors) => factors.iter().map(|&f| at(f)).product(),
+        Node::Pow(base, n) => power(at(*base), pool.is_number(*n).and_then(|n| n.small()), at(*n)),
+        Node::Call(f, x) => f.value(at(x[0]), x.get(1).map_or(0.0, |&y| at(y))),
+        Node::Compare(c, a, b) => truth(c.holds(&at(*a), &at(*b))),
+        Node::And(a, b) => truth(at(*a) != 0.0 && at(*b) != 0.0),
+        Node::Or(a, b) => truth(at(*a) != 0.0 || at(*b) != 0.0),
+        Node::Not(a) => truth(at(*a) == 0.0),
+        Node::Select(c, a, b) => {
+            if at(*c) != 0.0 {
+                at(*a)
+            } else {
+                at(*b)
+            }
+        }
+        Node::Table(t, x) => pool.table1d(*t).value(at(*x)),
+        Node::TableSlope(t, x) => pool.table1d(*t).slope(at(*x)),
+    }
+}
+
+fn power(base: f64, exact: Option<(i64, i64)>, n: f64) -> f64 {
+    match exact {
+        Some((n, 1)) => i32::try_from(n).map_or_else(|_| base.powf(n as f64), |n| base.powi(n)),
+        Some((1, 2)) => Function::Sqrt.value(base, 0.0),
+        Some((-1, 2)) => 1.0 / base.sqrt(),
+        _ => base.powf(n),
+    }
+}

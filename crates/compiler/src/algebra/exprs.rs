@@ -1,0 +1,312 @@
+//! The pool of shared expressions.
+
+use super::fingerprint::{Fingerprint, mix};
+use super::node::{Comparison, Expr, Facts, Function, Node, Symbol};
+use super::properties::Properties;
+use super::rational::Rational;
+use super::symbol_sets::{SetId, SymbolSets};
+use super::table::{Table1d, TableId};
+use hashbrown::HashTable;
+use rustc_hash::FxHashMap;
+use std::fmt;
+
+/// A pool of expressions that only grows. Equal expressions are one entry, so that `==` on [`Expr`] compares them.
+///
+/// Whatever enters is brought into canonical form: sums and products flat and sorted, numbers folded exactly, like
+/// terms and powers of one base collected. What would change where an expression is defined is left alone: `q/q`
+/// stays unless `q` is known not to be zero, `sqrt(x)^2` unless `x` is known not to be negative, and `0*x` unless
+/// `x` is defined everywhere (symbols are finite).
+///
+/// ```
+/// use halfarrow_compiler::algebra::{Exprs, Facts};
+/// let mut x = Exprs::default();
+/// let q = x.symbol("q", Facts::default());
+/// let m = x.symbol("m", Facts { positive: true, ..Facts::default() });
+/// let (q, m, one) = (x.sym(q), x.sym(m), x.int(1));
+/// assert_ne!(x.div(q, q), one);
+/// assert_eq!(x.div(m, m), one);
+/// ```
+#[derive(Clone)]
+pub struct Exprs {
+    pub(super) entries: Vec<Entry>,
+    ids: HashTable<u32>,
+    symbols: Vec<SymbolEntry>,
+    by_name: FxHashMap<Box<str>, Symbol>,
+    pub(super) sets: SymbolSets,
+    pub(super) tables: Vec<Table1d>,
+    pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
+    pub(super) slope_tables: FxHashMap<TableId, TableId>,
+}
+
+/// An expression with what is known of it from birth.
+#[derive(Clone)]
+pub(super) struct Entry {
+    pub node: Node,
+    /// From names and structure only: equal in every pool.
+    pub hash: u64,
+    pub depth: u32,
+    pub properties: Properties,
+    pub symbols: SetId,
+    /// The product without its number; itself if it has none.
+    pub monomial: Expr,
+    pub fingerprint: Fingerprint,
+}
+
+#[derive(Clone)]
+struct SymbolEntry {
+    name: Box<str>,
+    /// The name with its numbers padded, so that `q2` comes before `q10`.
+    order: Box<[u8]>,
+    facts: Facts,
+}
+
+impl Default for Exprs {
+    fn default() -> Self {
+        let mut pool = Exprs {
+            entries: Vec::new(),
+            ids: HashTable::new(),
+            symbols: Vec::new(),
+            by_name: FxHashMap::default(),
+            sets: SymbolSets::default(),
+            tables: Vec::new(),
+            derivatives: FxHashMap::default(),
+            slope_tables: FxHashMap::default(),
+        };
+        for n in [0, 1, -1] {
+            pool.int(n);
+        }
+        pool
+    }
+}
+
+impl fmt::Debug for Exprs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Exprs({} entries, {} symbols)", self.entries.len(), self.symbols.len())
+    }
+}
+
+/// The number 0, at the same place in every pool.
+pub const ZERO: Expr = Expr(0);
+/// The number 1, at the same place in every pool.
+pub const ONE: Expr = Expr(1);
+/// The number -1, at the same place in every pool.
+pub const MINUS_ONE: Expr = Expr(2);
+
+impl Exprs {
+    /// The symbol of that name. The facts hold if it is new; a name always means the same symbol.
+    pub fn symbol(&mut self, name: &str, facts: Facts) -> Symbol {
+        if let Some(&symbol) = self.by_name.get(name) {
+            return symbol;
+        }
+        let symbol = Symbol(u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols"));
+        self.symbols.push(SymbolEntry { name: name.into(), order: natural_order(name), facts });
+        self.by_name.insert(name.into(), symbol);
+        symbol
+    }
+
+    /// The symbol of that name, if there is one.
+    pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
+        self.by_name.get(name).copied()
+    }
+
+    /// The name of a symbol.
+    pub fn name(&self, symbol: Symbol) -> &str {
+        &self.symbols[symbol.0 as usize].name
+    }
+
+    /// What is known of a symbol.
+    pub fn facts(&self, symbol: Symbol) -> Facts {
+        self.symbols[symbol.0 as usize].facts
+    }
+
+    /// How many symbols there are; their ids are the numbers below.
+    pub fn symbol_count(&self) -> usize {
+        self.symbols.len()
+    }
+
+    /// How many expressions there are; their ids are the numbers below, those of the parts before those of the whole.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Never: 0, 1 and -1 are always there.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// The symbol as an expression.
+    pub fn sym(&mut self, symbol: Symbol) -> Expr {
+        self.intern(Node::Symbol(symbol))
+    }
+
+    /// An integer.
+    pub fn int(&mut self, n: i64) -> Expr {
+        self.number(Rational::from(n))
+    }
+
+    /// A number.
+    pub fn number(&mut self, value: Rational) -> Expr {
+        self.intern(Node::Number(value))
+    }
+
+    /// The quotient of two integers. Panics if the denominator is zero.
+    pub fn ratio(&mut self, numerator: i64, denominator: i64) -> Expr {
+        self.number(Rational::new(numerator, denominator))
+    }
+
+    /// The exact value of a decimal such as `1.4e-13`; `None` if the text is none.
+    pub fn decimal(&mut self, text: &str) -> Option<Expr> {
+        Rational::from_decimal(text).map(|value| self.number(value))
+    }
+
+    /// The exact value of a float. Panics if it is not finite.
+    pub fn float(&mut self, value: f64) -> Expr {
+        self.number(Rational::from_f64(value).expect("a finite number"))
+    }
+
+    /// The number pi.
+    pub fn pi(&mut self) -> Expr {
+        self.intern(Node::Pi)
+    }
+
+    /// What the expression is made of.
+    pub fn node(&self, e: Expr) -> &Node {
+        &self.entries[e.0 as usize].node
+    }
+
+    /// The number that the expression is, if it is one.
+    pub fn is_number(&self, e: Expr) -> Option<&Rational> {
+        match self.node(e) {
+            Node::Number(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// Registers a table.
+    pub fn add_table(&mut self, table: Table1d) -> TableId {
+        if let Some(known) = self.tables.iter().position(|t| t == &table) {
+            return TableId(known as u32);
+        }
+        self.tables.push(table);
+        TableId(u32::try_from(self.tables.len() - 1).expect("fewer than 2^32 tables"))
+    }
+
+    /// A registered table.
+    pub fn table1d(&self, id: TableId) -> &Table1d {
+        &self.tables[id.0 as usize]
+    }
+
+    /// How many tables are registered; their ids are the numbers below.
+    pub fn table_count(&self) -> usize {
+        self.tables.len()
+    }
+
+    pub(super) fn entry(&self, e: Expr) -> &Entry {
+        &self.entries[e.0 as usize]
+    }
+
+    pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
+        &self.symbols[symbol.0 as usize].order
+    }
+
+    /// The entry of a node that is in canonical form.
+    pub(super) fn intern(&mut self, node: Node) -> Expr {
+        let hash = self.hash_of(&node);
+        let entries = &self.entries;
+        if let Some(&id) = self.ids.find(hash, |&id| entries[id as usize].node == node) {
+            return Expr(id);
+        }
+        let monomial = self.monomial_of(&node);
+        let entry = Entry {
+            hash,
+            depth: self.depth_of(&node),
+            properties: self.properties_of(&node),
+            symbols: self.symbols_of_node(&node),
+            monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),
+            fingerprint: self.fingerprint_of(&node),
+            node,
+        };
+        let id = u32::try_from(self.entries.len()).expect("fewer than 2^32 expressions");
+        self.entries.push(entry);
+        let entries = &self.entries;
+        self.ids.insert_unique(hash, id, |&id| entries[id as usize].hash);
+        Expr(id)
+    }
+
+    fn monomial_of(&mut self, node: &Node) -> Option<Expr> {
+        let Node::Mul(factors) = node else { return None };
+        self.is_number(factors[0])?;
+        Some(match &factors[1..] {
+            [single] => *single,
+            several => self.intern(Node::Mul(several.to_vec())),
+        })
+    }
+
+    fn depth_of(&self, node: &Node) -> u32 {
+        let mut depth = 0;
+        node.for_each_child(|c| depth = depth.max(self.entry(c).depth + 1));
+        depth
+    }
+
+    fn hash_of(&self, node: &Node) -> u64 {
+        let seed = match node {
+            Node::Number(value) => return hash_number(value),
+            Node::Symbol(s) => return self.by_name_hash(*s),
+            Node::Pi => 1,
+            Node::Add(_) => 2,
+            Node::Mul(_) => 3,
+            Node::Pow(..) => 4,
+            Node::Compare(c, ..) => 16 + comparison_tag(*c),
+            Node::And(..) => 5,
+            Node::Or(..) => 6,
+            Node::Not(_) => 7,
+            Node::Select(..) => 8,
+            Node::Table(t, _) => mix(9, u64::from(t.0)),
+            Node::TableSlope(t, _) => mix(10, u64::from(t.0)),
+            Node::Call(f, _) => 32 + function_tag(*f),
+        };
+        let mut hash = mix(0x5eed, seed);
+        node.for_each_child(|c| hash = mix(hash, self.entry(c).hash));
+        hash
+    }
+
+    fn by_name_hash(&self, symbol: Symbol) -> u64 {
+        self.name(symbol).bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
+    }
+}
+
+pub(super) fn function_tag(f: Function) -> u64 {
+    f as u64
+}
+
+pub(super) fn comparison_tag(c: Comparison) -> u64 {
+    c as u64
+}
+
+fn hash_number(value: &Rational) -> u64 {
+    match value.small() {
+        Some((n, d)) => mix(mix(0x0c0, n as u64), d as u64),
+        None => {
+            let parts = [value.numerator(), value.denominator()];
+            parts.iter().flat_map(|p| p.to_signed_bytes_le()).fold(0xb16, |h, b| mix(h, u64::from(b)))
+        }
+    }
+}
+
+fn natural_order(name: &str) -> Box<[u8]> {
+    let mut order = Vec::with_capacity(name.len() + 4);
+    let mut rest = name.as_bytes();
+    while let Some(&first) = rest.first() {
+        if !first.is_ascii_digit() {
+            order.push(first);
+            rest = &rest[1..];
+            continue;
+        }
+        let len = rest.iter().take_while(|b| b.is_ascii_digit()).count();
+        // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
+        order.extend([b'0', len.min(255) as u8]);
+        order.extend_from_slice(&rest[..len]);
+        rest = &rest[len..];
+    }
+    order.into()
+}

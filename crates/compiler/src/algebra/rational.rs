@@ -1,0 +1,316 @@
+//! Exact numbers: machine integers where they suffice, big ones behind them.
+
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
+use std::cmp::Ordering;
+use std::fmt;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// An exact rational number.
+///
+/// Invariant: in lowest terms, the denominator positive; held as big integers only if either part does not fit `i64`.
+///
+/// ```
+/// use halfarrow_compiler::algebra::Rational;
+/// let third = Rational::new(1, 3);
+/// assert_eq!(&(&third + &third) + &third, Rational::from(1));
+/// ```
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub struct Rational(Repr);
+
+#[derive(Clone, PartialEq, Eq, Hash)]
+enum Repr {
+    Small(i64, i64),
+    Big(Box<BigRational>),
+}
+
+impl Rational {
+    /// `numerator / denominator`. Panics if the denominator is zero.
+    pub fn new(numerator: i64, denominator: i64) -> Self {
+        assert!(denominator != 0, "a rational needs a denominator that is not zero");
+        Self::reduced(i128::from(numerator), i128::from(denominator))
+    }
+
+    /// The number of a big rational.
+    pub fn from_big(value: BigRational) -> Self {
+        match (value.numer().to_i64(), value.denom().to_i64()) {
+            (Some(n), Some(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
+            _ => Rational(Repr::Big(Box::new(value))),
+        }
+    }
+
+    /// The same number as a big rational.
+    pub fn to_big(&self) -> BigRational {
+        match &self.0 {
+            Repr::Small(n, d) => BigRational::new_raw(BigInt::from(*n), BigInt::from(*d)),
+            Repr::Big(big) => (**big).clone(),
+        }
+    }
+
+    /// The exact value of a decimal such as `1.4e-13`, `9.81` or `12`; `None` if the text is none.
+    pub fn from_decimal(text: &str) -> Option<Self> {
+        let (mantissa, exponent) = match text.find(['e', 'E']) {
+            Some(at) => (&text[..at], text[at + 1..].parse::<i32>().ok()?),
+            None => (text, 0),
+        };
+        let (sign, mantissa) = match mantissa.strip_prefix('-') {
+            Some(rest) => (-1, rest),
+            None => (1, mantissa.strip_prefix('+').unwrap_or(mantissa)),
+        };
+        let (whole, part) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+        let digits = format!("{whole}{part}");
+        if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > 5000 {
+            return None;
+        }
+        let value = BigInt::parse_bytes(digits.as_bytes(), 10)? * sign;
+        let shift = exponent - i32::try_from(part.len()).ok()?;
+        let power = num_traits::pow(BigInt::from(10), shift.unsigned_abs() as usize);
+        let exact = if shift < 0 { BigRational::new(value, power) } else { BigRational::from(value * power) };
+        Some(Self::from_big(exact))
+    }
+
+    /// The exact value of a float; `None` if it is not finite.
+    pub fn from_f64(value: f64) -> Option<Self> {
+        BigRational::from_float(value).map(Self::from_big)
+    }
+
+    /// The nearest float (infinite beyond their range).
+    pub fn to_f64(&self) -> f64 {
+        const EXACT: u64 = 1 << 53;
+        match &self.0 {
+            Repr::Small(n, d) if n.unsigned_abs() <= EXACT && d.unsigned_abs() <= EXACT => *n as f64 / *d as f64,
+            _ => self.to_big().to_f64().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Numerator and denominator, if both fit `i64`.
+    pub fn small(&self) -> Option<(i64, i64)> {
+        match &self.0 {
+            Repr::Small(n, d) => Some((*n, *d)),
+            Repr::Big(_) => None,
+        }
+    }
+
+    /// The number as a machine integer, if it is one.
+    pub fn as_integer(&self) -> Option<i64> {
+        match &self.0 {
+            Repr::Small(n, 1) => Some(*n),
+            _ => None,
+        }
+    }
+
+    /// The numerator.
+    pub fn numerator(&self) -> BigInt {
+        self.to_big().numer().clone()
+    }
+
+    /// The denominator, positive.
+    pub fn denominator(&self) -> BigInt {
+        self.to_big().denom().clone()
+    }
+
+    /// Whether it is an integer, of whatever size.
+    pub fn is_integer(&self) -> bool {
+        match &self.0 {
+            Repr::Small(_, d) => *d == 1,
+            Repr::Big(big) => big.is_integer(),
+        }
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        matches!(self.0, Repr::Small(0, _))
+    }
+
+    /// Whether it is 1.
+    pub fn is_one(&self) -> bool {
+        matches!(self.0, Repr::Small(1, 1))
+    }
+
+    /// -1, 0 or 1.
+    pub fn signum(&self) -> i32 {
+        match &self.0 {
+            Repr::Small(n, _) => n.signum() as i32,
+            Repr::Big(big) => {
+                if big.is_negative() {
+                    -1
+                } else {
+                    1
+                }
+            }
+        }
+    }
+
+    /// The distance from zero.
+    pub fn abs(&self) -> Self {
+        if self.signum() < 0 { -self } else { self.clone() }
+    }
+
+    /// `1/self`; `None` for 0.
+    pub fn recip(&self) -> Option<Self> {
+        match &self.0 {
+            Repr::Small(0, _) => None,
+            Repr::Small(n, d) => Some(Rational(Repr::Small(d * n.signum(), n.abs()))),
+            Repr::Big(big) => Some(Self::from_big(big.recip())),
+        }
+    }
+
+    /// `self^exponent`; `None` for a negative power of 0, or if the result has more than about 4,000 digits.
+    pub fn powi(&self, exponent: i64) -> Option<Self> {
+        if self.is_one() || exponent == 0 {
+            return Some(Self::from(1));
+        }
+        if exponent < 0 {
+            return self.recip()?.powi(exponent.checked_neg()?);
+        }
+        let bits = self.numerator().bits().max(self.denominator().bits());
+        if bits.checked_mul(exponent as u64)? > 13_000 {
+            return None;
+        }
+        Some(Self::from_big(num_traits::pow(self.to_big(), exponent as usize)))
+    }
+
+    /// The exact root of this order, 2 or more, if it is rational. Of a negative number there is none.
+    pub fn root(&self, order: u32) -> Option<Self> {
+        if self.signum() < 0 {
+            return None;
+        }
+        let exact = |n: &BigInt| Some(n.nth_root(order)).filter(|r| &num_traits::pow(r.clone(), order as usize) == n);
+        let (n, d) = (exact(&self.numerator())?, exact(&self.denominator())?);
+        Some(Self::from_big(BigRational::new(n, d)))
+    }
+
+    /// The greatest integer not above it.
+    pub fn floor(&self) -> Self {
+        match &self.0 {
+            Repr::Small(n, d) => Self::from(n.div_floor(d)),
+            Repr::Big(big) => Self::from_big(big.floor()),
+        }
+    }
+
+    fn reduced(n: i128, d: i128) -> Self {
+        let g = if d == 1 { 1 } else { gcd(n.unsigned_abs(), d.unsigned_abs()) as i128 } * d.signum();
+        let (n, d) = (n / g, d / g);
+        match (i64::try_from(n), i64::try_from(d)) {
+            (Ok(n), Ok(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
+            _ => Rational(Repr::Big(Box::new(BigRational::new_raw(BigInt::from(n), BigInt::from(d))))),
+        }
+    }
+}
+
+fn gcd(a: u128, b: u128) -> u128 {
+    match (u64::try_from(a), u64::try_from(b)) {
+        (Ok(a), Ok(b)) => u128::from(a.gcd(&b)),
+        _ => a.gcd(&b),
+    }
+}
+
+impl From<i64> for Rational {
+    fn from(n: i64) -> Self {
+        Self::reduced(i128::from(n), 1)
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, |$a:ident, $b:ident, $c:ident, $d:ident| $small:expr) => {
+        impl $trait<&Rational> for &Rational {
+            type Output = Rational;
+            fn $method(self, other: &Rational) -> Rational {
+                match (&self.0, &other.0) {
+                    (Repr::Small($a, $b), Repr::Small($c, $d)) => {
+                        let [$a, $b, $c, $d] = [*$a, *$b, *$c, *$d].map(i128::from);
+                        $small
+                    }
+                    _ => Rational::from_big($trait::$method(self.to_big(), other.to_big())),
+                }
+            }
+        }
+    };
+}
+
+// The products stay below 2^127: each factor is at most 2^63 - 1 in size.
+operator!(Add, add, |a, b, c, d| if b == 1 && d == 1 {
+    Rational::reduced(a + c, 1)
+} else {
+    Rational::reduced(a * d + c * b, b * d)
+});
+operator!(Sub, sub, |a, b, c, d| if b == 1 && d == 1 {
+    Rational::reduced(a - c, 1)
+} else {
+    Rational::reduced(a * d - c * b, b * d)
+});
+operator!(Mul, mul, |a, b, c, d| Rational::reduced(a * c, b * d));
+operator!(Div, div, |a, b, c, d| {
+    assert!(c != 0, "division of a rational by zero");
+    Rational::reduced(a * d, b * c)
+});
+
+impl Neg for &Rational {
+    type Output = Rational;
+    fn neg(self) -> Rational {
+        match &self.0 {
+            Repr::Small(n, d) => Rational(Repr::Small(-n, *d)),
+            Repr::Big(big) => Rational::from_big(-(**big).clone()),
+        }
+    }
+}
+
+impl Ord for Rational {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (&self.0, &other.0) {
+            (Repr::Small(a, b), Repr::Small(c, d)) => {
+                (i128::from(*a) * i128::from(*d)).cmp(&(i128::from(*c) * i128::from(*b)))
+            }
+            _ => self.to_big().cmp(&other.to_big()),
+        }
+    }
+}
+
+impl PartialOrd for Rational {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl fmt::Display for Rational {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.to_big().fmt(f)
+    }
+}
+
+impl fmt::Debug for Rational {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl Zero for Rational {
+    fn zero() -> Self {
+        Self::from(0)
+    }
+    fn is_zero(&self) -> bool {
+        Rational::is_zero(self)
+    }
+}
+
+impl One for Rational {
+    fn one() -> Self {
+        Self::from(1)
+    }
+}
+
+impl Add for Rational {
+    type Output = Rational;
+    fn add(self, other: Rational) -> Rational {
+        &self + &other
+    }
+}
+
+impl Mul for Rational {
+    type Output = Rational;
+    fn mul(self, other: Rational) -> Rational {
+        &self * &other
+    }
+}
