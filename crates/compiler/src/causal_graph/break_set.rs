@@ -195,12 +195,7 @@ fn prefer(successors: &[Vec<u32>], mut set: BTreeSet<usize>, rank: impl Fn(usize
 ///
 /// Without `v` the cycles are paths from `v` to `v` through an acyclic graph; a vertex is on all of them if no edge jumps
 /// over it in topological order.
-fn meeting_all(
-    successors: &[Vec<u32>],
-    predecessors: &[Vec<u32>],
-    v: usize,
-    set: &BTreeSet<usize>,
-) -> BTreeSet<usize> {
+fn meeting_all(successors: &[Vec<u32>], predecessors: &[Vec<u32>], v: usize, set: &BTreeSet<usize>) -> BTreeSet<usize> {
     let forward = reach(successors, v, set);
     let backward = reach(predecessors, v, set);
     let inner: BTreeSet<usize> = forward.intersection(&backward).copied().filter(|&w| w != v).collect();

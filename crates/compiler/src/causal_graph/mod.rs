@@ -3,6 +3,9 @@
 //! Two layers, kept apart because they can differ (`method.md`, section 2): what is *true* of the ports, found by exact
 //! elimination ([`Ports`]), and what is *drawn* on the bonds, the strokes, along which causal paths are read.
 
+pub mod break_set;
+pub mod signals;
+
 use std::collections::BTreeMap;
 
 use crate::algebra::{Expr, Symbol};
