@@ -21,21 +21,22 @@ impl Jacobian {
         }
     }
 
-    /// Calls `entry(row, column, value)` for every nonzero of the Jacobian at `(t, x)`.
+    /// Calls `entry(row, column, place, value)` for every nonzero of the Jacobian at `(t, x)`; `place` is its number in
+    /// the order of the pattern.
     pub(crate) fn visit(
         &mut self,
         system: &mut dyn System,
         t: f64,
         x: &[f64],
-        mut entry: impl FnMut(usize, usize, f64),
+        mut entry: impl FnMut(usize, usize, usize, f64),
     ) -> Result<(), Failure> {
         for group in &self.groups {
             self.direction.fill(0.0);
             group.iter().for_each(|&column| self.direction[column] = 1.0);
             system.tangent(t, x, &self.direction, &mut self.product)?;
             for &column in group {
-                for &row in self.sparsity.column(column) {
-                    entry(row, column, self.product[row]);
+                for (place, &row) in self.sparsity.places(column).zip(self.sparsity.column(column)) {
+                    entry(row, column, place, self.product[row]);
                 }
             }
         }

@@ -9,6 +9,7 @@ mod grid;
 mod jacobian;
 mod lu;
 mod options;
+mod shared;
 mod simulate;
 mod sparsity;
 mod system;

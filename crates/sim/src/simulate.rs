@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use crate::events::Sides;
 use crate::fixed_step::{FixedMethod, FixedStep};
 use crate::grid::Grid;
+use crate::shared::Shared;
 use crate::{Failure, Method, Options, System};
 
 /// Receives what a run computes.
@@ -69,7 +70,8 @@ pub fn simulate(
     x: &mut [f64],
     sink: &mut dyn Sink,
 ) -> Result<Summary, Stopped> {
-    let mut run = Run::new(system, options, sink);
+    let shared = Shared::new(system);
+    let mut run = Run::new(&shared, options, sink);
     let end = match options.check(x.len()) {
         Err(failure) => Err(failure),
         Ok(()) => match (options.method, options.step) {
@@ -83,7 +85,7 @@ pub fn simulate(
 
 /// The parts of a run that all methods share.
 pub(crate) struct Run<'a> {
-    pub(crate) system: Counted<'a>,
+    pub(crate) shared: &'a Shared<'a>,
     pub(crate) options: &'a Options,
     pub(crate) sides: Sides,
     /// How far the run has come: `x` belongs to this time.
@@ -95,11 +97,13 @@ pub(crate) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(system: &'a mut dyn System, options: &'a Options, sink: &'a mut dyn Sink) -> Run<'a> {
+    fn new(shared: &'a Shared<'a>, options: &'a Options, sink: &'a mut dyn Sink) -> Run<'a> {
+        let observed = shared.system().observed();
+        let switches = shared.system().switches();
         Run {
-            values: vec![0.0; system.observed()],
-            sides: Sides::new(system.switches()),
-            system: Counted { system, rates: 0, tangents: 0 },
+            values: vec![0.0; observed],
+            sides: Sides::new(switches),
+            shared,
             options,
             time: options.from,
             counts: Summary::default(),
@@ -109,58 +113,23 @@ impl<'a> Run<'a> {
     }
 
     fn summary(&self) -> Summary {
-        Summary { rates: self.system.rates, tangents: self.system.tangents, ..self.counts }
+        let system = self.shared.system();
+        Summary { rates: system.rates, tangents: system.tangents, ..self.counts }
     }
 
     /// The start counts as a jump.
     pub(crate) fn start(&mut self, x: &mut [f64]) -> Result<(), Failure> {
         if let Some(state) = x.iter().position(|value| !value.is_finite()) {
-            return Err(Failure::NotFinite { time: self.time, what: self.system.state_name(state) });
+            return Err(Failure::NotFinite { time: self.time, what: self.shared.system().state_name(state) });
         }
-        self.system.cross_jump(self.time, x)?;
-        self.system.accept(self.time, x)?;
-        self.sides.take(&mut self.system, self.time, x)?;
-        self.record(self.time, x)
+        self.cross(self.time, x)?;
+        self.shared.system().accept(self.time, x)?;
+        self.record(self.time, self.time, x)
     }
 
-    /// A step to `(t, x)` is accepted and no jump or crossing stands there.
-    pub(crate) fn arrive(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.reach(t, x)?;
-        self.sample_if_due(t, x)
-    }
-
-    /// A step to `(t, x)` is accepted and a jump or a crossing stands there: crosses it.
-    pub(crate) fn arrive_at_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.reach(t, x)?;
-        if self.grid.is_none() {
-            self.record(t, x)?;
-        }
-        self.system.cross_jump(t, x)?;
-        self.sides.take(&mut self.system, t, x)?;
-        self.sample_if_due(t, x)
-    }
-
-    /// The next time that has to be sampled exactly, if the samples stand on a grid.
-    pub(crate) fn next_sample(&self) -> Option<f64> {
-        self.grid.as_ref().map(Grid::next)
-    }
-
-    /// Hands over the sample due at `t`, which is that of the grid.
-    pub(crate) fn record(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.system.observe(t, x, &mut self.values)?;
-        if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
-            let what = self.system.observed_name(value);
-            return Err(Failure::NotFinite { time: t, what });
-        }
-        self.sink.sample(t, &self.values);
-        if let Some(grid) = &mut self.grid {
-            grid.pass(t);
-        }
-        Ok(())
-    }
-
-    fn reach(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.system.accept(t, x)?;
+    /// A step to `(t, x)` is accepted.
+    pub(crate) fn reach(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.shared.system().accept(t, x)?;
         self.time = t;
         match self.sink.progress(t) {
             ControlFlow::Continue(()) => Ok(()),
@@ -168,28 +137,69 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn sample_if_due(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        let due = self.grid.as_ref().is_none_or(|grid| grid.is_due(t)) || t >= self.options.to;
-        if due { self.record(t, x) } else { Ok(()) }
+    /// Samples where the run stands, if that is due. On a grid the sample bears the time of the grid, from which the run
+    /// may be a rounding error away.
+    pub(crate) fn settle(&mut self, x: &[f64]) -> Result<(), Failure> {
+        let due = self.grid.as_ref().map_or(Some(self.time), |grid| grid.is_due(self.time).then(|| grid.next()));
+        let at_end = (self.time >= self.options.to).then_some(self.options.to);
+        at_end.or(due).map_or(Ok(()), |label| self.record(label, self.time, x))
+    }
+
+    /// Crosses the jump or crossing at which the run stands, and samples: on a grid what is true after it, else both.
+    pub(crate) fn settle_at_jump(&mut self, x: &mut [f64]) -> Result<(), Failure> {
+        if self.grid.is_none() {
+            self.record(self.time, self.time, x)?;
+        }
+        self.cross(self.time, x)?;
+        self.settle(x)
+    }
+
+    fn cross(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        let system = &mut *self.shared.system();
+        system.cross_jump(t, x)?;
+        self.sides.take(system, t, x)
+    }
+
+    /// The next time of the grid that is clearly before `end`.
+    pub(crate) fn sample_before(&self, end: f64) -> Option<f64> {
+        self.grid
+            .as_ref()
+            .map(|grid| (grid.next(), grid.slack()))
+            .filter(|(next, slack)| next + slack < end)
+            .map(|(next, _)| next)
+    }
+
+    /// Hands over the values at `(t, x)` as the sample of time `label`.
+    pub(crate) fn record(&mut self, label: f64, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.shared.system().observe(t, x, &mut self.values)?;
+        if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
+            return Err(Failure::NotFinite { time: t, what: self.shared.system().observed_name(value) });
+        }
+        self.sink.sample(label, &self.values);
+        if let Some(grid) = &mut self.grid {
+            grid.pass(label);
+        }
+        Ok(())
     }
 
     fn fixed(&mut self, method: FixedMethod, step: f64, x: &mut [f64]) -> Result<(), Failure> {
-        let mut stepper = FixedStep::new(method, self.system.sparsity());
+        let mut stepper = FixedStep::new(method, self.shared.system().sparsity());
         let mut ticks = Grid::new(self.options.from, step);
         self.start(x)?;
         while self.time < self.options.to {
             ticks.pass(self.time);
-            let jump = self.system.next_jump(self.time);
+            let jump = self.shared.system().next_jump(self.time);
             let target = self.target(ticks.next(), jump, ticks.slack());
-            stepper.step(&mut self.system, self.time, target - self.time, x)?;
+            stepper.step(&mut *self.shared.system(), self.time, target - self.time, x)?;
             self.counts.steps += 1;
-            let switched = self.sides.crossed(&mut self.system, target, x)?.is_some();
+            let switched = self.sides.crossed(&mut *self.shared.system(), target, x)?.is_some();
             self.counts.switches += usize::from(switched);
             self.counts.jumps += usize::from(jump == Some(target));
+            self.reach(target, x)?;
             if switched || jump == Some(target) {
-                self.arrive_at_jump(target, x)?;
+                self.settle_at_jump(x)?;
             } else {
-                self.arrive(target, x)?;
+                self.settle(x)?;
             }
         }
         Ok(())
@@ -198,65 +208,8 @@ impl<'a> Run<'a> {
     /// Where the step that starts now has to end: at the tick, sooner at a sample, the end or a jump; a jump a rounding
     /// error later is waited for.
     fn target(&self, tick: f64, jump: Option<f64>, slack: f64) -> f64 {
-        let target = tick.min(self.next_sample().unwrap_or(tick));
+        let target = tick.min(self.grid.as_ref().map_or(tick, Grid::next));
         let target = if target + slack >= self.options.to { self.options.to } else { target };
         jump.filter(|&jump| jump <= target + slack && jump <= self.options.to).unwrap_or(target)
-    }
-}
-
-/// A system whose evaluations are counted.
-pub(crate) struct Counted<'a> {
-    system: &'a mut dyn System,
-    rates: usize,
-    tangents: usize,
-}
-
-impl System for Counted<'_> {
-    fn states(&self) -> usize {
-        self.system.states()
-    }
-    fn state_name(&self, state: usize) -> String {
-        self.system.state_name(state)
-    }
-    fn switch_name(&self, switch: usize) -> String {
-        self.system.switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.system.observed_name(value)
-    }
-    fn scales(&self) -> &[f64] {
-        self.system.scales()
-    }
-    fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
-        self.rates += 1;
-        self.system.rates(t, x, dx)
-    }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
-        self.tangents += 1;
-        self.system.tangent(t, x, v, jv)
-    }
-    fn sparsity(&self) -> &crate::Sparsity {
-        self.system.sparsity()
-    }
-    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.system.observe(t, x, out)
-    }
-    fn observed(&self) -> usize {
-        self.system.observed()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.system.next_jump(t)
-    }
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.system.cross_jump(t, x)
-    }
-    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.system.accept(t, x)
-    }
-    fn switches(&self) -> usize {
-        self.system.switches()
-    }
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.system.switch_values(t, x, g)
     }
 }

@@ -1,5 +1,11 @@
 //! Switching functions: which side they are on, and where they change it.
 
+mod chatter;
+mod locate;
+
+pub(crate) use chatter::Chatter;
+pub(crate) use locate::first_crossing;
+
 use crate::{Failure, System};
 
 /// The side of each switching function during the present mode.
@@ -13,9 +19,14 @@ impl Sides {
         Sides { held: vec![false; switches], values: vec![0.0; switches] }
     }
 
-    /// Whether there is anything to watch.
+    /// Whether there is nothing to watch.
     pub(crate) fn is_empty(&self) -> bool {
         self.held.is_empty()
+    }
+
+    /// Values of the switching functions where they were asked for last.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
     }
 
     /// Takes the sides at `(t, x)`, as the system does in `cross_jump`.

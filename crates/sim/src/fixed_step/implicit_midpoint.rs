@@ -64,7 +64,7 @@ impl ImplicitMidpoint {
         self.matrix.set_unit();
         self.sizes.iter_mut().zip(x).for_each(|(size, x)| *size = x.abs());
         let (matrix, sizes, middle) = (&mut self.matrix, &mut self.sizes, &self.middle);
-        self.jacobian.visit(system, t, middle, |row, column, value| {
+        self.jacobian.visit(system, t, middle, |row, column, _, value| {
             matrix.add(row, column, -half * value);
             sizes[row] += (half * value * middle[column]).abs();
         })?;

@@ -1,9 +1,230 @@
-//! Methods that choose their step. Not there yet: refused by name.
+//! Methods that choose their step.
 
-use crate::Failure;
+mod first_step;
+mod library;
+mod stiffness;
+mod tolerances;
+
+use crate::events::{Chatter, first_crossing};
 use crate::simulate::Run;
+use crate::{Failure, Method, System};
+use first_step::first_step;
+use stiffness::Stiffness;
+use tolerances::Tolerances;
 
-pub(crate) fn run(_run: &mut Run<'_>, _x: &mut [f64]) -> Result<(), Failure> {
-    let expected = "a method of fixed step: those of variable step are still being built";
-    Err(Failure::BadOption { option: "method", value: f64::NAN, expected })
+/// A method of variable step between two restarts.
+trait Integrator {
+    /// Order of the first step after a restart.
+    fn first_order(&self) -> usize;
+
+    /// Starts anew at `(t, x)`, where the rates are `dx`, with a first step of about `h`.
+    fn restart(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
+
+    /// Takes one step that meets the tolerances and ends at `stop` at the latest.
+    fn step(&mut self, stop: f64) -> Result<(), Failure>;
+
+    /// Where the last step ended.
+    fn time(&self) -> f64;
+
+    /// Where the last step started.
+    fn start(&self) -> f64;
+
+    /// Length of the step to come, as far as is known.
+    fn next_step(&self) -> f64;
+
+    /// The state where the last step ended.
+    fn state(&self) -> &[f64];
+
+    /// The state at a time inside the last step, to the accuracy of the step.
+    fn between(&mut self, t: f64, x: &mut [f64]);
+
+    /// Steps tried in vain so far.
+    fn rejected(&self) -> usize;
+}
+
+/// Why an integrator hands over.
+enum End {
+    /// The run is at its end.
+    Done,
+    /// The system is stiff.
+    Stiff,
+    /// States have outgrown the magnitudes that the tolerances were made for.
+    Grown,
+}
+
+/// Integrates to the end.
+pub(crate) fn run(run: &mut Run<'_>, x: &mut [f64]) -> Result<(), Failure> {
+    run.start(x)?;
+    let shared = run.shared;
+    let mut tolerances = Tolerances::new(run.options, &*shared.system(), x);
+    let mut chatter = Chatter::new(run.options.to - run.options.from);
+    let mut stiff = run.options.method == Method::Bdf && !x.is_empty();
+    loop {
+        let atol = tolerances.clone();
+        let end = if stiff {
+            library::with_bdf(shared, &atol, |method| {
+                Drive::new(run, method, &mut tolerances, &mut chatter, None).run(x)
+            })
+        } else {
+            let watch = (run.options.method == Method::Auto).then(|| Stiffness::new(&atol));
+            library::with_explicit(shared, &atol, |method| {
+                Drive::new(run, method, &mut tolerances, &mut chatter, watch).run(x)
+            })
+        };
+        match end {
+            Ok(End::Done) => return Ok(()),
+            Ok(End::Grown) => tolerances.grow(),
+            Ok(End::Stiff) => stiff = true,
+            Err(Failure::StepTooSmall { .. }) if becomes_known(run, &mut tolerances, x) => {}
+            Err(Failure::StepTooSmall { .. }) if run.options.method == Method::Auto && !stiff => stiff = true,
+            Err(failure) => return Err(failure),
+        }
+        run.counts.stiff |= stiff && run.options.method == Method::Auto;
+    }
+}
+
+/// A state of unknown magnitude that leaves 0 fails every test. `true` if its magnitude can be guessed a little later.
+fn becomes_known(run: &Run<'_>, tolerances: &mut Tolerances, x: &[f64]) -> bool {
+    let system = &mut *run.shared.system();
+    let end = system.next_jump(run.time).map_or(run.options.to, |jump| jump.min(run.options.to));
+    let later = 1e-3 * (end - run.time);
+    tolerances.guess(system, run.time + later, x, later).unwrap_or(false)
+}
+
+/// One integrator at work on a run.
+struct Drive<'r, 'a, 'i> {
+    run: &'r mut Run<'a>,
+    method: &'i mut dyn Integrator,
+    tolerances: &'r mut Tolerances,
+    chatter: &'r mut Chatter,
+    stiffness: Option<Stiffness>,
+    interpolated: Vec<f64>,
+}
+
+impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
+    fn new(
+        run: &'r mut Run<'a>,
+        method: &'i mut dyn Integrator,
+        tolerances: &'r mut Tolerances,
+        chatter: &'r mut Chatter,
+        stiffness: Option<Stiffness>,
+    ) -> Self {
+        let interpolated = vec![0.0; method.state().len()];
+        Drive { run, method, tolerances, chatter, stiffness, interpolated }
+    }
+
+    fn run(mut self, x: &mut [f64]) -> Result<End, Failure> {
+        let rejected = self.run.counts.rejected;
+        let end = self.pieces(x);
+        self.run.counts.rejected = rejected + self.method.rejected();
+        end
+    }
+
+    /// From jump to jump.
+    fn pieces(&mut self, x: &mut [f64]) -> Result<End, Failure> {
+        while self.run.time < self.run.options.to {
+            let to = self.run.options.to;
+            let jump = self.run.shared.system().next_jump(self.run.time).filter(|&jump| jump <= to);
+            if let Some(end) = self.piece(jump.unwrap_or(to), jump.is_some(), x)? {
+                return Ok(end);
+            }
+        }
+        Ok(End::Done)
+    }
+
+    /// From here to `stop`, where there may be a jump, or to a crossing before it.
+    fn piece(&mut self, stop: f64, jump: bool, x: &mut [f64]) -> Result<Option<End>, Failure> {
+        if is_at(self.run.time, stop, self.run.time) {
+            self.run.reach(stop, x)?;
+            self.run.counts.jumps += usize::from(jump);
+            return if jump { self.run.settle_at_jump(x) } else { self.run.settle(x) }.map(|()| None);
+        }
+        let interval = stop - self.run.time;
+        if self.tolerances.guess(&mut *self.run.shared.system(), self.run.time, x, interval)? {
+            return Ok(Some(End::Grown));
+        }
+        self.restart(stop, x)?;
+        while self.run.time < stop {
+            let stop_now = self.run.options.step.map_or(stop, |longest| stop.min(self.run.time + longest));
+            self.method.step(stop_now)?;
+            self.run.counts.steps += 1;
+            let end = if is_at(self.method.time(), stop, self.method.start()) { stop } else { self.method.time() };
+            let crossing = self.crossing(end)?;
+            if let Some((time, switch)) = crossing {
+                self.cross(time, switch, x)?;
+                return Ok(None);
+            }
+            x.copy_from_slice(self.method.state());
+            self.run.reach(end, x)?;
+            self.samples_before(end)?;
+            if jump && end == stop {
+                self.run.counts.jumps += 1;
+                self.run.settle_at_jump(x)?;
+            } else {
+                self.run.settle(x)?;
+            }
+            if let Some(end) = self.hand_over(x) {
+                return Ok(Some(end));
+            }
+        }
+        Ok(None)
+    }
+
+    fn restart(&mut self, stop: f64, x: &[f64]) -> Result<(), Failure> {
+        let longest = (stop - self.run.time).min(self.run.options.step.unwrap_or(f64::INFINITY));
+        let mut rates = vec![0.0; x.len()];
+        let order = self.method.first_order();
+        let step = {
+            let system = &mut *self.run.shared.system();
+            first_step(system, self.tolerances, order, self.run.time, x, longest, &mut rates)?
+        };
+        self.method.restart(self.run.time, x, &rates, step)
+    }
+
+    /// The first crossing of a switching function in the step that ends at `end`, and which it is.
+    fn crossing(&mut self, end: f64) -> Result<Option<(f64, usize)>, Failure> {
+        let (shared, method, x) = (self.run.shared, &mut *self.method, &mut self.interpolated);
+        first_crossing(&mut self.run.sides, self.run.time, end, |sides, t| {
+            method.between(t, x);
+            sides.crossed(&mut *shared.system(), t, x)
+        })
+    }
+
+    /// Goes back to a crossing inside the last step and over it.
+    fn cross(&mut self, time: f64, switch: usize, x: &mut [f64]) -> Result<(), Failure> {
+        if self.chatter.is_one(time) {
+            return Err(Failure::Chattering { time, what: self.run.shared.system().switch_name(switch) });
+        }
+        self.method.between(time, x);
+        self.run.reach(time, x)?;
+        self.samples_before(time)?;
+        self.run.counts.switches += 1;
+        self.run.settle_at_jump(x)
+    }
+
+    /// Samples of the grid inside the last step, before `end`.
+    fn samples_before(&mut self, end: f64) -> Result<(), Failure> {
+        while let Some(t) = self.run.sample_before(end) {
+            self.method.between(t, &mut self.interpolated);
+            self.run.record(t, t, &self.interpolated)?;
+        }
+        Ok(())
+    }
+
+    /// Whether another integrator should go on from here.
+    fn hand_over(&mut self, x: &[f64]) -> Option<End> {
+        let (time, step) = (self.run.time, self.method.time() - self.method.start());
+        let remaining = self.run.options.to - time;
+        if self.tolerances.watch(x) {
+            return Some(End::Grown);
+        }
+        let system = &mut *self.run.shared.system();
+        let stiffness = self.stiffness.as_mut()?;
+        stiffness.watch(system, self.tolerances, (time, x), step, remaining).then_some(End::Stiff)
+    }
+}
+
+/// Whether `time` is `stop` to rounding, after a step from `start`.
+fn is_at(time: f64, stop: f64, start: f64) -> bool {
+    (stop - time).abs() <= 4000.0 * f64::EPSILON * (time - start) + 200.0 * f64::EPSILON * time.abs()
 }

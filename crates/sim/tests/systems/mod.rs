@@ -197,3 +197,166 @@ pub fn stepped() -> Known {
     system.jumps = vec![0.3, 0.77];
     system
 }
+
+/// A mass on a spring, 100 rad/s: 160 periods in 10 s.
+pub fn fast_oscillator() -> Known {
+    Known::new(
+        &[1.0, 0.0],
+        |_, x, _, dx| (dx[0], dx[1]) = (100.0 * x[1], -100.0 * x[0]),
+        |_, _, v, _, jv| (jv[0], jv[1]) = (100.0 * v[1], -100.0 * v[0]),
+        |t| vec![(100.0 * t).cos(), -(100.0 * t).sin()],
+    )
+}
+
+/// The chemical kinetics of Robertson, stiff over eleven decades of time. Source of the values at 1e11 s: [IVPTestSet].
+pub fn robertson() -> Known {
+    Known::new(
+        &[1.0, 0.0, 0.0],
+        |_, x, _, dx| {
+            let (slow, fast, back) = (0.04 * x[0], 3e7 * x[1] * x[1], 1e4 * x[1] * x[2]);
+            (dx[0], dx[1], dx[2]) = (back - slow, slow - back - fast, fast);
+        },
+        |_, x, v, _, jv| {
+            let (slow, fast) = (0.04 * v[0], 6e7 * x[1] * v[1]);
+            let back = 1e4 * (v[1] * x[2] + x[1] * v[2]);
+            (jv[0], jv[1], jv[2]) = (back - slow, slow - back - fast, fast);
+        },
+        |_| vec![0.2083340149701255e-07, 0.8333360770334713e-13, 0.999999979166505],
+    )
+}
+
+/// `x' = -λ (x - cos t) - sin t`, stiff, with the solution `cos t`.
+pub fn prothero_robinson() -> Known {
+    const RATE: f64 = 1e6;
+    Known::new(
+        &[1.0],
+        |t, x, _, dx| dx[0] = -RATE * (x[0] - t.cos()) - t.sin(),
+        |_, _, v, _, jv| jv[0] = -RATE * v[0],
+        |t| vec![t.cos()],
+    )
+}
+
+/// Two masses of very different scale: a charge of 1e-13 C that starts at 0 and follows a motion of 1e5.
+pub fn scales_apart() -> Known {
+    Known::new(
+        &[1e5, 0.0, 0.0],
+        |_, x, _, dx| (dx[0], dx[1], dx[2]) = (x[1], -x[0], 1e-18 * x[0] - 3.0 * x[2]),
+        |_, _, v, _, jv| (jv[0], jv[1], jv[2]) = (v[1], -v[0], 1e-18 * v[0] - 3.0 * v[2]),
+        |t| vec![1e5 * t.cos(), -1e5 * t.sin(), 1e-14 * (3.0 * t.cos() + t.sin() - 3.0 * (-3.0 * t).exp())],
+    )
+}
+
+/// Heat along a rod of 100 cells that starts as one sine arc: a pattern of three diagonals.
+pub fn rod() -> Known {
+    const CELLS: usize = 100;
+    fn flow(x: &[f64], dx: &mut [f64]) {
+        let at = |i: usize| if i == 0 || i > CELLS { 0.0 } else { x[i - 1] };
+        (1..=CELLS).for_each(|i| dx[i - 1] = 1e4 * (at(i - 1) - 2.0 * at(i) + at(i + 1)));
+    }
+    fn arc(cell: usize) -> f64 {
+        (std::f64::consts::PI * (cell + 1) as f64 / (CELLS + 1) as f64).sin()
+    }
+    let start: Vec<f64> = (0..CELLS).map(arc).collect();
+    let mut system = Known::new(
+        &start,
+        |_, x, _, dx| flow(x, dx),
+        |_, _, v, _, jv| flow(v, jv),
+        |t| {
+            let decay = 4e4 * (0.5 * std::f64::consts::PI / (CELLS + 1) as f64).sin().powi(2);
+            (0..CELLS).map(|cell| arc(cell) * (-decay * t).exp()).collect()
+        },
+    );
+    let near = |i: usize| (i.saturating_sub(1)..=(i + 1).min(CELLS - 1)).collect();
+    system.sparsity = Sparsity::from_columns((0..CELLS).map(near));
+    system
+}
+
+/// A ball that falls from 1 m and keeps half its speed at each bounce; 9.81 m/s².
+pub fn ball() -> Known {
+    let mut system = Known::new(
+        &[1.0, 0.0],
+        |_, x, _, dx| (dx[0], dx[1]) = (x[1], -9.81),
+        |_, _, v, _, jv| (jv[0], jv[1]) = (v[1], 0.0),
+        |_| vec![],
+    )
+    .with_switches(1, |_, x, _, g| g[0] = x[0]);
+    system.reset = |t, mode, x| {
+        if mode.sides[0] && x[0] <= 0.0 && t > 0.0 {
+            (x[0], x[1]) = (f64::MIN_POSITIVE, -0.5 * x[1]);
+        }
+    };
+    system
+}
+
+/// A mass between two springs, one of them engaged only for `x > 0`: stiffness 4 there, 1 for `x < 0`.
+pub fn lopsided() -> Known {
+    let mut system = Known::new(
+        &[0.0, 1.0],
+        |_, x, mode, dx| (dx[0], dx[1]) = (x[1], if mode.sides[0] { -4.0 * x[0] } else { -x[0] }),
+        |_, _, v, mode, jv| (jv[0], jv[1]) = (v[1], if mode.sides[0] { -4.0 * v[0] } else { -v[0] }),
+        |t| {
+            let (half, period) = (0.5 * std::f64::consts::PI, 1.5 * std::f64::consts::PI);
+            let phase = t.rem_euclid(period);
+            let slow = phase - half;
+            if phase <= half {
+                vec![0.5 * (2.0 * phase).sin(), (2.0 * phase).cos()]
+            } else {
+                vec![-slow.sin(), -slow.cos()]
+            }
+        },
+    )
+    .with_switches(1, |_, x, _, g| g[0] = x[0]);
+    system.mode.sides = vec![true];
+    system
+}
+
+/// A relay that pushes towards 0 with full force: it has no solution beyond 1 s.
+pub fn relay() -> Known {
+    Known::new(
+        &[1.0],
+        |_, _, mode, dx| dx[0] = if mode.sides[0] { -1.0 } else { 1.0 },
+        |_, _, _, _, jv| jv[0] = 0.0,
+        |t| vec![1.0 - t],
+    )
+    .with_switches(1, |_, x, _, g| g[0] = x[0])
+}
+
+/// `x' = -2 √x`, which has no rate for `x < 0`: `(1 - t)²` until 1 s.
+pub fn draining() -> Known {
+    Known::new(
+        &[1.0],
+        |_, x, _, dx| dx[0] = -2.0 * x[0].sqrt(),
+        |_, x, v, _, jv| jv[0] = -v[0] / x[0].sqrt(),
+        |t| vec![(1.0 - t).powi(2)],
+    )
+}
+
+/// A pulse of 1 µs and area 1 at 5 s into an integrator.
+pub fn pulse() -> Known {
+    let mut system = Known::new(
+        &[0.0],
+        |_, _, mode, dx| dx[0] = if mode.interval == 1 { 1e6 } else { 0.0 },
+        |_, _, _, _, jv| jv[0] = 0.0,
+        |t| vec![((t - 5.0) * 1e6).clamp(0.0, 1.0)],
+    );
+    system.jumps = vec![5.0, 5.000001];
+    system
+}
+
+/// Two signals of 1 rad/s, and a count of how often their difference to 0.999 has changed its sign: twice a period,
+/// 0.09 s apart.
+pub fn grazing() -> Known {
+    let mut system = oscillator().with_switches(1, |_, x, _, g| g[0] = x[1] - 0.999);
+    system.reset = |_, _, _| {};
+    system
+}
+
+/// Rest at 0 until 5 s, then `x' = (t - 5)²`, which nobody announces.
+pub fn late() -> Known {
+    Known::new(
+        &[0.0],
+        |t, _, _, dx| dx[0] = (t - 5.0).max(0.0).powi(2),
+        |_, _, _, _, jv| jv[0] = 0.0,
+        |t| vec![(t - 5.0).max(0.0).powi(3) / 3.0],
+    )
+}

@@ -1,0 +1,110 @@
+//! The first crossing inside a step.
+
+use super::Sides;
+use crate::Failure;
+
+/// Parts of a step at whose ends the sides are looked at: a pulse as short as one part is not missed.
+const PARTS: usize = 4;
+
+/// Halvings of the bracket of a crossing at most.
+const MOST_HALVINGS: usize = 80;
+
+/// The first time in `(start, end]` at which a switching function is on another side than that held, and which it is.
+/// `crossed` says for a time inside the step what [`Sides::crossed`] says of the state there. The time returned is just
+/// past the crossing, by a rounding error.
+///
+/// Two crossings of one function inside one part of the step are found where its values bend towards 0 there.
+pub(crate) fn first_crossing(
+    sides: &mut Sides,
+    start: f64,
+    end: f64,
+    mut crossed: impl FnMut(&mut Sides, f64) -> Result<Option<usize>, Failure>,
+) -> Result<Option<(f64, usize)>, Failure> {
+    if sides.is_empty() {
+        return Ok(None);
+    }
+    let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
+    crossed(sides, start)?;
+    let mut seen = vec![sides.values().to_vec()];
+    for part in 1..=PARTS {
+        let found = crossed(sides, time(part))?;
+        seen.push(sides.values().to_vec());
+        if found.is_some() {
+            return halve(sides, time(part - 1), time(part), found, &mut crossed);
+        }
+        for turn in turns(&seen) {
+            let turning = start + (end - start) * turn / PARTS as f64;
+            let found = crossed(sides, turning)?;
+            if found.is_some() {
+                let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
+                return halve(sides, before, turning, found, &mut crossed);
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Where, in parts, values turn round on their way to 0, judged by the parabola through the last three.
+fn turns(seen: &[Vec<f64>]) -> Vec<f64> {
+    let [.., a, b, c] = seen else { return vec![] };
+    let part = (seen.len() - 2) as f64;
+    let turn = |((&a, &b), &c): ((&f64, &f64), &f64)| {
+        let (slope, bend) = (0.5 * (c - a), a - 2.0 * b + c);
+        (bend * b > 0.0).then(|| -slope / bend).filter(|turn| turn.abs() <= 1.0).map(|turn| part + turn)
+    };
+    a.iter().zip(b).zip(c).filter_map(turn).collect()
+}
+
+/// Halves the bracket until it is as short as times can be told apart.
+fn halve(
+    sides: &mut Sides,
+    mut before: f64,
+    mut after: f64,
+    mut found: Option<usize>,
+    crossed: &mut impl FnMut(&mut Sides, f64) -> Result<Option<usize>, Failure>,
+) -> Result<Option<(f64, usize)>, Failure> {
+    for _ in 0..MOST_HALVINGS {
+        let middle = before + 0.5 * (after - before);
+        if middle <= before || middle >= after {
+            break;
+        }
+        match crossed(sides, middle)? {
+            None => before = middle,
+            there => (after, found) = (middle, there),
+        }
+    }
+    Ok(found.map(|switch| (after, switch)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first crossing of `g`, whose side is held from 0, in (0, 1].
+    fn first(g: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut sides = Sides { held: vec![g(0.0) > 0.0], values: vec![0.0] };
+        let crossing = first_crossing(&mut sides, 0.0, 1.0, |sides, t| {
+            sides.values[0] = g(t);
+            Ok((sides.held[0] != (g(t) > 0.0)).then_some(0))
+        });
+        crossing.unwrap().map(|(time, _)| time)
+    }
+
+    #[test]
+    fn finds_the_first_to_rounding() {
+        assert_eq!(first(|t| t - 0.3), Some(0.3_f64.next_up()));
+        assert_eq!(first(|t| 0.3 - t), Some(0.3));
+        assert_eq!(first(|t| t - 1.0), None);
+        assert_eq!(first(|t| 1.0 - t), Some(1.0));
+    }
+
+    #[test]
+    fn finds_both_when_one_part_holds_two() {
+        for middle in [0.1, 0.24, 0.26, 0.4, 0.5, 0.6, 0.74, 0.8, 0.9] {
+            let half = 0.01_f64;
+            let found = first(|t| (t - middle).powi(2) - half * half);
+            assert!((found.unwrap() - (middle - half)).abs() < 1e-12, "{middle}: {found:?}");
+        }
+        assert_eq!(first(|t| (t - 0.4).powi(2) + 1e-9), None);
+    }
+}

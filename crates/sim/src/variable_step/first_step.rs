@@ -1,0 +1,44 @@
+//! The length of the first step after a start or a jump.
+
+use super::tolerances::Tolerances;
+use crate::{Failure, System};
+
+/// Times the trial step is shortened tenfold because the system fails there.
+const MOST_TRIALS: usize = 30;
+
+/// A first step for a method of order `order` from `(t, x)`, at most `longest`, and writes the rates there to `rates`.
+/// Source: [HNW], II.4, "Starting step size".
+pub(super) fn first_step(
+    system: &mut dyn System,
+    tolerances: &Tolerances,
+    order: usize,
+    t: f64,
+    x: &[f64],
+    longest: f64,
+    rates: &mut [f64],
+) -> Result<f64, Failure> {
+    system.rates(t, x, rates)?;
+    let (size, speed) = (tolerances.norm(x, x), tolerances.norm(rates, x));
+    let unknown = size < 1e-5 || speed < 1e-5;
+    let mut trial = if unknown { 1e-6 * longest } else { 0.01 * size / speed }.min(longest);
+    for _ in 0..MOST_TRIALS {
+        if let Some(bend) = bend(system, tolerances, t, x, trial, rates) {
+            let sharpest = speed.max(bend);
+            let root = 1.0 / (order as f64 + 1.0);
+            let step =
+                if sharpest <= 1e-15 { (trial * 1e-3).max(1e-6 * longest) } else { (0.01 / sharpest).powf(root) };
+            return Ok(step.min(100.0 * trial).min(longest));
+        }
+        trial /= 10.0;
+    }
+    Ok(trial)
+}
+
+/// Size of the second derivative over a trial step; `None` if the system fails there.
+fn bend(system: &mut dyn System, tolerances: &Tolerances, t: f64, x: &[f64], trial: f64, rates: &[f64]) -> Option<f64> {
+    let end: Vec<f64> = x.iter().zip(rates).map(|(x, rate)| x + trial * rate).collect();
+    let mut change = vec![0.0; x.len()];
+    system.rates(t + trial, &end, &mut change).ok()?;
+    change.iter_mut().zip(rates).for_each(|(change, rate)| *change -= rate);
+    Some(tolerances.norm(&change, x) / trial).filter(|bend| bend.is_finite())
+}

@@ -1,0 +1,69 @@
+//! Whether an explicit method is held back by stability instead of accuracy.
+
+use super::tolerances::Tolerances;
+use crate::System;
+
+/// Accepted steps between two looks.
+const EVERY: usize = 10;
+
+/// Step times spectral radius beyond which only stability can limit the step: on oscillations that accuracy limits it
+/// stays below 1.
+const STABILITY_LIMIT: f64 = 2.0;
+
+/// Looks in a row that must find stiffness.
+const LOOKS: usize = 4;
+
+/// Steps still to come below which a change of method does not pay.
+const WORTH_A_CHANGE: f64 = 200.0;
+
+/// Follows the spectral radius of the Jacobian by power iteration, one product a look.
+pub(super) struct Stiffness {
+    steps: usize,
+    looks: usize,
+    vector: Vec<f64>,
+    product: Vec<f64>,
+}
+
+impl Stiffness {
+    pub(super) fn new(tolerances: &Tolerances) -> Stiffness {
+        // Any start will do that has a part along every eigenvector.
+        let start =
+            |(i, magnitude): (usize, &f64)| magnitude * (1.0 + (i % 7) as f64) * if i % 2 == 0 { 1.0 } else { -1.0 };
+        let vector: Vec<f64> = tolerances.magnitudes().iter().enumerate().map(start).collect();
+        Stiffness { steps: 0, looks: 0, product: vec![0.0; vector.len()], vector }
+    }
+
+    /// Takes notice of an accepted step of length `h` to `(t, x)`, `remaining` s before the next stop. `true` if the
+    /// stiff method should take over.
+    pub(super) fn watch(
+        &mut self,
+        system: &mut dyn System,
+        tolerances: &Tolerances,
+        (t, x): (f64, &[f64]),
+        h: f64,
+        remaining: f64,
+    ) -> bool {
+        self.steps += 1;
+        if !self.steps.is_multiple_of(EVERY) {
+            return false;
+        }
+        let radius = self.radius(system, tolerances, t, x).unwrap_or(0.0);
+        self.looks = if h * radius > STABILITY_LIMIT { self.looks + 1 } else { 0 };
+        self.looks >= LOOKS && remaining > WORTH_A_CHANGE * h
+    }
+
+    /// Growth of the vector under the Jacobian; `None` where that cannot be had.
+    fn radius(&mut self, system: &mut dyn System, tolerances: &Tolerances, t: f64, x: &[f64]) -> Option<f64> {
+        system.tangent(t, x, &self.vector, &mut self.product).ok()?;
+        let size = |v: &[f64]| {
+            let sum: f64 = v.iter().zip(tolerances.magnitudes()).map(|(v, magnitude)| (v / magnitude).powi(2)).sum();
+            sum.sqrt()
+        };
+        let (before, after) = (size(&self.vector), size(&self.product));
+        if !(after.is_finite() && after > 0.0) {
+            return None;
+        }
+        self.vector.iter_mut().zip(&self.product).for_each(|(v, product)| *v = product / after);
+        Some(after / before)
+    }
+}

@@ -1,0 +1,213 @@
+//! The variable-step methods: work and error on known solutions, jumps, switches, failures.
+
+mod systems;
+
+use std::ops::ControlFlow;
+
+use halfarrow_sim::Method::{Auto, Bdf, Explicit};
+use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, simulate};
+use systems::*;
+
+fn options(method: Method, rtol: f64, to: f64) -> Options {
+    Options { method, rtol, to, every: Some(0.01), ..Options::default() }
+}
+
+/// Bounds of the work and the error of a method on a system with a known solution, over 10 s.
+macro_rules! work {
+    ($name:ident: $method:ident, $system:expr, rtol = $rtol:expr => steps <= $steps:expr, rates <= $rates:expr, error < $error:expr) => {
+        #[test]
+        fn $name() {
+            let mut system: Known = $system;
+            let (samples, end) = system.run(&options($method, $rtol, 10.0));
+            let summary = end.unwrap();
+            assert!(summary.steps <= $steps && summary.rates <= $rates, "{summary:?}");
+            assert_eq!(samples.times.len(), 1001);
+            let error = system.error(&samples);
+            assert!(error < $error, "error {error:e}, {summary:?}");
+        }
+    };
+}
+
+work!(explicit_decay_6: Explicit, decay(), rtol = 1e-6 => steps <= 40, rates <= 250, error < 1e-6);
+work!(explicit_decay_12: Explicit, decay(), rtol = 1e-12 => steps <= 300, rates <= 1800, error < 1e-12);
+work!(explicit_oscillator_6: Explicit, oscillator(), rtol = 1e-6 => steps <= 60, rates <= 450, error < 1e-6);
+work!(explicit_oscillator_12: Explicit, oscillator(), rtol = 1e-12 => steps <= 500, rates <= 3000, error < 2e-12);
+work!(explicit_fast_12: Explicit, fast_oscillator(), rtol = 1e-12 => steps <= 50_000, rates <= 300_000, error < 2e-10);
+work!(explicit_hyperbola_12: Explicit, hyperbola(), rtol = 1e-12 => steps <= 200, rates <= 1200, error < 1e-11);
+work!(explicit_stepped_12: Explicit, stepped(), rtol = 1e-12 => steps <= 310, rates <= 1900, error < 1e-12);
+work!(explicit_scales_6: Explicit, scales_apart(), rtol = 1e-6 => steps <= 70, rates <= 500, error < 1e-6);
+work!(explicit_scales_12: Explicit, scales_apart(), rtol = 1e-12 => steps <= 600, rates <= 3500, error < 2e-12);
+work!(explicit_lopsided_12: Explicit, lopsided(), rtol = 1e-12 => steps <= 700, rates <= 4200, error < 1e-11);
+work!(bdf_decay_6: Bdf, decay(), rtol = 1e-6 => steps <= 220, rates <= 250, error < 1e-6);
+work!(bdf_oscillator_6: Bdf, oscillator(), rtol = 1e-6 => steps <= 250, rates <= 300, error < 2e-6);
+work!(bdf_oscillator_12: Bdf, oscillator(), rtol = 1e-12 => steps <= 2000, rates <= 2200, error < 2e-11);
+work!(bdf_stepped_12: Bdf, stepped(), rtol = 1e-12 => steps <= 1500, rates <= 1700, error < 1e-11);
+work!(bdf_scales_12: Bdf, scales_apart(), rtol = 1e-12 => steps <= 2000, rates <= 2200, error < 5e-11);
+work!(bdf_lopsided_12: Bdf, lopsided(), rtol = 1e-12 => steps <= 3000, rates <= 3300, error < 2e-10);
+work!(bdf_prothero_robinson_12: Bdf, prothero_robinson(), rtol = 1e-12 => steps <= 1500, rates <= 2000, error < 1e-12);
+work!(bdf_rod_6: Bdf, rod(), rtol = 1e-6 => steps <= 300, rates <= 330, error < 1e-6);
+work!(bdf_rod_12: Bdf, rod(), rtol = 1e-12 => steps <= 1200, rates <= 1300, error < 1e-11);
+work!(auto_stays_explicit: Auto, oscillator(), rtol = 1e-6 => steps <= 60, rates <= 450, error < 1e-6);
+work!(auto_turns_stiff: Auto, prothero_robinson(), rtol = 1e-9 => steps <= 700, rates <= 1200, error < 1e-9);
+work!(auto_turns_stiff_on_a_large_system: Auto, rod(), rtol = 1e-9 => steps <= 850, rates <= 1200, error < 2e-9);
+work!(auto_pulse: Auto, pulse(), rtol = 1e-6 => steps <= 60, rates <= 400, error < 1e-10);
+work!(auto_late: Auto, late(), rtol = 1e-6 => steps <= 60, rates <= 700, error < 1e-6);
+
+#[test]
+fn bdf_meets_the_published_values_of_robertson() {
+    for (method, rtol, bound) in [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7)] {
+        let mut system = robertson();
+        let atol = AbsoluteTolerance::Each([1e-4, 1e-10, 1e-2].map(|share| share * rtol).to_vec());
+        let options = Options { method, rtol, atol, to: 1e11, every: Some(1e11), ..Options::default() };
+        let (samples, end) = system.run(&options);
+        let exact = (system.solution)(1e11);
+        for (value, exact) in samples.values[1].iter().zip(exact) {
+            assert!((value / exact - 1.0).abs() < bound, "{method:?} {rtol:e}: {value:e}, {end:?}");
+        }
+    }
+}
+
+#[test]
+fn scaled_tolerances_carry_robertson_through() {
+    let mut system = robertson();
+    let (samples, end) = system.run(&Options { to: 1e11, every: Some(1e11), ..Options::default() });
+    assert!(end.unwrap().stiff);
+    assert!((samples.values[1][0] / 0.2083340149701255e-07 - 1.0).abs() < 0.01, "{samples:?}");
+}
+
+#[test]
+fn jumps_are_met_to_the_last_bit() {
+    for method in [Explicit, Bdf] {
+        let mut system = stepped();
+        let (samples, end) = system.run(&Options { every: None, ..options(method, 1e-9, 1.0) });
+        assert_eq!(end.unwrap().jumps, 2);
+        for jump in [0.3, 0.77] {
+            assert_eq!(samples.times.iter().filter(|&&t| t == jump).count(), 2, "both sides of {jump}");
+            assert!(system.accepted.contains(&jump));
+        }
+        assert_eq!(samples.times.last(), Some(&1.0));
+        assert!(system.error(&samples) < 1e-8);
+    }
+}
+
+#[test]
+fn a_thousand_jumps() {
+    let mut system = stepped();
+    system.jumps = (1..1000).map(|i| i as f64 * 1e-3).collect();
+    system.rates = |_, x, mode, dx| dx[0] = (mode.interval % 2) as f64 * 2.0 - 1.0 - 0.0 * x[0];
+    let (samples, end) = system.run(&Options { every: Some(0.1), ..options(Auto, 1e-6, 1.0) });
+    assert_eq!(end.unwrap().jumps, 999);
+    assert!((samples.values.last().unwrap()[0] - 1.0).abs() < 1e-12, "{samples:?}");
+    assert_eq!(samples.times, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]);
+}
+
+#[test]
+fn every_bounce_is_found() {
+    // Half the speed is kept: each flight takes half the time of the one before.
+    let first = (2.0_f64 / 9.81).sqrt();
+    let bounces: Vec<f64> = (0..8).map(|n| first * (1.0 + 2.0 * (1.0 - 0.5_f64.powi(n)))).collect();
+    for method in [Explicit, Bdf] {
+        let (samples, end) = ball().run(&Options { every: None, ..options(method, 1e-9, 1.3485) });
+        assert_eq!(end.unwrap().switches, 8);
+        let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+        assert_eq!(found.len(), 8);
+        found.iter().zip(&bounces).for_each(|(t, exact)| assert!((t - exact).abs() < 1e-9, "{t} {exact}"));
+    }
+}
+
+#[test]
+fn bounces_without_end_are_reported() {
+    for (mut system, time) in [(ball(), 3.0 * (2.0_f64 / 9.81).sqrt()), (relay(), 1.0)] {
+        let stopped = system.run(&options(Explicit, 1e-6, 2.0)).1.unwrap_err();
+        assert!(matches!(stopped.failure, Failure::Chattering { .. }), "{stopped:?}");
+        assert!((stopped.time - time).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn two_crossings_in_one_step_are_both_found() {
+    for (method, rtol) in [(Explicit, 1e-3), (Explicit, 1e-6), (Bdf, 1e-4)] {
+        let (_, end) = grazing().run(&options(method, rtol, 10.0));
+        assert_eq!(end.unwrap().switches, 2, "{method:?} {rtol:e}");
+    }
+}
+
+#[test]
+fn trial_steps_out_of_the_domain_are_taken_back() {
+    for method in [Explicit, Bdf, Auto] {
+        let mut system = draining();
+        let (samples, end) = system.run(&options(method, 1e-9, 0.999));
+        end.unwrap();
+        assert!(system.error(&samples) < 1e-7, "{:e}", system.error(&samples));
+    }
+}
+
+#[test]
+fn a_failure_of_the_system_is_handed_on_with_what_was_computed() {
+    for method in [Explicit, Bdf, Auto] {
+        let mut system = draining();
+        system.rates = |_, x, _, dx| dx[0] = -1.0 - x[0].sqrt();
+        let (samples, end) = system.run(&options(method, 1e-6, 10.0));
+        let stopped = end.unwrap_err();
+        assert!(stopped.failure.to_string().contains("a rate is not a finite number"), "{stopped:?}");
+        assert!(stopped.time > 0.6 && stopped.time < 0.62, "{stopped:?}");
+        assert!(samples.times.len() > 60 && *samples.times.last().unwrap() <= stopped.time);
+    }
+}
+
+#[test]
+fn a_solution_that_escapes_is_reported() {
+    for method in [Explicit, Bdf, Auto] {
+        let mut system = hyperbola();
+        system.rates = |_, x, _, dx| dx[0] = x[0] * x[0];
+        system.tangent = |_, x, v, _, jv| jv[0] = 2.0 * x[0] * v[0];
+        let stopped = system.run(&options(method, 1e-6, 2.0)).1.unwrap_err();
+        assert!((stopped.time - 1.0).abs() < 1e-4, "{stopped:?}");
+    }
+}
+
+#[test]
+fn a_failure_at_the_start_is_reported() {
+    let mut system = draining();
+    system.start = vec![-1.0];
+    let stopped = system.run(&options(Auto, 1e-6, 1.0)).1.unwrap_err();
+    assert_eq!((stopped.time, stopped.failure.time()), (0.0, Some(0.0)));
+}
+
+#[test]
+fn the_sink_may_stop_the_run() {
+    struct Impatient(Vec<f64>);
+    impl Sink for Impatient {
+        fn sample(&mut self, t: f64, _: &[f64]) {
+            self.0.push(t);
+        }
+        fn progress(&mut self, t: f64) -> ControlFlow<()> {
+            if t > 3.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+    }
+    let (mut system, mut sink) = (oscillator(), Impatient(vec![]));
+    let mut x = system.start.clone();
+    let stopped = simulate(&mut system, &options(Auto, 1e-6, 10.0), &mut x, &mut sink).unwrap_err();
+    assert_eq!(stopped.failure, Failure::Interrupted { time: stopped.time });
+    assert!((x[0] - stopped.time.cos()).abs() < 1e-5 && *sink.0.last().unwrap() <= stopped.time);
+}
+
+#[test]
+fn no_state_at_all() {
+    let mut system = Known::new(&[], |_, _, _, _| {}, |_, _, _, _, _| {}, |_| vec![]);
+    for method in [Explicit, Bdf, Auto] {
+        system.accepted.clear();
+        let (samples, end) = system.run(&options(method, 1e-6, 1.0));
+        end.unwrap();
+        assert_eq!(samples.times.len(), 101);
+    }
+}
+
+#[test]
+fn the_longest_step_is_kept() {
+    for method in [Explicit, Bdf] {
+        let (samples, end) = decay().run(&Options { every: None, step: Some(0.05), ..options(method, 1e-3, 10.0) });
+        assert!(samples.times.windows(2).all(|pair| pair[1] - pair[0] <= 0.05 + 1e-12));
+        assert!(end.unwrap().steps >= 200);
+    }
+}
