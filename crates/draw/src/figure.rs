@@ -1,0 +1,176 @@
+//! A bond graph reduced to what is drawn: glyphs, bonds and paths, as plain text and indices.
+
+use crate::layout::{Network, Node, Role, Room, Side};
+use crate::text::width;
+
+/// Font sizes in px.
+pub const KIND: f64 = 16.0;
+/// Of the names of elements.
+pub const NAME: f64 = 12.5;
+/// Of laws and of the names of junctions.
+pub const LAW: f64 = 10.5;
+/// Height of a line of small text.
+pub const LEADING: f64 = 13.0;
+
+/// Room that the frame of a storage in derivative causality takes beside its sign.
+pub const FRAME: f64 = 4.0;
+
+/// What is drawn.
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    /// Name of the model.
+    pub title: String,
+    /// Its documentation.
+    pub doc: String,
+    /// Elements and junctions.
+    pub glyphs: Vec<Glyph>,
+    /// Bonds, numbered for people from 1.
+    pub bonds: Vec<Line>,
+    /// Causal paths to be drawn.
+    pub loops: Vec<Loop>,
+    /// What is to be said about the paths that are not drawn, if any.
+    pub note: String,
+}
+
+/// An element or junction.
+#[derive(Debug, Clone)]
+pub struct Glyph {
+    /// Its keyword.
+    pub kind: String,
+    /// Its name.
+    pub name: String,
+    /// Its law or value, short; may be empty.
+    pub law: String,
+    /// What to show when pointed at.
+    pub tip: String,
+    /// How it is drawn.
+    pub form: Form,
+    /// Whether it is a storage in derivative causality.
+    pub derivative: bool,
+}
+
+/// How an element is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// `0`, `1`: a bare sign with a small name beside it.
+    Junction,
+    /// `TF`, `GY`: a sign with modulus and name above it.
+    TwoPort,
+    /// A field: a centred block of text.
+    Field,
+    /// A one-port: `Kind : name`, away from its junction.
+    OnePort,
+    /// A one-port that gives power.
+    Source,
+}
+
+/// A bond.
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// Indices of the glyphs, from and to (where the half arrow is).
+    pub ends: [usize; 2],
+    /// Names of the ports of fields, else empty.
+    pub ports: [String; 2],
+    /// The causal stroke: at end 0 (from) or 1 (to), `None` if undetermined.
+    pub stroke: Option<usize>,
+    /// Its name, may be empty.
+    pub name: String,
+}
+
+/// A causal path, as bonds in order.
+#[derive(Debug, Clone)]
+pub struct Loop {
+    /// 1 to 4.
+    pub class: u8,
+    /// Indices of the bonds in the order in which the path first meets them.
+    pub bonds: Vec<usize>,
+    /// Its line in the legend: elements and gains.
+    pub text: String,
+}
+
+impl Figure {
+    /// What the layout needs to know.
+    pub fn network(&self) -> Network {
+        Network {
+            nodes: self.glyphs.iter().map(Glyph::node).collect(),
+            bonds: self.bonds.iter().map(|b| b.ends).collect(),
+        }
+    }
+}
+
+impl Glyph {
+    fn node(&self) -> Node {
+        let role = match self.form {
+            Form::Junction | Form::Field => Role::Centre,
+            Form::TwoPort => Role::TwoPort,
+            Form::Source => Role::Source,
+            Form::OnePort => Role::OnePort,
+        };
+        let sides = [Side::East, Side::North, Side::West, Side::South];
+        Node { role, room: sides.map(|s| self.room(s)) }
+    }
+    /// Half the width and height of the part that bonds end at.
+    pub fn core(&self) -> [f64; 2] {
+        match self.form {
+            Form::Junction => [9.0, 11.0],
+            Form::Field => [
+                self.main_width().max(width(&self.law, LAW, false)) / 2.0 + 4.0,
+                10.0 + if self.law.is_empty() { 0.0 } else { LEADING / 2.0 },
+            ],
+            _ => [width(&self.kind, KIND, true) / 2.0 + 4.0, 10.5],
+        }
+    }
+    /// Width of `Kind : name`.
+    pub fn main_width(&self) -> f64 {
+        width(&self.kind, KIND, true) + self.name_width()
+    }
+    /// Width of ` : name`.
+    pub fn name_width(&self) -> f64 {
+        let frame = if self.derivative { FRAME } else { 0.0 };
+        if self.name.is_empty() { 0.0 } else { frame + width(" : ", NAME, false) + width(&self.name, NAME, false) }
+    }
+    /// The small lines of a two-port: modulus, then name.
+    pub fn small_lines(&self) -> Vec<&str> {
+        [&self.law, &self.name].into_iter().map(String::as_str).filter(|l| !l.is_empty()).collect()
+    }
+    /// Width of the longest small line.
+    pub fn small_width(&self) -> f64 {
+        self.small_lines().iter().map(|l| width(l, LAW, false)).fold(0.0, f64::max)
+    }
+    /// Room around the anchor if the (first) neighbour is on this side.
+    fn room(&self, neighbour: Side) -> Room {
+        let [w, h] = self.core();
+        let frame = if self.derivative { 3.0 } else { 0.0 };
+        let even = Room { west: w + frame, east: w + frame, north: h + frame, south: h + frame };
+        match self.form {
+            Form::Junction => {
+                let name = (width(&self.name, LAW, false) - 34.0).max(0.0);
+                Room { east: even.east + name, ..even }
+            }
+            Form::Field => even,
+            Form::TwoPort => self.two_port_room(even, neighbour),
+            Form::OnePort | Form::Source => self.one_port_room(even, neighbour),
+        }
+    }
+    fn two_port_room(&self, even: Room, neighbour: Side) -> Room {
+        let lines = self.small_lines().len() as f64;
+        let text = self.small_width();
+        match neighbour {
+            Side::East | Side::West => {
+                let half = even.east.max(text / 2.0 + 2.0);
+                Room { north: even.north + lines * LEADING, west: half, east: half, ..even }
+            }
+            Side::North | Side::South => Room { east: even.east + text + 2.0, ..even },
+        }
+    }
+    fn one_port_room(&self, even: Room, neighbour: Side) -> Room {
+        let law = if self.law.is_empty() { 0.0 } else { LEADING };
+        let text = self.name_width().max(width(&self.law, LAW, false) - 8.0);
+        let below = Room { south: even.south + law, ..even };
+        match neighbour {
+            Side::East => Room { west: even.west + text, ..below },
+            Side::West | Side::North => Room { east: even.east + text, ..below },
+            Side::South => Room { east: even.east + text, north: even.north + law, ..even },
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Width of text and its way into XML.
+
+/// Families named in every drawing, the widest first: text is measured in DejaVu Sans and fits in the others.
+pub const FAMILIES: &str = "DejaVu Sans, Verdana, Noto Sans, Segoe UI, Helvetica, Arial, sans-serif";
+
+/// Advance widths of the characters from space to `~` in DejaVu Sans, in thousandths of the size.
+const BOOK: [u16; 95] = [
+    318, 401, 460, 838, 636, 950, 780, 275, 390, 390, 500, 838, 318, 361, 318, 337, 636, 636, 636, 636, 636, 636, 636,
+    636, 636, 636, 337, 337, 838, 838, 838, 531, 1000, 684, 686, 698, 770, 632, 575, 775, 752, 295, 295, 656, 557, 863,
+    748, 787, 603, 787, 695, 635, 611, 732, 684, 989, 685, 611, 685, 390, 337, 390, 838, 500, 500, 613, 635, 550, 635,
+    615, 352, 635, 634, 278, 278, 579, 278, 974, 634, 612, 635, 635, 411, 521, 392, 634, 592, 818, 592, 592, 525, 636,
+    337, 636, 838,
+];
+/// The same in DejaVu Sans Bold.
+const BOLD: [u16; 95] = [
+    348, 456, 521, 838, 696, 1002, 872, 306, 457, 457, 523, 838, 380, 415, 380, 365, 696, 696, 696, 696, 696, 696, 696,
+    696, 696, 696, 400, 400, 838, 838, 838, 580, 1000, 774, 762, 734, 830, 683, 683, 821, 837, 372, 372, 775, 637, 995,
+    837, 850, 733, 850, 770, 720, 682, 812, 774, 1103, 771, 724, 725, 457, 365, 457, 838, 500, 500, 675, 716, 593, 716,
+    678, 435, 716, 712, 343, 343, 665, 343, 1042, 712, 687, 716, 716, 493, 595, 478, 712, 652, 924, 645, 652, 582, 712,
+    365, 712, 838,
+];
+
+/// Width of a text in px at this font size in px.
+pub fn width(text: &str, size: f64, bold: bool) -> f64 {
+    let table = if bold { &BOLD } else { &BOOK };
+    let advance = |c: char| match c {
+        ' '..='~' => table[c as usize - 32],
+        '\u{300}'..='\u{36f}' => 0,
+        '·' => 318,
+        '⁰'..='₉' | '²' | '³' | '¹' => 420,
+        'Α'..='ω' => 680,
+        _ => 838,
+    };
+    text.chars().map(|c| f64::from(advance(c))).sum::<f64>() * size / 1000.0
+}
+
+/// The text with what XML reserves written out, and without characters that XML forbids.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\n' | '\t' | '\r' => safe.push(' '),
+            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// At most `most` characters; a longer text ends in an ellipsis.
+pub fn shorten(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_string();
+    }
+    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    format!("{}…", kept.trim_end())
+}
+
+/// An expression as written by the modeller, in the signs of print: `a*cos(phi)^2` becomes `a·cos(φ)²`.
+pub fn typeset(expr: &str) -> String {
+    let mut out = String::new();
+    let mut rest = expr;
+    while let Some(c) = rest.chars().next() {
+        let word = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let length = if c.is_alphabetic() || c == '_' {
+            out.push_str(greek(&rest[..word]).unwrap_or(&rest[..word]));
+            word
+        } else if c.is_ascii_digit() {
+            let end = number_end(rest);
+            out.push_str(&rest[..end]);
+            end
+        } else {
+            typeset_sign(rest, c, &mut out)
+        };
+        rest = &rest[length..];
+    }
+    out
+}
+
+/// Typesets the sign at the start of `rest` and gives its length.
+fn typeset_sign(rest: &str, c: char, out: &mut String) -> usize {
+    match c {
+        '*' => out.push('·'),
+        '-' => out.push('−'),
+        '^' => {
+            let digits = rest[1..].find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len() - 1);
+            let fraction = rest[1 + digits..].starts_with('.');
+            if digits > 0 && !fraction {
+                out.extend(rest[1..1 + digits].chars().map(raised));
+                return 1 + digits;
+            }
+            out.push('^');
+        }
+        c => out.push(c),
+    }
+    c.len_utf8()
+}
+
+/// Where the number at the start of a text ends, its exponent included (`1e-9`).
+fn number_end(text: &str) -> usize {
+    let digits = |s: &str| s.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(s.len());
+    let end = digits(text);
+    let Some(exponent) = text[end..].strip_prefix(['e', 'E']) else { return end };
+    let unsigned = exponent.strip_prefix(['-', '+']).unwrap_or(exponent);
+    let sign = exponent.len() - unsigned.len();
+    match digits(unsigned) {
+        0 => end,
+        n => end + 1 + sign + n,
+    }
+}
+
+fn raised(digit: char) -> char {
+    match digit {
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        d => char::from_u32('⁰' as u32 + (d as u32 - '0' as u32)).unwrap_or(d),
+    }
+}
+
+fn greek(word: &str) -> Option<&'static str> {
+    const LETTERS: [(&str, &str); 22] = [
+        ("alpha", "α"),
+        ("beta", "β"),
+        ("gamma", "γ"),
+        ("delta", "δ"),
+        ("epsilon", "ε"),
+        ("eps", "ε"),
+        ("eta", "η"),
+        ("theta", "θ"),
+        ("kappa", "κ"),
+        ("lambda", "λ"),
+        ("mu", "μ"),
+        ("nu", "ν"),
+        ("xi", "ξ"),
+        ("pi", "π"),
+        ("rho", "ρ"),
+        ("sigma", "σ"),
+        ("tau", "τ"),
+        ("phi", "φ"),
+        ("psi", "ψ"),
+        ("omega", "ω"),
+        ("Omega", "Ω"),
+        ("Phi", "Φ"),
+    ];
+    LETTERS.iter().find(|l| l.0 == word).map(|l| l.1)
+}
