@@ -70,7 +70,7 @@ impl Exprs {
         match rest {
             None => self.number(number),
             Some(single) if !several => self.scale(&number, single),
-            Some(_) => self.product(number, factors),
+            Some(_) => self.product(factors),
         }
     }
 
@@ -163,8 +163,8 @@ impl Exprs {
         }
     }
 
-    fn product(&mut self, number: Rational, factors: &[Expr]) -> Expr {
-        let mut product = Product { number, powers: Vec::with_capacity(factors.len() + 2) };
+    fn product(&mut self, factors: &[Expr]) -> Expr {
+        let mut product = Product { number: Rational::from(1), powers: Vec::with_capacity(factors.len() + 2) };
         for &factor in factors {
             self.collect_factor(&mut product, factor);
         }

@@ -15,10 +15,13 @@ mod functions;
 mod linear;
 mod node;
 mod order;
+mod polynomial;
 mod properties;
 mod rational;
+mod simplify;
 mod symbol_sets;
 mod table;
+mod text;
 mod zero;
 
 pub use cost::Cost;
@@ -28,3 +31,4 @@ pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use node::{Comparison, Expr, Facts, Function, Node, Symbol};
 pub use rational::Rational;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
+pub use text::{Names, PlainNames, ascii, latex, latex_name, unicode, unicode_name};

@@ -1,0 +1,199 @@
+//! Expressions multiplied out: polynomials in whatever is no sum, product or power.
+
+use super::exprs::Exprs;
+use super::node::{Expr, Node};
+use super::rational::Rational;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+/// What a polynomial is made of.
+#[derive(Debug, Default)]
+pub(super) struct Generators {
+    pub list: Vec<Expr>,
+    index: FxHashMap<Expr, usize>,
+}
+
+impl Generators {
+    pub fn index_of(&mut self, e: Expr) -> usize {
+        *self.index.entry(e).or_insert_with(|| {
+            self.list.push(e);
+            self.list.len() - 1
+        })
+    }
+}
+
+/// Exponents by generator, without zeros at the end. Negative ones only of generators that are nonzero.
+pub(super) type Monomial = Vec<i64>;
+
+/// A sum of monomials. A coefficient of zero is kept where dropping it would change where the sum is defined.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Polynomial(pub BTreeMap<Monomial, Rational>);
+
+/// More terms than this are not multiplied out.
+const MOST_TERMS: usize = 160;
+const HIGHEST_POWER: i64 = 8;
+const DEEPEST: u32 = 64;
+
+impl Polynomial {
+    pub fn constant(value: Rational) -> Self {
+        Polynomial(BTreeMap::from([(Vec::new(), value)]))
+    }
+
+    fn generator(index: usize, exponent: i64) -> Self {
+        let mut monomial = vec![0; index];
+        monomial.push(exponent);
+        Polynomial(BTreeMap::from([(monomial, Rational::from(1))]))
+    }
+
+    pub fn add_term(&mut self, monomial: Monomial, coefficient: Rational) {
+        let entry = self.0.entry(monomial).or_insert_with(|| Rational::from(0));
+        *entry = &*entry + &coefficient;
+    }
+
+    pub fn plus(mut self, other: &Polynomial) -> Self {
+        for (monomial, coefficient) in &other.0 {
+            self.add_term(monomial.clone(), coefficient.clone());
+        }
+        self
+    }
+
+    pub fn times(&self, other: &Polynomial) -> Option<Self> {
+        if self.0.len() * other.0.len() > 4 * MOST_TERMS {
+            return None;
+        }
+        let mut product = Polynomial::default();
+        for (p, a) in &self.0 {
+            for (q, b) in &other.0 {
+                product.add_term(times(p, q), a * b);
+            }
+        }
+        (product.0.len() <= MOST_TERMS).then_some(product)
+    }
+
+    /// Without the terms that cancelled and are defined everywhere.
+    pub fn tidy(mut self, x: &Exprs, generators: &Generators) -> Self {
+        self.0.retain(|monomial, coefficient| !coefficient.is_zero() || !is_total(x, generators, monomial));
+        self
+    }
+
+    pub fn to_expr(&self, x: &mut Exprs, generators: &Generators) -> Expr {
+        let terms: Vec<Expr> = self.0.iter().map(|(m, c)| monomial_expr(x, generators, m, c)).collect();
+        x.add(&terms)
+    }
+
+    /// The greatest monomial that divides all terms.
+    pub fn content(&self) -> Monomial {
+        let mut monomials = self.0.keys();
+        let Some(first) = monomials.next() else { return Vec::new() };
+        let mut common = first.clone();
+        for monomial in monomials {
+            let len = common.len().max(monomial.len());
+            common.resize(len, 0);
+            for (i, n) in common.iter_mut().enumerate() {
+                *n = (*n).min(monomial.get(i).copied().unwrap_or(0));
+            }
+        }
+        trimmed(common)
+    }
+
+    pub fn divided_by_monomial(&self, monomial: &[i64]) -> Self {
+        let inverse: Monomial = monomial.iter().map(|n| -n).collect();
+        Polynomial(self.0.iter().map(|(m, c)| (times(m, &inverse), c.clone())).collect())
+    }
+
+    /// The quotient, if there is no remainder. Exponents are not negative.
+    pub fn divided_by(&self, divisor: &Polynomial) -> Option<Self> {
+        let (lead, scale) = divisor.0.last_key_value()?;
+        let (mut rest, mut quotient) = (self.clone(), Polynomial::default());
+        rest.0.retain(|_, c| !c.is_zero());
+        while let Some((monomial, coefficient)) = rest.0.last_key_value() {
+            let factor = quotient_of(monomial, lead)?;
+            let coefficient = coefficient / scale;
+            for (m, c) in &divisor.0 {
+                let product = &coefficient * c;
+                rest.add_term(times(m, &factor), -&product);
+            }
+            rest.0.retain(|_, c| !c.is_zero());
+            quotient.add_term(factor, coefficient);
+            if quotient.0.len() > MOST_TERMS {
+                return None;
+            }
+        }
+        Some(quotient)
+    }
+}
+
+fn trimmed(mut monomial: Monomial) -> Monomial {
+    while monomial.last() == Some(&0) {
+        monomial.pop();
+    }
+    monomial
+}
+
+pub(super) fn times(a: &[i64], b: &[i64]) -> Monomial {
+    let at = |m: &[i64], i: usize| m.get(i).copied().unwrap_or(0);
+    trimmed((0..a.len().max(b.len())).map(|i| at(a, i) + at(b, i)).collect())
+}
+
+fn quotient_of(a: &[i64], b: &[i64]) -> Option<Monomial> {
+    let inverse: Monomial = b.iter().map(|n| -n).collect();
+    Some(times(a, &inverse)).filter(|q| q.iter().all(|&n| n >= 0))
+}
+
+fn is_total(x: &Exprs, generators: &Generators, monomial: &[i64]) -> bool {
+    monomial.iter().enumerate().all(|(i, &n)| n == 0 || x.total(generators.list[i]))
+}
+
+pub(super) fn monomial_expr(x: &mut Exprs, generators: &Generators, monomial: &[i64], coefficient: &Rational) -> Expr {
+    let mut factors = vec![x.number(coefficient.clone())];
+    for (i, &n) in monomial.iter().enumerate().filter(|p| *p.1 != 0) {
+        factors.push(x.powi(generators.list[i], n));
+    }
+    x.mul(&factors)
+}
+
+/// The expression multiplied out; `None` if that takes too many terms.
+pub(super) fn expand(x: &Exprs, e: Expr, generators: &mut Generators) -> Option<Polynomial> {
+    if x.entry(e).depth > DEEPEST {
+        return None;
+    }
+    match x.node(e) {
+        Node::Number(value) => Some(Polynomial::constant(value.clone())),
+        Node::Add(terms) => {
+            let mut sum = Polynomial::default();
+            for &term in terms {
+                sum = sum.plus(&expand(x, term, generators)?);
+                if sum.0.len() > MOST_TERMS {
+                    return None;
+                }
+            }
+            Some(sum)
+        }
+        Node::Mul(factors) => {
+            let mut product = Polynomial::constant(Rational::from(1));
+            for &factor in factors {
+                product = product.times(&expand(x, factor, generators)?)?;
+            }
+            Some(product)
+        }
+        Node::Pow(base, n) => expand_power(x, e, *base, *n, generators),
+        _ => Some(Polynomial::generator(generators.index_of(e), 1)),
+    }
+}
+
+fn expand_power(x: &Exprs, e: Expr, base: Expr, n: Expr, generators: &mut Generators) -> Option<Polynomial> {
+    let own = |generators: &mut Generators| Some(Polynomial::generator(generators.index_of(e), 1));
+    let Some(n) = x.is_number(n).and_then(|n| n.as_integer()) else { return own(generators) };
+    if n < 0 && !x.nonzero(base) {
+        // The inverse of what may be zero never cancels.
+        return own(generators);
+    }
+    if n > 0 && matches!(x.node(base), Node::Add(_)) {
+        if n > HIGHEST_POWER {
+            return None;
+        }
+        let base = expand(x, base, generators)?;
+        return (1..n).try_fold(base.clone(), |power, _| power.times(&base));
+    }
+    Some(Polynomial::generator(generators.index_of(base), n))
+}

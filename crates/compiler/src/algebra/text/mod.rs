@@ -1,0 +1,45 @@
+//! Expressions as people write them: in the model language, as Unicode text, as LaTeX.
+
+mod names;
+mod numbers;
+mod render;
+mod shape;
+
+pub use names::{Names, PlainNames, latex_name, unicode_name};
+
+use super::exprs::Exprs;
+use super::node::Expr;
+use render::Style;
+
+/// The expression in the model language: `-R1/R2`, `x^2`, `if c then a else b`.
+///
+/// Terms and factors stand in human order: a positive term first where there is one, numbers before parameters before
+/// states before functions. Parts nested deeper than 200 levels, and what comes after 20,000 parts, are left out as `…`.
+///
+/// ```
+/// use halfarrow_compiler::algebra::{Exprs, Facts, PlainNames, ascii};
+/// let mut x = Exprs::default();
+/// let [a, b] = ["a", "b"].map(|name| x.symbol(name, Facts::default()));
+/// let [a, b] = [a, b].map(|s| x.sym(s));
+/// let e = x.sub(b, a);
+/// let e = x.div(e, b);
+/// assert_eq!(ascii(&x, e, &PlainNames(&x)), "(b - a)/b");
+/// ```
+pub fn ascii(x: &Exprs, e: Expr, names: &dyn Names) -> String {
+    print(x, e, names, Style::Ascii)
+}
+
+/// The expression as a textbook sets it in plain text: `M g a cos φ`, `x²`.
+pub fn unicode(x: &Exprs, e: Expr, names: &dyn Names) -> String {
+    print(x, e, names, Style::Unicode)
+}
+
+/// The expression in LaTeX, for math mode.
+pub fn latex(x: &Exprs, e: Expr, names: &dyn Names) -> String {
+    print(x, e, names, Style::Latex)
+}
+
+fn print(x: &Exprs, e: Expr, names: &dyn Names, style: Style) -> String {
+    let shape = shape::shape(x, e, names);
+    render::render(&shape, names, style)
+}

@@ -1,0 +1,148 @@
+//! How symbols are written.
+
+use super::super::exprs::Exprs;
+use super::super::node::Symbol;
+use super::super::table::TableId;
+
+/// How symbols and tables are written, and in what order they stand in a product.
+pub trait Names {
+    /// In the model language.
+    fn ascii(&self, symbol: Symbol) -> String;
+
+    /// In Unicode text.
+    fn unicode(&self, symbol: Symbol) -> String {
+        unicode_name(&self.ascii(symbol))
+    }
+
+    /// In LaTeX.
+    fn latex(&self, symbol: Symbol) -> String {
+        latex_name(&self.ascii(symbol))
+    }
+
+    /// Smaller ones stand further left in a product: parameters 0, what varies 1; then by position.
+    fn place(&self, symbol: Symbol) -> (u8, u32);
+
+    /// The name of a table, as of a function.
+    fn table(&self, table: TableId) -> String {
+        format!("table{}", table.0 + 1)
+    }
+}
+
+/// Symbols by their own names, in the order in which they were made, parameters first.
+pub struct PlainNames<'a>(
+    /// The pool of the symbols.
+    pub &'a Exprs,
+);
+
+impl Names for PlainNames<'_> {
+    fn ascii(&self, symbol: Symbol) -> String {
+        self.0.name(symbol).to_owned()
+    }
+
+    fn place(&self, symbol: Symbol) -> (u8, u32) {
+        (u8::from(self.0.facts(symbol).given.is_none()), symbol.0)
+    }
+}
+
+const GREEK: [(&str, char, &str); 34] = [
+    ("alpha", 'α', "alpha"),
+    ("beta", 'β', "beta"),
+    ("gamma", 'γ', "gamma"),
+    ("delta", 'δ', "delta"),
+    ("epsilon", 'ε', "varepsilon"),
+    ("eps", 'ε', "varepsilon"),
+    ("zeta", 'ζ', "zeta"),
+    ("eta", 'η', "eta"),
+    ("theta", 'θ', "theta"),
+    ("kappa", 'κ', "kappa"),
+    ("lambda", 'λ', "lambda"),
+    ("mu", 'μ', "mu"),
+    ("nu", 'ν', "nu"),
+    ("xi", 'ξ', "xi"),
+    ("pi", 'π', "pi"),
+    ("rho", 'ρ', "rho"),
+    ("sigma", 'σ', "sigma"),
+    ("tau", 'τ', "tau"),
+    ("upsilon", 'υ', "upsilon"),
+    ("phi", 'φ', "varphi"),
+    ("chi", 'χ', "chi"),
+    ("psi", 'ψ', "psi"),
+    ("omega", 'ω', "omega"),
+    ("Gamma", 'Γ', "Gamma"),
+    ("Delta", 'Δ', "Delta"),
+    ("Theta", 'Θ', "Theta"),
+    ("Lambda", 'Λ', "Lambda"),
+    ("Xi", 'Ξ', "Xi"),
+    ("Pi", 'Π', "Pi"),
+    ("Sigma", 'Σ', "Sigma"),
+    ("Phi", 'Φ', "Phi"),
+    ("Psi", 'Ψ', "Psi"),
+    ("Omega", 'Ω', "Omega"),
+    ("iota", 'ι', "iota"),
+];
+
+/// A name of the model language in Unicode: `phi_1'` is `φ_1'`, `omega2` is `ω2`.
+pub fn unicode_name(name: &str) -> String {
+    let (name, marks) = split_marks(name);
+    let words: Vec<String> =
+        name.split('.').map(|part| part.split('_').map(unicode_word).collect::<Vec<_>>().join("_")).collect();
+    words.join(".") + marks
+}
+
+/// A name of the model language in LaTeX: `phi_1'` is `\dot{\varphi}_{1}`, `w.f` is `f_{\mathrm{w}}`.
+pub fn latex_name(name: &str) -> String {
+    let (name, marks) = split_marks(name);
+    let (owner, own) = match name.rsplit_once('.') {
+        Some((owner, own)) => (Some(owner), own),
+        None => (None, name),
+    };
+    let mut parts = own.split('_').filter(|p| !p.is_empty());
+    let (letters, digits) = split_digits(parts.next().unwrap_or(own));
+    let mut below: Vec<String> = Vec::new();
+    below.extend(Some(digits).filter(|d| !d.is_empty()).map(str::to_owned));
+    below.extend(parts.map(latex_subscript));
+    below.extend(owner.map(|o| o.split(['.', '_']).map(latex_subscript).collect::<Vec<_>>().join("\\,")));
+    let base = latex_word(letters);
+    let base = match marks.len() {
+        0 => base,
+        1 => format!("\\dot{{{base}}}"),
+        2 => format!("\\ddot{{{base}}}"),
+        n => format!("{base}^{{({n})}}"),
+    };
+    if below.is_empty() { base } else { format!("{base}_{{{}}}", below.join(",")) }
+}
+
+fn split_marks(name: &str) -> (&str, &str) {
+    let end = name.trim_end_matches('\'').len();
+    name.split_at(end)
+}
+
+fn split_digits(word: &str) -> (&str, &str) {
+    let end = word.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    if end == 0 { (word, "") } else { word.split_at(end) }
+}
+
+fn unicode_word(word: &str) -> String {
+    let (letters, digits) = split_digits(word);
+    match GREEK.iter().find(|g| g.0 == letters) {
+        Some(greek) => format!("{}{digits}", greek.1),
+        None => word.to_owned(),
+    }
+}
+
+fn latex_word(word: &str) -> String {
+    if let Some(greek) = GREEK.iter().find(|g| g.0 == word || word.chars().eq([g.1])) {
+        return format!("\\{}", greek.2);
+    }
+    if word.chars().count() == 1 { word.to_owned() } else { format!("\\mathit{{{word}}}") }
+}
+
+fn latex_subscript(word: &str) -> String {
+    if GREEK.iter().any(|g| g.0 == word) {
+        return latex_word(word);
+    }
+    if word.chars().count() == 1 || word.bytes().all(|b| b.is_ascii_digit()) {
+        return word.to_owned();
+    }
+    format!("\\mathrm{{{word}}}")
+}

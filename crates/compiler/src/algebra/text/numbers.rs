@@ -1,0 +1,65 @@
+//! Numbers as people write them.
+
+use super::super::rational::Rational;
+use num_bigint::BigInt;
+
+/// The digits and the power of ten of a number of 0 or more: `digits * 10^exponent`, no zeros at the end. `None` if it is
+/// no decimal of at most 17 digits and not the exact value of a float either.
+pub(super) fn decimal(value: &Rational) -> Option<(String, i32)> {
+    exact_decimal(value).or_else(|| {
+        let float = value.to_f64();
+        let exact = Rational::from_f64(float).as_ref() == Some(value);
+        exact.then(|| Rational::from_decimal(&format!("{float:e}")))?.and_then(|v| exact_decimal(&v))
+    })
+}
+
+fn exact_decimal(value: &Rational) -> Option<(String, i32)> {
+    let mut below = value.denominator();
+    let mut power = 0u32;
+    let ten = BigInt::from(10);
+    let mut above = value.numerator();
+    while below != BigInt::from(1) {
+        if power > 340 {
+            return None;
+        }
+        above *= &ten;
+        power += 1;
+        let common = num_integer::Integer::gcd(&above, &below);
+        if common == BigInt::from(1) {
+            return None;
+        }
+        above /= &common;
+        below /= &common;
+        // A factor other than 2 and 5 never goes away.
+        let bits = below.bits();
+        if bits > 64 * 18 {
+            return None;
+        }
+    }
+    let digits = above.to_string();
+    let kept = digits.trim_end_matches('0');
+    let zeros = digits.len() - kept.len();
+    if kept.is_empty() {
+        return Some(("0".into(), 0));
+    }
+    let exponent = i32::try_from(zeros).ok()? - i32::try_from(power).ok()?;
+    (kept.len() <= 17).then(|| (kept.to_owned(), exponent))
+}
+
+/// A decimal as plain text if that is short, else with a power of ten: the mantissa and the exponent, 0 for none.
+pub(super) fn layout(digits: &str, exponent: i32) -> (String, i32) {
+    let len = digits.len() as i32;
+    let leading = len + exponent;
+    if exponent >= 0 && leading <= 9 {
+        return (format!("{digits}{}", "0".repeat(exponent as usize)), 0);
+    }
+    if exponent < 0 && leading > 0 {
+        let (whole, part) = digits.split_at(leading as usize);
+        return (format!("{whole}.{part}"), 0);
+    }
+    if exponent < 0 && leading > -3 {
+        return (format!("0.{}{digits}", "0".repeat(-leading as usize)), 0);
+    }
+    let (whole, part) = digits.split_at(1);
+    (if part.is_empty() { whole.to_owned() } else { format!("{whole}.{part}") }, leading - 1)
+}
