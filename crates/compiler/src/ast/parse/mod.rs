@@ -44,10 +44,10 @@ pub const MAX_DIAGNOSTICS: usize = 200;
 const MAX_NESTING: usize = 120;
 
 /// Words that are no names because expressions are made with them.
-const RESERVED: [&str; 6] = ["and", "else", "if", "not", "or", "then"];
+pub(super) const RESERVED: [&str; 6] = ["and", "else", "if", "not", "or", "then"];
 
 /// Words that begin a statement.
-const KEYWORDS: [&str; 15] = [
+pub(super) const KEYWORDS: [&str; 15] = [
     "causality",
     "component",
     "const",
@@ -74,8 +74,13 @@ const KEYWORDS: [&str; 15] = [
 /// assert_eq!(parsed.ast.statements.len(), 1);
 /// ```
 pub fn parse(text: &str, file: FileId) -> Parsed {
+    parse_with_units(text, file).0
+}
+
+/// The tree, and the places of all units in the order of the text.
+pub(super) fn parse_with_units(text: &str, file: FileId) -> (Parsed, Vec<Span>) {
     if text.len() > MAX_TEXT {
-        return too_large(text, file);
+        return (too_large(text, file), Vec::new());
     }
     let tokens: Vec<Token> = significant(text, lex(text));
     let mut parser = Parser {
@@ -88,11 +93,12 @@ pub fn parse(text: &str, file: FileId) -> Parsed {
         nesting: 0,
         quiet: false,
         faults: Vec::new(),
+        units: Vec::new(),
     };
     let ast = parser.model();
     let mut diagnostics = parser.faults;
     diagnostics.sort_by_key(|d| d.primary.span);
-    Parsed { ast, diagnostics }
+    (Parsed { ast, diagnostics }, parser.units)
 }
 
 fn too_large(text: &str, file: FileId) -> Parsed {
@@ -105,7 +111,7 @@ fn too_large(text: &str, file: FileId) -> Parsed {
 
 /// The tokens that the parser reads: no comments, and newlines only where they can end a statement, which they cannot
 /// before `->` or after a token that asks for more.
-fn significant(text: &str, mut tokens: Vec<Token>) -> Vec<Token> {
+pub(super) fn significant(text: &str, mut tokens: Vec<Token>) -> Vec<Token> {
     let mut newlines = 0;
     tokens.retain_mut(|t| {
         newlines = newlines.max(t.newlines);
@@ -161,6 +167,8 @@ struct Parser<'t> {
     /// Whether an error was just reported, so that what follows from it is not.
     quiet: bool,
     faults: Vec<Diagnostic>,
+    /// Places of the units that were read.
+    units: Vec<Span>,
 }
 
 /// Looking at tokens.

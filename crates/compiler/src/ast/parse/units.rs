@@ -34,6 +34,7 @@ impl Parser<'_> {
         let start = self.span();
         self.pos += length;
         let span = self.since(start);
+        self.units.push(span);
         UnitText { text: self.text[span.start as usize..span.end as usize].to_owned(), span }
     }
 
