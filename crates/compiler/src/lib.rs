@@ -5,7 +5,11 @@
 
 pub mod algebra;
 pub mod ast;
+pub mod bond_graph;
+pub mod causal_graph;
+pub mod causal_paths;
 pub mod diagnostic;
+pub mod equations;
 pub mod ids;
 pub mod span;
 pub mod unit;

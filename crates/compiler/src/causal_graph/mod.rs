@@ -3,14 +3,26 @@
 //! Two layers, kept apart because they can differ (`method.md`, section 2): what is *true* of the ports, found by exact
 //! elimination ([`Ports`]), and what is *drawn* on the bonds, the strokes, along which causal paths are read.
 
+mod assign;
 pub mod break_set;
+mod contradiction;
+mod local;
+mod ports;
 pub mod signals;
+mod strokes;
+mod tableau;
+mod text;
 
 use std::collections::BTreeMap;
 
-use crate::algebra::{Expr, Symbol};
+use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
 use crate::ids::Table;
+
+pub use assign::assign_causality;
+pub use contradiction::warnings;
+pub use ports::Virtual;
+pub(crate) use ports::{circuits, rank_given};
 
 /// Where the causal stroke of a bond sits: at the end that the effort runs towards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +63,10 @@ pub struct Ports {
     pub degenerate: Vec<Expr>,
     /// Variables (bond efforts or flows) that the junction structure leaves undetermined.
     pub undetermined: Vec<Symbol>,
+    /// Independent variables that sit on no storage, `method.md`, 5.2.
+    pub virtual_speeds: Vec<Virtual>,
+    /// Relations among imposed variables alone that the structure demands; they hold, else there were an error.
+    pub demands: Vec<Combination>,
 }
 
 /// One port and its causality.
@@ -84,3 +100,92 @@ pub enum Role {
 /// A linear combination of variables: sorted by symbol, no zero coefficient.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Combination(pub Vec<(Symbol, Expr)>);
+
+impl Ports {
+    /// The state of a port.
+    pub fn of(&self, port: PortRef) -> Option<&PortState> {
+        self.ports.binary_search_by_key(&port, |p| p.port).ok().map(|i| &self.ports[i])
+    }
+
+    /// A variable as a combination of inputs alone; `known` keeps what has been worked out.
+    pub fn resolve(&self, x: &mut Exprs, symbol: Symbol, known: &mut BTreeMap<Symbol, Combination>) -> Combination {
+        // Depth can equal the length of a chain of bonds, so the recursion keeps its own stack.
+        let mut stack = vec![symbol];
+        while let Some(&top) = stack.last() {
+            let Some(definition) = self.definitions.get(&top) else {
+                stack.pop();
+                continue;
+            };
+            let before = stack.len();
+            let open = |s: &Symbol| self.definitions.contains_key(s) && !known.contains_key(s);
+            if known.contains_key(&top) {
+                stack.pop();
+                continue;
+            }
+            stack.extend(definition.0.iter().map(|t| t.0).filter(open));
+            if stack.len() == before {
+                let flat = definition.substitute(x, known);
+                known.insert(top, flat);
+                stack.pop();
+            }
+        }
+        known.get(&symbol).cloned().unwrap_or_else(|| Combination(vec![(symbol, x.int(1))]))
+    }
+}
+
+impl Combination {
+    /// The combination as an expression.
+    pub fn expr(&self, x: &mut Exprs) -> Expr {
+        let terms: Vec<Expr> = self
+            .0
+            .iter()
+            .map(|&(s, c)| {
+                let s = x.sym(s);
+                x.mul(&[c, s])
+            })
+            .collect();
+        x.add(&terms)
+    }
+
+    /// The coefficient of a symbol, if it occurs.
+    pub fn coefficient(&self, symbol: Symbol) -> Option<Expr> {
+        self.0.binary_search_by_key(&symbol, |t| t.0).ok().map(|i| self.0[i].1)
+    }
+
+    /// The combination with known ones put in for their symbols.
+    fn substitute(&self, x: &mut Exprs, known: &BTreeMap<Symbol, Combination>) -> Combination {
+        if self.0.iter().all(|t| !known.contains_key(&t.0)) {
+            return self.clone();
+        }
+        if let [(only, coefficient)] = self.0[..]
+            && x.is_number(coefficient).is_some_and(|n| n.is_one())
+        {
+            return known[&only].clone();
+        }
+        let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
+        for &(s, c) in &self.0 {
+            let own = [(s, c)];
+            let inner = known.get(&s);
+            for &(t, e) in inner.map_or(&own[..], |k| &k.0) {
+                let product = if inner.is_some() { x.mul(&[c, e]) } else { e };
+                let value = sum.get(&t).map_or(product, |&old| x.add(&[old, product]));
+                sum.insert(t, value);
+            }
+        }
+        for e in sum.values_mut() {
+            if x.is_number(*e).is_none() {
+                *e = x.simplify(*e);
+            }
+        }
+        sum.retain(|_, e| !x.is_zero_given(*e));
+        Combination(sum.into_iter().collect())
+    }
+}
+
+/// The size of an expression at the given parameters, every other symbol taken as 1.
+pub(crate) fn magnitude(x: &Exprs, e: Expr) -> f64 {
+    fn value(x: &Exprs, s: Symbol) -> f64 {
+        x.facts(s).given.map_or(1.0, |g| x.eval(g, &mut |s| value(x, s)))
+    }
+    x.eval(e, &mut |s| value(x, s)).abs()
+}

@@ -35,6 +35,16 @@ codes! {
     S011 "quoted text that documents nothing";
     S012 "the text is too large";
     S013 "an unknown word in a statement";
+    C001 "two sources set the same variable";
+    C002 "sources or constraints cannot hold together";
+    C003 "forced strokes or causality cannot hold together";
+    C004 "a source or constraint repeats what others impose (warning)";
+    C005 "sources alone fix a storage (warning)";
+    C006 "a flow or effort circulates undetermined (warning)";
+    C007 "the structure degenerates at the given parameters (warning)";
+    C008 "a forced causality that the equations cannot follow (warning)";
+    E001 "an equation needs the time derivative of an input";
+    E002 "a loop of variables has no unique solution";
     U001 "an unknown unit";
     U002 "a unit that cannot be read";
 }

@@ -1,9 +1,23 @@
 //! The equations of a bond graph in one of its forms, in the order in which they are evaluated.
 
+mod blocks;
+mod conserved;
+mod definitions;
+mod derive;
+mod display;
+mod minimal;
+mod observed;
+mod text;
+
+use std::collections::BTreeMap;
+
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{BondGraph, ElementId};
 use crate::span::Span;
 use crate::unit::Unit;
+
+pub use derive::derive_equations;
+pub use text::{Style, print, print_expr};
 
 /// A formulation, `method.md`, section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,8 +47,12 @@ pub struct Equations {
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
     pub conditions: Vec<Condition>,
-    /// The equations as a person would write them.
+    /// The equations as a person would write them: one for each state, then what stays implicit.
     pub display: Vec<DisplayEquation>,
+    /// What a state is that is no variable of its own (`pi = X + S^T X_d`), in stored quantities.
+    pub meanings: Vec<(Symbol, Expr)>,
+    /// Names that outputs or `let`s give to states.
+    pub aliases: BTreeMap<Symbol, String>,
     /// Differentiation index of what is left, 0 for an explicit ODE.
     pub index: u8,
     /// Number of independent storages.

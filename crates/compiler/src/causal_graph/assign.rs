@@ -1,0 +1,489 @@
+//! The stage: strokes by propagation where that is the whole truth, exact elimination everywhere else.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
+use super::signals::{NodeId, signal_graph};
+use super::strokes::{Strokes, parts, sits_here};
+use super::{CausalGraph, Combination, Ports, Role, Stroke, break_set, contradiction, local};
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::ids::{Id, Table};
+
+/// Assigns causality: the exact one of every port, and a stroke on every determined bond.
+///
+/// Errors: sources, constraints or forced strokes that cannot hold together, with the smallest set that cannot.
+/// Source: `method.md`, section 2 and 5.1.
+pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
+    let mut graph = graph.clone();
+    let mut x = graph.exprs.clone();
+    let wanted = Wanted::of(&mut x, &graph);
+    let mut strokes = Strokes::new(&graph);
+    let mut ports = Ports::default();
+    let mut faults = Vec::new();
+    let mut undrawn = BTreeSet::new();
+    for members in parts(&graph) {
+        let mut part = Part { x: &mut x, graph: &graph, wanted: &wanted, members: &members, laws: BTreeMap::new() };
+        match part.assign_with_fewest_breaks(&mut strokes) {
+            Ok(solved) => {
+                undrawn.extend(solved.undetermined.iter().copied());
+                merge(&mut ports, solved);
+            }
+            Err(more) => faults.extend(more),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(Diagnostics(faults));
+    }
+    ports.ports.sort_by_key(|p| p.port);
+    let mut strokes = strokes.table();
+    erase(&graph, &mut strokes, &undrawn);
+    graph.exprs = x;
+    Ok(CausalGraph { graph, strokes, ports })
+}
+
+/// One connected part under assignment, with the causality chosen for some of its algebraic laws.
+struct Part<'a> {
+    x: &'a mut Exprs,
+    graph: &'a BondGraph,
+    wanted: &'a Wanted,
+    members: &'a [ElementId],
+    laws: BTreeMap<PortRef, PortCausality>,
+}
+
+/// Up to this many laws on causal loops all their causalities are tried; above, one law is turned at a time.
+const TRIED_TOGETHER: usize = 8;
+/// Parts with more elements than this keep the causality that propagation gives.
+const TURNED_AT_MOST: usize = 600;
+
+impl Part<'_> {
+    /// Assigns the part; laws on causal loops are turned so that the fewest break variables are left.
+    fn assign_with_fewest_breaks(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
+        let mark = strokes.mark();
+        let solved = self.assign(strokes)?;
+        if self.members.len() > TURNED_AT_MOST || !strokes.is_complete(self.members) {
+            return Ok(solved);
+        }
+        let table = strokes.table();
+        let turnable = self.laws_on_loops(&table);
+        if turnable.is_empty() {
+            return Ok(solved);
+        }
+        let drawn: BTreeMap<PortRef, bool> =
+            outer_ports(self.graph, self.members).into_iter().filter_map(|p| Some((p, strokes.at(p)?))).collect();
+        strokes.undo(mark);
+        let before = loop_size(self.graph, &table);
+        let best = self.best_laws(strokes, &drawn, &turnable, before);
+        strokes.undo(mark);
+        self.laws = best.iter().map(|(&p, &here)| (p, causality_of(here))).collect();
+        self.assign(strokes)
+    }
+
+    /// Invertible laws whose port signals lie on a causal loop.
+    fn laws_on_loops(&mut self, table: &Table<BondId, Stroke>) -> Vec<PortRef> {
+        let signals = signal_graph(self.graph, table);
+        let looped: BTreeSet<usize> =
+            break_set::cyclic_components(&signals.algebraic_successors()).into_iter().flatten().collect();
+        if looped.is_empty() {
+            return Vec::new();
+        }
+        let ports = outer_ports(self.graph, self.members);
+        let on_loop = |p: &PortRef| {
+            let bond = self.graph.bond_of(*p);
+            matches!(self.graph.elements[p.element].kind, Kind::Resistor(_))
+                && [NodeId::effort(bond), NodeId::flow(bond)].iter().any(|n| looped.contains(&n.index()))
+        };
+        let found: Vec<PortRef> = ports.into_iter().filter(on_loop).collect();
+        found.into_iter().filter(|&p| self.is_invertible(p)).collect()
+    }
+
+    fn is_invertible(&mut self, port: PortRef) -> bool {
+        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return false };
+        let bond = &self.graph.bonds[self.graph.bond_of(port)];
+        let (given, law, wanted) = match laws[port.port as usize] {
+            ResistorLaw::Resistive(e) => (bond.effort, e, bond.flow),
+            ResistorLaw::Conductive(f) => (bond.flow, f, bond.effort),
+            ResistorLaw::Implicit(_) => return true,
+        };
+        let given = self.x.sym(given);
+        let residual = self.x.sub(given, law);
+        self.x.solve_for(residual, wanted).is_some()
+    }
+
+    /// The causality of laws that leaves the smallest loops, found by trial on the strokes.
+    fn best_laws(
+        &mut self,
+        strokes: &mut Strokes,
+        drawn: &BTreeMap<PortRef, bool>,
+        turnable: &[PortRef],
+        before: (usize, usize),
+    ) -> BTreeMap<PortRef, bool> {
+        let start: BTreeMap<PortRef, bool> = turnable.iter().map(|&p| (p, drawn[&p])).collect();
+        let mut best = (before, start.clone());
+        let mut consider = |choice: BTreeMap<PortRef, bool>, best: &mut ((usize, usize), BTreeMap<PortRef, bool>)| {
+            if let Some(size) = self.try_laws(strokes, drawn, &choice)
+                && size < best.0
+            {
+                *best = (size, choice);
+            }
+        };
+        if turnable.len() <= TRIED_TOGETHER {
+            for mask in 1..1usize << turnable.len() {
+                let turned = |(i, (p, here)): (usize, (&PortRef, &bool))| (*p, *here != (mask >> i & 1 == 1));
+                consider(start.iter().enumerate().map(turned).collect(), &mut best);
+            }
+        } else {
+            for port in turnable {
+                let mut choice = best.1.clone();
+                choice.entry(*port).and_modify(|here| *here = !*here);
+                consider(choice, &mut best);
+            }
+        }
+        best.1
+    }
+
+    /// Break variables and signals on loops with these strokes at the laws, all else that matters as drawn before.
+    fn try_laws(
+        &mut self,
+        strokes: &mut Strokes,
+        drawn: &BTreeMap<PortRef, bool>,
+        choice: &BTreeMap<PortRef, bool>,
+    ) -> Option<(usize, usize)> {
+        let mark = strokes.mark();
+        let mut fine = contradiction::force_strokes(self.graph, strokes, self.members).is_ok();
+        let is_law = |p: &PortRef| matches!(self.graph.elements[p.element].kind, Kind::Resistor(_));
+        fine = fine && drawn.iter().filter(|(p, _)| !is_law(p)).all(|(&p, &here)| strokes.set_at(p, here).is_ok());
+        fine = fine && choice.iter().all(|(&p, &here)| strokes.set_at(p, here).is_ok());
+        for (&port, &here) in drawn {
+            if fine && strokes.at(port).is_none() {
+                fine = strokes.set_at(port, here).is_ok() || strokes.set_at(port, !here).is_ok();
+            }
+        }
+        fine = fine && strokes.complete(self.members).is_ok() && strokes.is_complete(self.members);
+        let size = fine.then(|| loop_size(self.graph, &strokes.table()));
+        strokes.undo(mark);
+        size
+    }
+
+    /// Assigns the part with the laws as they are wished.
+    fn assign(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
+        let (graph, members) = (self.graph, self.members);
+        let forced = contradiction::force_strokes(graph, strokes, members).map_err(|fault| vec![fault])?;
+        let mark = strokes.mark();
+        let drawn = self.propagate(strokes);
+        let plain = drawn && !forced && !self.wanted.concerns(members) && is_plain(self.x, graph, members);
+        if plain && let Some((definitions, watched)) = whole_truth(self.x, graph, members, strokes) {
+            let ports = local::roles(graph, members, strokes);
+            return Ok(Solved { ports, definitions, watched, ..Solved::default() });
+        }
+        let solved = self.solve(strokes, forced);
+        let faults = contradiction::demands(self.x, graph, &solved);
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+        if !(forced && drawn) {
+            strokes.undo(mark);
+            draw_truth(graph, strokes, members, &solved);
+        }
+        Ok(solved)
+    }
+
+    /// The causality asked of an algebraic law: the one chosen, else the one in which it is written.
+    fn wish(&self, port: PortRef) -> PortCausality {
+        self.laws.get(&port).copied().unwrap_or_else(|| wished(self.graph, port))
+    }
+}
+
+/// Number of break variables, and number of signals on loops.
+fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>) -> (usize, usize) {
+    let successors = signal_graph(graph, table).algebraic_successors();
+    let looped = break_set::cyclic_components(&successors).iter().map(Vec::len).sum();
+    (break_set::count(&successors), looped)
+}
+
+fn causality_of(here: bool) -> PortCausality {
+    if here { PortCausality::Conductive } else { PortCausality::Resistive }
+}
+
+/// The order in which storages are asked to be independent, ahead of the order of the model.
+struct Wanted {
+    independent: Vec<PortRef>,
+    virtual_speeds: Vec<Virtual>,
+}
+
+impl Wanted {
+    /// `prefer`, then common variables of junctions whose integrals occur in moduli. Source: `method.md`, 5.2.
+    fn of(x: &mut Exprs, graph: &BondGraph) -> Wanted {
+        let mut symbols: Vec<Symbol> = graph.preferences.iter().map(|p| p.symbol).collect();
+        symbols.extend(integrated_in_moduli(x, graph));
+        let mut wanted = Wanted { independent: Vec::new(), virtual_speeds: Vec::new() };
+        for symbol in symbols {
+            wanted.add(x, graph, symbol);
+        }
+        wanted
+    }
+
+    fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol) {
+        let (bond, flow) = match graph.variables.get(&symbol).map(|v| v.meaning) {
+            Some(Meaning::Flow(bond)) => (bond, true),
+            Some(Meaning::Effort(bond)) => (bond, false),
+            _ => return,
+        };
+        let ends = [graph.bonds[bond].from, graph.bonds[bond].to];
+        let is_junction = |k: &Kind| matches!((k, flow), (Kind::One, true) | (Kind::Zero, false));
+        let Some(junction) = ends.iter().map(|p| p.element).find(|&e| is_junction(&graph.elements[e].kind)) else {
+            self.independent.extend(ends.iter().copied().filter(|&p| gives(graph, p, flow)));
+            return;
+        };
+        let own = ends.iter().copied().find(|&p| gives(graph, p, flow));
+        let opposite = |bond: BondId| {
+            let b = &graph.bonds[bond];
+            if b.from.element == junction { b.to } else { b.from }
+        };
+        let neighbours = graph.elements[junction].ports.iter().map(|p| opposite(p.bond));
+        match own.or_else(|| neighbours.into_iter().find(|&p| gives(graph, p, flow))) {
+            Some(port) if !self.independent.contains(&port) => self.independent.push(port),
+            Some(_) => {}
+            None if self.virtual_speeds.iter().any(|v| v.junction == junction) => {}
+            None => {
+                let name = &graph.elements[junction].name;
+                let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
+                let mut fresh = |suffix: &str| {
+                    let name = format!("{name}.{suffix}");
+                    let taken = graph.variables.keys().any(|&s| x.name(s) == name);
+                    x.symbol(&if taken { format!("{name}*") } else { name }, Default::default())
+                };
+                let speed = fresh(own);
+                let reaction = fresh(&format!("{conjugate}*"));
+                self.virtual_speeds.push(Virtual { junction, speed, reaction });
+            }
+        }
+    }
+
+    fn concerns(&self, members: &[ElementId]) -> bool {
+        let inside = |e: &ElementId| members.binary_search(e).is_ok();
+        self.independent.iter().any(|p| inside(&p.element)) || self.virtual_speeds.iter().any(|v| inside(&v.junction))
+    }
+}
+
+/// Whether a port belongs to a storage whose co-energy variable is a flow (or an effort).
+fn gives(graph: &BondGraph, port: PortRef, flow: bool) -> bool {
+    !is_imposed(graph, port)
+        && matches!(
+            (&graph.elements[port.element].kind, flow),
+            (Kind::Inertance(_), true) | (Kind::Compliance(_), false)
+        )
+}
+
+/// Bond variables whose integrals (as integrated signals) the moduli read.
+fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
+    let mut found = Vec::new();
+    for element in graph.elements.values() {
+        let (Kind::Transformer { modulus } | Kind::Gyrator { modulus }) = element.kind else { continue };
+        for symbol in x.symbols_of(modulus) {
+            let Some(Meaning::Signal(signal)) = graph.variables.get(&symbol).map(|v| v.meaning) else { continue };
+            let read = x.symbols_of(graph.signals[signal].rate);
+            let bonds = |s: &Symbol| {
+                matches!(graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Flow(_) | Meaning::Effort(_)))
+            };
+            let mut read = read.into_iter();
+            if let (Some(only), None) = (read.next(), read.next())
+                && bonds(&only)
+                && !found.contains(&only)
+            {
+                found.push(only);
+            }
+        }
+    }
+    found
+}
+
+impl Part<'_> {
+    /// Sequential causality assignment. `false` if it meets a contradiction; then the strokes are partial.
+    fn propagate(&self, strokes: &mut Strokes) -> bool {
+        let graph = self.graph;
+        let ports = outer_ports(graph, self.members);
+        let either = |strokes: &mut Strokes, port: PortRef, here: bool| {
+            strokes.at(port).is_some() || strokes.set_at(port, here).is_ok() || strokes.set_at(port, !here).is_ok()
+        };
+        let imposing = |p: &PortRef| imposes(graph, *p).map(|effort| (*p, !effort));
+        let storage = |p: &PortRef| match &graph.elements[p.element].kind {
+            _ if imposes(graph, *p).is_some() => None,
+            Kind::Inertance(_) => Some((*p, sits_here(PortCausality::Integral, true))),
+            Kind::Compliance(_) => Some((*p, sits_here(PortCausality::Integral, false))),
+            _ => None,
+        };
+        ports.iter().filter_map(imposing).all(|(p, here)| strokes.set_at(p, here).is_ok())
+            && ports.iter().filter_map(storage).all(|(p, here)| either(strokes, p, here))
+            && self.laws.keys().all(|&p| either(strokes, p, sits_here(self.wish(p), false)))
+            && ports.iter().all(|&p| either(strokes, p, sits_here(self.wish(p), false)))
+            && (strokes.is_complete(self.members)
+                || (strokes.complete(self.members).is_ok() && strokes.is_complete(self.members)))
+    }
+
+    /// Exact elimination, with virtual speeds where they are combinations of storages and sources.
+    fn solve(&mut self, strokes: &Strokes, forced: bool) -> Solved {
+        let (graph, members) = (self.graph, self.members);
+        let inside = |e: ElementId| members.binary_search(&e).is_ok();
+        let independent = self.wanted.independent.iter().copied().filter(|p| inside(p.element)).collect();
+        let mut wishes = Wishes { independent, ..Wishes::default() };
+        for port in outer_ports(graph, members) {
+            match &graph.elements[port.element].kind {
+                kind @ (Kind::Inertance(_) | Kind::Compliance(_)) => {
+                    let integral = sits_here(PortCausality::Integral, matches!(kind, Kind::Inertance(_)));
+                    if forced && strokes.at(port) == Some(!integral) {
+                        wishes.derivative.push(port);
+                    }
+                }
+                _ => {
+                    let drawn = strokes.at(port).map(causality_of);
+                    wishes.algebraic.insert(port, drawn.unwrap_or_else(|| self.wish(port)));
+                }
+            }
+        }
+        let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
+        if !speeds.is_empty() {
+            let first = solve_part(self.x, graph, members, &wishes);
+            wishes.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
+            if wishes.virtual_speeds.is_empty() {
+                return first;
+            }
+        }
+        solve_part(self.x, graph, members, &wishes)
+    }
+}
+
+fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
+    let outer = members.iter().filter(|&&m| !graph.elements[m].kind.is_inner());
+    outer
+        .flat_map(|&element| (0..graph.elements[element].ports.len() as u32).map(move |port| PortRef { element, port }))
+        .collect()
+}
+
+/// Whether a port imposes an effort (`true`) or a flow (`false`) as drawn, or neither.
+fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
+    match graph.elements[port.element].kind {
+        Kind::EffortSource { .. } | Kind::FlowDetector | Kind::ResidualEffort { .. } => Some(true),
+        Kind::FlowSource { .. } | Kind::ZeroCompliance { .. } | Kind::EffortDetector | Kind::ResidualFlow { .. } => {
+            Some(false)
+        }
+        Kind::Compliance(_) if is_imposed(graph, port) => Some(true),
+        _ => None,
+    }
+}
+
+/// The causality that an algebraic law asks for: the one in which it is written.
+fn wished(graph: &BondGraph, port: PortRef) -> PortCausality {
+    match &graph.elements[port.element].kind {
+        Kind::Resistor(laws) => match laws[port.port as usize] {
+            ResistorLaw::Conductive(_) => PortCausality::Conductive,
+            _ => PortCausality::Resistive,
+        },
+        _ => PortCausality::Resistive,
+    }
+}
+
+/// Whether nothing in the part asks for exact elimination: residual sinks, and moduli that vanish.
+fn is_plain(x: &Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
+    members.iter().all(|&m| match graph.elements[m].kind {
+        Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. } => false,
+        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => !x.is_zero_given(modulus),
+        _ => true,
+    })
+}
+
+/// The definitions that the strokes give, if they are the whole truth: on trees, and on rings in which all storages are
+/// integral and no signal runs in a circle.
+fn whole_truth(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    strokes: &Strokes,
+) -> Option<(Vec<(Symbol, Combination)>, Vec<Expr>)> {
+    let bonds: usize = members.iter().map(|&m| graph.elements[m].ports.len()).sum::<usize>() / 2;
+    let tree = bonds + 1 == members.len();
+    if !tree && local::roles(graph, members, strokes).iter().any(|p| p.role == Role::Dependent) {
+        return None;
+    }
+    let (definitions, divisors) = local::definitions(x, graph, members, strokes);
+    (tree || is_triangular(&definitions)).then_some((definitions, divisors))
+}
+
+/// Whether no definition leads back to itself.
+fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
+    let index: BTreeMap<Symbol, usize> = definitions.iter().enumerate().map(|(i, d)| (d.0, i)).collect();
+    let mut waits = vec![0usize; definitions.len()];
+    let mut readers: Vec<Vec<usize>> = vec![Vec::new(); definitions.len()];
+    for (i, (_, combination)) in definitions.iter().enumerate() {
+        for read in combination.0.iter().filter_map(|t| index.get(&t.0)) {
+            waits[i] += 1;
+            readers[*read].push(i);
+        }
+    }
+    let mut ready: Vec<usize> = (0..definitions.len()).filter(|&i| waits[i] == 0).collect();
+    let mut done = 0;
+    while let Some(i) = ready.pop() {
+        done += 1;
+        for &reader in &readers[i] {
+            waits[reader] -= 1;
+            if waits[reader] == 0 {
+                ready.push(reader);
+            }
+        }
+    }
+    done == definitions.len()
+}
+
+/// Whether the common variable of a junction is a combination of co-energy variables and imposed variables.
+fn spanned(x: &mut Exprs, graph: &BondGraph, solved: &Solved, speed: &Virtual) -> bool {
+    let ports = Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() };
+    let bond = &graph.bonds[graph.elements[speed.junction].ports[0].bond];
+    let common = if matches!(graph.elements[speed.junction].kind, Kind::One) { bond.flow } else { bond.effort };
+    let row = ports.resolve(x, common, &mut BTreeMap::new());
+    let allowed = |s: Symbol| {
+        solved
+            .ports
+            .iter()
+            .any(|p| p.input == s && matches!(p.role, Role::Independent | Role::Source | Role::Redundant))
+    };
+    row.0.iter().all(|t| allowed(t.0))
+        && row.0.iter().any(|t| solved.ports.iter().any(|p| p.input == t.0 && p.role == Role::Independent))
+}
+
+/// Strokes from the exact causality of the ports; what that leaves open is completed by matching.
+fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], solved: &Solved) {
+    for state in &solved.ports {
+        let inertance = matches!(graph.elements[state.port.element].kind, Kind::Inertance(_));
+        let here = match (imposes(graph, state.port), state.role) {
+            (Some(effort), _) => !effort,
+            (None, Role::Independent) => sits_here(PortCausality::Integral, inertance),
+            (None, Role::Dependent) => sits_here(PortCausality::Derivative, inertance),
+            (None, Role::Algebraic(causality)) => sits_here(causality, false),
+            (None, Role::Source | Role::Redundant) => continue,
+        };
+        // Where a flow circulates, what is true of the ports need not fit on the strokes.
+        let _ = strokes.set_at(state.port, here);
+    }
+    let _ = strokes.complete(members);
+}
+
+/// Bonds whose effort or flow is undetermined have no stroke, those at sources excepted.
+fn erase(graph: &BondGraph, strokes: &mut Table<BondId, Stroke>, undetermined: &BTreeSet<Symbol>) {
+    for (id, bond) in graph.bonds.iter() {
+        let inner = [bond.from, bond.to].iter().all(|p| graph.elements[p.element].kind.is_inner());
+        if inner && (undetermined.contains(&bond.effort) || undetermined.contains(&bond.flow)) {
+            strokes[id] = Stroke::Undetermined;
+        }
+    }
+}
+
+fn merge(ports: &mut Ports, solved: Solved) {
+    ports.ports.extend(solved.ports);
+    ports.definitions.extend(solved.definitions);
+    ports.watched.extend(solved.watched);
+    ports.degenerate.extend(solved.degenerate);
+    ports.undetermined.extend(solved.undetermined);
+    ports.virtual_speeds.extend(solved.virtual_speeds);
+    ports.demands.extend(solved.demands);
+}

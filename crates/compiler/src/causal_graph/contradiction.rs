@@ -1,0 +1,275 @@
+//! What cannot hold together, and what is legal but odd, in physical words.
+
+use std::collections::BTreeMap;
+
+use super::ports::Solved;
+use super::strokes::{Strokes, sits_here};
+use super::{CausalGraph, Combination, Role, Stroke};
+use crate::algebra::{Expr, Exprs, PlainNames, Symbol, ascii};
+use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
+use crate::diagnostic::{Diagnostic, codes};
+use crate::ids::Id;
+use crate::span::Span;
+
+/// One demand of the modeller on a stroke.
+#[derive(Debug, Clone, Copy)]
+struct Demand {
+    bond: BondId,
+    at_to: bool,
+    span: Span,
+}
+
+/// Applies `stroke` and `causality` to one part; tells whether there were any. On conflict the smallest set is reported.
+pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId]) -> Result<bool, Diagnostic> {
+    let demands = demands_on(graph, members);
+    let mark = strokes.mark();
+    if demands.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok()) {
+        return Ok(!demands.is_empty());
+    }
+    strokes.undo(mark);
+    let holds = |set: &[Demand], strokes: &mut Strokes| {
+        let fine = set.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok());
+        strokes.undo(mark);
+        fine
+    };
+    // Leave out one demand after the other as long as the rest still contradicts itself.
+    let mut core = demands;
+    let mut i = 0;
+    while i < core.len() {
+        let mut fewer = core.clone();
+        fewer.remove(i);
+        if holds(&fewer, strokes) { i += 1 } else { core = fewer }
+    }
+    let bond = |d: &Demand| {
+        let bond = &graph.bonds[d.bond];
+        let name = |p: PortRef| graph.elements[p.element].name.clone();
+        format!("{} -> {}", name(bond.from), name(bond.to))
+    };
+    let Some(first) = core.first() else { unreachable!("an empty set contradicts nothing") };
+    let mut fault = Diagnostic::error(
+        codes::C003,
+        "these forced strokes cannot hold together",
+        first.span,
+        format!("this settles the stroke of {}", bond(first)),
+    );
+    for other in &core[1..] {
+        fault = fault.also(other.span, format!("this settles the stroke of {}", bond(other)));
+    }
+    Err(fault
+        .note("one bond sets the effort of a 0-junction, one sets the flow of a 1-junction; a TF passes causality on, a GY turns it")
+        .hint("leave out one of them"))
+}
+
+fn demands_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {
+    let inside = |e: ElementId| members.binary_search(&e).is_ok();
+    let mut demands = Vec::new();
+    for forced in &graph.forced_causality {
+        if inside(forced.port.element) {
+            let port = &graph.elements[forced.port.element].ports[forced.port.port as usize];
+            let inertance = matches!(graph.elements[forced.port.element].kind, Kind::Inertance(_));
+            let here = sits_here(forced.causality, inertance);
+            demands.push(Demand { bond: port.bond, at_to: here == port.inward, span: forced.span });
+        }
+    }
+    for forced in &graph.forced_strokes {
+        if inside(graph.bonds[forced.bond].from.element) {
+            demands.push(Demand { bond: forced.bond, at_to: forced.at_to, span: forced.span });
+        }
+    }
+    demands
+}
+
+/// Errors for relations that the structure demands of imposed variables and that do not hold.
+pub fn demands(x: &mut Exprs, graph: &BondGraph, solved: &Solved) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    for demand in &solved.demands {
+        if !holds(x, graph, solved, demand) {
+            faults.push(contradiction(x, graph, solved, demand));
+        }
+    }
+    faults
+}
+
+/// Whether a relation among imposed variables holds with the values that they are given.
+fn holds(x: &mut Exprs, graph: &BondGraph, solved: &Solved, demand: &Combination) -> bool {
+    let mut terms = Vec::new();
+    for &(symbol, coefficient) in &demand.0 {
+        let Some(value) = imposed_value(x, graph, solved, symbol) else { return false };
+        terms.push(x.mul(&[coefficient, value]));
+    }
+    let sum = x.add(&terms);
+    x.is_zero_given(sum)
+}
+
+/// The port that imposes a variable.
+fn imposer(solved: &Solved, symbol: Symbol) -> Option<PortRef> {
+    solved.ports.iter().find(|p| p.input == symbol).map(|p| p.port)
+}
+
+fn imposed_value(x: &mut Exprs, graph: &BondGraph, solved: &Solved, symbol: Symbol) -> Option<Expr> {
+    let port = imposer(solved, symbol)?;
+    Some(match graph.elements[port.element].kind {
+        Kind::EffortSource { value } | Kind::FlowSource { value } => value,
+        Kind::ZeroCompliance { flow } => flow,
+        _ => x.int(0),
+    })
+}
+
+fn contradiction(x: &mut Exprs, graph: &BondGraph, solved: &Solved, demand: &Combination) -> Diagnostic {
+    let concerned: Vec<PortRef> = demand.0.iter().filter_map(|t| imposer(solved, t.0)).collect();
+    let name = |p: &PortRef| graph.elements[p.element].name.as_str();
+    let names: Vec<&str> = concerned.iter().map(name).collect();
+    let span = |p: &PortRef| graph.elements[p.element].span;
+    let relation = demand.expr(x);
+    let relation = ascii(x, relation, &PlainNames(x));
+    let last = concerned.last().copied().expect("a demand has terms");
+    let effort = demand.0.iter().all(|t| matches!(meaning(graph, t.0), Some(Meaning::Effort(_))));
+    let quantity = if effort { "effort" } else { "flow" };
+    let shared = (concerned.len() == 2).then(|| shared_junction(graph, concerned[0], concerned[1])).flatten();
+    let (code, title) = match (shared, concerned.len()) {
+        (Some(junction), _) => {
+            (codes::C001, format!("two sources set the {quantity} of junction {}", graph.elements[junction].name))
+        }
+        (None, 1) => (codes::C002, format!("the structure leaves {} no freedom", names[0])),
+        (None, _) => (codes::C002, format!("{} cannot hold together", names.join(" and "))),
+    };
+    let sets = |p: &PortRef| format!("{} sets it here", name(p));
+    let mut fault = Diagnostic::error(code, title, span(&last), sets(&last));
+    for port in &concerned[..concerned.len() - 1] {
+        fault = fault.also(span(port), sets(port));
+    }
+    let remedy = match (effort, concerned.len()) {
+        (true, 2..) => "put an R between them, or make one of them an Sf",
+        (false, 2..) => "put an R or a C between them, or make one of them an Se",
+        _ => "put an R or a storage beside it, or take it away",
+    };
+    fault.note(format!("the junctions demand {relation} = 0")).hint(remedy)
+}
+
+fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {
+    graph.variables.get(&symbol).map(|v| v.meaning)
+}
+
+/// The junction that two one-ports stand at.
+fn shared_junction(graph: &BondGraph, a: PortRef, b: PortRef) -> Option<ElementId> {
+    let other = |p: PortRef| {
+        let bond = &graph.bonds[graph.bond_of(p)];
+        if bond.from == p { bond.to.element } else { bond.from.element }
+    };
+    (other(a) == other(b)).then(|| other(a))
+}
+
+/// Legal, but odd: redundant constraints, storages fixed by sources alone, circulating variables, degenerate parameters.
+pub fn warnings(causal: &CausalGraph) -> Vec<Diagnostic> {
+    let mut all = Vec::new();
+    let graph = &causal.graph;
+    redundant(graph, causal, &mut all);
+    fixed_storages(graph, causal, &mut all);
+    circulating(graph, causal, &mut all);
+    forced_otherwise(graph, causal, &mut all);
+    if let Some(&first) = causal.ports.degenerate.first() {
+        let text = ascii(&graph.exprs, first, &PlainNames(&graph.exprs));
+        let span =
+            graph.parameters.values().find(|p| graph.exprs.symbols_of(first).contains(&p.symbol)).map(|p| p.span);
+        all.push(
+            Diagnostic::warning(
+                codes::C007,
+                "the structure degenerates at the given parameters",
+                span.unwrap_or_default(),
+                "with this value",
+            )
+            .note(format!(
+                "{text} = 0 here, and not in general: variables that are independent elsewhere depend on each other"
+            ))
+            .hint("if that is not meant, change one of the parameters"),
+        );
+    }
+    all
+}
+
+fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    for state in causal.ports.ports.iter().filter(|p| p.role == Role::Redundant) {
+        let element = &graph.elements[state.port.element];
+        all.push(
+            Diagnostic::warning(
+                codes::C004,
+                format!("{} repeats what other sources or constraints impose", element.name),
+                element.span,
+                "it agrees with them",
+            )
+            .note("how they share the reaction is not determined; everything else is")
+            .hint(format!("leave {} out", element.name)),
+        );
+    }
+}
+
+fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    let mut x = graph.exprs.clone();
+    let mut known = BTreeMap::new();
+    let inputs: BTreeMap<Symbol, &super::PortState> = causal.ports.ports.iter().map(|p| (p.input, p)).collect();
+    for state in causal.ports.ports.iter().filter(|p| p.role == Role::Dependent) {
+        let row = causal.ports.resolve(&mut x, state.output, &mut known);
+        let imposed = |t: &(Symbol, Expr)| inputs.get(&t.0).is_some_and(|p| p.role == Role::Source);
+        if !row.0.iter().all(imposed) {
+            continue;
+        }
+        let element = &graph.elements[state.port.element];
+        let sources: Vec<&str> =
+            row.0.iter().map(|t| graph.elements[inputs[&t.0].port.element].name.as_str()).collect();
+        let by = if sources.is_empty() {
+            "the junctions hold it at zero".into()
+        } else {
+            format!("fixed by {}", sources.join(", "))
+        };
+        all.push(
+            Diagnostic::warning(
+                codes::C005,
+                format!("{} stores only what it is given", element.name),
+                element.span,
+                by,
+            )
+            .note("it has no freedom of its own, and its reaction needs the time derivative of what fixes it")
+            .hint("if that is not meant, put an R between them"),
+        );
+    }
+}
+
+fn circulating(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    let bonds: Vec<BondId> =
+        causal.strokes.iter().filter(|(_, s)| **s == Stroke::Undetermined).map(|(id, _)| id).collect();
+    let Some(&first) = bonds.first() else { return };
+    let numbers: Vec<String> = bonds.iter().map(|b| (b.index() + 1).to_string()).collect();
+    all.push(
+        Diagnostic::warning(
+            codes::C006,
+            format!("a flow or effort can circulate in bonds {}", numbers.join(", ")),
+            graph.bonds[first].span,
+            "it is not determined here",
+        )
+        .note("the bonds form a ring that passes it on unchanged; all elements outside the ring are determined")
+        .hint("leave out one of the bonds"),
+    );
+}
+
+/// Storages drawn in derivative causality by force although they are independent.
+fn forced_otherwise(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    use crate::bond_graph::PortCausality::{Derivative, Integral};
+    for forced in &graph.forced_causality {
+        let role = causal.ports.of(forced.port).map(|p| p.role);
+        let (drawn, truth) = match (forced.causality, role) {
+            (Derivative, Some(Role::Independent)) => ("derivative", "independent"),
+            (Integral, Some(Role::Dependent)) => ("integral", "dependent"),
+            _ => continue,
+        };
+        let name = &graph.elements[forced.port.element].name;
+        all.push(
+            Diagnostic::warning(
+                codes::C008,
+                format!("{name} is drawn in {drawn} causality, but it is {truth}"),
+                forced.span,
+                "drawn so, as asked",
+            )
+            .note("the strokes and causal paths follow the drawing; the smallest equations follow what is true"),
+        );
+    }
+}

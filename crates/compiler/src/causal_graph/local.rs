@@ -1,0 +1,88 @@
+//! What strokes say about a part without rings: every variable defined by its neighbours.
+
+use super::strokes::Strokes;
+use super::{Combination, PortState, Role};
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
+
+/// Definitions of the variables that junctions and two-ports set, one element at a time, and the moduli divided by.
+///
+/// Triangular if no signal runs in a circle, which is so on trees.
+pub fn definitions(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    strokes: &Strokes,
+) -> (Vec<(Symbol, Combination)>, Vec<Expr>) {
+    let mut all = Vec::new();
+    let mut divisors = Vec::new();
+    let one = x.int(1);
+    for &element in members {
+        let ports = &graph.elements[element].ports;
+        let at = |i: usize| strokes.at(PortRef { element, port: i as u32 }).expect("strokes are complete");
+        let pair = |i: usize| {
+            let bond = &graph.bonds[ports[i].bond];
+            (bond.effort, bond.flow)
+        };
+        match graph.elements[element].kind {
+            Kind::Zero | Kind::One => {
+                let zero = matches!(graph.elements[element].kind, Kind::Zero);
+                let strong = (0..ports.len()).find(|&i| at(i) == zero).expect("one bond determines a junction");
+                let common = |i: usize| if zero { pair(i).0 } else { pair(i).1 };
+                let summed = |i: usize| if zero { pair(i).1 } else { pair(i).0 };
+                let mut sum = Vec::with_capacity(ports.len() - 1);
+                for i in (0..ports.len()).filter(|&i| i != strong) {
+                    all.push((common(i), Combination(vec![(common(strong), one)])));
+                    let same = ports[i].inward == ports[strong].inward;
+                    sum.push((summed(i), x.int(if same { -1 } else { 1 })));
+                }
+                sum.sort_by_key(|t| t.0);
+                all.push((summed(strong), Combination(sum)));
+            }
+            Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
+                let transformer = matches!(graph.elements[element].kind, Kind::Transformer { .. });
+                let ((e_in, f_in), (e_out, f_out)) = (pair(0), pair(1));
+                if at(0) {
+                    if !x.nonzero(modulus) {
+                        divisors.push(modulus);
+                        x.assume_nonzero(modulus);
+                    }
+                }
+                let inverse = |x: &mut Exprs| x.recip(modulus);
+                let [(a, b, ab), (c, d, cd)] = match (transformer, at(0)) {
+                    (true, false) => [(e_in, e_out, modulus), (f_out, f_in, modulus)],
+                    (true, true) => [(e_out, e_in, inverse(x)), (f_in, f_out, inverse(x))],
+                    (false, false) => [(e_in, f_out, modulus), (e_out, f_in, modulus)],
+                    (false, true) => [(f_out, e_in, inverse(x)), (f_in, e_out, inverse(x))],
+                };
+                all.push((a, Combination(vec![(b, ab)])));
+                all.push((c, Combination(vec![(d, cd)])));
+            }
+            _ => {}
+        }
+    }
+    (all, divisors)
+}
+
+/// The roles of the ports of a part as the strokes say.
+pub fn roles(graph: &BondGraph, members: &[ElementId], strokes: &Strokes) -> Vec<PortState> {
+    let mut states = Vec::new();
+    for &element in members.iter().filter(|&&m| !graph.elements[m].kind.is_inner()) {
+        for index in 0..graph.elements[element].ports.len() as u32 {
+            let port = PortRef { element, port: index };
+            let bond = &graph.bonds[graph.bond_of(port)];
+            let effort_in = strokes.at(port).expect("strokes are complete");
+            let role = match (&graph.elements[element].kind, effort_in) {
+                (Kind::Inertance(_), true) | (Kind::Compliance(_), false) => Role::Independent,
+                (Kind::Inertance(_), false) | (Kind::Compliance(_), true) => Role::Dependent,
+                (Kind::Resistor(_), true) => Role::Algebraic(PortCausality::Conductive),
+                (Kind::Resistor(_), false) => Role::Algebraic(PortCausality::Resistive),
+                _ => Role::Source,
+            };
+            let role = if super::ports::is_imposed(graph, port) { Role::Source } else { role };
+            let (input, output) = if effort_in { (bond.flow, bond.effort) } else { (bond.effort, bond.flow) };
+            states.push(PortState { port, role, input, output });
+        }
+    }
+    states
+}

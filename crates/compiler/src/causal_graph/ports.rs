@@ -1,0 +1,414 @@
+//! The causality of ports by exact elimination. Source: `method.md`, 5.1.
+
+use std::collections::BTreeMap;
+
+use super::tableau::Tableau;
+use super::{Combination, PortState, Role};
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
+
+/// What the elimination is asked for, beyond the graph itself.
+#[derive(Debug, Clone, Default)]
+pub struct Wishes {
+    /// Storages that shall become dependent rather than others (drawn in derivative causality).
+    pub derivative: Vec<PortRef>,
+    /// Causality wished for algebraic ports.
+    pub algebraic: BTreeMap<PortRef, PortCausality>,
+    /// Storages that shall stay independent, first of all.
+    pub independent: Vec<PortRef>,
+    /// Common variables of junctions that shall stay independent although no storage has them.
+    pub virtual_speeds: Vec<Virtual>,
+}
+
+/// A variable that is independent without a storage: a storage of value zero stands for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Virtual {
+    /// The 1-junction (flow) or 0-junction (effort).
+    pub junction: ElementId,
+    /// Symbol of the common variable.
+    pub speed: Symbol,
+    /// Symbol of the conjugate, which vanishes.
+    pub reaction: Symbol,
+}
+
+/// The solved part of the junction structure.
+#[derive(Debug, Default)]
+pub struct Solved {
+    /// The ports with their roles, in order.
+    pub ports: Vec<PortState>,
+    /// The virtual speeds that turned out independent.
+    pub virtual_speeds: Vec<Virtual>,
+    /// Triangular definitions.
+    pub definitions: Vec<(Symbol, Combination)>,
+    /// Relations among source variables alone that the structure demands: each `Σ = 0`, its support minimal.
+    pub demands: Vec<Combination>,
+    /// Divisors to be watched.
+    pub watched: Vec<Expr>,
+    /// Entries that vanish at the given parameters only.
+    pub degenerate: Vec<Expr>,
+    /// Variables that are not determined.
+    pub undetermined: Vec<Symbol>,
+}
+
+/// Which of effort and flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Which {
+    Effort,
+    Flow,
+}
+
+/// What an element gives to the junction structure, seen by priority.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Offer {
+    /// A variable is imposed.
+    Imposed(Which),
+    /// A storage with this co-energy variable.
+    Storage(Which),
+    /// A law that takes either, or prefers to give one.
+    Law,
+    /// A storage of value zero.
+    Virtual(Which),
+}
+
+struct NetPort {
+    port: Option<PortRef>,
+    effort: usize,
+    flow: usize,
+    offer: Offer,
+}
+
+struct Net {
+    symbols: Vec<Symbol>,
+    column: BTreeMap<Symbol, usize>,
+    rows: Vec<Vec<(usize, Expr)>>,
+    ports: Vec<NetPort>,
+    inner: Vec<usize>,
+}
+
+/// Solves the junction structure of one connected part.
+pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Solved {
+    let net = Net::new(x, graph, members, wishes);
+    let mut tableau = Tableau::new(net.symbols.len(), net.rows.clone());
+    tableau.eliminate(x, &net.inner);
+
+    // Outputs are chosen from the least wanted input to the most wanted one: reactions, rates, laws, co-energies.
+    let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
+    let storages = net.storage_order(wishes);
+    let laws = net.ports_where(|o| o == Offer::Law);
+    let mut solved = Solved::default();
+    let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
+    for &p in &imposed {
+        let determined = tableau.pivot(x, net.ports[p].conjugate());
+        outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
+    }
+    for &p in &storages {
+        tableau.pivot(x, net.ports[p].conjugate());
+    }
+    for &p in laws.iter().rev() {
+        let port = &net.ports[p];
+        let causality = law_causality(x, &tableau, port, wishes);
+        tableau.pivot(x, port.column(causality == PortCausality::Conductive));
+        outputs.insert(p, Role::Algebraic(causality));
+    }
+    for &p in storages.iter().rev() {
+        let dependent = tableau.pivot(x, net.ports[p].given());
+        outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
+    }
+    let rest: Vec<Vec<(usize, Expr)>> = tableau.rest().cloned().collect();
+    solved.demands = circuits(x, net.symbols.len(), rest).into_iter().map(|(_, row)| net.combination(&row)).collect();
+    net.report(tableau, &outputs, wishes, &mut solved, x);
+    solved
+}
+
+impl NetPort {
+    fn column(&self, effort: bool) -> usize {
+        if effort { self.effort } else { self.flow }
+    }
+    /// The column of the variable that the element gives, if it has its way.
+    fn given(&self) -> usize {
+        match self.offer {
+            Offer::Imposed(which) | Offer::Storage(which) | Offer::Virtual(which) => {
+                self.column(which == Which::Effort)
+            }
+            Offer::Law => self.effort,
+        }
+    }
+    fn conjugate(&self) -> usize {
+        self.effort + self.flow - self.given()
+    }
+}
+
+impl Net {
+    fn new(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Net {
+        let mut net = Net {
+            symbols: Vec::new(),
+            column: BTreeMap::new(),
+            rows: Vec::new(),
+            ports: Vec::new(),
+            inner: Vec::new(),
+        };
+        let one = x.int(1);
+        let minus = x.int(-1);
+        for &element in members {
+            if !graph.elements[element].kind.is_inner() {
+                net.add_ports(x, graph, element, one, minus);
+            }
+        }
+        let outer = net.symbols.len();
+        for &element in members {
+            let speed = wishes.virtual_speeds.iter().find(|v| v.junction == element);
+            net.add_rows(x, graph, element, one, minus, speed);
+        }
+        let virtuals: Vec<usize> = net.ports.iter().flat_map(|p| [p.effort, p.flow]).filter(|&c| c >= outer).collect();
+        net.inner = (outer..net.symbols.len()).filter(|c| !virtuals.contains(c)).collect();
+        net
+    }
+
+    fn of(&mut self, symbol: Symbol) -> usize {
+        let next = self.symbols.len();
+        *self.column.entry(symbol).or_insert_with(|| {
+            self.symbols.push(symbol);
+            next
+        })
+    }
+
+    /// Columns of the ports of an element. Where two elements meet on one bond the second gets variables of its own.
+    fn add_ports(&mut self, x: &mut Exprs, graph: &BondGraph, element: ElementId, one: Expr, minus: Expr) {
+        for (index, port) in graph.elements[element].ports.iter().enumerate() {
+            let bond = &graph.bonds[port.bond];
+            let (mut effort, mut flow) = (bond.effort, bond.flow);
+            if self.column.contains_key(&effort) {
+                let twin = |x: &mut Exprs, s: Symbol| {
+                    let name = format!("{}*", x.name(s));
+                    x.symbol(&name, Default::default())
+                };
+                (effort, flow) = (twin(x, effort), twin(x, flow));
+                for (own, common) in [(effort, bond.effort), (flow, bond.flow)] {
+                    let mut row = vec![(self.of(own), one), (self.of(common), minus)];
+                    row.sort_by_key(|e| e.0);
+                    self.rows.push(row);
+                }
+            }
+            let port = PortRef { element, port: index as u32 };
+            let offer = offer(graph, port);
+            let (effort, flow) = (self.of(effort), self.of(flow));
+            self.ports.push(NetPort { port: Some(port), effort, flow, offer });
+        }
+    }
+
+    /// Rows of a junction or two-port.
+    fn add_rows(
+        &mut self,
+        x: &mut Exprs,
+        graph: &BondGraph,
+        element: ElementId,
+        one: Expr,
+        minus: Expr,
+        speed: Option<&Virtual>,
+    ) {
+        let ports = &graph.elements[element].ports;
+        let mut columns: Vec<(usize, usize, Expr)> = Vec::with_capacity(ports.len() + 1);
+        for port in ports {
+            let bond = &graph.bonds[port.bond];
+            columns.push((self.of(bond.effort), self.of(bond.flow), if port.inward { one } else { minus }));
+        }
+        match graph.elements[element].kind {
+            Kind::Zero => {
+                if let Some(v) = speed {
+                    let (effort, flow) = (self.of(v.speed), self.of(v.reaction));
+                    self.ports.push(NetPort { port: None, effort, flow, offer: Offer::Virtual(Which::Effort) });
+                    columns.push((effort, flow, minus));
+                }
+                self.junction(columns.iter().map(|c| (c.0, c.1, c.2)).collect(), one, minus);
+            }
+            Kind::One => {
+                if let Some(v) = speed {
+                    let (effort, flow) = (self.of(v.reaction), self.of(v.speed));
+                    self.ports.push(NetPort { port: None, effort, flow, offer: Offer::Virtual(Which::Flow) });
+                    columns.push((effort, flow, minus));
+                }
+                self.junction(columns.iter().map(|c| (c.1, c.0, c.2)).collect(), one, minus);
+            }
+            Kind::Transformer { modulus } => {
+                let m = x.neg(modulus);
+                self.push(vec![(columns[0].0, one), (columns[1].0, m)]);
+                self.push(vec![(columns[1].1, one), (columns[0].1, m)]);
+            }
+            Kind::Gyrator { modulus } => {
+                let r = x.neg(modulus);
+                self.push(vec![(columns[0].0, one), (columns[1].1, r)]);
+                self.push(vec![(columns[1].0, one), (columns[0].1, r)]);
+            }
+            _ => {}
+        }
+    }
+
+    /// Rows of a junction: the first variable of each triple is common, the second ones sum to zero with their signs.
+    fn junction(&mut self, columns: Vec<(usize, usize, Expr)>, one: Expr, minus: Expr) {
+        for pair in columns.windows(2) {
+            self.push(vec![(pair[0].0, one), (pair[1].0, minus)]);
+        }
+        self.push(columns.iter().map(|c| (c.1, c.2)).collect());
+    }
+
+    /// Adds a row; a bond from an element to itself would name a column twice and is refused before.
+    fn push(&mut self, mut row: Vec<(usize, Expr)>) {
+        row.sort_by_key(|e| e.0);
+        if row.windows(2).all(|w| w[0].0 != w[1].0) {
+            self.rows.push(row);
+        }
+    }
+
+    fn ports_where(&self, test: impl Fn(Offer) -> bool) -> Vec<usize> {
+        (0..self.ports.len()).filter(|&p| test(self.ports[p].offer)).collect()
+    }
+
+    /// Storages from the most wanted independent one to the least.
+    fn storage_order(&self, wishes: &Wishes) -> Vec<usize> {
+        let mut order = self.ports_where(|o| matches!(o, Offer::Storage(_) | Offer::Virtual(_)));
+        order.sort_by_key(|&p| match self.ports[p].port {
+            None => (1, 0, p),
+            Some(port) => match wishes.independent.iter().position(|&i| i == port) {
+                Some(rank) => (0, rank, p),
+                None => (2 + usize::from(wishes.derivative.contains(&port)), 0, p),
+            },
+        });
+        order
+    }
+
+    fn combination(&self, row: &[(usize, Expr)]) -> Combination {
+        let mut terms: Vec<(Symbol, Expr)> = row.iter().map(|&(c, e)| (self.symbols[c], e)).collect();
+        terms.sort_by_key(|t| t.0);
+        Combination(terms)
+    }
+
+    fn report(
+        &self,
+        tableau: Tableau,
+        outputs: &BTreeMap<usize, Role>,
+        wishes: &Wishes,
+        solved: &mut Solved,
+        x: &mut Exprs,
+    ) {
+        for (&p, &role) in outputs {
+            let port = &self.ports[p];
+            let output = match role {
+                Role::Source | Role::Redundant | Role::Independent => port.conjugate(),
+                Role::Dependent => port.given(),
+                Role::Algebraic(causality) => port.column(causality == PortCausality::Conductive),
+            };
+            let input = port.effort + port.flow - output;
+            match port.port {
+                Some(port) => solved.ports.push(PortState {
+                    port,
+                    role,
+                    input: self.symbols[input],
+                    output: self.symbols[output],
+                }),
+                None if role == Role::Independent => solved
+                    .virtual_speeds
+                    .extend(wishes.virtual_speeds.iter().filter(|v| v.speed == self.symbols[input])),
+                None => {}
+            }
+        }
+        let mut defined = vec![false; self.symbols.len()];
+        for (column, row) in &tableau.pivots {
+            defined[*column] = true;
+            let negative: Vec<(usize, Expr)> = row.iter().map(|&(c, e)| (c, x.neg(e))).collect();
+            solved.definitions.push((self.symbols[*column], self.combination(&negative)));
+        }
+        let free = |&c: &usize| !defined[c];
+        solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
+        for (&p, &role) in outputs {
+            if role == Role::Redundant {
+                solved.undetermined.push(self.symbols[self.ports[p].conjugate()]);
+            }
+        }
+        solved.watched = tableau.watched;
+        solved.degenerate = tableau.degenerate;
+    }
+}
+
+/// What an outer port offers to the junction structure.
+fn offer(graph: &BondGraph, port: PortRef) -> Offer {
+    use crate::bond_graph::StorageLaw::Known;
+    let index = port.port as usize;
+    match &graph.elements[port.element].kind {
+        Kind::EffortSource { .. } | Kind::FlowDetector => Offer::Imposed(Which::Effort),
+        Kind::ResidualFlow { residual: None } => Offer::Imposed(Which::Effort),
+        Kind::FlowSource { .. } | Kind::ZeroCompliance { .. } | Kind::EffortDetector => Offer::Imposed(Which::Flow),
+        Kind::ResidualEffort { residual: None } => Offer::Imposed(Which::Flow),
+        Kind::Compliance(s) if matches!(s.laws[index], Known { .. }) => Offer::Imposed(Which::Effort),
+        Kind::Inertance(_) => Offer::Storage(Which::Flow),
+        Kind::Compliance(_) => Offer::Storage(Which::Effort),
+        _ => Offer::Law,
+    }
+}
+
+/// The causality of an algebraic port: the one wished for if it is admissible and well conditioned.
+fn law_causality(x: &Exprs, tableau: &Tableau, port: &NetPort, wishes: &Wishes) -> PortCausality {
+    let wish = port.port.and_then(|p| wishes.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
+    let size = |column| tableau.candidate(x, column).map(|e| super::magnitude(x, e));
+    match (size(port.effort), size(port.flow)) {
+        (Some(_), None) => PortCausality::Conductive,
+        (None, Some(_)) => PortCausality::Resistive,
+        (Some(effort), Some(flow)) => match wish {
+            PortCausality::Conductive if effort < 1e-3 * flow => PortCausality::Resistive,
+            PortCausality::Conductive => PortCausality::Conductive,
+            _ if flow < 1e-3 * effort => PortCausality::Conductive,
+            _ => PortCausality::Resistive,
+        },
+        (None, None) => wish,
+    }
+}
+
+/// Fully reduces rows: each of the results is a relation of minimal support, with the column that leads it.
+pub(crate) fn circuits(
+    x: &mut Exprs,
+    columns: usize,
+    rows: Vec<Vec<(usize, Expr)>>,
+) -> Vec<(usize, Vec<(usize, Expr)>)> {
+    let mut used: Vec<usize> = rows.iter().flatten().map(|e| e.0).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut tableau = Tableau::new(columns, rows);
+    for column in used {
+        tableau.pivot(x, column);
+    }
+    let one = x.int(1);
+    let mut reduced: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
+    for (column, row) in tableau.pivots.into_iter().rev() {
+        let mut sum: BTreeMap<usize, Expr> = BTreeMap::new();
+        for (c, e) in row {
+            let terms = reduced.get(&c).map_or_else(|| vec![(c, one)], |r| negated(x, r));
+            for (t, coefficient) in terms {
+                let product = x.mul(&[e, coefficient]);
+                let value = sum.get(&t).map_or(product, |&old| x.add(&[old, product]));
+                sum.insert(t, value);
+            }
+        }
+        sum.retain(|_, e| !x.is_zero_given(*e));
+        reduced.insert(column, sum.into_iter().collect());
+    }
+    let whole = |(column, mut row): (usize, Vec<(usize, Expr)>)| {
+        row.push((column, one));
+        row.sort_by_key(|e| e.0);
+        (column, row)
+    };
+    reduced.into_iter().map(whole).collect()
+}
+
+/// The rank of a matrix, given by rows without zeros, at the given parameters.
+pub(crate) fn rank_given(x: &mut Exprs, columns: usize, rows: Vec<Vec<(usize, Expr)>>) -> usize {
+    let mut tableau = Tableau::new(columns, rows);
+    (0..columns).filter(|&c| tableau.pivot(x, c)).count()
+}
+
+fn negated(x: &mut Exprs, row: &[(usize, Expr)]) -> Vec<(usize, Expr)> {
+    row.iter().map(|&(c, e)| (c, x.neg(e))).collect()
+}
+
+/// Whether a port has its variable imposed: sources, constraints, detectors, compliances of known displacement.
+pub fn is_imposed(graph: &BondGraph, port: PortRef) -> bool {
+    matches!(offer(graph, port), Offer::Imposed(_))
+}

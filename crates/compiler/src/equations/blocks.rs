@@ -1,0 +1,214 @@
+//! From definitions to steps: order of evaluation, loops torn at few variables, linear ones recognised.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::DiGraph;
+
+use super::Step;
+use super::definitions::{Definition, Definitions};
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{ElementId, Meaning};
+use crate::causal_graph::{break_set::break_set, rank_given};
+
+/// A loop that has no unique solution, whatever the values are.
+#[derive(Debug, Clone)]
+pub struct Insoluble {
+    /// The variables of the loop.
+    pub unknowns: Vec<Symbol>,
+    /// The elements concerned.
+    pub elements: Vec<ElementId>,
+}
+
+/// Steps in order, and the linear equations that stand behind some of them: `Σ coefficient · unknown = right`.
+#[derive(Debug, Clone, Default)]
+pub struct Ordered {
+    /// The steps.
+    pub steps: Vec<Step>,
+    /// The rows of all linear blocks.
+    pub rows: Vec<LinearRow>,
+}
+
+/// One linear equation.
+#[derive(Debug, Clone)]
+pub struct LinearRow {
+    /// Unknowns with their coefficients, zeros left out.
+    pub left: Vec<(Symbol, Expr)>,
+    /// Right-hand side.
+    pub right: Expr,
+}
+
+/// Puts the definitions of `symbols` into evaluation order. Loops are preferably torn at the variables in `first`.
+pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
+    let mut ordered = Ordered::default();
+    for component in components(d, symbols) {
+        match component[..] {
+            [only] if is_direct(d, only) => {
+                ordered.steps.push(Step::Assign { symbol: only, value: d.of[&only].expr() });
+            }
+            _ => block(d, component, first, &mut ordered)?,
+        }
+    }
+    Ok(ordered)
+}
+
+fn is_direct(d: &Definitions, symbol: Symbol) -> bool {
+    match d.of[&symbol] {
+        Definition::Explicit(e) => !d.x.depends_on(e, symbol),
+        Definition::Implicit(_) => false,
+    }
+}
+
+/// Strongly connected components of the definitions, those that are read first.
+fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Vec<Symbol>> {
+    let graph = dependency_graph(&d.x, symbols, |s| d.of[&s].expr());
+    let sorted = |nodes: Vec<_>| {
+        let mut set: Vec<Symbol> = nodes.into_iter().map(|n| graph[n]).collect();
+        set.sort();
+        set
+    };
+    tarjan_scc(&graph).into_iter().map(sorted).collect()
+}
+
+/// An edge from every symbol to each symbol that its expression reads.
+fn dependency_graph(x: &Exprs, symbols: &[Symbol], expr: impl Fn(Symbol) -> Expr) -> DiGraph<Symbol, ()> {
+    let mut graph = DiGraph::with_capacity(symbols.len(), 2 * symbols.len());
+    let nodes: BTreeMap<Symbol, _> = symbols.iter().map(|&s| (s, graph.add_node(s))).collect();
+    for (symbol, &node) in &nodes {
+        for read in x.symbols_of(expr(*symbol)) {
+            if let Some(&target) = nodes.get(&read) {
+                graph.add_edge(node, target, ());
+            }
+        }
+    }
+    graph
+}
+
+/// Steps for variables that depend on each other.
+fn block(
+    d: &mut Definitions,
+    symbols: Vec<Symbol>,
+    first: &BTreeSet<Symbol>,
+    ordered: &mut Ordered,
+) -> Result<(), Insoluble> {
+    let torn = tear(d, &symbols, first);
+    let rest: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
+    let body: Vec<(Symbol, Expr)> = components(d, &rest).into_iter().map(|c| (c[0], d.of[&c[0]].expr())).collect();
+    let elements = elements_of(d, &symbols);
+    let mut residuals = Vec::with_capacity(torn.len());
+    for &t in &torn {
+        residuals.push(match d.of[&t] {
+            Definition::Explicit(e) => {
+                let own = d.x.sym(t);
+                d.x.sub(own, e)
+            }
+            Definition::Implicit(e) => e,
+        });
+    }
+    let flat = substituted(&mut d.x, &body, &residuals);
+    let linear: Option<Vec<(Vec<Expr>, Expr)>> = flat.iter().map(|&r| d.x.linear_in(r, &torn)).collect();
+    let Some(rows) = linear else {
+        let inner = body.clone();
+        ordered.steps.push(Step::Newton { unknowns: torn, body: inner, residuals, elements });
+        return Ok(ordered.assign(body));
+    };
+    let x = &mut d.x;
+    let matrix: Vec<Vec<Expr>> = rows.iter().map(|r| r.0.iter().map(|&e| x.simplify(e)).collect()).collect();
+    let right: Vec<Expr> = rows.iter().map(|r| x.neg(r.1)).collect();
+    if is_singular(x, &matrix) {
+        return Err(Insoluble { unknowns: torn, elements });
+    }
+    for (row, &right) in matrix.iter().zip(&right) {
+        let terms = torn.iter().copied().zip(row.iter().copied());
+        let left = terms.filter(|(_, e)| !x.is_zero(*e)).collect();
+        ordered.rows.push(LinearRow { left, right });
+    }
+    match (&matrix[..], &right[..], &torn[..]) {
+        ([row], [right], [unknown]) => {
+            if !x.nonzero(row[0]) {
+                ordered.steps.push(Step::Watch { pivot: row[0], elements });
+                x.assume_nonzero(row[0]);
+            }
+            let value = x.div(*right, row[0]);
+            ordered.steps.push(Step::Assign { symbol: *unknown, value });
+        }
+        _ => ordered.steps.push(Step::Linear { unknowns: torn, matrix, right, elements }),
+    }
+    ordered.assign(body);
+    Ok(())
+}
+
+impl Ordered {
+    fn assign(&mut self, body: Vec<(Symbol, Expr)>) {
+        self.steps.extend(body.into_iter().map(|(symbol, value)| Step::Assign { symbol, value }));
+    }
+}
+
+/// The variables at which a loop is torn: all implicit ones, then preferred ones, then a minimum set of the others.
+fn tear(d: &Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Vec<Symbol> {
+    let mut torn: BTreeSet<Symbol> =
+        symbols.iter().copied().filter(|s| matches!(d.of[s], Definition::Implicit(_))).collect();
+    for preferred in [true, false] {
+        let open: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
+        for component in components(d, &open) {
+            if component.len() == 1 && is_direct(d, component[0]) {
+                continue;
+            }
+            if preferred {
+                torn.extend(component.iter().filter(|s| first.contains(s)));
+            } else {
+                torn.extend(break_variables(d, &component));
+            }
+        }
+    }
+    torn.into_iter().collect()
+}
+
+/// A minimum set of variables that meets every loop of a component.
+fn break_variables(d: &Definitions, component: &[Symbol]) -> Vec<Symbol> {
+    let index: BTreeMap<Symbol, usize> = component.iter().enumerate().map(|(i, &s)| (s, i)).collect();
+    let successors: Vec<Vec<u32>> = component
+        .iter()
+        .map(|s| d.x.symbols_of(d.of[s].expr()).iter().filter_map(|r| index.get(r).map(|&i| i as u32)).collect())
+        .collect();
+    let rank = vec![0; component.len()];
+    break_set(&successors, &rank).vertices.into_iter().map(|i| component[i]).collect()
+}
+
+/// Expressions with the body put in.
+pub fn substituted(x: &mut Exprs, body: &[(Symbol, Expr)], exprs: &[Expr]) -> Vec<Expr> {
+    let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
+    for &(symbol, value) in body {
+        let value = x.substitute(value, &known);
+        known.insert(symbol, value);
+    }
+    exprs.iter().map(|&e| x.substitute(e, &known)).collect()
+}
+
+/// Whether the determinant vanishes for all values or at the given parameters.
+pub fn is_singular(x: &mut Exprs, matrix: &[Vec<Expr>]) -> bool {
+    if matrix.len() > 8 {
+        return false; // left to the pivots of the run
+    }
+    let entries = |row: &Vec<Expr>| row.iter().copied().enumerate().filter(|(_, e)| !x.is_zero_given(*e)).collect();
+    let rows: Vec<Vec<(usize, Expr)>> = matrix.iter().map(entries).collect();
+    rank_given(x, matrix.len(), rows) < matrix.len()
+}
+
+fn elements_of(d: &Definitions, symbols: &[Symbol]) -> Vec<ElementId> {
+    let mut elements = BTreeSet::new();
+    for &symbol in symbols {
+        let port = |p: crate::bond_graph::PortRef| (!d.graph.elements[p.element].kind.is_inner()).then_some(p.element);
+        match d.meaning(symbol) {
+            Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => {
+                let bond = &d.graph.bonds[bond];
+                elements.extend([bond.from, bond.to].into_iter().filter_map(port));
+            }
+            Some(Meaning::Stored(p)) => {
+                elements.insert(p.element);
+            }
+            _ => {}
+        }
+    }
+    elements.into_iter().collect()
+}

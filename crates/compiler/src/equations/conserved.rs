@@ -1,0 +1,125 @@
+//! Conserved quantities: constant combinations of stored quantities that nothing can change. Source: `method.md`, 5.7.
+
+use std::collections::BTreeMap;
+
+use super::Conserved;
+use super::minimal::{Assembled, Balance};
+use crate::algebra::{Expr, Symbol};
+use crate::causal_graph::{CausalGraph, circuits};
+
+/// Finds them, and makes each a constant in place of one state.
+pub fn eliminate(assembled: &mut Assembled, causal: &CausalGraph) -> Vec<Conserved> {
+    let _ = causal;
+    let balances = std::mem::take(&mut assembled.balances);
+    let rows = constant_rows(assembled, &balances);
+    let core = peel(&rows);
+    let mut found = Vec::new();
+    for vector in null_vectors(assembled, &rows, &core) {
+        found.extend(replace(assembled, &balances, &vector, found.len() + 1));
+    }
+    found
+}
+
+/// Rows over columns that are an input times its non-constant factor, with constant coefficients.
+fn constant_rows(assembled: &mut Assembled, balances: &[Balance]) -> Vec<Vec<(usize, Expr)>> {
+    let mut columns: BTreeMap<(Symbol, Option<Expr>), usize> = BTreeMap::new();
+    let one = assembled.d.x.int(1);
+    let mut rows = Vec::with_capacity(balances.len());
+    for balance in balances {
+        let mut row = Vec::with_capacity(balance.row.0.len());
+        for &(symbol, coefficient) in &balance.row.0 {
+            let constant = assembled.d.is_constant(coefficient);
+            let next = columns.len();
+            let key = (symbol, (!constant).then_some(coefficient));
+            let column = *columns.entry(key).or_insert(next);
+            row.push((column, if constant { coefficient } else { one }));
+        }
+        row.sort_by_key(|e| e.0);
+        rows.push(row);
+    }
+    rows
+}
+
+/// The rows that are left when rows with a column of their own are taken away again and again.
+fn peel(rows: &[Vec<(usize, Expr)>]) -> Vec<usize> {
+    let columns = rows.iter().flatten().map(|e| e.0 + 1).max().unwrap_or(0);
+    let mut holders: Vec<Vec<usize>> = vec![Vec::new(); columns];
+    for (r, row) in rows.iter().enumerate() {
+        row.iter().for_each(|e| holders[e.0].push(r));
+    }
+    let mut count: Vec<usize> = holders.iter().map(Vec::len).collect();
+    let mut gone = vec![false; rows.len()];
+    let mut single: Vec<usize> = (0..columns).filter(|&c| count[c] == 1).collect();
+    while let Some(column) = single.pop() {
+        let Some(&row) = holders[column].iter().find(|&&r| !gone[r]) else { continue };
+        gone[row] = true;
+        for &(c, _) in &rows[row] {
+            count[c] -= 1;
+            if count[c] == 1 {
+                single.push(c);
+            }
+        }
+    }
+    (0..rows.len()).filter(|&r| !gone[r]).collect()
+}
+
+/// Combinations of rows that vanish: pairs (index of a balance, factor).
+fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[usize]) -> Vec<Vec<(usize, Expr)>> {
+    let mut transposed: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
+    for (k, &row) in core.iter().enumerate() {
+        for &(column, e) in &rows[row] {
+            transposed.entry(column).or_default().push((k, e));
+        }
+    }
+    let x = &mut assembled.d.x;
+    let reduced = circuits(x, core.len(), transposed.into_values().collect());
+    let one = x.int(1);
+    let mut pivot = vec![false; core.len()];
+    let mut vectors: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
+    for (leading, row) in &reduced {
+        pivot[*leading] = true;
+        for &(k, e) in row.iter().filter(|t| t.0 != *leading) {
+            let factor = x.neg(e);
+            vectors.entry(k).or_default().push((core[*leading], factor));
+        }
+    }
+    for k in (0..core.len()).filter(|&k| !pivot[k]) {
+        vectors.entry(k).or_default().push((core[k], one));
+    }
+    vectors
+        .into_values()
+        .map(|mut v| {
+            v.sort_by_key(|t| t.0);
+            v
+        })
+        .collect()
+}
+
+/// Replaces one state of a conserved combination by the constant. `None` if no state can be solved for.
+fn replace(
+    assembled: &mut Assembled,
+    balances: &[Balance],
+    vector: &[(usize, Expr)],
+    number: usize,
+) -> Option<Conserved> {
+    let mut terms = Vec::new();
+    for &(b, factor) in vector {
+        terms.push(assembled.d.x.mul(&[factor, balances[b].quantity]));
+    }
+    let value = assembled.d.x.add(&terms);
+    let symbol = assembled.d.x.symbol(&format!("K{number}"), Default::default());
+    let constant = assembled.d.x.sym(symbol);
+    let residual = assembled.d.x.sub(value, constant);
+    for &(b, _) in vector.iter().rev() {
+        let state = balances[b].state;
+        if let Some(solution) = assembled.d.x.solve_for(residual, state) {
+            assembled.states.retain(|s| s.symbol != state);
+            assembled.d.states.remove(&state);
+            assembled.d.constants.insert(symbol);
+            assembled.d.set(state, solution);
+            let name = assembled.d.x.name(symbol).to_string();
+            return Some(Conserved { symbol, name, value });
+        }
+    }
+    None
+}

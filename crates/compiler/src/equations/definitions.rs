@@ -1,0 +1,215 @@
+//! What defines each variable, and the time derivative of anything.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Unavailable;
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{BondGraph, Meaning};
+
+/// How a symbol gets its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Definition {
+    /// It equals the expression.
+    Explicit(Expr),
+    /// It makes the expression vanish.
+    Implicit(Expr),
+}
+
+impl Definition {
+    /// The expression.
+    pub fn expr(self) -> Expr {
+        match self {
+            Definition::Explicit(e) | Definition::Implicit(e) => e,
+        }
+    }
+}
+
+/// The definitions of all variables of a formulation, and what is given from outside.
+pub struct Definitions<'a> {
+    /// The pool.
+    pub x: Exprs,
+    /// The graph.
+    pub graph: &'a BondGraph,
+    /// Definitions by symbol.
+    pub of: BTreeMap<Symbol, Definition>,
+    /// States with the symbols of their rates.
+    pub states: BTreeMap<Symbol, Symbol>,
+    /// Stored quantities with the symbols of their rates, which the bonds carry.
+    pub stored: BTreeMap<Symbol, Symbol>,
+    /// Conserved constants.
+    pub constants: BTreeSet<Symbol>,
+    /// Symbols that have no value, with the reason.
+    pub missing: BTreeMap<Symbol, Unavailable>,
+    rates: BTreeMap<Symbol, Symbol>,
+}
+
+impl<'a> Definitions<'a> {
+    /// Nothing defined yet.
+    pub fn new(x: Exprs, graph: &'a BondGraph) -> Self {
+        Definitions {
+            x,
+            graph,
+            of: BTreeMap::new(),
+            states: BTreeMap::new(),
+            stored: BTreeMap::new(),
+            constants: BTreeSet::new(),
+            missing: BTreeMap::new(),
+            rates: BTreeMap::new(),
+        }
+    }
+
+    /// Defines a symbol by an expression.
+    pub fn set(&mut self, symbol: Symbol, value: Expr) {
+        self.of.insert(symbol, Definition::Explicit(value));
+    }
+
+    /// Defines a symbol as what makes an expression vanish; solved for it where that can be written down.
+    pub fn set_root(&mut self, symbol: Symbol, residual: Expr) {
+        let definition = match self.x.solve_for(residual, symbol) {
+            Some(value) => Definition::Explicit(value),
+            None => Definition::Implicit(residual),
+        };
+        self.of.insert(symbol, definition);
+    }
+
+    /// Makes a symbol a state; gives the symbol of its rate.
+    pub fn state(&mut self, symbol: Symbol) -> Symbol {
+        let rate = self.rate_symbol(symbol);
+        self.states.insert(symbol, rate);
+        rate
+    }
+
+    /// Makes a stored quantity a state: its rate is the variable that the bond carries.
+    pub fn stored_state(&mut self, stored: Symbol) {
+        let rate = self.stored[&stored];
+        self.states.insert(stored, rate);
+    }
+
+    /// The symbol that stands for the time derivative of another.
+    pub fn rate_symbol(&mut self, symbol: Symbol) -> Symbol {
+        let name = format!("{}'", self.x.name(symbol));
+        self.x.symbol(&name, Default::default())
+    }
+
+    /// Whether an expression keeps its value during a run: it reads parameters only.
+    pub fn is_constant(&self, e: Expr) -> bool {
+        let constant = |s: &Symbol| matches!(self.meaning(*s), Some(Meaning::Parameter(_)));
+        self.x.symbols_of(e).iter().all(constant)
+    }
+
+    /// The time derivative of an expression. Symbols whose rates it needs are defined on the way.
+    pub fn rate(&mut self, e: Expr) -> Result<Expr, Unavailable> {
+        let mut terms = Vec::new();
+        for symbol in self.x.symbols_of(e) {
+            let slope = self.x.derivative(e, symbol);
+            if self.x.is_zero(slope) {
+                continue;
+            }
+            let rate = self.rate_of(symbol)?;
+            terms.push(self.x.mul(&[slope, rate]));
+        }
+        Ok(self.x.add(&terms))
+    }
+
+    /// The time derivative of a symbol.
+    pub fn rate_of(&mut self, symbol: Symbol) -> Result<Expr, Unavailable> {
+        if let Some(reason) = self.missing.get(&symbol) {
+            return Err(reason.clone());
+        }
+        if let Some(&rate) = self.states.get(&symbol).or_else(|| self.stored.get(&symbol)) {
+            return Ok(self.x.sym(rate));
+        }
+        if self.constants.contains(&symbol) {
+            return Ok(self.x.int(0));
+        }
+        match self.meaning(symbol) {
+            Some(Meaning::Parameter(_)) => return Ok(self.x.int(0)),
+            Some(Meaning::Time) => return Ok(self.x.int(1)),
+            Some(Meaning::Input(input)) => {
+                return Err(Unavailable::NeedsRateOf(self.graph.inputs[input].name.clone()));
+            }
+            Some(Meaning::Signal(signal)) => return Ok(self.graph.signals[signal].rate),
+            Some(Meaning::Held(held)) => match self.graph.held[held].kind {
+                crate::bond_graph::HeldKind::Sample => return Ok(self.x.int(0)),
+                crate::bond_graph::HeldKind::Delay => {
+                    return Err(Unavailable::NeedsRateOf(self.graph.held[held].name.clone()));
+                }
+            },
+            _ => {}
+        }
+        if let Some(&rate) = self.rates.get(&symbol) {
+            return Ok(self.x.sym(rate));
+        }
+        let Some(&definition) = self.of.get(&symbol) else { return Err(Unavailable::Unsolvable) };
+        let rate = self.rate_symbol(symbol);
+        self.rates.insert(symbol, rate);
+        match self.rate(definition.expr()) {
+            Ok(value) => {
+                let definition = match definition {
+                    Definition::Explicit(_) => Definition::Explicit(value),
+                    Definition::Implicit(_) => Definition::Implicit(value),
+                };
+                self.of.insert(rate, definition);
+                Ok(self.x.sym(rate))
+            }
+            Err(reason) => {
+                self.missing.insert(rate, reason.clone());
+                self.rates.remove(&symbol);
+                Err(reason)
+            }
+        }
+    }
+
+    /// Defines what the modeller's own rates (`x'` in an expression) stand for; those that have no value are noted.
+    pub fn define_user_rates(&mut self) {
+        let rates: Vec<(Symbol, Symbol)> = self
+            .graph
+            .variables
+            .iter()
+            .filter_map(|(&s, v)| if let Meaning::Rate(of) = v.meaning { Some((s, of)) } else { None })
+            .collect();
+        for (symbol, of) in rates {
+            match self.rate_of(of) {
+                Ok(value) => {
+                    let own = self.x.sym(symbol);
+                    if value != own {
+                        self.set(symbol, value);
+                    }
+                }
+                Err(reason) => {
+                    self.missing.insert(symbol, reason);
+                }
+            }
+        }
+    }
+
+    /// What a symbol of the graph stands for.
+    pub fn meaning(&self, symbol: Symbol) -> Option<Meaning> {
+        self.graph.variables.get(&symbol).map(|v| v.meaning)
+    }
+
+    /// Symbols that cannot be had because something they read, near or far, has no value.
+    pub fn spread_missing(&mut self) {
+        let mut readers: BTreeMap<Symbol, Vec<Symbol>> = BTreeMap::new();
+        if self.missing.is_empty() {
+            return;
+        }
+        for (&symbol, definition) in &self.of {
+            for read in self.x.symbols_of(definition.expr()) {
+                readers.entry(read).or_default().push(symbol);
+            }
+        }
+        let mut work: Vec<Symbol> = self.missing.keys().copied().collect();
+        while let Some(symbol) = work.pop() {
+            let reason = self.missing[&symbol].clone();
+            for &reader in readers.get(&symbol).into_iter().flatten() {
+                if !self.missing.contains_key(&reader) {
+                    self.missing.insert(reader, reason.clone());
+                    work.push(reader);
+                }
+            }
+        }
+        let missing: BTreeSet<Symbol> = self.missing.keys().copied().collect();
+        self.of.retain(|s, _| !missing.contains(s));
+    }
+}

@@ -1,0 +1,204 @@
+//! The equations as a textbook shows them: everything put in that can be, until only states are left.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::blocks::{LinearRow, Ordered};
+use super::definitions::Definitions;
+use super::{DisplayEquation, State, Step};
+use crate::algebra::{Expr, Exprs, Node, Symbol};
+
+/// Up to this many steps everything is put in; above, equations are shown in the variables of the steps.
+const SMALL: usize = 2_000;
+/// Linear blocks up to this size are written out.
+const CLOSED: usize = 3;
+
+/// What is shown.
+pub struct Shown {
+    /// One equation for each state, then the equations of what stays implicit.
+    pub display: Vec<DisplayEquation>,
+    /// Names that outputs or `let`s give to states.
+    pub aliases: BTreeMap<Symbol, String>,
+}
+
+/// The equations for people, with everything put in that can be.
+pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered) -> Shown {
+    let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
+    let known = if ordered.steps.len() <= SMALL { expansions(d, &ordered.steps, &rates) } else { BTreeMap::new() };
+    let aliases = aliases(d, states, &known);
+    Shown { display: equations(d, states, ordered, &known), aliases }
+}
+
+/// Outputs and `let`s that are nothing but a state.
+fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, Expr>) -> BTreeMap<Symbol, String> {
+    let mut aliases = BTreeMap::new();
+    let graph = d.graph;
+    for named in graph.outputs.iter().chain(&graph.lets) {
+        let value = d.x.substitute(named.value, known);
+        if let &Node::Symbol(symbol) = d.x.node(value)
+            && states.iter().any(|s| s.symbol == symbol)
+        {
+            aliases.entry(symbol).or_insert_with(|| named.name.clone());
+        }
+    }
+    aliases
+}
+
+fn equations(
+    d: &mut Definitions,
+    states: &[State],
+    ordered: &Ordered,
+    known: &BTreeMap<Symbol, Expr>,
+) -> Vec<DisplayEquation> {
+    let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
+    let mut shown = Vec::new();
+    let rows = ordered.rows.iter().filter(|r| r.left.iter().any(|t| rates.contains(&t.0)));
+    let by_row: BTreeMap<Symbol, &LinearRow> = assign_rows(rows, &rates);
+    for state in states {
+        let equation = match by_row.get(&state.rate) {
+            Some(row) => from_row(&mut d.x, row, known),
+            None => {
+                let left = d.x.sym(state.rate);
+                let value = d.of.get(&state.rate).map(|f| f.expr()).unwrap_or(left);
+                let right = put_in(&mut d.x, value, known);
+                DisplayEquation { left, right }
+            }
+        };
+        shown.push(equation);
+    }
+    let mut implicit = Vec::new();
+    for step in &ordered.steps {
+        match step {
+            Step::Newton { residuals, body, .. } => {
+                let inner = super::blocks::substituted(&mut d.x, body, residuals);
+                let zero = d.x.int(0);
+                for residual in inner {
+                    let left = put_in(&mut d.x, residual, known);
+                    implicit.push(DisplayEquation { left, right: zero });
+                }
+            }
+            Step::Linear { unknowns, matrix, right, .. }
+                if unknowns.len() > CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
+            {
+                for (row, &right) in matrix.iter().zip(right) {
+                    let left = unknowns.iter().copied().zip(row.iter().copied()).collect();
+                    implicit.push(from_row(&mut d.x, &LinearRow { left, right }, known));
+                }
+            }
+            _ => {}
+        }
+    }
+    // What stays implicit is shown only if the equations of the states read it.
+    let mut read: BTreeSet<Symbol> = shown.iter().flat_map(|e| d.x.symbols_of(e.right)).collect();
+    let mut waiting = implicit;
+    loop {
+        let (now, later): (Vec<_>, Vec<_>) = waiting
+            .into_iter()
+            .partition(|e| d.x.symbols_of(e.left).iter().any(|s| read.contains(s) && d.of.contains_key(s)));
+        waiting = later;
+        if now.is_empty() {
+            return shown;
+        }
+        for equation in now {
+            read.extend(d.x.symbols_of(equation.left));
+            read.extend(d.x.symbols_of(equation.right));
+            shown.push(equation);
+        }
+    }
+}
+
+/// For each state rate the row of its block that shows it best: the one whose position it has.
+fn assign_rows<'a>(
+    rows: impl Iterator<Item = &'a LinearRow>,
+    rates: &BTreeSet<Symbol>,
+) -> BTreeMap<Symbol, &'a LinearRow> {
+    let mut assigned: BTreeMap<Symbol, &LinearRow> = BTreeMap::new();
+    let mut left_over = Vec::new();
+    for row in rows {
+        let free = row.left.iter().map(|t| t.0).find(|s| rates.contains(s) && !assigned.contains_key(s));
+        match free {
+            Some(symbol) => {
+                assigned.insert(symbol, row);
+            }
+            None => left_over.push(row),
+        }
+    }
+    assigned
+}
+
+fn from_row(x: &mut Exprs, row: &LinearRow, known: &BTreeMap<Symbol, Expr>) -> DisplayEquation {
+    let mut terms = Vec::new();
+    for &(symbol, coefficient) in &row.left {
+        let coefficient = put_in(x, coefficient, known);
+        let symbol = x.sym(symbol);
+        terms.push(x.mul(&[coefficient, symbol]));
+    }
+    let left = x.add(&terms);
+    let right = put_in(x, row.right, known);
+    DisplayEquation { left, right }
+}
+
+fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
+    let e = x.substitute(e, known);
+    x.simplify(e)
+}
+
+/// Every variable in terms of states, time, inputs and what stays implicit. Rates of states stay as they are.
+fn expansions(d: &mut Definitions, steps: &[Step], rates: &BTreeSet<Symbol>) -> BTreeMap<Symbol, Expr> {
+    let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
+    for step in steps {
+        match step {
+            Step::Assign { symbol, value } if !rates.contains(symbol) => {
+                let value = put_in(&mut d.x, *value, &known);
+                known.insert(*symbol, value);
+            }
+            Step::Linear { unknowns, matrix, right, .. }
+                if unknowns.len() <= CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
+            {
+                let matrix: Vec<Vec<Expr>> =
+                    matrix.iter().map(|r| r.iter().map(|&e| put_in(&mut d.x, e, &known)).collect()).collect();
+                let right: Vec<Expr> = right.iter().map(|&e| put_in(&mut d.x, e, &known)).collect();
+                let values = cramer(&mut d.x, &matrix, &right);
+                known.extend(unknowns.iter().copied().zip(values));
+            }
+            _ => {}
+        }
+    }
+    known
+}
+
+/// The solution of a small linear system by determinants.
+fn cramer(x: &mut Exprs, matrix: &[Vec<Expr>], right: &[Expr]) -> Vec<Expr> {
+    let all = determinant(x, matrix);
+    let all = x.simplify(all);
+    (0..right.len())
+        .map(|k| {
+            let replaced: Vec<Vec<Expr>> = matrix
+                .iter()
+                .zip(right)
+                .map(|(row, &r)| row.iter().enumerate().map(|(c, &e)| if c == k { r } else { e }).collect())
+                .collect();
+            let one = determinant(x, &replaced);
+            let one = x.simplify(one);
+            let quotient = x.div(one, all);
+            x.simplify(quotient)
+        })
+        .collect()
+}
+
+/// A determinant by expansion along the first row.
+fn determinant(x: &mut Exprs, matrix: &[Vec<Expr>]) -> Expr {
+    if let [row] = matrix {
+        return row[0];
+    }
+    let mut terms = Vec::new();
+    for (c, &e) in matrix[0].iter().enumerate() {
+        let minor: Vec<Vec<Expr>> = matrix[1..]
+            .iter()
+            .map(|r| r.iter().enumerate().filter(|(k, _)| *k != c).map(|(_, &e)| e).collect())
+            .collect();
+        let minor = determinant(x, &minor);
+        let term = x.mul(&[e, minor]);
+        terms.push(if c % 2 == 0 { term } else { x.neg(term) });
+    }
+    x.add(&terms)
+}

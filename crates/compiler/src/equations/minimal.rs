@@ -1,0 +1,603 @@
+//! The minimal form: one explicit ODE per degree of freedom. Source: `method.md`, section 5.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use petgraph::unionfind::UnionFind;
+
+use super::definitions::{Definition, Definitions};
+use super::{StateKind, Unavailable};
+use crate::algebra::{Expr, Exprs, Node, Symbol};
+use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
+use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual};
+
+/// A state of the minimal form before it is ordered.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// Whose it is.
+    pub kind: StateKind,
+    /// For a momentum form: what the state is, in stored quantities.
+    pub meaning: Option<Expr>,
+}
+
+/// The definitions of the minimal form.
+pub struct Assembled<'a> {
+    /// All definitions.
+    pub d: Definitions<'a>,
+    /// The states, storages in the order of the model, then signals.
+    pub states: Vec<Chosen>,
+    /// Rows of the junction structure, by variable, over inputs of the structure.
+    pub rows: BTreeMap<Symbol, Combination>,
+    /// What changes the stored quantities behind the states.
+    pub balances: Vec<Balance>,
+    later: Vec<Later>,
+}
+
+/// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`.
+#[derive(Debug, Clone)]
+pub struct Balance {
+    /// The state that stands for it.
+    pub state: Symbol,
+    /// The quantity.
+    pub quantity: Expr,
+    /// Its rate, over inputs of the junction structure other than rates of dependent storages.
+    pub row: Combination,
+}
+
+/// A rate whose definition waits until all states are known.
+enum Later {
+    /// The rate of the state `z` makes the rate of `X(z)` equal to what the bond carries.
+    Speed { rate: Symbol, stored: Expr, bond: Symbol },
+    /// The rate of a dependent storage follows by differentiating what defines its stored quantity.
+    Dependent { rate: Symbol, stored: Symbol },
+    /// `pi' = structure + S'^T X_d`.
+    Momentum { rate: Symbol, structure: Expr, followers: Vec<Follower>, z: Symbol },
+}
+
+/// A storage port with all that its equations need.
+struct Cell<'a> {
+    state: &'a PortState,
+    storage: &'a Storage,
+    law: StorageLaw,
+    /// Stored quantity, co-energy variable and rate, as the port has them.
+    stored: Symbol,
+    z: Symbol,
+    rate: Symbol,
+    inertance: bool,
+}
+
+/// Writes down what defines every variable. Errors name the variable that has no value and why.
+pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
+    let graph = &causal.graph;
+    let mut d = Definitions::new(graph.exprs.clone(), graph);
+    let mut rows = BTreeMap::new();
+    for state in &causal.ports.ports {
+        causal.ports.resolve(&mut d.x, state.output, &mut rows);
+    }
+    for v in &causal.ports.virtual_speeds {
+        causal.ports.resolve(&mut d.x, v.reaction, &mut rows);
+    }
+    for &symbol in causal.ports.definitions.keys() {
+        causal.ports.resolve(&mut d.x, symbol, &mut rows);
+    }
+    for &symbol in &causal.ports.undetermined {
+        d.missing.insert(symbol, Unavailable::Undetermined);
+    }
+    drop_vanishing_sources(&mut d, causal, &mut rows);
+    for (&symbol, row) in &rows {
+        let value = row.expr(&mut d.x);
+        d.set(symbol, value);
+    }
+    let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), later: Vec::new() };
+    assembled.imposed_and_algebraic(causal);
+    assembled.storages(causal);
+    assembled.signals();
+    assembled.rates()?;
+    assembled.d.define_user_rates();
+    Ok(assembled)
+}
+
+/// Sources whose value is zero leave the rows: a constraint at rest imposes nothing on a dependent storage.
+fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut BTreeMap<Symbol, Combination>) {
+    let mut zero = BTreeSet::new();
+    for state in causal.ports.ports.iter().filter(|p| matches!(p.role, Role::Source | Role::Redundant)) {
+        let value = imposed(&mut d.x, causal, state);
+        if d.x.is_zero(value) {
+            zero.insert(state.input);
+        }
+    }
+    for row in rows.values_mut() {
+        row.0.retain(|t| !zero.contains(&t.0));
+    }
+}
+
+/// The value that a port imposes.
+fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) -> Expr {
+    match &causal.graph.elements[state.port.element].kind {
+        Kind::EffortSource { value } | Kind::FlowSource { value } => *value,
+        Kind::ZeroCompliance { flow } => *flow,
+        Kind::Compliance(storage) => match storage.laws[state.port.port as usize] {
+            StorageLaw::Known { displacement, law } => {
+                let stored = storage.stored[state.port.port as usize];
+                x.substitute(law, &BTreeMap::from([(stored, displacement)]))
+            }
+            _ => x.int(0),
+        },
+        _ => x.int(0),
+    }
+}
+
+impl<'a> Assembled<'a> {
+    /// Sources, constraints and algebraic laws give their variable.
+    fn imposed_and_algebraic(&mut self, causal: &'a CausalGraph) {
+        let graph = &causal.graph;
+        for state in &causal.ports.ports {
+            match state.role {
+                Role::Source | Role::Redundant => {
+                    let value = imposed(&mut self.d.x, causal, state);
+                    self.d.set(state.input, value);
+                    if let Kind::Compliance(storage) = &graph.elements[state.port.element].kind
+                        && let StorageLaw::Known { displacement, .. } = storage.laws[state.port.port as usize]
+                    {
+                        self.d.set(storage.stored[state.port.port as usize], displacement);
+                    }
+                }
+                Role::Algebraic(causality) => self.algebraic(causal, state, causality),
+                Role::Independent | Role::Dependent => {}
+            }
+        }
+    }
+
+    fn algebraic(&mut self, causal: &'a CausalGraph, state: &PortState, causality: PortCausality) {
+        let graph = &causal.graph;
+        let bond = &graph.bonds[graph.bond_of(state.port)];
+        let residual = match &graph.elements[state.port.element].kind {
+            Kind::Resistor(laws) => match laws[state.port.port as usize] {
+                ResistorLaw::Resistive(e) => (bond.effort, e, PortCausality::Resistive),
+                ResistorLaw::Conductive(f) => (bond.flow, f, PortCausality::Conductive),
+                ResistorLaw::Implicit(residual) => {
+                    let residual = self.own(causal, state, residual);
+                    return self.d.set_root(state.input, residual);
+                }
+            },
+            Kind::ResidualEffort { residual: Some(r) } | Kind::ResidualFlow { residual: Some(r) } => {
+                let residual = self.own(causal, state, *r);
+                return self.d.set_root(state.input, residual);
+            }
+            _ => return,
+        };
+        let (given, law, written) = residual;
+        let law = self.own(causal, state, law);
+        if written == causality {
+            return self.d.set(state.input, law);
+        }
+        // Written the other way round: the law gives what the junction structure gives too.
+        let given = self.d.x.sym(given);
+        let given = self.own(causal, state, given);
+        let residual = self.d.x.sub(given, law);
+        self.d.set_root(state.input, residual);
+    }
+
+    /// An expression of a law with the variables that this port itself has where two elements share a bond.
+    fn own(&mut self, causal: &CausalGraph, state: &PortState, e: Expr) -> Expr {
+        let bond = &causal.graph.bonds[causal.graph.bond_of(state.port)];
+        if [bond.effort, bond.flow].contains(&state.input) {
+            return e;
+        }
+        let effort_in = is_twin_of(&self.d.x, state.output, bond.effort);
+        let (effort, flow) = if effort_in { (state.output, state.input) } else { (state.input, state.output) };
+        let (effort, flow) = (self.d.x.sym(effort), self.d.x.sym(flow));
+        self.d.x.substitute(e, &BTreeMap::from([(bond.effort, effort), (bond.flow, flow)]))
+    }
+
+    /// Storages, one group of mutually dependent ones after the other.
+    fn storages(&mut self, causal: &'a CausalGraph) {
+        let cells: Vec<Cell<'a>> = causal.ports.ports.iter().filter_map(|state| self.cell(causal, state)).collect();
+        for cell in &cells {
+            self.d.stored.insert(cell.stored, cell.rate);
+        }
+        let speeds = &causal.ports.virtual_speeds;
+        for (members, group_speeds) in groups(causal, &cells, speeds, &self.rows) {
+            let group: Vec<&Cell> = members.iter().map(|&m| &cells[m]).collect();
+            if group.iter().all(|c| c.state.role == Role::Independent) && group_speeds.is_empty() {
+                group.iter().for_each(|cell| self.independent(cell));
+            } else if self.in_velocity_form(causal, &group) {
+                self.velocity_form(&group, &group_speeds);
+            } else {
+                self.momentum_form(&group, &group_speeds);
+            }
+        }
+        let place = |c: &Chosen| match c.kind {
+            StateKind::Storage(Some(element)) => element.0,
+            _ => u32::MAX,
+        };
+        self.states.sort_by_key(place);
+    }
+
+    fn cell(&mut self, causal: &'a CausalGraph, state: &'a PortState) -> Option<Cell<'a>> {
+        if !matches!(state.role, Role::Independent | Role::Dependent) {
+            return None;
+        }
+        let element = &causal.graph.elements[state.port.element];
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
+        let port = state.port.port as usize;
+        let (z, rate) = match state.role {
+            Role::Independent => (state.input, state.output),
+            _ => (state.output, state.input),
+        };
+        let law = match storage.laws[port] {
+            StorageLaw::Integral(e) => StorageLaw::Integral(self.own(causal, state, e)),
+            StorageLaw::Derivative(e) => StorageLaw::Derivative(self.own(causal, state, e)),
+            StorageLaw::Implicit(e) => StorageLaw::Implicit(self.own(causal, state, e)),
+            known => known,
+        };
+        let inertance = matches!(element.kind, Kind::Inertance(_));
+        Some(Cell { state, storage, law, stored: storage.stored[port], z, rate, inertance })
+    }
+
+    /// `X` as an expression of co-energy variables, if it can be written down.
+    fn stored_of(&mut self, cell: &Cell) -> Option<Expr> {
+        match cell.law {
+            StorageLaw::Derivative(e) => Some(e),
+            StorageLaw::Integral(e) => {
+                let z = self.d.x.sym(cell.z);
+                let residual = self.d.x.sub(z, e);
+                let others = cell.storage.stored.iter().any(|s| *s != cell.stored && self.d.x.depends_on(e, *s));
+                if others { None } else { self.d.x.solve_for(residual, cell.stored) }
+            }
+            StorageLaw::Implicit(e) => self.d.x.solve_for(e, cell.stored),
+            StorageLaw::Known { .. } => None,
+        }
+    }
+
+    /// `m` of a linear inertance `X = m z` with constant `m`.
+    fn constant_inertance(&mut self, cell: &Cell) -> Option<Expr> {
+        if !cell.inertance {
+            return None;
+        }
+        let stored = self.stored_of(cell)?;
+        let symbols: Vec<Symbol> = cell.storage_speeds(&self.d).into_iter().collect();
+        let (coefficients, rest) = self.d.x.linear_in(stored, &symbols)?;
+        let constant = coefficients.iter().all(|&c| self.d.is_constant(c)) && self.d.x.is_zero(rest);
+        constant.then_some(stored)
+    }
+
+    fn choose(&mut self, cell: &Cell, symbol: Symbol) {
+        let kind = StateKind::Storage(Some(cell.state.port.element));
+        self.states.push(Chosen { symbol, kind, meaning: None });
+    }
+
+    /// A storage on which no other depends: flow of a linear inertance, stored quantity of anything else.
+    fn independent(&mut self, cell: &Cell) {
+        if let Some(stored) = self.constant_inertance(cell) {
+            return self.by_speed(cell, stored, &[]);
+        }
+        match cell.law {
+            StorageLaw::Integral(e) => {
+                self.by_stored(cell, &[]);
+                self.d.set(cell.z, e);
+            }
+            StorageLaw::Derivative(e) => {
+                let stored = self.d.x.sym(cell.stored);
+                let residual = self.d.x.sub(stored, e);
+                let inverse = self.d.x.solve_for(residual, cell.z);
+                let alone = cell.storage.laws.len() == 1;
+                match inverse.filter(|_| alone) {
+                    Some(z) => {
+                        self.by_stored(cell, &[]);
+                        self.d.set(cell.z, z);
+                    }
+                    None => self.by_speed(cell, e, &[]),
+                }
+            }
+            StorageLaw::Implicit(e) => {
+                self.by_stored(cell, &[]);
+                self.d.set_root(cell.z, e);
+            }
+            StorageLaw::Known { .. } => {}
+        }
+    }
+
+    /// State `X`, whose rate the bond carries.
+    fn by_stored(&mut self, cell: &Cell, group: &[&Cell]) {
+        self.d.stored_state(cell.stored);
+        self.choose(cell, cell.stored);
+        let quantity = self.d.x.sym(cell.stored);
+        let followers = self.followers(cell.z, group);
+        self.balance(cell.stored, quantity, cell.rate, &followers);
+    }
+
+    /// State `z`: its rate makes the rate of `X(z)` equal to what the bond carries.
+    fn by_speed(&mut self, cell: &Cell, stored: Expr, group: &[&Cell]) {
+        self.d.set(cell.stored, stored);
+        let rate = self.d.state(cell.z);
+        self.choose(cell, cell.z);
+        self.later.push(Later::Speed { rate, stored, bond: cell.rate });
+        let followers = self.followers(cell.z, group);
+        self.balance(cell.z, stored, cell.rate, &followers);
+    }
+
+    /// Notes what changes a stored quantity together with the dependent ones that follow it, if they do so constantly.
+    fn balance(&mut self, state: Symbol, quantity: Expr, rate: Symbol, followers: &[Follower]) {
+        if followers.iter().any(|f| !self.d.is_constant(f.factor)) {
+            return;
+        }
+        let mut row = self.rows[&rate].clone();
+        let mut terms = vec![quantity];
+        for f in followers {
+            row.0.retain(|t| t.0 != f.rate);
+            let stored = self.d.x.sym(f.stored);
+            terms.push(self.d.x.mul(&[f.factor, stored]));
+        }
+        let quantity = self.d.x.add(&terms);
+        self.balances.push(Balance { state, quantity, row });
+    }
+
+    /// The dependent storages of a group that read `z`.
+    fn followers(&self, z: Symbol, group: &[&Cell]) -> Vec<Follower> {
+        let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
+        dependent
+            .filter_map(|c| {
+                let factor = self.rows[&c.z].coefficient(z)?;
+                Some(Follower { factor, stored: c.stored, rate: c.rate })
+            })
+            .collect()
+    }
+
+    /// Whether a group can be written with speeds (or stored quantities) of the independent storages as states: no
+    /// varying source enters, and every law gives `X` from `z`.
+    fn in_velocity_form(&mut self, causal: &CausalGraph, group: &[&Cell]) -> bool {
+        let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
+        let constant_sources = dependent.clone().all(|cell| {
+            self.rows[&cell.z].0.iter().all(|t| match causal.ports.ports.iter().find(|p| p.input == t.0) {
+                Some(p) if matches!(p.role, Role::Source | Role::Redundant) => {
+                    let value = self.d.of[&p.input].expr();
+                    self.d.is_constant(value)
+                }
+                _ => true,
+            })
+        });
+        constant_sources && group.iter().all(|cell| self.stored_of(cell).is_some())
+    }
+
+    /// States are speeds of linear inertances and stored quantities of other storages; rates of dependent ones follow by
+    /// differentiating what they depend on.
+    fn velocity_form(&mut self, group: &[&Cell], speeds: &[Virtual]) {
+        for cell in group {
+            let stored = self.stored_of(cell).expect("checked before");
+            if cell.state.role == Role::Dependent {
+                self.d.set(cell.stored, stored);
+                self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
+            } else if self.constant_inertance(cell).is_some() || !matches!(cell.law, StorageLaw::Integral(_)) {
+                self.by_speed(cell, stored, group);
+            } else {
+                let StorageLaw::Integral(law) = cell.law else { unreachable!("other laws are taken above") };
+                self.by_stored(cell, group);
+                self.d.set(cell.z, law);
+            }
+        }
+        for v in speeds {
+            let rate = self.d.state(v.speed);
+            let element = Some(v.junction);
+            self.states.push(Chosen { symbol: v.speed, kind: StateKind::Storage(element), meaning: None });
+            let reaction = self.d.of[&v.reaction].expr();
+            self.d.of.insert(rate, Definition::Implicit(reaction));
+        }
+    }
+
+    /// States are `pi = X_i + S^T X_d`: no rate of a source is asked for, no law has to be inverted.
+    fn momentum_form(&mut self, group: &[&Cell], speeds: &[Virtual]) {
+        let dependent: Vec<&&Cell> = group.iter().filter(|c| c.state.role == Role::Dependent).collect();
+        for cell in &dependent {
+            match self.stored_of(cell) {
+                Some(stored) => self.d.set(cell.stored, stored),
+                None => {
+                    let residual = self.law_residual(cell);
+                    self.d.set_root(cell.stored, residual);
+                }
+            }
+            // While running nothing needs the rates of dependent storages; who looks at them gets them by differentiation.
+            self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
+        }
+        for cell in group.iter().filter(|c| c.state.role == Role::Independent) {
+            let followers = self.followers(cell.z, group);
+            let element = cell.state.port.element;
+            let (sum, state) = self.momentum_state(Some(cell.stored), cell.z, cell.rate, element, followers);
+            let own = self.d.x.sub(state, sum);
+            self.d.set(cell.stored, own);
+            match cell.law {
+                StorageLaw::Integral(law) => self.d.set(cell.z, law),
+                _ => {
+                    let residual = self.law_residual(cell);
+                    self.d.set_root(cell.z, residual);
+                }
+            }
+        }
+        for v in speeds {
+            let followers = self.followers(v.speed, group);
+            let (sum, state) = self.momentum_state(None, v.speed, v.reaction, v.junction, followers);
+            let residual = self.d.x.sub(state, sum);
+            self.d.set_root(v.speed, residual);
+        }
+    }
+
+    /// `0 = …` in `X` and `z`.
+    fn law_residual(&mut self, cell: &Cell) -> Expr {
+        match cell.law {
+            StorageLaw::Integral(e) => {
+                let z = self.d.x.sym(cell.z);
+                self.d.x.sub(z, e)
+            }
+            StorageLaw::Derivative(e) => {
+                let stored = self.d.x.sym(cell.stored);
+                self.d.x.sub(stored, e)
+            }
+            StorageLaw::Implicit(e) => e,
+            StorageLaw::Known { displacement, .. } => displacement,
+        }
+    }
+
+    /// Declares the state `pi` with its rate; gives `Σ S X_d` and `pi` as expressions.
+    fn momentum_state(
+        &mut self,
+        stored: Option<Symbol>,
+        z: Symbol,
+        rate: Symbol,
+        element: ElementId,
+        followers: Vec<Follower>,
+    ) -> (Expr, Expr) {
+        let name = format!("{}.pi", self.d.graph.elements[element].name);
+        let pi = self.d.x.symbol(&name, Default::default());
+        let state = self.d.x.sym(pi);
+        self.balance(pi, state, rate, &[]);
+        if let Some(balance) = self.balances.last_mut() {
+            balance.row.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
+        }
+        let d = &mut self.d;
+        let pi_rate = d.state(pi);
+        let mut sum = Vec::new();
+        for f in &followers {
+            let stored = d.x.sym(f.stored);
+            sum.push(d.x.mul(&[f.factor, stored]));
+        }
+        let sum = d.x.add(&sum);
+        let own = stored.map_or(d.x.int(0), |s| d.x.sym(s));
+        let meaning = d.x.add(&[own, sum]);
+        // pi' = what the bond of the independent storage carries without the rates of dependent ones, and S'^T X_d.
+        let mut structure = self.rows[&rate].clone();
+        structure.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
+        if followers.iter().any(|f| !d.is_constant(f.factor)) {
+            self.balances.pop();
+        }
+        let structure = structure.expr(&mut d.x);
+        self.later.push(Later::Momentum { rate: pi_rate, structure, followers, z });
+        self.states.push(Chosen { symbol: pi, kind: StateKind::Storage(Some(element)), meaning: Some(meaning) });
+        (sum, state)
+    }
+
+    /// Integrated signals; one that repeats a stored quantity is read from it.
+    fn signals(&mut self) {
+        let graph = self.d.graph;
+        for signal in graph.signals.values() {
+            if let Some(value) = self.repeated(signal) {
+                self.d.set(signal.symbol, value);
+                continue;
+            }
+            let rate = self.d.state(signal.symbol);
+            self.d.set(rate, signal.rate);
+            self.states.push(Chosen { symbol: signal.symbol, kind: StateKind::Signal, meaning: None });
+        }
+    }
+}
+
+impl Assembled<'_> {
+    /// A signal that repeats a stored quantity, read from it: with the same start value or a constant distance to it.
+    fn repeated(&mut self, signal: &Signal) -> Option<Expr> {
+        let &Node::Symbol(rate) = self.d.x.node(signal.rate) else { return None };
+        let (&stored, _) = self.d.stored.iter().find(|(_, r)| **r == rate)?;
+        let own = self.d.x.sym(stored);
+        let Some(start) = signal.initial else { return Some(own) };
+        let Some(Meaning::Stored(port)) = self.d.meaning(stored) else { return None };
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &self.d.graph.elements[port.element].kind else {
+            return None;
+        };
+        let first = storage.initial.iter().find(|i| i.symbol == stored)?.value;
+        let distance = self.d.x.sub(start, first);
+        Some(self.d.x.add(&[own, distance]))
+    }
+
+    /// Defines the rates that were put off.
+    fn rates(&mut self) -> Result<(), (Symbol, Unavailable)> {
+        for later in std::mem::take(&mut self.later) {
+            let d = &mut self.d;
+            match later {
+                Later::Speed { rate, stored, bond } => {
+                    let change = d.rate(stored).map_err(|reason| (rate, reason))?;
+                    let bond = d.x.sym(bond);
+                    let residual = d.x.sub(change, bond);
+                    d.of.insert(rate, Definition::Implicit(residual));
+                }
+                Later::Dependent { rate, stored } => {
+                    let definition = d.of[&stored];
+                    match (d.rate(definition.expr()), definition) {
+                        (Ok(change), Definition::Explicit(_)) => d.set(rate, change),
+                        (Ok(change), Definition::Implicit(_)) => d.set_root(rate, change),
+                        (Err(reason), _) => {
+                            d.missing.insert(rate, reason);
+                        }
+                    }
+                }
+                Later::Momentum { rate, structure, followers, z } => {
+                    let mut sum = vec![structure];
+                    for f in followers {
+                        let slope = d.rate(f.factor).map_err(|reason| (z, reason))?;
+                        let stored = d.x.sym(f.stored);
+                        sum.push(d.x.mul(&[slope, stored]));
+                    }
+                    let value = d.x.add(&sum);
+                    d.set(rate, value);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A dependent storage seen from an independent one: `z_d = factor · z + …`.
+#[derive(Debug, Clone, Copy)]
+struct Follower {
+    factor: Expr,
+    stored: Symbol,
+    rate: Symbol,
+}
+
+impl Cell<'_> {
+    /// The co-energy symbols of all ports of the storage.
+    fn storage_speeds(&self, d: &Definitions) -> BTreeSet<Symbol> {
+        let ports = 0..self.storage.laws.len() as u32;
+        let port = |port| PortRef { element: self.state.port.element, port };
+        let mut all: BTreeSet<Symbol> =
+            ports.filter_map(|p| d.graph.storage_symbols(port(p))).map(|(z, _)| z).collect();
+        all.insert(self.z);
+        all
+    }
+}
+
+/// Storages that depend on each other, or are ports of one field, with the virtual speeds among them.
+fn groups(
+    causal: &CausalGraph,
+    cells: &[Cell],
+    speeds: &[Virtual],
+    rows: &BTreeMap<Symbol, Combination>,
+) -> Vec<(Vec<usize>, Vec<Virtual>)> {
+    let _ = causal;
+    let mut index: BTreeMap<Symbol, usize> = cells.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
+    index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, cells.len() + k)));
+    let mut set = UnionFind::<usize>::new(cells.len() + speeds.len());
+    let mut last: BTreeMap<ElementId, usize> = BTreeMap::new();
+    for (i, cell) in cells.iter().enumerate() {
+        if let Some(previous) = last.insert(cell.state.port.element, i) {
+            set.union(previous, i);
+        }
+        if cell.state.role == Role::Dependent {
+            for term in &rows[&cell.z].0 {
+                if let Some(&other) = index.get(&term.0) {
+                    set.union(i, other);
+                }
+            }
+        }
+    }
+    let mut groups: BTreeMap<usize, (Vec<usize>, Vec<Virtual>)> = BTreeMap::new();
+    for i in 0..cells.len() {
+        groups.entry(set.find(i)).or_default().0.push(i);
+    }
+    for (k, v) in speeds.iter().enumerate() {
+        groups.entry(set.find(cells.len() + k)).or_default().1.push(*v);
+    }
+    groups.into_values().collect()
+}
+
+fn is_twin_of(x: &Exprs, symbol: Symbol, of: Symbol) -> bool {
+    x.name(symbol).strip_suffix('*') == Some(x.name(of))
+}

@@ -1,0 +1,145 @@
+//! What can be recorded, and what the start has to satisfy.
+
+use std::collections::BTreeSet;
+
+use super::definitions::Definitions;
+use super::{Condition, Observed, State, Unavailable};
+use crate::algebra::{Expr, Symbol};
+use crate::bond_graph::{BondGraph, Kind};
+use crate::unit::Unit;
+
+/// The name of a state: its variable, or the output or `let` that says the same.
+pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> String {
+    let same = meaning.and_then(|m| d.graph.outputs.iter().chain(&d.graph.lets).find(|n| n.value == m));
+    let own = d.x.name(symbol).trim_end_matches('*');
+    same.map_or_else(|| own.to_string(), |n| n.name.clone())
+}
+
+/// Every variable that can be recorded, states and outputs first.
+pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
+    let mut all = Vec::new();
+    let mut taken = BTreeSet::new();
+    let mut add = |name: String, value, unit, default| {
+        if taken.insert(name.clone()) {
+            all.push(Observed { name, value, unit, default });
+        }
+    };
+    for state in states {
+        let value = d.x.sym(state.symbol);
+        add(state.name.clone(), Ok(value), state.unit.clone(), true);
+    }
+    let graph = d.graph;
+    for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
+        for named in list {
+            let value = value_of(d, named.value);
+            add(named.name.clone(), value, named.unit.clone(), default);
+        }
+    }
+    for constraint in &graph.constraints {
+        let value = value_of(d, constraint.multiplier);
+        add(format!("{}.e", constraint.name), value, None, false);
+        if constraint.holonomic {
+            let drift = value_of(d, constraint.expr);
+            add(format!("{}.drift", constraint.name), drift, None, false);
+        }
+    }
+    for (name, symbol) in variables(graph) {
+        let e = d.x.sym(symbol);
+        let value = value_of(d, e);
+        let unit: Option<Unit> = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
+        add(name, value, unit, false);
+    }
+    for signal in graph.signals.values() {
+        let e = d.x.sym(signal.symbol);
+        let value = value_of(d, e);
+        add(signal.name.clone(), value, signal.unit.clone(), false);
+    }
+    for input in graph.inputs.values() {
+        let e = d.x.sym(input.symbol);
+        add(input.name.clone(), Ok(e), input.unit.clone(), false);
+    }
+    all
+}
+
+/// An expression as something to evaluate, or the reason why it has no value.
+fn value_of(d: &Definitions, e: Expr) -> Result<Expr, Unavailable> {
+    for symbol in d.x.symbols_of(e) {
+        if let Some(reason) = d.missing.get(&symbol) {
+            return Err(reason.clone());
+        }
+        let given = d.of.contains_key(&symbol) || d.states.contains_key(&symbol) || is_outside(d, symbol);
+        if !given {
+            return Err(Unavailable::Undetermined);
+        }
+    }
+    Ok(e)
+}
+
+fn is_outside(d: &Definitions, symbol: Symbol) -> bool {
+    use crate::bond_graph::Meaning::{Held, Input, Parameter, Time};
+    matches!(d.meaning(symbol), Some(Time | Parameter(_) | Input(_) | Held(_)))
+}
+
+/// Names of all efforts, flows and stored quantities, with their symbols.
+fn variables(graph: &BondGraph) -> Vec<(String, Symbol)> {
+    let mut all = Vec::new();
+    for element in graph.elements.values() {
+        let name = &element.name;
+        let bond = |port: usize| &graph.bonds[element.ports[port].bond];
+        match &element.kind {
+            Kind::Zero => all.push((format!("{name}.e"), bond(0).effort)),
+            Kind::One => all.push((format!("{name}.f"), bond(0).flow)),
+            kind => {
+                for (index, port) in element.ports.iter().enumerate() {
+                    let place = if port.name.is_empty() { name.clone() } else { format!("{name}.{}", port.name) };
+                    all.push((format!("{place}.e"), bond(index).effort));
+                    all.push((format!("{place}.f"), bond(index).flow));
+                    match kind {
+                        Kind::Inertance(storage) => all.push((format!("{place}.p"), storage.stored[index])),
+                        Kind::Compliance(storage) => all.push((format!("{place}.q"), storage.stored[index])),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+    for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
+        all.push((format!("{}.e", bond.name), bond.effort));
+        all.push((format!("{}.f", bond.name), bond.flow));
+    }
+    all
+}
+
+/// Start values of storages and signals, and constraints on displacements.
+pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
+    let graph = d.graph;
+    let mut all = Vec::new();
+    let mut add = |d: &mut Definitions, symbol: Symbol, value: Expr, span| {
+        let own = d.x.sym(symbol);
+        let residual = d.x.sub(own, value);
+        let name = d.x.name(symbol).to_string();
+        all.push(Condition { residual, name, value, span });
+    };
+    for element in graph.elements.values() {
+        if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
+            for initial in &storage.initial {
+                add(d, initial.symbol, initial.value, initial.span);
+            }
+        }
+    }
+    for signal in graph.signals.values() {
+        if let Some(value) = signal.initial {
+            add(d, signal.symbol, value, signal.span);
+        }
+    }
+    for constraint in graph.constraints.iter().filter(|c| c.holonomic) {
+        let zero = d.x.int(0);
+        all.push(Condition {
+            residual: constraint.expr,
+            name: constraint.name.clone(),
+            value: zero,
+            span: constraint.span,
+        });
+    }
+    all
+}

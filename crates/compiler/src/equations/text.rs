@@ -1,0 +1,178 @@
+//! Equations as text: the model language (for programs), Unicode (for people), LaTeX (for papers).
+
+use std::collections::BTreeMap;
+use std::fmt::{Display, Formatter, Result};
+
+use super::{DisplayEquation, Equations, Step};
+use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
+use crate::bond_graph::Meaning;
+
+/// A way of writing equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// The model language: `(J + M*a^2)*IJ.f' = -M*g*a*cos(phi)`.
+    Ascii,
+    /// Unicode text: `(J + M a²) ω' = -M g a cos φ`.
+    Unicode,
+    /// LaTeX.
+    Latex,
+}
+
+/// The equations, one a line.
+pub fn print(equations: &Equations, style: Style) -> Vec<String> {
+    let names = Written::of(equations);
+    let side = |e: Expr| expression(&equations.graph.exprs, e, &names, style);
+    equations
+        .display
+        .iter()
+        .map(|&DisplayEquation { left, right }| format!("{} = {}", side(left), side(right)))
+        .collect()
+}
+
+/// One expression in the names of these equations.
+pub fn print_expr(equations: &Equations, e: Expr, style: Style) -> String {
+    expression(&equations.graph.exprs, e, &Written::of(equations), style)
+}
+
+fn expression(x: &Exprs, e: Expr, names: &Written, style: Style) -> String {
+    match style {
+        Style::Ascii => ascii(x, e, names),
+        Style::Unicode => unicode(x, e, names),
+        Style::Latex => latex(x, e, names),
+    }
+}
+
+/// How the symbols of equations are written: for people by the name that an output or `let` gives to a state.
+struct Written<'a> {
+    x: &'a Exprs,
+    aliases: &'a BTreeMap<Symbol, String>,
+    states: BTreeMap<Symbol, (&'a str, bool)>,
+    place: BTreeMap<Symbol, u8>,
+}
+
+impl<'a> Written<'a> {
+    fn of(equations: &'a Equations) -> Self {
+        let mut states = BTreeMap::new();
+        for state in &equations.states {
+            states.insert(state.symbol, (state.name.as_str(), false));
+            states.insert(state.rate, (state.name.as_str(), true));
+        }
+        let class = |m: Meaning| match m {
+            Meaning::Parameter(_) => 0,
+            Meaning::Time | Meaning::Input(_) => 1,
+            _ => 2,
+        };
+        let place = equations.graph.variables.iter().map(|(&s, v)| (s, class(v.meaning))).collect();
+        Written { x: &equations.graph.exprs, aliases: &equations.aliases, states, place }
+    }
+
+    /// The name for people, and whether it is the rate of what has the name.
+    fn name(&self, symbol: Symbol) -> (String, bool) {
+        let own = self.x.name(symbol);
+        let (base, rate) = match self.states.get(&symbol) {
+            Some(&(name, rate)) => (name, rate),
+            None => match own.strip_suffix('\'') {
+                Some(base) => (base, true),
+                None => (own, false),
+            },
+        };
+        let of =
+            if rate { self.states.iter().find(|(_, s)| s.0 == base && !s.1).map(|(&s, _)| s) } else { Some(symbol) };
+        let alias = of.and_then(|s| self.aliases.get(&s));
+        (alias.map_or(base, String::as_str).trim_end_matches('*').to_string(), rate)
+    }
+}
+
+impl Names for Written<'_> {
+    fn ascii(&self, symbol: Symbol) -> String {
+        match self.states.get(&symbol) {
+            Some((name, true)) => format!("{name}'"),
+            Some((name, false)) => (*name).to_string(),
+            None => self.x.name(symbol).trim_end_matches('*').to_string(),
+        }
+    }
+
+    fn unicode(&self, symbol: Symbol) -> String {
+        let (name, rate) = self.name(symbol);
+        let name = match subscripted(&name) {
+            Some((variable, element)) => format!("{variable}_{element}"),
+            None => unicode_name(&name),
+        };
+        if rate { format!("{name}'") } else { name }
+    }
+
+    fn latex(&self, symbol: Symbol) -> String {
+        let (name, rate) = self.name(symbol);
+        match subscripted(&name) {
+            Some((variable, element)) => {
+                let variable = if rate { format!("\\dot {variable}") } else { variable.to_string() };
+                format!("{variable}_{{\\mathrm{{{}}}}}", element.replace('_', "\\_"))
+            }
+            None if rate => format!("\\dot{{{}}}", latex_name(&name)),
+            None => latex_name(&name),
+        }
+    }
+
+    fn place(&self, symbol: Symbol) -> (u8, u32) {
+        (self.place.get(&symbol).copied().unwrap_or(2), symbol.0)
+    }
+}
+
+/// `m.f` is written as `f` with the subscript `m`.
+fn subscripted(name: &str) -> Option<(&str, &str)> {
+    let (element, variable) = name.rsplit_once('.')?;
+    matches!(variable, "e" | "f" | "q" | "p" | "pi").then_some((variable, element))
+}
+
+impl Display for Equations {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let names = Written::of(self);
+        let text = |e: Expr| ascii(&self.graph.exprs, e, &names);
+        writeln!(f, "equations {} {:?}", self.graph.name, self.form)?;
+        writeln!(f, "\nstates")?;
+        for state in &self.states {
+            writeln!(f, "  {}", state.name)?;
+        }
+        for (symbol, meaning) in &self.meanings {
+            writeln!(f, "  where {} = {}", names.ascii(*symbol), text(*meaning))?;
+        }
+        if !self.conserved.is_empty() {
+            writeln!(f, "\nconserved")?;
+        }
+        for conserved in &self.conserved {
+            writeln!(f, "  {} = {}", conserved.name, text(conserved.value))?;
+        }
+        writeln!(f, "\nequations")?;
+        for line in print(self, Style::Unicode) {
+            writeln!(f, "  {line}")?;
+        }
+        writeln!(f, "\nsteps")?;
+        for step in &self.steps {
+            match step {
+                Step::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
+                Step::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
+                Step::Linear { unknowns, matrix, right, .. } => {
+                    writeln!(f, "  solve for {}", list(unknowns, &names))?;
+                    for (row, &right) in matrix.iter().zip(right) {
+                        let row: Vec<String> = row.iter().map(|&e| text(e)).collect();
+                        writeln!(f, "    [{}] = {}", row.join(", "), text(right))?;
+                    }
+                }
+                Step::Newton { unknowns, body, residuals, .. } => {
+                    writeln!(f, "  iterate for {}", list(unknowns, &names))?;
+                    for (symbol, value) in body {
+                        writeln!(f, "    {} = {}", names.ascii(*symbol), text(*value))?;
+                    }
+                    for &residual in residuals {
+                        writeln!(f, "    0 = {}", text(residual))?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn list(symbols: &[Symbol], names: &Written) -> String {
+    symbols.iter().map(|&s| names.ascii(s)).collect::<Vec<_>>().join(", ")
+}
