@@ -10,6 +10,7 @@ mod jacobian;
 mod lu;
 mod options;
 mod shared;
+mod signal;
 mod simulate;
 mod sparsity;
 mod system;
@@ -17,6 +18,7 @@ mod variable_step;
 
 pub use failure::Failure;
 pub use options::{AbsoluteTolerance, Method, Options};
+pub use signal::{Signal, SignalError};
 pub use simulate::{Sink, Stopped, Summary, simulate};
 pub use sparsity::Sparsity;
 pub use system::System;

@@ -1,0 +1,77 @@
+//! A trace as comma-separated values.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::{Trace, WriteError, write_whole};
+
+/// Writes a trace as CSV: a header of `t` and the names, then a line for each sample. Numbers have as many digits as
+/// it takes to read the same number back. The file is written whole or not at all.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_csv(trace: &Trace, path: &Path) -> Result<(), WriteError> {
+    write_whole(path, |out| write(trace, out))
+}
+
+/// A trace as CSV text, as [`write_csv`] writes it.
+///
+/// ```
+/// use halfarrow_sim::Sink;
+/// let mut trace = halfarrow_trace::Trace::new([("m.p", "N.s")]);
+/// trace.sample(0.1, &[1e-13]);
+/// assert_eq!(halfarrow_trace::csv_text(&trace), "t,m.p\n0.1,1e-13\n");
+/// ```
+pub fn csv_text(trace: &Trace) -> String {
+    let mut text = Vec::new();
+    // Writing to memory does not fail.
+    let _ = write(trace, &mut text);
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+fn write(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+    write!(out, "t")?;
+    trace.columns.iter().try_for_each(|column| write!(out, ",{}", quoted(&column.name)))?;
+    writeln!(out)?;
+    for (sample, t) in trace.times.iter().enumerate() {
+        write!(out, "{t:?}")?;
+        trace.columns.iter().try_for_each(|column| write!(out, ",{:?}", column.values[sample]))?;
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// A name as a field: in quotes if it holds a comma, a quote or a line break.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halfarrow_sim::Sink;
+
+    #[test]
+    fn every_number_comes_back() {
+        let numbers = [0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, 1.0 / 3.0, 123456789.0, 1e-13, 1e22];
+        let mut trace = Trace::new([("max(a, b)", ""), ("say \"x\"", "")]);
+        numbers.iter().for_each(|&x| trace.sample(x, &[x, -x]));
+        let text = csv_text(&trace);
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("t,\"max(a, b)\",\"say \"\"x\"\"\""));
+        for (line, x) in lines.zip(numbers) {
+            let read: Vec<u64> = line.split(',').map(|field| field.parse::<f64>().unwrap().to_bits()).collect();
+            assert_eq!(read, [x.to_bits(), x.to_bits(), (-x).to_bits()]);
+        }
+    }
+
+    #[test]
+    fn the_file_holds_the_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.csv");
+        let mut trace = Trace::new([("x", "m")]);
+        trace.sample(0.5, &[2.0]);
+        write_csv(&trace, &path).unwrap();
+        assert_eq!(std::fs::read_to_string(path).unwrap(), "t,x\n0.5,2.0\n");
+    }
+}
