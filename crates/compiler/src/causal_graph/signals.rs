@@ -109,7 +109,7 @@ impl NodeId {
     }
     /// Whether it is the effort of its bond.
     pub fn is_effort(self) -> bool {
-        self.0 % 2 == 0
+        self.0.is_multiple_of(2)
     }
     /// The other variable of its bond.
     pub fn conjugate(self) -> NodeId {
