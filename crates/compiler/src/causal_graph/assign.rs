@@ -117,11 +117,11 @@ impl Part<'_> {
         strokes: &mut Strokes,
         drawn: &BTreeMap<PortRef, bool>,
         turnable: &[PortRef],
-        before: (usize, usize),
+        before: Loops,
     ) -> BTreeMap<PortRef, bool> {
         let start: BTreeMap<PortRef, bool> = turnable.iter().map(|&p| (p, drawn[&p])).collect();
         let mut best = (before, start.clone());
-        let mut consider = |choice: BTreeMap<PortRef, bool>, best: &mut ((usize, usize), BTreeMap<PortRef, bool>)| {
+        let mut consider = |choice: BTreeMap<PortRef, bool>, best: &mut (Loops, BTreeMap<PortRef, bool>)| {
             if let Some(size) = self.try_laws(strokes, drawn, &choice)
                 && size < best.0
             {
@@ -149,7 +149,7 @@ impl Part<'_> {
         strokes: &mut Strokes,
         drawn: &BTreeMap<PortRef, bool>,
         choice: &BTreeMap<PortRef, bool>,
-    ) -> Option<(usize, usize)> {
+    ) -> Option<Loops> {
         let mark = strokes.mark();
         let mut fine = contradiction::force_strokes(self.graph, strokes, self.members).is_ok();
         let is_law = |p: &PortRef| matches!(self.graph.elements[p.element].kind, Kind::Resistor(_));
@@ -195,11 +195,23 @@ impl Part<'_> {
     }
 }
 
-/// Number of break variables, and number of signals on loops.
-fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>) -> (usize, usize) {
-    let successors = signal_graph(graph, table).algebraic_successors();
-    let looped = break_set::cyclic_components(&successors).iter().map(Vec::len).sum();
-    (break_set::count(&successors), looped)
+/// How unwelcome loops are: number of break variables, signals on loops that no law is on, signals on any loop.
+///
+/// Loops without a law are those that can be singular; dividing by their determinant spoils the equations even where
+/// the model is regular. Source: `method.md`, section 3 and 5.1.
+type Loops = (usize, usize, usize);
+
+fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>) -> Loops {
+    let mut successors = signal_graph(graph, table).algebraic_successors();
+    let size = |s: &[Vec<u32>]| break_set::cyclic_components(s).iter().map(Vec::len).sum();
+    let (breaks, looped) = (break_set::count(&successors), size(&successors));
+    for element in graph.elements.values().filter(|e| matches!(e.kind, Kind::Resistor(_))) {
+        for port in &element.ports {
+            successors[NodeId::effort(port.bond).index()].clear();
+            successors[NodeId::flow(port.bond).index()].clear();
+        }
+    }
+    (breaks, size(&successors), looped)
 }
 
 fn causality_of(here: bool) -> PortCausality {

@@ -53,7 +53,7 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         _ => Vec::new(),
     });
     let implicit = implicit.collect();
-    let display::Shown { display, aliases } = display::display(&mut d, &states, &ordered);
+    let display::Shown { display, aliases, sources } = display::display(&mut d, &states, &ordered);
     let dof =
         causal.ports.ports.iter().filter(|p| p.role == Role::Independent).count() + causal.ports.virtual_speeds.len();
     let graph = BondGraph { exprs: d.x, ..graph.clone() };
@@ -68,6 +68,7 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         display,
         meanings,
         aliases,
+        sources,
         index: 0,
         dof,
         implicit,

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::blocks::{LinearRow, Ordered};
-use super::definitions::Definitions;
+use super::definitions::{Definition, Definitions};
 use super::{DisplayEquation, State, Step};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
+use crate::bond_graph::{Kind, Meaning};
 
 /// Up to this many steps everything is put in; above, equations are shown in the variables of the steps.
 const SMALL: usize = 2_000;
@@ -18,14 +19,48 @@ pub struct Shown {
     pub display: Vec<DisplayEquation>,
     /// Names that outputs or `let`s give to states.
     pub aliases: BTreeMap<Symbol, String>,
+    /// Sources that stand in the equations by name, with their values.
+    pub sources: Vec<(Symbol, Expr)>,
 }
 
 /// The equations for people, with everything put in that can be.
 pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered) -> Shown {
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
-    let known = if ordered.steps.len() <= SMALL { expansions(d, &ordered.steps, &rates) } else { BTreeMap::new() };
+    let named = named_sources(d);
+    let small = ordered.steps.len() <= SMALL;
+    let known = if small { expansions(d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
     let aliases = aliases(d, states, &known);
-    Shown { display: equations(d, states, ordered, &known), aliases }
+    let mut display = equations(d, states, ordered, &known);
+    let mut read = BTreeSet::new();
+    for equation in &mut display {
+        read.extend(d.x.symbols_of(equation.left));
+        read.extend(d.x.symbols_of(equation.right));
+        equation.closed = (d.x.substitute(equation.left, &named), d.x.substitute(equation.right, &named));
+    }
+    let sources = named.into_iter().filter(|(s, _)| read.contains(s)).collect();
+    Shown { display, aliases, sources }
+}
+
+/// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.
+fn named_sources(d: &Definitions) -> BTreeMap<Symbol, Expr> {
+    let mut named = BTreeMap::new();
+    for element in d.graph.elements.values() {
+        let (symbol, value) = match element.kind {
+            Kind::EffortSource { value } => (d.graph.bonds[element.ports[0].bond].effort, value),
+            Kind::FlowSource { value } => (d.graph.bonds[element.ports[0].bond].flow, value),
+            _ => continue,
+        };
+        let outside = |s: &Symbol| {
+            matches!(d.meaning(*s), Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)))
+        };
+        let symbols = d.x.symbols_of(value);
+        let given = d.of.get(&symbol) == Some(&Definition::Explicit(value));
+        let plain = matches!(d.x.node(value), Node::Symbol(_));
+        if given && !plain && !d.is_constant(value) && symbols.iter().all(outside) {
+            named.insert(symbol, value);
+        }
+    }
+    named
 }
 
 /// Outputs and `let`s that are nothing but a state.
@@ -54,16 +89,16 @@ fn equations(
     let rows = ordered.rows.iter().filter(|r| r.left.iter().any(|t| rates.contains(&t.0)));
     let by_row: BTreeMap<Symbol, &LinearRow> = assign_rows(rows, &rates);
     for state in states {
-        let equation = match by_row.get(&state.rate) {
+        let shown_as = match by_row.get(&state.rate) {
             Some(row) => from_row(&mut d.x, row, known),
             None => {
                 let left = d.x.sym(state.rate);
                 let value = d.of.get(&state.rate).map(|f| f.expr()).unwrap_or(left);
                 let right = put_in(&mut d.x, value, known);
-                DisplayEquation { left, right }
+                equation(left, right)
             }
         };
-        shown.push(equation);
+        shown.push(shown_as);
     }
     let mut implicit = Vec::new();
     for step in &ordered.steps {
@@ -73,7 +108,7 @@ fn equations(
                 let zero = d.x.int(0);
                 for residual in inner {
                     let left = put_in(&mut d.x, residual, known);
-                    implicit.push(DisplayEquation { left, right: zero });
+                    implicit.push(equation(left, zero));
                 }
             }
             Step::Linear { unknowns, matrix, right, .. }
@@ -134,7 +169,11 @@ fn from_row(x: &mut Exprs, row: &LinearRow, known: &BTreeMap<Symbol, Expr>) -> D
     }
     let left = x.add(&terms);
     let right = put_in(x, row.right, known);
-    DisplayEquation { left, right }
+    equation(left, right)
+}
+
+fn equation(left: Expr, right: Expr) -> DisplayEquation {
+    DisplayEquation { left, right, closed: (left, right) }
 }
 
 fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
@@ -142,12 +181,17 @@ fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     x.simplify(e)
 }
 
-/// Every variable in terms of states, time, inputs and what stays implicit. Rates of states stay as they are.
-fn expansions(d: &mut Definitions, steps: &[Step], rates: &BTreeSet<Symbol>) -> BTreeMap<Symbol, Expr> {
+/// Every variable in terms of states, time, inputs, named sources and what stays implicit.
+fn expansions(
+    d: &mut Definitions,
+    steps: &[Step],
+    rates: &BTreeSet<Symbol>,
+    named: &BTreeMap<Symbol, Expr>,
+) -> BTreeMap<Symbol, Expr> {
     let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
     for step in steps {
         match step {
-            Step::Assign { symbol, value } if !rates.contains(symbol) => {
+            Step::Assign { symbol, value } if !named.contains_key(symbol) => {
                 let value = put_in(&mut d.x, *value, &known);
                 known.insert(*symbol, value);
             }

@@ -381,8 +381,10 @@ impl<'a> Assembled<'a> {
             let rate = self.d.state(v.speed);
             let element = Some(v.junction);
             self.states.push(Chosen { symbol: v.speed, kind: StateKind::Storage(element), meaning: None });
+            // Nothing stands there to take the reaction: what acts on the dependent storages balances itself.
             let reaction = self.d.of[&v.reaction].expr();
-            self.d.of.insert(rate, Definition::Implicit(reaction));
+            let balance = self.d.x.neg(reaction);
+            self.d.of.insert(rate, Definition::Implicit(balance));
         }
     }
 

@@ -17,7 +17,7 @@ use crate::span::Span;
 use crate::unit::Unit;
 
 pub use derive::derive_equations;
-pub use text::{Style, print, print_expr};
+pub use text::{Style, print, print_expr, print_meanings};
 
 /// A formulation, `method.md`, section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,6 +49,8 @@ pub struct Equations {
     pub conditions: Vec<Condition>,
     /// The equations as a person would write them: one for each state, then what stays implicit.
     pub display: Vec<DisplayEquation>,
+    /// Sources that stand in `display` by name, with their values.
+    pub sources: Vec<(Symbol, Expr)>,
     /// What a state is that is no variable of its own (`pi = X + S^T X_d`), in stored quantities.
     pub meanings: Vec<(Symbol, Expr)>,
     /// Names that outputs or `let`s give to states.
@@ -181,6 +183,8 @@ pub struct Condition {
 pub struct DisplayEquation {
     /// Left side.
     pub left: Expr,
-    /// Right side.
+    /// Right side, with sources that vary in time as symbols.
     pub right: Expr,
+    /// Both sides with the values of these sources put in.
+    pub closed: (Expr, Expr),
 }

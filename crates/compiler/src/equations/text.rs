@@ -5,7 +5,7 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{DisplayEquation, Equations, Step};
 use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
-use crate::bond_graph::Meaning;
+use crate::bond_graph::{BondGraph, Element, Kind, Meaning};
 
 /// A way of writing equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,15 +18,28 @@ pub enum Style {
     Latex,
 }
 
-/// The equations, one a line.
+/// The equations, one a line. For people, sources that vary in time stand by name; [`print_meanings`] has their values.
 pub fn print(equations: &Equations, style: Style) -> Vec<String> {
     let names = Written::of(equations);
     let side = |e: Expr| expression(&equations.graph.exprs, e, &names, style);
-    equations
-        .display
-        .iter()
-        .map(|&DisplayEquation { left, right }| format!("{} = {}", side(left), side(right)))
-        .collect()
+    let sides = |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
+    let line = |(left, right)| format!("{} = {}", side(left), side(right));
+    equations.display.iter().map(sides).map(line).collect()
+}
+
+/// What stands behind the names in the equations: sources that vary in time, states that are sums of stored quantities,
+/// conserved quantities.
+pub fn print_meanings(equations: &Equations, style: Style) -> Vec<String> {
+    let names = Written::of(equations);
+    let text = |e: Expr| expression(&equations.graph.exprs, e, &names, style);
+    let name = |s: Symbol| match style {
+        Style::Ascii => names.ascii(s),
+        Style::Unicode => names.unicode(s),
+        Style::Latex => names.latex(s),
+    };
+    let conserved = equations.conserved.iter().map(|c| (c.symbol, c.value));
+    let all = equations.sources.iter().copied().chain(equations.meanings.iter().copied()).chain(conserved);
+    all.map(|(symbol, value)| format!("{} = {}", name(symbol), text(value))).collect()
 }
 
 /// One expression in the names of these equations.
@@ -47,6 +60,7 @@ struct Written<'a> {
     x: &'a Exprs,
     aliases: &'a BTreeMap<Symbol, String>,
     states: BTreeMap<Symbol, (&'a str, bool)>,
+    sources: BTreeMap<Symbol, String>,
     place: BTreeMap<Symbol, u8>,
 }
 
@@ -63,11 +77,15 @@ impl<'a> Written<'a> {
             _ => 2,
         };
         let place = equations.graph.variables.iter().map(|(&s, v)| (s, class(v.meaning))).collect();
-        Written { x: &equations.graph.exprs, aliases: &equations.aliases, states, place }
+        let sources = equations.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
+        Written { x: &equations.graph.exprs, aliases: &equations.aliases, states, sources, place }
     }
 
     /// The name for people, and whether it is the rate of what has the name.
     fn name(&self, symbol: Symbol) -> (String, bool) {
+        if let Some(source) = self.sources.get(&symbol) {
+            return (source.clone(), false);
+        }
         let own = self.x.name(symbol);
         let (base, rate) = match self.states.get(&symbol) {
             Some(&(name, rate)) => (name, rate),
@@ -118,6 +136,17 @@ impl Names for Written<'_> {
     }
 }
 
+/// The name of the source that sets a variable.
+fn element_name(graph: &BondGraph, symbol: Symbol) -> String {
+    let bond = match graph.variables.get(&symbol).map(|v| v.meaning) {
+        Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => &graph.bonds[bond],
+        _ => return graph.exprs.name(symbol).to_string(),
+    };
+    let source = |e: &&Element| matches!(e.kind, Kind::EffortSource { .. } | Kind::FlowSource { .. });
+    let ends = [bond.from, bond.to].map(|p| &graph.elements[p.element]);
+    ends.iter().copied().find(source).map_or_else(String::new, |e| e.name.clone())
+}
+
 /// `m.f` is written as `f` with the subscript `m`.
 fn subscripted(name: &str) -> Option<(&str, &str)> {
     let (element, variable) = name.rsplit_once('.')?;
@@ -133,18 +162,12 @@ impl Display for Equations {
         for state in &self.states {
             writeln!(f, "  {}", state.name)?;
         }
-        for (symbol, meaning) in &self.meanings {
-            writeln!(f, "  where {} = {}", names.ascii(*symbol), text(*meaning))?;
-        }
-        if !self.conserved.is_empty() {
-            writeln!(f, "\nconserved")?;
-        }
-        for conserved in &self.conserved {
-            writeln!(f, "  {} = {}", conserved.name, text(conserved.value))?;
-        }
         writeln!(f, "\nequations")?;
         for line in print(self, Style::Unicode) {
             writeln!(f, "  {line}")?;
+        }
+        for line in print_meanings(self, Style::Unicode) {
+            writeln!(f, "  where {line}")?;
         }
         writeln!(f, "\nsteps")?;
         for step in &self.steps {
