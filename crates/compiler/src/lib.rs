@@ -11,5 +11,6 @@ pub mod causal_paths;
 pub mod diagnostic;
 pub mod equations;
 pub mod ids;
+pub mod program;
 pub mod span;
 pub mod unit;

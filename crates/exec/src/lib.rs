@@ -1,2 +1,13 @@
-//! Program to System: the register bytecode. The only crate that may hold `unsafe`.
+//! Runs a [`Program`](halfarrow_compiler::program::Program): [`Model`] is the [`System`](halfarrow_sim::System) that it
+//! becomes, with parameters that can be set, inputs that can be connected, and start values that fit.
+//!
+//! The bytecode is the meaning of a program. Elementary functions come from [`math`] alone.
 #![deny(unsafe_code)]
+
+mod bytecode;
+pub mod math;
+mod model;
+
+pub use model::{
+    Equilibrium, EquilibriumError, InputError, Model, ParameterError, RecordError, StartConflict, StartError, StartValue,
+};

@@ -1,0 +1,413 @@
+//! Expressions to values.
+
+use super::values::{Op, Reads, Values};
+use super::{BlockId, Cause, Condition, ConditionId, ConditionKind, Value};
+use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
+use crate::ids::Table;
+use rustc_hash::FxHashMap;
+
+/// Values made of expressions so far.
+pub(super) struct Lowering<'a> {
+    exprs: &'a Exprs,
+    pub values: Values,
+    pub conditions: Table<ConditionId, Condition>,
+    condition_of: FxHashMap<(Value, ConditionKind), ConditionId>,
+    symbols: Vec<Option<Value>>,
+    known: Vec<Option<Value>>,
+    /// Symbols and expressions of the Newton block that is being lowered.
+    inner: Option<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    symbols: FxHashMap<Symbol, Value>,
+    known: FxHashMap<Expr, Value>,
+    piecewise: bool,
+}
+
+impl<'a> Lowering<'a> {
+    pub fn new(exprs: &'a Exprs) -> Self {
+        Lowering {
+            exprs,
+            values: Values::default(),
+            conditions: Table::new(),
+            condition_of: FxHashMap::default(),
+            symbols: vec![None; exprs.symbol_count()],
+            known: vec![None; exprs.len()],
+            inner: None,
+        }
+    }
+
+    /// From now on `symbol` means `value`; inside a Newton block, until it ends.
+    pub fn define(&mut self, symbol: Symbol, value: Value) {
+        match &mut self.inner {
+            Some(inner) => {
+                inner.symbols.insert(symbol, value);
+            }
+            None => self.symbols[symbol.0 as usize] = Some(value),
+        }
+    }
+
+    /// What a symbol means, if it is defined.
+    pub fn defined(&self, symbol: Symbol) -> Option<Value> {
+        let inner = self.inner.as_ref().and_then(|inner| inner.symbols.get(&symbol).copied());
+        inner.or(self.symbols[symbol.0 as usize])
+    }
+
+    /// Begins a Newton block: gives its guesses.
+    pub fn begin_newton(&mut self, block: BlockId, unknowns: &[Symbol]) -> Vec<Value> {
+        self.inner = Some(Inner::default());
+        let guess = |i: usize| Op::Guess(block, i as u32);
+        let guesses: Vec<Value> = (0..unknowns.len()).map(|i| self.values.add(guess(i), Reads::GUESS)).collect();
+        unknowns.iter().zip(&guesses).for_each(|(&symbol, &value)| self.define(symbol, value));
+        guesses
+    }
+
+    /// Ends it; whether conditions were met in it.
+    pub fn end_newton(&mut self) -> bool {
+        self.inner.take().is_some_and(|inner| inner.piecewise)
+    }
+
+    /// The value of an expression whose symbols are all defined.
+    ///
+    /// # Panics
+    /// If one is not: the steps are out of order.
+    pub fn value(&mut self, e: Expr) -> Value {
+        if let Some(known) = self.known(e) {
+            return known;
+        }
+        for part in self.missing_below(e) {
+            let value = self.node(part);
+            match &mut self.inner {
+                Some(inner) => {
+                    inner.known.insert(part, value);
+                }
+                None => self.known[part.0 as usize] = Some(value),
+            }
+        }
+        self.known(e).expect("an expression is lowered after its parts")
+    }
+
+    fn known(&self, e: Expr) -> Option<Value> {
+        self.known[e.0 as usize].or_else(|| self.inner.as_ref().and_then(|inner| inner.known.get(&e).copied()))
+    }
+
+    /// What is not lowered yet at and below `e`, parts before wholes.
+    fn missing_below(&self, e: Expr) -> Vec<Expr> {
+        let mut seen = rustc_hash::FxHashSet::from_iter([e]);
+        let (mut open, mut order) = (vec![e], vec![e]);
+        while let Some(e) = open.pop() {
+            self.exprs.node(e).for_each_child(|c| {
+                if self.known(c).is_none() && seen.insert(c) {
+                    open.push(c);
+                    order.push(c);
+                }
+            });
+        }
+        order.sort_unstable();
+        order
+    }
+
+    fn node(&mut self, e: Expr) -> Value {
+        let exprs = self.exprs;
+        let of = |this: &Self, e: Expr| this.known(e).expect("parts stand before wholes");
+        match exprs.node(e) {
+            Node::Number(number) => self.number(number),
+            Node::Pi => self.constant(std::f64::consts::PI),
+            Node::Symbol(symbol) => self
+                .defined(*symbol)
+                .unwrap_or_else(|| panic!("{} is read before a step defines it", exprs.name(*symbol))),
+            Node::Add(terms) => self.sum(terms),
+            Node::Mul(factors) => self.product(factors, false),
+            Node::Pow(base, exponent) => {
+                let (numerator, denominator) = self.power(*base, *exponent);
+                self.quotient(numerator, denominator)
+            }
+            Node::Call(f, arguments) => {
+                let a = of(self, arguments[0]);
+                let b = arguments.get(1).map(|&b| of(self, b));
+                self.call(*f, a, b)
+            }
+            Node::Compare(relation, a, b) => {
+                let (a, b) = (of(self, *a), of(self, *b));
+                self.compare(*relation, a, b)
+            }
+            Node::And(a, b) => self.op(Op::And(of(self, *a), of(self, *b))),
+            Node::Or(a, b) => self.op(Op::Or(of(self, *a), of(self, *b))),
+            Node::Not(a) => self.op(Op::Not(of(self, *a))),
+            Node::Select(c, a, b) => self.select(of(self, *c), of(self, *a), of(self, *b)),
+            Node::Table(table, x) => {
+                let x = of(self, *x);
+                let piece = self.piece(*table, x);
+                self.op(Op::Table(table.0, piece, x))
+            }
+            Node::TableSlope(table, x) => {
+                let x = of(self, *x);
+                let piece = self.piece(*table, x);
+                self.op(Op::TableSlope(table.0, piece, x))
+            }
+        }
+    }
+
+    pub fn op(&mut self, op: Op) -> Value {
+        self.values.add(op, Reads::PARAMETERS)
+    }
+
+    pub fn constant(&mut self, value: f64) -> Value {
+        self.op(Op::Constant(value.to_bits()))
+    }
+
+    fn number(&mut self, number: &Rational) -> Value {
+        self.constant(number.to_f64())
+    }
+
+    fn sum(&mut self, terms: &[Expr]) -> Value {
+        let mut parts: Vec<(bool, Value)> = terms.iter().map(|&t| self.magnitude(t)).collect();
+        // A term that is added goes first, so that nothing need be negated.
+        if let Some(first) = parts.iter().position(|&(minus, _)| !minus) {
+            parts[..=first].rotate_right(1);
+        }
+        let (minus, first) = parts[0];
+        let start = if minus { self.neg(first) } else { first };
+        parts[1..].iter().fold(start, |sum, &(minus, term)| match minus {
+            true => self.sub(sum, term),
+            false => self.add(sum, term),
+        })
+    }
+
+    /// Whether a term is subtracted, and the value that is.
+    fn magnitude(&mut self, term: Expr) -> (bool, Value) {
+        let exprs = self.exprs;
+        let negative = |e: Expr| exprs.is_number(e).is_some_and(|n| n.signum() < 0);
+        match exprs.node(term) {
+            Node::Mul(factors) if negative(factors[0]) => (true, self.product(factors, true)),
+            Node::Number(n) if n.signum() < 0 => (true, self.number(&n.abs())),
+            _ => (false, self.known(term).expect("parts stand before wholes")),
+        }
+    }
+
+    /// The product, with the sign of its number left out if `absolute`.
+    fn product(&mut self, factors: &[Expr], absolute: bool) -> Value {
+        let (mut numerator, mut denominator, mut minus) = (None, None, false);
+        for &factor in factors {
+            let (above, below) = match self.exprs.node(factor) {
+                Node::Number(n) => {
+                    let size = n.abs();
+                    minus = n.signum() < 0 && !absolute;
+                    (if size.is_one() { None } else { Some(self.number(&size)) }, None)
+                }
+                Node::Pow(base, exponent) => self.power(*base, *exponent),
+                _ => (Some(self.known(factor).expect("parts stand before wholes")), None),
+            };
+            numerator = self.times(numerator, above);
+            denominator = self.times(denominator, below);
+        }
+        let value = self.quotient(numerator, denominator);
+        if minus { self.neg(value) } else { value }
+    }
+
+    fn times(&mut self, a: Option<Value>, b: Option<Value>) -> Option<Value> {
+        match (a, b) {
+            (Some(a), Some(b)) => Some(self.mul(a, b)),
+            (one, other) => one.or(other),
+        }
+    }
+
+    fn quotient(&mut self, numerator: Option<Value>, denominator: Option<Value>) -> Value {
+        match (numerator, denominator) {
+            (Some(n), Some(d)) => self.div(n, d),
+            (Some(n), None) => n,
+            (None, d) => {
+                let one = self.constant(1.0);
+                d.map_or(one, |d| self.div(one, d))
+            }
+        }
+    }
+
+    /// A power as a numerator or a denominator.
+    fn power(&mut self, base: Expr, exponent: Expr) -> (Option<Value>, Option<Value>) {
+        let a = self.known(base).expect("parts stand before wholes");
+        let small = self.exprs.is_number(exponent).and_then(|n| n.small());
+        let value = match small {
+            Some((n, 1)) if n.unsigned_abs() <= 64 => self.powi(a, n.unsigned_abs() as u32),
+            Some((1 | -1, 2)) => self.op(Op::Call(Function::Sqrt, a)),
+            Some((3 | -3, 2)) => {
+                let root = self.op(Op::Call(Function::Sqrt, a));
+                self.mul(a, root)
+            }
+            _ => {
+                let b = self.known(exponent).expect("parts stand before wholes");
+                let value = self.op(Op::Pow(a, b));
+                return (Some(value), None);
+            }
+        };
+        match small {
+            Some((n, _)) if n < 0 => (None, Some(value)),
+            _ => (Some(value), None),
+        }
+    }
+
+    fn call(&mut self, f: Function, a: Value, b: Option<Value>) -> Value {
+        match (f, b) {
+            (Function::Mod, Some(b)) => {
+                let ratio = self.div(a, b);
+                let whole = self.floor(ratio);
+                let product = self.mul(b, whole);
+                self.sub(a, product)
+            }
+            (Function::Floor, _) => self.floor(a),
+            (Function::Abs, _) if self.holds(a) => {
+                let (side, minus) = (self.side(a), self.neg(a));
+                self.select(side, a, minus)
+            }
+            (Function::Sign, _) if self.holds(a) => {
+                let minus = self.neg(a);
+                let (plus, minus) = (self.side(a), self.side(minus));
+                self.sub(plus, minus)
+            }
+            (Function::Min | Function::Max, Some(b)) => {
+                let difference = if f == Function::Min { self.sub(b, a) } else { self.sub(a, b) };
+                let side = self.side(difference);
+                self.select(side, a, b)
+            }
+            (f, Some(b)) => self.op(Op::Call2(f, a, b)),
+            (f, None) => {
+                self.note_piecewise(f, a);
+                self.op(Op::Call(f, a))
+            }
+        }
+    }
+
+    fn note_piecewise(&mut self, f: Function, a: Value) {
+        let guessed = self.values.reads(a).includes(Reads::GUESS);
+        if let Some(inner) = &mut self.inner {
+            inner.piecewise |= guessed && matches!(f, Function::Abs | Function::Sign);
+        }
+    }
+
+    fn compare(&mut self, relation: Comparison, a: Value, b: Value) -> Value {
+        let above = self.sub(a, b);
+        let below = self.sub(b, a);
+        match relation {
+            Comparison::Gt => self.side(above),
+            Comparison::Lt => self.side(below),
+            Comparison::Le => {
+                let side = self.side(above);
+                self.op(Op::Not(side))
+            }
+            Comparison::Ge => {
+                let side = self.side(below);
+                self.op(Op::Not(side))
+            }
+            Comparison::Eq | Comparison::Ne => {
+                let (above, below) = (self.side(above), self.side(below));
+                let differ = self.op(Op::Or(above, below));
+                if relation == Comparison::Ne { differ } else { self.op(Op::Not(differ)) }
+            }
+        }
+    }
+
+    /// Whether conditions on the value are held: it varies and is no guess.
+    fn holds(&self, a: Value) -> bool {
+        let reads = self.values.reads(a);
+        reads != Reads::PARAMETERS && !reads.includes(Reads::GUESS)
+    }
+
+    fn side(&mut self, a: Value) -> Value {
+        if self.holds(a) {
+            let condition = self.condition(a, ConditionKind::Sign);
+            return self.op(Op::Side(condition, a));
+        }
+        if let Some(inner) = &mut self.inner {
+            inner.piecewise = true;
+        }
+        self.op(Op::Positive(a))
+    }
+
+    fn floor(&mut self, a: Value) -> Value {
+        if self.holds(a) {
+            let condition = self.condition(a, ConditionKind::Floor);
+            return self.op(Op::Floor(condition, a));
+        }
+        self.op(Op::Call(Function::Floor, a))
+    }
+
+    /// The condition that holds the piece of a table, where it needs one: a smooth table read by the state has none.
+    fn piece(&mut self, table: TableId, x: Value) -> Option<ConditionId> {
+        let shape = self.exprs.table1d(table);
+        let smooth = shape.interpolation() == Interpolation::Cubic && shape.outside() != Outside::Clamp;
+        let needed = self.holds(x) && !(smooth && self.values.reads(x).includes(Reads::STATE));
+        needed.then(|| self.condition(x, ConditionKind::Piece(table.0)))
+    }
+
+    fn condition(&mut self, operand: Value, kind: ConditionKind) -> ConditionId {
+        if let Some(&known) = self.condition_of.get(&(operand, kind)) {
+            return known;
+        }
+        let id = self.conditions.push(Condition { operand, kind, cause: Cause::Shown });
+        self.condition_of.insert((operand, kind), id);
+        id
+    }
+}
+
+/// Operations, with what is trivial left out.
+impl Lowering<'_> {
+    fn is(&self, a: Value, number: f64) -> bool {
+        self.values.constant(a) == Some(number)
+    }
+
+    pub fn neg(&mut self, a: Value) -> Value {
+        match self.values.op(a) {
+            Op::Neg(b) => b,
+            Op::Sub(b, c) => self.op(Op::Sub(c, b)),
+            Op::Constant(bits) => self.constant(-f64::from_bits(bits)),
+            _ => self.op(Op::Neg(a)),
+        }
+    }
+
+    pub fn add(&mut self, a: Value, b: Value) -> Value {
+        match () {
+            () if self.is(a, 0.0) => b,
+            () if self.is(b, 0.0) => a,
+            () => self.op(Op::Add(a, b)),
+        }
+    }
+
+    pub fn sub(&mut self, a: Value, b: Value) -> Value {
+        match () {
+            () if self.is(a, 0.0) => self.neg(b),
+            () if self.is(b, 0.0) => a,
+            () => self.op(Op::Sub(a, b)),
+        }
+    }
+
+    pub fn mul(&mut self, a: Value, b: Value) -> Value {
+        match () {
+            () if self.is(a, 1.0) => b,
+            () if self.is(b, 1.0) => a,
+            () if self.is(a, -1.0) => self.neg(b),
+            () => self.op(Op::Mul(a, b)),
+        }
+    }
+
+    pub fn div(&mut self, a: Value, b: Value) -> Value {
+        if self.is(b, 1.0) { a } else { self.op(Op::Div(a, b)) }
+    }
+
+    pub fn powi(&mut self, a: Value, n: u32) -> Value {
+        match n {
+            0 => self.constant(1.0),
+            1 => a,
+            2 => self.op(Op::Mul(a, a)),
+            _ => self.op(Op::Powi(a, n)),
+        }
+    }
+
+    pub fn select(&mut self, condition: Value, then: Value, other: Value) -> Value {
+        match self.values.constant(condition) {
+            Some(c) => [then, other][usize::from(c == 0.0)],
+            None if then == other => then,
+            None => self.op(Op::Select(condition, then, other)),
+        }
+    }
+}

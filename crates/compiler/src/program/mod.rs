@@ -1,0 +1,251 @@
+//! The program: what is evaluated to integrate a model and to record its variables.
+//!
+//! [`schedule`] turns the steps of [`Equations`] into one list of [values](Program::values), each an operation on
+//! values before it, equal ones shared. From it [`Program::routine`] makes the code that computes a chosen few of
+//! them, with everything else left out and registers reused: one routine for the rates, one for what is recorded, one
+//! for switching functions. Values that read parameters alone are computed once for each set of parameters, by the
+//! [preamble](Program::preamble).
+//!
+//! # Conditions
+//!
+//! Truth values are the numbers 0 and 1. Whatever makes a value jump or bend — a comparison, `abs`, `min`, `floor`, a
+//! corner of a table — reads a [`Condition`], which whoever runs the program may hold fixed while it integrates. Both
+//! branches of an `if` are evaluated: there are no side effects, and a branch without a value does no harm as long as
+//! it is not chosen. Inside a Newton block conditions that read its unknowns are not held.
+
+mod dependence;
+mod derive;
+mod lower;
+mod print;
+mod routine;
+mod schedule;
+mod values;
+
+pub use routine::{Instruction, Layout, Register, Routine, Solve};
+pub use schedule::schedule;
+pub use values::{Op, Reads, Values};
+
+use crate::algebra::Table1d;
+use crate::bond_graph::HeldKind;
+pub use crate::equations::Unavailable;
+use crate::ids::{Table, id};
+use crate::span::Span;
+use crate::unit::Unit;
+
+id!(
+    /// A value: an entry of [`Program::values`].
+    Value
+);
+id!(
+    /// A solve block.
+    BlockId
+);
+id!(
+    /// A condition.
+    ConditionId
+);
+
+/// What is evaluated.
+///
+/// Invariant: every value reads values before it; a value that reads a guess of a Newton block is read by that block
+/// and by such values only.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// Name of the model.
+    pub name: String,
+    /// All values, in an order in which they can be evaluated.
+    pub values: Values,
+    /// Solve blocks, in the order in which they are evaluated.
+    pub blocks: Table<BlockId, Block>,
+    /// Conditions, those that others read before these.
+    pub conditions: Table<ConditionId, Condition>,
+    /// Tables; the ids in the operations are those of the expression pool.
+    pub tables: Vec<Table1d>,
+    /// Parameters and constants.
+    pub parameters: Vec<Parameter>,
+    /// Inputs.
+    pub inputs: Vec<Input>,
+    /// Signals held from earlier times.
+    pub held: Vec<Held>,
+    /// States.
+    pub states: Vec<State>,
+    /// Constants fixed by the start values.
+    pub conserved: Vec<String>,
+    /// What can be recorded.
+    pub observed: Vec<Observed>,
+    /// What the start of a run has to satisfy.
+    pub start: Vec<StartCondition>,
+    /// Divisors that must not vanish.
+    pub watches: Vec<Watch>,
+    /// For each state the states that its rate reads, ascending.
+    pub dependence: Vec<Vec<u32>>,
+}
+
+/// A parameter or constant.
+#[derive(Debug, Clone)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its value where none is set: a value of constants and other parameters.
+    pub default: Value,
+    /// Whether it cannot be set.
+    pub constant: bool,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+}
+
+/// An input.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// Its name.
+    pub name: String,
+    /// Its value where nothing is connected, in parameters.
+    pub default: Value,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+}
+
+/// A delayed or sampled signal.
+#[derive(Debug, Clone)]
+pub struct Held {
+    /// Its name.
+    pub name: String,
+    /// The signal that is delayed or sampled.
+    pub source: Value,
+    /// Delay or period in s, in parameters.
+    pub time: Value,
+    /// Which of the two.
+    pub kind: HeldKind,
+}
+
+/// A state.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Its name.
+    pub name: String,
+    /// Its rate.
+    pub rate: Value,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+}
+
+/// A variable that can be recorded.
+#[derive(Debug, Clone)]
+pub struct Observed {
+    /// Its name.
+    pub name: String,
+    /// Its value, or why it has none.
+    pub value: Result<Value, Unavailable>,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+    /// Whether it is recorded without being asked for.
+    pub default: bool,
+}
+
+/// A condition on the start of a run: `residual = 0`.
+#[derive(Debug, Clone)]
+pub struct StartCondition {
+    /// The variable it is about, as shown.
+    pub name: String,
+    /// What vanishes.
+    pub residual: Value,
+    /// The value asked for.
+    pub asked: Value,
+    /// States (by index) and, after them, conserved constants that the residual reads, ascending.
+    pub reads: Vec<u32>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A divisor: if it vanishes the run stops.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    /// The divisor.
+    pub pivot: Value,
+    /// Magnitude of the terms it is the sum of, 0 if it is no sum: below rounding of it the divisor counts as zero.
+    pub scale: Value,
+    /// The elements concerned, for messages.
+    pub elements: String,
+}
+
+/// What decides between the pieces of a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Condition {
+    /// What it reads.
+    pub operand: Value,
+    /// How it decides.
+    pub kind: ConditionKind,
+    /// When it may change.
+    pub cause: Cause,
+}
+
+/// How a condition decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ConditionKind {
+    /// Whether the operand is above zero.
+    Sign,
+    /// The greatest integer not above the operand.
+    Floor,
+    /// The piece of this table (index into [`Program::tables`]) that the operand is in: number of points not above it.
+    Piece(u32),
+}
+
+/// What moves a condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// Time alone, and between two changes of other conditions in a straight line: its next change has a closed form.
+    Clock,
+    /// Time alone, along some other curve.
+    Curve,
+    /// States, inputs or held signals; rates read it.
+    State,
+    /// States, inputs or held signals, but no rate reads it: it needs no event.
+    Shown,
+}
+
+/// A solve block.
+#[derive(Debug, Clone)]
+pub enum Block {
+    /// `matrix · unknowns = right`.
+    Linear {
+        /// Row by row.
+        matrix: Vec<Value>,
+        /// Right-hand side.
+        right: Vec<Value>,
+        /// The elements concerned, for messages.
+        elements: String,
+    },
+    /// `residuals = 0` by Newton.
+    Newton {
+        /// The residuals at the guess, as many as unknowns.
+        residuals: Vec<Value>,
+        /// Their exact derivatives by the guess, row by row.
+        jacobian: Vec<Value>,
+        /// The elements concerned, for messages.
+        elements: String,
+    },
+}
+
+impl Block {
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        match self {
+            Block::Linear { right, .. } => right.len(),
+            Block::Newton { residuals, .. } => residuals.len(),
+        }
+    }
+    /// What it reads.
+    pub fn reads(&self) -> impl Iterator<Item = Value> + '_ {
+        let (matrix, right) = match self {
+            Block::Linear { matrix, right, .. } => (matrix, right),
+            Block::Newton { residuals, jacobian, .. } => (jacobian, residuals),
+        };
+        matrix.iter().chain(right).copied()
+    }
+    /// The elements concerned, for messages.
+    pub fn elements(&self) -> &str {
+        match self {
+            Block::Linear { elements, .. } | Block::Newton { elements, .. } => elements,
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! Equations to a program.
+
+use super::lower::Lowering;
+use super::values::{Op, Reads};
+use super::{
+    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Held, Input, Observed, Parameter, Program,
+    StartCondition, State, Value, Watch,
+};
+use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
+use crate::bond_graph::{BondGraph, ElementId, ParameterId};
+use crate::equations::{Equations, Step};
+use crate::ids::{Id, Table};
+use rustc_hash::FxHashMap;
+
+/// The program that evaluates the equations.
+///
+/// # Panics
+/// If a step reads a symbol that is not given or defined before it: then the equations are not in evaluation order.
+pub fn schedule(equations: &Equations) -> Program {
+    let graph = &equations.graph;
+    let mut schedule = Schedule {
+        graph,
+        lower: Lowering::new(&graph.exprs),
+        blocks: Table::new(),
+        watches: Vec::new(),
+        kinks: Vec::new(),
+    };
+    let parameters = schedule.parameters();
+    schedule.givens(equations);
+    equations.steps.iter().for_each(|step| schedule.step(step));
+    schedule.finish(equations, parameters)
+}
+
+struct Schedule<'a> {
+    graph: &'a BondGraph,
+    lower: Lowering<'a>,
+    blocks: Table<BlockId, Block>,
+    watches: Vec<Watch>,
+    /// Conditions inside Newton blocks, as seen from outside.
+    kinks: Vec<ConditionId>,
+}
+
+impl Schedule<'_> {
+    /// Parameters, each after those its value reads.
+    fn parameters(&mut self) -> Vec<Parameter> {
+        let graph = self.graph;
+        let index_of: FxHashMap<Symbol, ParameterId> = graph.parameters.iter().map(|(id, p)| (p.symbol, id)).collect();
+        let mut defaults: Table<ParameterId, Option<Value>> = Table::filled(graph.parameters.len(), None);
+        for id in graph.parameters.ids() {
+            let mut open = vec![id];
+            while let Some(&id) = open.last() {
+                let parameter = &graph.parameters[id];
+                let read = graph.exprs.symbols_of(parameter.value);
+                let missing = read.iter().filter(|&&s| self.lower.defined(s).is_none()).map(|s| index_of[s]);
+                let missing: Vec<ParameterId> = missing.collect();
+                assert!(open.len() <= graph.parameters.len(), "parameters are given by each other in a circle");
+                if !missing.is_empty() {
+                    open.extend(missing);
+                    continue;
+                }
+                open.pop();
+                if defaults[id].is_none() {
+                    defaults[id] = Some(self.lower.value(parameter.value));
+                    let value = self.lower.op(Op::Parameter(id.0));
+                    self.lower.define(parameter.symbol, value);
+                }
+            }
+        }
+        let named = graph.parameters.values().zip(defaults.values());
+        named
+            .map(|(p, &default)| Parameter {
+                name: p.name.clone(),
+                default: default.expect("every parameter has been given its value"),
+                constant: p.constant,
+                unit: p.unit.clone(),
+            })
+            .collect()
+    }
+
+    fn givens(&mut self, equations: &Equations) {
+        let graph = self.graph;
+        let mut give = |symbol: Symbol, op: Op, reads: Reads| {
+            let value = self.lower.values.add(op, reads);
+            self.lower.define(symbol, value);
+        };
+        give(graph.time, Op::Time, Reads::TIME);
+        graph.inputs.iter().for_each(|(id, input)| give(input.symbol, Op::Input(id.0), Reads::STATE));
+        graph.held.iter().for_each(|(id, held)| give(held.symbol, Op::Held(id.0), Reads::STATE));
+        let conserved = equations.conserved.iter().enumerate();
+        conserved.for_each(|(i, c)| give(c.symbol, Op::Conserved(i as u32), Reads::STATE));
+        let states = equations.states.iter().enumerate();
+        states.for_each(|(i, s)| give(s.symbol, Op::State(i as u32), Reads::STATE));
+    }
+
+    fn step(&mut self, step: &Step) {
+        match step {
+            Step::Assign { symbol, value } => {
+                let value = self.lower.value(*value);
+                self.lower.define(*symbol, value);
+            }
+            Step::Linear { unknowns, matrix, right, elements } => self.linear(unknowns, matrix, right, elements),
+            Step::Newton { unknowns, body, residuals, elements } => self.newton(unknowns, body, residuals, elements),
+            Step::Watch { pivot, elements } => {
+                let elements = names(self.graph, elements);
+                divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.watch(factor, &elements));
+            }
+        }
+    }
+
+    fn linear(&mut self, unknowns: &[Symbol], matrix: &[Vec<Expr>], right: &[Expr], elements: &[ElementId]) {
+        let matrix = matrix.iter().flatten().map(|&e| self.lower.value(e)).collect();
+        let right = right.iter().map(|&e| self.lower.value(e)).collect();
+        let block = self.blocks.push(Block::Linear { matrix, right, elements: names(self.graph, elements) });
+        self.solved(block, unknowns);
+    }
+
+    fn newton(&mut self, unknowns: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr], elements: &[ElementId]) {
+        let block = BlockId::new(self.blocks.len());
+        let from = self.lower.values.len();
+        let guesses = self.lower.begin_newton(block, unknowns);
+        for &(symbol, value) in body {
+            let value = self.lower.value(value);
+            self.lower.define(symbol, value);
+        }
+        let values: Vec<Value> = residuals.iter().map(|&e| self.lower.value(e)).collect();
+        let columns: Vec<Vec<Value>> =
+            guesses.iter().map(|&guess| self.lower.derivatives(&values, guess, from)).collect();
+        let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
+        let piecewise = self.lower.end_newton();
+        self.blocks.push(Block::Newton { residuals: values, jacobian, elements: names(self.graph, elements) });
+        self.solved(block, unknowns);
+        for &(symbol, value) in body {
+            let value = self.lower.value(value);
+            self.lower.define(symbol, value);
+        }
+        if piecewise {
+            let known = self.lower.conditions.len();
+            residuals.iter().for_each(|&e| {
+                self.lower.value(e);
+            });
+            self.kinks.extend(self.lower.conditions.ids().skip(known));
+        }
+    }
+
+    fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {
+        let values = &self.lower.values;
+        let reads = self.blocks[block].reads().fold(Reads::PARAMETERS, |all, v| all.with(values.reads(v)));
+        for (i, &symbol) in unknowns.iter().enumerate() {
+            let value = self.lower.values.add(Op::Solution(block, i as u32), reads.without(Reads::GUESS));
+            self.lower.define(symbol, value);
+        }
+    }
+
+    fn watch(&mut self, factor: Expr, elements: &str) {
+        let pivot = self.lower.value(factor);
+        let scale = match self.graph.exprs.node(factor) {
+            Node::Add(terms) => {
+                let mut sum = self.lower.constant(0.0);
+                for &term in terms {
+                    let term = self.lower.value(term);
+                    let size = self.lower.op(Op::Call(Function::Abs, term));
+                    sum = self.lower.add(sum, size);
+                }
+                sum
+            }
+            Node::Call(Function::Sin | Function::Cos, _) => self.lower.constant(1.0),
+            _ => self.lower.constant(0.0),
+        };
+        self.watches.push(Watch { pivot, scale, elements: elements.to_string() });
+    }
+
+    fn finish(mut self, equations: &Equations, parameters: Vec<Parameter>) -> Program {
+        let graph = self.graph;
+        let lower = &mut self.lower;
+        let rate = |s: &crate::equations::State| {
+            lower.defined(s.rate).unwrap_or_else(|| panic!("no step defines the rate of {}", s.name))
+        };
+        let rates: Vec<Value> = equations.states.iter().map(rate).collect();
+        let states = equations.states.iter().zip(rates);
+        let inputs = graph.inputs.values();
+        let held = graph.held.values();
+        let mut program = Program {
+            name: graph.name.clone(),
+            states: states.map(|(s, rate)| State { name: s.name.clone(), rate, unit: s.unit.clone() }).collect(),
+            conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
+            inputs: inputs
+                .map(|i| Input { name: i.name.clone(), default: lower.value(i.default), unit: i.unit.clone() })
+                .collect(),
+            held: held
+                .map(|h| Held {
+                    name: h.name.clone(),
+                    source: lower.value(h.source),
+                    time: lower.value(h.time),
+                    kind: h.kind,
+                })
+                .collect(),
+            observed: equations
+                .observed
+                .iter()
+                .map(|o| Observed {
+                    name: o.name.clone(),
+                    value: o.value.clone().map(|e| lower.value(e)),
+                    unit: o.unit.clone(),
+                    default: o.default,
+                })
+                .collect(),
+            start: equations
+                .conditions
+                .iter()
+                .map(|c| StartCondition {
+                    name: c.name.clone(),
+                    residual: lower.value(c.residual),
+                    asked: lower.value(c.value),
+                    reads: Vec::new(),
+                    span: c.span,
+                })
+                .collect(),
+            tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
+            parameters,
+            blocks: self.blocks,
+            watches: self.watches,
+            conditions: self.lower.conditions,
+            values: self.lower.values,
+            dependence: Vec::new(),
+        };
+        program.find_dependence();
+        find_causes(&mut program, &self.kinks);
+        program
+    }
+}
+
+fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
+    let names: Vec<&str> = elements.iter().map(|&e| graph.elements[e].name.as_str()).collect();
+    names.join(", ")
+}
+
+/// The factors of a divisor that vary or could vanish.
+fn divisors(exprs: &Exprs, pivot: Expr) -> Vec<Expr> {
+    match exprs.node(pivot) {
+        Node::Mul(factors) => factors.iter().flat_map(|&f| divisors(exprs, f)).collect(),
+        Node::Pow(base, exponent) if exprs.is_number(*exponent).is_some_and(|n| n.signum() > 0) => {
+            divisors(exprs, *base)
+        }
+        Node::Pow(_, exponent) if exprs.is_number(*exponent).is_some() => Vec::new(),
+        Node::Number(n) if !n.is_zero() => Vec::new(),
+        _ => vec![pivot],
+    }
+}
+
+/// How a value depends on time while conditions are held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Degree {
+    Constant,
+    Line,
+    Curve,
+}
+
+fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
+    let degrees = degrees(program);
+    let mut causes: Vec<Cause> = Vec::new();
+    for condition in program.conditions.values() {
+        let reads = program.values.reads(condition.operand);
+        causes.push(match degrees[condition.operand.index()] {
+            _ if reads.includes(Reads::STATE) => Cause::Shown,
+            Degree::Curve => Cause::Curve,
+            _ => Cause::Clock,
+        });
+    }
+    let shown = |cause: &mut Cause| {
+        if *cause == Cause::Shown {
+            *cause = Cause::State;
+            return true;
+        }
+        false
+    };
+    kinks.iter().for_each(|c| {
+        shown(&mut causes[c.index()]);
+    });
+    let mut roots: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
+    roots.extend(program.held.iter().map(|h| h.source));
+    loop {
+        let events = program.conditions.iter().filter(|(id, _)| causes[id.index()] == Cause::State);
+        roots.extend(events.map(|(_, c)| c.operand));
+        let live = program.live(&roots, false);
+        let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| condition_of(op));
+        // Not short-circuited: all of them are marked.
+        if used.filter(|c| shown(&mut causes[c.index()])).count() == 0 {
+            break;
+        }
+    }
+    program.conditions.iter_mut().for_each(|(id, condition): (ConditionId, &mut Condition)| {
+        condition.cause = causes[id.index()];
+    });
+}
+
+/// The condition that an operation reads.
+fn condition_of(op: Op) -> Option<ConditionId> {
+    match op {
+        Op::Side(c, _) | Op::Floor(c, _) => Some(c),
+        Op::Table(_, c, _) | Op::TableSlope(_, c, _) => c,
+        _ => None,
+    }
+}
+
+fn degrees(program: &Program) -> Vec<Degree> {
+    let mut degrees: Vec<Degree> = Vec::with_capacity(program.values.len());
+    for (value, op) in program.values.iter() {
+        let of = |v: Value| degrees[v.index()];
+        let degree = match op {
+            _ if program.values.reads(value) == Reads::PARAMETERS => Degree::Constant,
+            Op::Time => Degree::Line,
+            Op::Side(..) | Op::Floor(..) => Degree::Constant,
+            Op::Neg(a) => of(a),
+            Op::Add(a, b) | Op::Sub(a, b) => of(a).max(of(b)),
+            Op::Mul(a, b) if of(a) == Degree::Constant => of(b),
+            Op::Mul(a, b) | Op::Div(a, b) if of(b) == Degree::Constant => of(a),
+            Op::Select(c, a, b) if of(c) == Degree::Constant => of(a).max(of(b)),
+            Op::Table(t, Some(_), a) if program.tables[t as usize].interpolation() != Interpolation::Cubic => of(a),
+            Op::TableSlope(t, Some(_), _) if program.tables[t as usize].interpolation() != Interpolation::Cubic => {
+                Degree::Constant
+            }
+            Op::Guess(..) | Op::Solution(..) => Degree::Curve,
+            Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) => Degree::Curve,
+            _ => {
+                let mut most = Degree::Constant;
+                op.for_each_operand(|v| most = most.max(of(v)));
+                if most == Degree::Constant { most } else { Degree::Curve }
+            }
+        };
+        degrees.push(degree);
+    }
+    degrees
+}
+
+impl ConditionKind {
+    /// Number of switching functions that it needs.
+    pub fn switches(self) -> usize {
+        match self {
+            ConditionKind::Sign => 1,
+            ConditionKind::Floor | ConditionKind::Piece(_) => 2,
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! Registers and the code that runs on them.
+
+use super::conditions::{Conditions, table_on};
+use super::lu::Lu;
+use super::newton::Newton;
+use super::piece_of;
+use crate::math;
+use halfarrow_compiler::algebra::Table1d;
+use halfarrow_compiler::program::{Block, ConditionId, Instruction, Layout, Program, Reads, Routine, Solve};
+
+/// Why a routine stopped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Trouble {
+    /// A watched divisor vanishes.
+    Vanished { watch: u32 },
+    /// A linear block has no unique solution.
+    Singular { block: u32 },
+    /// A Newton block found none.
+    NoConvergence { block: u32, iterations: usize, residual: f64, singular: bool },
+}
+
+/// Everything a routine reads and writes; all memory is taken in [`new`](Frame::new).
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    /// Values.
+    pub r: Vec<f64>,
+    /// Derivatives along the present direction.
+    pub d: Vec<f64>,
+    pub conditions: Conditions,
+    pub solvers: Vec<Solver>,
+    /// Set values of parameters.
+    pub set: Vec<Option<f64>>,
+    pub tables: Vec<Table1d>,
+    time: u32,
+}
+
+/// What a solve block needs.
+#[derive(Debug, Clone)]
+pub(crate) struct Solver {
+    pub lu: Lu,
+    /// Right-hand side and solution.
+    x: Vec<f64>,
+    rate: Vec<f64>,
+    /// Whether the matrix reads parameters alone, and has been factored since they were set.
+    constant: bool,
+    factored: bool,
+    pub newton: Newton,
+}
+
+impl Frame {
+    pub fn new(program: &Program, layout: &Layout, registers: u32) -> Frame {
+        let solver = |block: &Block| {
+            let n = block.size();
+            let constant = matches!(block, Block::Linear { matrix, .. }
+                if matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS));
+            let newton = Newton::new(if matches!(block, Block::Newton { .. }) { n } else { 0 });
+            Solver { lu: Lu::new(n), x: vec![0.0; n], rate: vec![0.0; n], constant, factored: false, newton }
+        };
+        let mut r = vec![0.0; registers.max(layout.size) as usize];
+        layout.constants.iter().for_each(|&(register, value)| r[register as usize] = value);
+        Frame {
+            d: vec![0.0; r.len()],
+            r,
+            conditions: Conditions::new(program.conditions.values()),
+            solvers: program.blocks.values().map(solver).collect(),
+            set: vec![None; program.parameters.len()],
+            tables: program.tables.clone(),
+            time: layout.time,
+        }
+    }
+
+    /// Makes room for a routine.
+    pub fn reserve(&mut self, routine: &Routine) {
+        let size = self.r.len().max(routine.registers as usize);
+        self.r.resize(size, 0.0);
+        self.d.resize(size, 0.0);
+    }
+
+    /// Forgets what was kept for the old parameters.
+    pub fn parameters_changed(&mut self) {
+        self.solvers.iter_mut().for_each(|s| s.factored = false);
+    }
+
+    /// Runs a routine.
+    pub fn run(&mut self, routine: &Routine) -> Result<(), Trouble> {
+        self.all::<false>(routine)
+    }
+
+    /// Runs it with derivatives along the direction that the fixed registers have in `d`.
+    pub fn run_along(&mut self, routine: &Routine) -> Result<(), Trouble> {
+        self.all::<true>(routine)
+    }
+
+    fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), Trouble> {
+        for instruction in &routine.code {
+            match *instruction {
+                Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
+                Instruction::Watch { pivot, scale, watch } => {
+                    let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
+                    if pivot == 0.0 || pivot.abs() <= 64.0 * f64::EPSILON * scale {
+                        return Err(Trouble::Vanished { watch });
+                    }
+                }
+                ref plain => self.step::<ALONG>(plain),
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn plain<const ALONG: bool>(&mut self, code: &[Instruction]) {
+        code.iter().for_each(|instruction| self.step::<ALONG>(instruction));
+    }
+
+    fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+        if solve.guess.is_empty() { self.linear::<ALONG>(solve) } else { self.newton::<ALONG>(solve) }
+    }
+
+    fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+        let Frame { r, d, solvers, .. } = self;
+        let solver = &mut solvers[solve.block.0 as usize];
+        if !(solver.constant && solver.factored) {
+            solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
+            solver.factored = solver.lu.factor().is_ok();
+        }
+        solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
+        if !solver.factored {
+            return Err(Trouble::Singular { block: solve.block.0 });
+        }
+        solver.lu.solve(&mut solver.x);
+        if ALONG {
+            let n = solver.x.len();
+            for (i, rate) in solver.rate.iter_mut().enumerate() {
+                let row = &solve.matrix[i * n..][..n];
+                let moved: f64 = row.iter().zip(&solver.x).map(|(&m, x)| d[m as usize] * x).sum();
+                *rate = d[solve.right[i] as usize] - moved;
+            }
+            solver.lu.solve(&mut solver.rate);
+            solve.unknowns.iter().zip(&solver.rate).for_each(|(&out, &rate)| d[out as usize] = rate);
+        }
+        solve.unknowns.iter().zip(&solver.x).for_each(|(&out, &x)| r[out as usize] = x);
+        Ok(())
+    }
+
+    fn newton<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+        self.find_root(solve)?;
+        let size = solve.right.len();
+        if ALONG {
+            solve.guess.iter().for_each(|&g| self.d[g as usize] = 0.0);
+            self.plain::<true>(&solve.code);
+            let Frame { r, d, solvers, .. } = self;
+            let solver = &mut solvers[solve.block.0 as usize];
+            solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
+            if solver.lu.factor().is_err() {
+                return Err(Trouble::Singular { block: solve.block.0 });
+            }
+            (0..size).for_each(|i| solver.rate[i] = -d[solve.right[i] as usize]);
+            solver.lu.solve(&mut solver.rate);
+            solve.unknowns.iter().zip(&solver.rate).for_each(|(&out, &rate)| d[out as usize] = rate);
+        }
+        let root = &self.solvers[solve.block.0 as usize].newton.x;
+        solve.unknowns.iter().zip(root).for_each(|(&out, &x)| self.r[out as usize] = x);
+        Ok(())
+    }
+
+    fn condition<const ALONG: bool>(&mut self, condition: ConditionId, a: u32) -> f64 {
+        let value = self.r[a as usize];
+        if ALONG {
+            let t = self.r[self.time as usize];
+            self.conditions.value_after(condition, (value, self.d[a as usize]), t, &self.tables)
+        } else {
+            self.conditions.value(condition, value, &self.tables)
+        }
+    }
+
+    fn table<const ALONG: bool>(&mut self, a: u32, table: u32, piece: Option<ConditionId>) -> [f64; 3] {
+        let piece = match piece {
+            Some(condition) => self.condition::<ALONG>(condition, a) as usize,
+            None => piece_of(&self.tables[table as usize], self.r[a as usize]),
+        };
+        table_on(&self.tables[table as usize], piece, self.r[a as usize])
+    }
+
+    #[inline]
+    fn put<const ALONG: bool>(&mut self, out: u32, value: f64, rate: f64) {
+        self.r[out as usize] = value;
+        if ALONG {
+            self.d[out as usize] = rate;
+        }
+    }
+
+    /// One instruction that is neither a solve block nor a watch.
+    #[inline]
+    fn step<const ALONG: bool>(&mut self, instruction: &Instruction) {
+        use Instruction::*;
+        let r = |i: u32| self.r[i as usize];
+        let d = |i: u32| if ALONG { self.d[i as usize] } else { 0.0 };
+        match *instruction {
+            Add { out, a, b } => self.put::<ALONG>(out, r(a) + r(b), d(a) + d(b)),
+            Sub { out, a, b } => self.put::<ALONG>(out, r(a) - r(b), d(a) - d(b)),
+            Mul { out, a, b } => self.put::<ALONG>(out, r(a) * r(b), along(r(b), d(a)) + along(r(a), d(b))),
+            Div { out, a, b } => {
+                let value = r(a) / r(b);
+                let rate = if ALONG { (d(a) - along(value, d(b))) / r(b) } else { 0.0 };
+                self.put::<ALONG>(out, value, rate);
+            }
+            Neg { out, a } => self.put::<ALONG>(out, -r(a), -d(a)),
+            Powi { out, a, n } => {
+                let rate = if ALONG { along(f64::from(n) * math::powi(r(a), n - 1), d(a)) } else { 0.0 };
+                self.put::<ALONG>(out, math::powi(r(a), n), rate);
+            }
+            Pow { out, a, b } => {
+                let value = math::pow(r(a), r(b));
+                let rate = if ALONG { slope_of_power(value, (r(a), d(a)), (r(b), d(b))) } else { 0.0 };
+                self.put::<ALONG>(out, value, rate);
+            }
+            Call { f, out, a } => {
+                let value = math::call(f, r(a));
+                let rate = if ALONG && d(a) != 0.0 { math::slope(f, r(a), value) * d(a) } else { 0.0 };
+                self.put::<ALONG>(out, value, rate);
+            }
+            Call2 { f, out, a, b } => {
+                let rate = if ALONG { math::slope2(f, (r(a), d(a)), (r(b), d(b))) } else { 0.0 };
+                self.put::<ALONG>(out, math::call2(f, r(a), r(b)), rate);
+            }
+            Positive { out, a } => self.put::<ALONG>(out, f64::from(r(a) > 0.0), 0.0),
+            Side { out, a, condition } | Floor { out, a, condition } => {
+                let value = self.condition::<ALONG>(condition, a);
+                self.put::<ALONG>(out, value, 0.0);
+            }
+            And { out, a, b } => self.put::<ALONG>(out, f64::from(r(a) != 0.0 && r(b) != 0.0), 0.0),
+            Or { out, a, b } => self.put::<ALONG>(out, f64::from(r(a) != 0.0 || r(b) != 0.0), 0.0),
+            Not { out, a } => self.put::<ALONG>(out, f64::from(r(a) == 0.0), 0.0),
+            Select { out, c, a, b } => {
+                let chosen = if r(c) != 0.0 { a } else { b };
+                self.put::<ALONG>(out, r(chosen), d(chosen));
+            }
+            Table { out, a, table, piece } => {
+                let rate = d(a);
+                let [value, slope, _] = self.table::<ALONG>(a, table, piece);
+                self.put::<ALONG>(out, value, along(slope, rate));
+            }
+            TableSlope { out, a, table, piece } => {
+                let rate = d(a);
+                let [_, slope, curvature] = self.table::<ALONG>(a, table, piece);
+                self.put::<ALONG>(out, slope, along(curvature, rate));
+            }
+            Parameter { out, index, default } => {
+                let value = self.set[index as usize].unwrap_or(r(default));
+                self.put::<ALONG>(out, value, 0.0);
+            }
+            Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
+        }
+    }
+}
+
+/// A slope times a rate; what does not move has no rate even where the slope is infinite.
+#[inline]
+fn along(slope: f64, rate: f64) -> f64 {
+    if rate == 0.0 { 0.0 } else { slope * rate }
+}
+
+fn slope_of_power(value: f64, (a, da): (f64, f64), (b, db): (f64, f64)) -> f64 {
+    let base = if da == 0.0 { 0.0 } else { b * math::pow(a, b - 1.0) * da };
+    let exponent = if db == 0.0 || value == 0.0 { 0.0 } else { value * libm::log(a) * db };
+    base + exponent
+}

@@ -1,0 +1,160 @@
+//! Conditions that time alone moves: when they change next.
+
+use crate::bytecode::{Frame, Hold};
+use halfarrow_compiler::program::{Cause, ConditionId, Layout, Program, Routine, Value};
+
+/// Evaluations in one search along a curve; at its end the run makes a stop at which nothing changes.
+const SEARCH: usize = 4000;
+
+/// Conditions of time, in an order in which each reads those before it.
+#[derive(Debug, Clone)]
+pub(super) struct Clock {
+    conditions: Vec<(ConditionId, Cause)>,
+    /// Computes their operands.
+    routine: Routine,
+    time: usize,
+    /// The next change, in s.
+    pub next: Option<f64>,
+}
+
+impl Clock {
+    pub fn new(program: &Program, layout: &Layout) -> Clock {
+        let timed = program.conditions.iter().filter(|(_, c)| matches!(c.cause, Cause::Clock | Cause::Curve));
+        let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.cause), c.operand)).unzip();
+        let routine = program.routine(layout, &operands);
+        Clock { conditions, routine, time: layout.time as usize, next: None }
+    }
+
+    pub fn routine(&self) -> &Routine {
+        &self.routine
+    }
+
+    /// Takes all of them as they are just after `t`, and finds when the first of them changes.
+    pub fn cross(&mut self, frame: &mut Frame, t: f64) {
+        if self.conditions.is_empty() {
+            return;
+        }
+        frame.conditions.clock = Hold::Take;
+        self.evaluate(frame, t);
+        for (&(condition, _), &register) in self.conditions.iter().zip(&self.routine.outputs) {
+            let operand = (frame.r[register as usize], frame.d[register as usize]);
+            frame.conditions.value_after(condition, operand, t, &frame.tables);
+        }
+        frame.conditions.clock = Hold::Keep;
+        let lines = self.next_on_lines(frame, t);
+        let curves: Vec<usize> =
+            (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
+        let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
+        self.next = along.chain(lines).reduce(f64::min);
+        self.evaluate(frame, t);
+    }
+
+    /// Operands and their rates at `t`.
+    fn evaluate(&self, frame: &mut Frame, t: f64) {
+        frame.r[self.time] = t;
+        frame.d[self.time] = 1.0;
+        // Time alone is read: no block can fail that has not failed for the parameters.
+        let _ = frame.run_along(&self.routine);
+        frame.d[self.time] = 0.0;
+    }
+
+    /// Straight lines: where each meets the border it runs towards, computed from time zero so that the result does not
+    /// depend on when it is asked for.
+    fn next_on_lines(&self, frame: &mut Frame, t: f64) -> Option<f64> {
+        self.evaluate(frame, 0.0);
+        let mut next: Option<f64> = None;
+        for (&(condition, cause), &register) in self.conditions.iter().zip(&self.routine.outputs) {
+            let (start, slope) = (frame.r[register as usize], frame.d[register as usize]);
+            if cause != Cause::Clock || slope == 0.0 {
+                continue;
+            }
+            let border = frame.conditions.borders(condition, &frame.tables)[usize::from(slope > 0.0)];
+            let change = (border - start) / slope;
+            if change.is_finite() && change > t {
+                next = Some(next.map_or(change, |n| n.min(change)));
+            }
+        }
+        next
+    }
+
+    /// How far the operand of a condition is from the nearest border, below 0 once it is beyond, and the rate of that.
+    fn margin(&self, frame: &mut Frame, index: usize, t: f64) -> (f64, f64) {
+        self.evaluate(frame, t);
+        let register = self.routine.outputs[index] as usize;
+        let (a, rate) = (frame.r[register], frame.d[register]);
+        let [low, high] = frame.conditions.borders(self.conditions[index].0, &frame.tables);
+        if a - low < high - a { (a - low, rate) } else { (high - a, -rate) }
+    }
+
+    /// Searches a curve with steps in which a cubic follows it; gives the change, or where the search ended.
+    fn next_on_curve(&self, frame: &mut Frame, index: usize, from: f64, until: Option<f64>) -> Option<f64> {
+        let mut t = from;
+        let mut h = 1e-9 * from.abs().max(1.0);
+        let mut here = self.margin(frame, index, t);
+        for _ in 0..SEARCH {
+            if until.is_some_and(|until| t > until) {
+                return None;
+            }
+            let middle = self.margin(frame, index, t + 0.5 * h);
+            let there = self.margin(frame, index, t + h);
+            if !(middle.0.is_finite() && there.0.is_finite()) {
+                return Some(t).filter(|&t| t > from);
+            }
+            let cubic = 0.5 * (here.0 + there.0) + 0.125 * h * (here.1 - there.1);
+            let error = (middle.0 - cubic).abs();
+            let allowed = 1e-3 * here.0.abs().max(there.0.abs()).max(middle.0.abs());
+            if error > allowed && h > 1e-12 * t.abs().max(1e-6) {
+                h *= 0.5;
+                continue;
+            }
+            for (a, b) in [((t, here), (t + 0.5 * h, middle)), ((t + 0.5 * h, middle), (t + h, there))] {
+                if let Some(change) = self.change_between(frame, index, a, b) {
+                    return Some(change).filter(|&c| c > from);
+                }
+            }
+            (t, here) = (t + h, there);
+            if error < 0.1 * allowed {
+                h *= 2.0;
+            }
+        }
+        Some(t)
+    }
+
+    /// The change between two points, if the second is beyond a border or the way to it leads there.
+    fn change_between(&self, frame: &mut Frame, index: usize, a: At, b: At) -> Option<f64> {
+        if b.1.0 < 0.0 {
+            return Some(self.bisect(frame, a.0, b.0, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
+        }
+        if a.1.1 < 0.0 && b.1.1 > 0.0 {
+            let lowest = self.bisect(frame, a.0, b.0, |this, frame, t| this.margin(frame, index, t).1 > 0.0);
+            if self.margin(frame, index, lowest).0 < 0.0 {
+                return Some(self.bisect(frame, a.0, lowest, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
+            }
+        }
+        None
+    }
+
+    /// The first instant, to rounding, at which `beyond` holds; it does at `high` and not at `low`.
+    fn bisect(
+        &self,
+        frame: &mut Frame,
+        mut low: f64,
+        mut high: f64,
+        beyond: impl Fn(&Self, &mut Frame, f64) -> bool,
+    ) -> f64 {
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return high;
+            }
+            if beyond(self, frame, middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+    }
+}
+
+/// A time with margin and rate.
+type At = (f64, (f64, f64));

@@ -1,0 +1,141 @@
+//! What is connected to inputs.
+
+/// A signal over time: constant, or points with straight lines between them.
+///
+/// Between two corners it is one straight line, which is evaluated beyond its ends as it is inside.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Signal {
+    default: f64,
+    times: Vec<f64>,
+    values: Vec<f64>,
+    /// The points (first and last index) between which the held line runs; `None`: not held.
+    held: Option<(usize, usize)>,
+}
+
+impl Signal {
+    /// A signal through points; times ascend, a time given twice is a jump.
+    pub fn table(times: &[f64], values: &[f64]) -> Result<Signal, String> {
+        if times.len() != values.len() {
+            return Err(format!("{} times but {} values", times.len(), values.len()));
+        }
+        if times.is_empty() {
+            return Err("there are none".to_string());
+        }
+        if let Some(i) = times.iter().zip(values).position(|(t, v)| !t.is_finite() || !v.is_finite()) {
+            return Err(format!("point {} is not finite", i + 1));
+        }
+        if let Some(i) = (1..times.len()).find(|&i| times[i] < times[i - 1]) {
+            return Err(format!("time goes back from {} s to {} s", times[i - 1], times[i]));
+        }
+        if let Some(i) = (2..times.len()).find(|&i| times[i] == times[i - 2]) {
+            return Err(format!("{} s stands there more than twice", times[i]));
+        }
+        Ok(Signal { default: 0.0, times: times.to_vec(), values: values.to_vec(), held: None })
+    }
+
+    /// The value where nothing is connected.
+    pub fn set_default(&mut self, value: f64) {
+        self.default = value;
+    }
+
+    /// Value and slope at `t`.
+    pub fn at(&self, t: f64) -> (f64, f64) {
+        let n = self.times.len();
+        if n == 0 {
+            return (self.default, 0.0);
+        }
+        match self.held {
+            Some((first, last)) if first == last => (self.values[first], 0.0),
+            Some((first, last)) => {
+                let k = self.times[..=last].partition_point(|&p| p <= t).clamp(first + 1, last) - 1;
+                self.line(k, t)
+            }
+            None => match self.times.partition_point(|&p| p <= t) {
+                0 => (self.values[0], 0.0),
+                k if k == n => (self.values[n - 1], 0.0),
+                k => self.line(k - 1, t),
+            },
+        }
+    }
+
+    /// Holds the line that begins at `t` or runs through it.
+    pub fn hold(&mut self, t: f64) {
+        let n = self.times.len();
+        if n == 0 {
+            return;
+        }
+        let after = self.times.partition_point(|&p| p <= t);
+        if after == 0 || after == n {
+            let end = if after == 0 { 0 } else { n - 1 };
+            self.held = Some((end, end));
+            return;
+        }
+        let last = (after..n).find(|&k| self.is_corner(k)).unwrap_or(n - 1);
+        self.held = Some((after - 1, last));
+    }
+
+    pub fn release(&mut self) {
+        self.held = None;
+    }
+
+    /// The first corner after `t`.
+    pub fn next_corner(&self, t: f64) -> Option<f64> {
+        let after = self.times.partition_point(|&p| p <= t);
+        (after..self.times.len()).find(|&k| self.is_corner(k)).map(|k| self.times[k])
+    }
+
+    fn line(&self, k: usize, t: f64) -> (f64, f64) {
+        let slope = self.slope(k);
+        // From the nearer end, so that points are met exactly.
+        let near = if t - self.times[k] <= self.times[k + 1] - t { k } else { k + 1 };
+        (self.values[near] + slope * (t - self.times[near]), slope)
+    }
+
+    fn slope(&self, k: usize) -> f64 {
+        (self.values[k + 1] - self.values[k]) / (self.times[k + 1] - self.times[k])
+    }
+
+    /// Whether the signal bends or jumps at a point; it is constant beyond its ends.
+    fn is_corner(&self, k: usize) -> bool {
+        let n = self.times.len();
+        let jumps = |a: usize, b: usize| self.times[a] == self.times[b];
+        if (k > 0 && jumps(k - 1, k)) || (k + 1 < n && jumps(k, k + 1)) {
+            return true;
+        }
+        let before = if k == 0 { 0.0 } else { self.slope(k - 1) };
+        let after = if k + 1 == n { 0.0 } else { self.slope(k) };
+        (after - before).abs() > 1e-12 * after.abs().max(before.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jumps_have_two_sides() {
+        let mut signal = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
+        assert_eq!(signal.next_corner(-1.0), Some(0.0));
+        signal.hold(0.0);
+        assert_eq!((signal.at(0.5), signal.at(1.0)), ((0.5, 1.0), (1.0, 1.0)));
+        assert_eq!(signal.next_corner(0.0), Some(1.0));
+        signal.hold(1.0);
+        assert_eq!((signal.at(1.0), signal.at(1.5)), ((5.0, 0.0), (5.0, 0.0)));
+        assert_eq!(signal.next_corner(1.0), Some(2.0).filter(|_| signal.is_corner(3)));
+        signal.hold(3.0);
+        assert_eq!((signal.at(3.0), signal.next_corner(3.0)), ((5.0, 0.0), None));
+    }
+
+    #[test]
+    fn points_on_a_line_are_no_corners() {
+        let signal = Signal::table(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 0.0]).unwrap();
+        assert_eq!(signal.next_corner(0.0), Some(2.0));
+    }
+
+    #[test]
+    fn refuses_what_is_no_function_of_time() {
+        assert!(Signal::table(&[1.0, 0.0], &[0.0, 0.0]).unwrap_err().contains("goes back"));
+        assert!(Signal::table(&[1.0, 1.0, 1.0], &[0.0; 3]).unwrap_err().contains("twice"));
+        assert!(Signal::table(&[1.0, f64::NAN], &[0.0; 2]).unwrap_err().contains("not finite"));
+    }
+}

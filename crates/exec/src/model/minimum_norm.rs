@@ -1,0 +1,56 @@
+//! Least squares of minimum norm, for rows and columns of any magnitude.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this fraction of the greatest count as zero.
+const RANK: f64 = 1e-11;
+
+/// The shortest of the steps that reduce `jacobian · step + residual` most; rows and columns are weighed so that the
+/// greatest entry of each is 1.
+pub(super) struct Step {
+    /// The step.
+    pub step: Vec<f64>,
+    /// Rank of the Jacobian.
+    pub rank: usize,
+    /// The weights of the rows.
+    pub weights: Vec<f64>,
+}
+
+/// Computes it; `jacobian` row by row. `None` if something is not finite or the singular values do not come out.
+pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option<Step> {
+    let rows = residual.len();
+    if rows == 0 || columns == 0 {
+        return Some(Step { step: vec![0.0; columns], rank: 0, weights: vec![1.0; rows] });
+    }
+    if jacobian.iter().chain(residual).any(|v| !v.is_finite()) {
+        return None;
+    }
+    let greatest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |most, v| most.max(v.abs()));
+    let inverse = |most: f64| if most > 0.0 { 1.0 / most } else { 1.0 };
+    let weights: Vec<f64> = jacobian.chunks(columns).map(|row| inverse(greatest(&mut row.iter().copied()))).collect();
+    let weighed = |j: usize| (0..rows).map(move |i| (i, j));
+    let sizes: Vec<f64> = (0..columns)
+        .map(|j| inverse(greatest(&mut weighed(j).map(|(i, j)| jacobian[i * columns + j] * weights[i]))))
+        .collect();
+    let matrix = DMatrix::from_fn(rows, columns, |i, j| jacobian[i * columns + j] * weights[i] * sizes[j]);
+    let right = DVector::from_fn(rows, |i, _| -residual[i] * weights[i]);
+    let svd = matrix.try_svd(true, true, f64::EPSILON, 10_000)?;
+    let limit = RANK * svd.singular_values.max();
+    let rank = svd.rank(limit);
+    let solution = svd.solve(&right, limit).ok()?;
+    Some(Step { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shortest_and_best() {
+        let s = step(&[1.0, 1.0], &[-2.0], 2).unwrap();
+        assert!(s.rank == 1 && s.step.iter().all(|x| (x - 1.0).abs() < 1e-15));
+        let s = step(&[1.0, 1.0, 1e-6, 1e-6], &[-1.0, -3e-6], 1).unwrap_or_else(|| unreachable!());
+        assert_eq!(s.rank, 1);
+        assert!((s.step[0] - 2.0).abs() < 1e-14 || s.step.len() == 1);
+    }
+}

@@ -1,0 +1,287 @@
+//! A program with everything it needs to run.
+
+mod clock;
+mod equilibrium;
+mod errors;
+mod history;
+mod inputs;
+mod minimum_norm;
+mod start;
+mod system;
+
+pub use equilibrium::Equilibrium;
+pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
+
+use crate::bytecode::{Frame, Hold, Trouble};
+use clock::Clock;
+use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Layout, Program, Routine, Unavailable, Value};
+use halfarrow_sim::{Failure, Sparsity};
+use history::{Delay, Sample};
+use inputs::Signal;
+
+/// A model that runs: a program, the values of its parameters, what is connected to its inputs, and its memory.
+///
+/// [`initialise`](Model::initialise) gives the state to start from; after it the model is a
+/// [`System`](halfarrow_sim::System) to integrate.
+#[derive(Debug, Clone)]
+pub struct Model {
+    program: Program,
+    layout: Layout,
+    preamble: Routine,
+    rates: Routine,
+    observe: Routine,
+    switching: Routine,
+    sources: Routine,
+    frame: Frame,
+    recorded: Vec<usize>,
+    /// Conditions of the state that are offered as switching functions.
+    switches: Vec<ConditionId>,
+    clock: Clock,
+    inputs: Vec<Signal>,
+    held: Vec<Held>,
+    sparsity: Sparsity,
+    scales: Vec<f64>,
+    /// Values of the conserved constants.
+    conserved: Vec<f64>,
+    dx: Vec<f64>,
+    /// Blocks that no rate needs.
+    shown_blocks: Vec<BlockId>,
+    /// Whether the run has begun: conditions are held.
+    begun: bool,
+    /// When the last jump was crossed, in s.
+    crossed: f64,
+}
+
+/// What a held signal remembers.
+#[derive(Debug, Clone)]
+enum Held {
+    Delay(Delay),
+    Sample(Sample),
+}
+
+impl Model {
+    /// Makes a program ready to run, with all parameters at their defaults, recording what is recorded by default.
+    ///
+    /// # Errors
+    /// Equations of parameters alone that have no solution.
+    pub fn new(program: Program) -> Result<Model, Failure> {
+        let layout = program.layout();
+        let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
+        let rates = program.watched_routine(&layout, &rates);
+        let preamble = program.preamble(&layout);
+        let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
+        let sources = program.routine(&layout, &sources);
+        let of = |wanted: Cause| program.conditions.iter().filter(move |(_, c)| c.cause == wanted);
+        let switches: Vec<ConditionId> = of(Cause::State).map(|(id, _)| id).collect();
+        let operands: Vec<Value> = of(Cause::State).map(|(_, c)| c.operand).collect();
+        let switching = program.routine(&layout, &operands);
+        let clock = Clock::new(&program, &layout);
+        let mut frame = Frame::new(&program, &layout, layout.size);
+        for routine in [&rates, &preamble, &sources, &switching, clock.routine()] {
+            frame.reserve(routine);
+        }
+        let used: Vec<BlockId> = rates.solves.iter().map(|s| s.block).collect();
+        let n = program.states.len();
+        let mut model = Model {
+            sparsity: sparsity_of(&program),
+            inputs: program.inputs.iter().map(|_| Signal::default()).collect(),
+            held: Vec::new(),
+            scales: vec![0.0; n],
+            conserved: vec![0.0; program.conserved.len()],
+            dx: vec![0.0; n],
+            shown_blocks: program.blocks.ids().filter(|b| !used.contains(b)).collect(),
+            begun: false,
+            crossed: f64::NEG_INFINITY,
+            observe: Routine::default(),
+            recorded: Vec::new(),
+            layout,
+            preamble,
+            rates,
+            switching,
+            sources,
+            frame,
+            switches,
+            clock,
+            program,
+        };
+        let defaults = model.program.observed.iter().enumerate().filter(|(_, o)| o.default && o.value.is_ok());
+        model.recorded = defaults.map(|(i, _)| i).collect();
+        model.choose_recorded();
+        model.parameters_changed()?;
+        Ok(model)
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// Sets a parameter, in SI units; parameters given by it follow. The run starts anew.
+    ///
+    /// # Errors
+    /// There is no such parameter, it is a constant, the value is not finite, or nothing can be solved with it.
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        let found = self.program.parameters.iter().position(|p| p.name == name);
+        let index = found.ok_or_else(|| ParameterError::Unknown(name.to_string()))?;
+        if self.program.parameters[index].constant {
+            return Err(ParameterError::Constant(name.to_string()));
+        }
+        if !value.is_finite() {
+            return Err(ParameterError::NotFinite(name.to_string()));
+        }
+        self.frame.set[index] = Some(value);
+        self.parameters_changed().map_err(ParameterError::Unsolvable)
+    }
+
+    /// The present value of a parameter or constant, in SI units.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        let index = self.program.parameters.iter().position(|p| p.name == name)?;
+        Some(self.frame.r[self.layout.parameters as usize + index])
+    }
+
+    /// Connects a table of values over time to an input: straight lines between the points, the first value before
+    /// them, the last one after them. A time given twice is a jump.
+    ///
+    /// # Errors
+    /// There is no such input, or the points are no function of time.
+    pub fn connect(&mut self, input: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
+        let found = self.program.inputs.iter().position(|i| i.name == input);
+        let index = found.ok_or_else(|| InputError::Unknown(input.to_string()))?;
+        self.inputs[index] = Signal::table(times, values).map_err(|why| InputError::Points(input.to_string(), why))?;
+        self.restart();
+        Ok(())
+    }
+
+    /// Chooses what is recorded, in this order.
+    ///
+    /// # Errors
+    /// The first name that is unknown or has no value.
+    pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
+        let mut chosen = Vec::with_capacity(names.len());
+        for &name in names {
+            let found = self.program.observed.iter().position(|o| o.name == name);
+            let index = found.ok_or_else(|| RecordError::Unknown(name.to_string()))?;
+            if let Err(why) = &self.program.observed[index].value {
+                return Err(RecordError::Unavailable(name.to_string(), why.clone()));
+            }
+            chosen.push(index);
+        }
+        self.recorded = chosen;
+        self.choose_recorded();
+        Ok(())
+    }
+
+    /// Everything that has a value, in the order of the program.
+    pub fn record_all(&mut self) {
+        let available = self.program.observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
+        self.recorded = available.map(|(i, _)| i).collect();
+        self.choose_recorded();
+    }
+
+    /// Indices into [`Program::observed`] of what is recorded.
+    pub fn recorded(&self) -> &[usize] {
+        &self.recorded
+    }
+
+    /// Forgets a run: the next crossing is its start. Parameters, inputs and conserved constants stay.
+    pub fn restart(&mut self) {
+        self.begun = false;
+        self.crossed = f64::NEG_INFINITY;
+        self.follow();
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.memory.fill(0.0));
+        let time = |i: usize| self.layout.registers.get(&self.program.held[i].time).map(|&r| self.frame.r[r as usize]);
+        let held = self.program.held.iter().enumerate().map(|(i, h)| {
+            let time = time(i).unwrap_or(f64::NAN);
+            match h.kind {
+                HeldKind::Delay => Held::Delay(Delay::new(time)),
+                HeldKind::Sample => Held::Sample(Sample::new(time)),
+            }
+        });
+        self.held = held.collect();
+    }
+
+    fn follow(&mut self) {
+        self.frame.conditions.clock = Hold::Follow;
+        self.frame.conditions.state = Hold::Follow;
+    }
+
+    fn parameters_changed(&mut self) -> Result<(), Failure> {
+        self.frame.parameters_changed();
+        let run = self.frame.run(&self.preamble);
+        run.map_err(|trouble| self.failure(f64::NAN, trouble))?;
+        for (i, input) in self.program.inputs.iter().enumerate() {
+            if let Some(&register) = self.layout.registers.get(&input.default) {
+                self.inputs[i].set_default(self.frame.r[register as usize]);
+            }
+        }
+        self.restart();
+        Ok(())
+    }
+
+    fn choose_recorded(&mut self) {
+        let value = |&i: &usize| self.program.observed[i].value.clone().ok();
+        let wanted: Vec<Value> = self.recorded.iter().filter_map(value).collect();
+        self.observe = self.program.routine(&self.layout, &wanted);
+        self.frame.reserve(&self.observe);
+    }
+
+    /// Puts time, inputs, held signals, constants and states where routines read them.
+    fn place(&mut self, t: f64, x: &[f64]) {
+        self.place_time(t);
+        let (states, conserved) = (self.layout.states as usize, self.layout.conserved as usize);
+        self.frame.r[states..states + x.len()].copy_from_slice(x);
+        self.frame.r[conserved..conserved + self.conserved.len()].copy_from_slice(&self.conserved);
+    }
+
+    fn place_time(&mut self, t: f64) {
+        let Model { frame, layout, inputs, held, crossed, .. } = self;
+        frame.r[layout.time as usize] = t;
+        for (i, signal) in inputs.iter().enumerate() {
+            frame.r[layout.inputs as usize + i] = signal.at(t).0;
+        }
+        for (i, held) in held.iter().enumerate() {
+            frame.r[layout.held as usize + i] = match held {
+                Held::Delay(delay) => delay.at(t, *crossed).0,
+                Held::Sample(sample) => sample.value,
+            };
+        }
+    }
+
+    /// Sets the direction of derivatives: nothing moves.
+    fn still(&mut self) {
+        let fixed = self.layout.time as usize..self.layout.size as usize;
+        self.frame.d[fixed].fill(0.0);
+    }
+
+    /// What stopped a routine, for the modeller.
+    fn failure(&self, time: f64, trouble: Trouble) -> Failure {
+        let elements = |block: u32| self.program.blocks[BlockId(block)].elements().to_string();
+        match trouble {
+            Trouble::Vanished { watch } => {
+                Failure::Singular { time, what: self.program.watches[watch as usize].elements.clone() }
+            }
+            Trouble::Singular { block } => Failure::Singular { time, what: elements(block) },
+            Trouble::NoConvergence { block, iterations, residual, .. } => {
+                Failure::NoConvergence { time, what: elements(block), iterations, residual }
+            }
+        }
+    }
+}
+
+fn sparsity_of(program: &Program) -> Sparsity {
+    let mut columns = vec![Vec::new(); program.states.len()];
+    for (row, reads) in program.dependence.iter().enumerate() {
+        reads.iter().for_each(|&column| columns[column as usize].push(row));
+    }
+    Sparsity::from_columns(columns)
+}
+
+/// Why a variable has no value, in words.
+fn reason(why: &Unavailable) -> String {
+    match why {
+        Unavailable::Undetermined => "the junction structure does not determine it".to_string(),
+        Unavailable::NeedsRateOf(input) => format!("it needs the time derivative of the input {input}"),
+        Unavailable::Unsolvable => "it needs a rate that is only defined through itself".to_string(),
+    }
+}

@@ -1,0 +1,315 @@
+//! Start values: what is given holds, the rest is solved for, remaining freedom is zero.
+
+use super::minimum_norm;
+use super::{Held, Model, StartConflict, StartError, StartValue};
+use halfarrow_compiler::program::{Routine, Value};
+use halfarrow_sim::Failure;
+use std::collections::BTreeMap;
+
+/// A start condition is met if it is missed by less than this fraction of the terms it is made of.
+const MET: f64 = 1e-9;
+/// Passes over conditions that one unknown is left in.
+const PASSES: usize = 30;
+const ITERATIONS: usize = 60;
+
+/// The unknowns of the start: states, then conserved constants.
+struct Unknowns {
+    z: Vec<f64>,
+    known: Vec<bool>,
+}
+
+/// Start conditions that share unknowns.
+#[derive(Default)]
+struct Group {
+    conditions: Vec<usize>,
+    unknowns: Vec<u32>,
+}
+
+impl Model {
+    /// The state at the start of a run at `t`, which meets all start conditions; unknowns that they leave free are as
+    /// near to zero as they allow. Fixes the conserved constants. The run starts anew.
+    ///
+    /// # Errors
+    /// Start values that contradict each other, with fitting ones.
+    pub fn initialise(&mut self, t: f64) -> Result<Vec<f64>, StartError> {
+        self.restart();
+        let states = self.program.states.len();
+        let n = states + self.conserved.len();
+        let mut z = vec![0.0; n];
+        for _ in 0..20 {
+            let mut unknowns = Unknowns { z: vec![0.0; n], known: vec![false; n] };
+            self.solve_direct(t, &mut unknowns)?;
+            self.solve_groups(t, &mut unknowns)?;
+            let settled = z == unknowns.z;
+            z = unknowns.z;
+            self.conserved.copy_from_slice(&z[states..]);
+            if self.held.is_empty() || settled {
+                break;
+            }
+            // Held signals start with what the start makes of them.
+            self.begin_held(t, &z[..states]).map_err(StartError::Failure)?;
+        }
+        self.scales = z[..states].iter().map(|x| x.abs()).collect();
+        if self.held.iter().any(|h| matches!(h, Held::Delay(_) | Held::Sample(_))) {
+            self.crossed = f64::NEG_INFINITY;
+        }
+        z.truncate(states);
+        Ok(z)
+    }
+
+    /// Conditions in which one unknown is left determine it; all of one pass at once.
+    fn solve_direct(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
+        for _ in 0..PASSES {
+            let mut chosen: BTreeMap<u32, usize> = BTreeMap::new();
+            for (index, condition) in self.program.start.iter().enumerate() {
+                let mut open = condition.reads.iter().filter(|&&u| !unknowns.known[u as usize]);
+                if let (Some(&only), None) = (open.next(), open.next()) {
+                    chosen.entry(only).or_insert(index);
+                }
+            }
+            if chosen.is_empty() {
+                return Ok(());
+            }
+            if self.solve_each(t, unknowns, &chosen) == 0 {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Newton for each of the chosen (unknown, condition) by itself; gives how many were found and marks them known.
+    fn solve_each(&mut self, t: f64, unknowns: &mut Unknowns, chosen: &BTreeMap<u32, usize>) -> usize {
+        let wanted: Vec<Value> = chosen.values().map(|&c| self.program.start[c].residual).collect();
+        let routine = self.routine_for(&wanted);
+        let targets: Vec<usize> = chosen.keys().map(|&u| u as usize).collect();
+        let mut best: Vec<(f64, f64)> = targets.iter().map(|&u| (f64::INFINITY, unknowns.z[u])).collect();
+        let mut step = vec![0.0; targets.len()];
+        let mut done = vec![false; targets.len()];
+        for _ in 0..ITERATIONS {
+            if self.residuals(t, &routine, &unknowns.z, Some(&targets)).is_err() {
+                break;
+            }
+            for (i, (&unknown, &out)) in targets.iter().zip(&routine.outputs).enumerate() {
+                let (residual, slope) = (self.frame.r[out as usize], self.frame.d[out as usize]);
+                if done[i] {
+                    continue;
+                }
+                let z = &mut unknowns.z[unknown];
+                if residual.abs() < best[i].0 {
+                    best[i] = (residual.abs(), *z);
+                    step[i] = -residual / slope;
+                } else {
+                    step[i] *= 0.5;
+                }
+                done[i] = residual == 0.0 || step[i].abs() <= 2.0 * f64::EPSILON * best[i].1.abs();
+                *z = if done[i] || !step[i].is_finite() { best[i].1 } else { best[i].1 + step[i] };
+            }
+            if done.iter().all(|&done| done) {
+                break;
+            }
+        }
+        for (&unknown, &done) in targets.iter().zip(&done) {
+            unknowns.known[unknown] = done;
+            if !done {
+                unknowns.z[unknown] = 0.0;
+            }
+        }
+        done.iter().filter(|&&done| done).count()
+    }
+
+    /// Whatever is not met yet is solved together with all that shares unknowns with it.
+    fn solve_groups(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
+        for group in self.groups() {
+            let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.program.start[c].residual).collect();
+            let routine = self.routine_for(&wanted);
+            let known = group.unknowns.iter().all(|&u| unknowns.known[u as usize]);
+            if known && self.is_met(t, &routine, &group, &unknowns.z) {
+                continue;
+            }
+            self.solve_group(t, &routine, &group, unknowns)?;
+        }
+        Ok(())
+    }
+
+    fn is_met(&mut self, t: f64, routine: &Routine, group: &Group, z: &[f64]) -> bool {
+        let Some((residual, jacobian)) = self.linearised(t, routine, group, z) else { return false };
+        self.missed(group, z, &residual, &jacobian).is_empty()
+    }
+
+    /// Conditions of a group that are missed, as indices into it.
+    fn missed(&self, group: &Group, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
+        let n = group.unknowns.len();
+        let asked = |i: usize| {
+            let register = self.layout.registers.get(&self.program.start[group.conditions[i]].asked);
+            register.map_or(0.0, |&r| self.frame.r[r as usize].abs())
+        };
+        let size = |i: usize| {
+            let terms = group.unknowns.iter().enumerate().map(|(j, &u)| (jacobian[i * n + j] * z[u as usize]).abs());
+            asked(i) + terms.sum::<f64>()
+        };
+        (0..residual.len()).filter(|&i| !(residual[i].abs() <= MET * size(i))).collect()
+    }
+
+    /// Gauss-Newton of minimum norm, damped.
+    fn solve_group(&mut self, t: f64, routine: &Routine, group: &Group, all: &mut Unknowns) -> Result<(), StartError> {
+        let names = || group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
+        let not_found = StartError::NotFound(names());
+        let mut z = all.z.clone();
+        let starts = [0.0, 1e-6, 1e-3, 1.0];
+        let mut at = None;
+        for start in starts {
+            for &u in group.unknowns.iter().filter(|&&u| !all.known[u as usize]) {
+                z[u as usize] = start;
+            }
+            at = self.linearised(t, routine, group, &z);
+            if at.is_some() {
+                break;
+            }
+        }
+        let (mut residual, mut jacobian) = match at {
+            Some(at) => at,
+            None => {
+                let run = self.residuals(t, routine, &z, None);
+                return Err(run.err().map_or(not_found, StartError::Failure));
+            }
+        };
+        for _ in 0..ITERATIONS {
+            let Some(step) = minimum_norm::step(&jacobian, &residual, group.unknowns.len()) else {
+                return Err(not_found);
+            };
+            let norm = |r: &[f64]| r.iter().zip(&step.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
+            let moves = |(u, s): (&u32, &f64)| s.abs() > 4.0 * f64::EPSILON * z[*u as usize].abs();
+            if norm(&residual) == 0.0 || !group.unknowns.iter().zip(&step.step).any(moves) {
+                break;
+            }
+            let mut fraction = 1.0;
+            let moved = loop {
+                let mut trial = z.clone();
+                group.unknowns.iter().zip(&step.step).for_each(|(&u, s)| trial[u as usize] += fraction * s);
+                match self.linearised(t, routine, group, &trial) {
+                    Some(next) if norm(&next.0) < norm(&residual) => break Some((trial, next)),
+                    _ if fraction < 1e-9 => break None,
+                    _ => fraction *= 0.5,
+                }
+            };
+            // No step helps any more: this is as near as it gets.
+            let Some((trial, next)) = moved else { break };
+            z = trial;
+            (residual, jacobian) = next;
+        }
+        let missed = self.missed(group, &z, &residual, &jacobian);
+        if missed.is_empty() {
+            all.z = z;
+            group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
+            return Ok(());
+        }
+        Err(self.conflict(t, group, &z, &residual, &jacobian).unwrap_or(not_found))
+    }
+
+    /// The contradiction, if the point is as near as any to all conditions.
+    fn conflict(&mut self, t: f64, group: &Group, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Option<StartError> {
+        let weights = minimum_norm::step(jacobian, residual, group.unknowns.len())?.weights;
+        let n = group.unknowns.len();
+        let weighed: Vec<f64> = residual.iter().zip(&weights).map(|(r, w)| r * w).collect();
+        let most = weighed.iter().fold(0.0f64, |most, r| most.max(r.abs()));
+        // At a least-squares point the residual is orthogonal to whatever the unknowns can do.
+        for j in 0..n {
+            let column = |i: usize| jacobian[i * n + j] * weights[i];
+            let product: f64 = (0..residual.len()).map(|i| column(i) * weighed[i]).sum();
+            let size: f64 = (0..residual.len()).map(|i| column(i).abs()).sum();
+            if product.abs() > 1e-5 * size * most {
+                return None;
+            }
+        }
+        let involved: Vec<usize> = (0..residual.len()).filter(|&i| weighed[i].abs() > 1e-6 * most).collect();
+        let values = involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect();
+        Some(StartError::Conflict(StartConflict { values }))
+    }
+
+    fn start_value(&mut self, t: f64, condition: usize, z: &[f64], residual: f64) -> StartValue {
+        let start = self.program.start[condition].clone();
+        let observed = self.program.observed.iter().find(|o| o.name == start.name).and_then(|o| o.value.clone().ok());
+        let mut wanted = vec![start.asked];
+        wanted.extend(observed);
+        let routine = self.routine_for(&wanted);
+        let run = self.residuals(t, &routine, z, None);
+        let value = |i: usize| routine.outputs.get(i).map(|&out| self.frame.r[out as usize]);
+        let asked = value(0).unwrap_or(f64::NAN);
+        let fitting = value(1).filter(|_| run.is_ok()).unwrap_or(asked + residual);
+        StartValue { name: start.name, asked, fitting, span: start.span }
+    }
+
+    /// Residuals and, row by row, their derivatives by the unknowns of the group; `None` where one has no value.
+    fn linearised(&mut self, t: f64, routine: &Routine, group: &Group, z: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (rows, columns) = (group.conditions.len(), group.unknowns.len());
+        let mut jacobian = vec![0.0; rows * columns];
+        if columns == 0 {
+            self.residuals(t, routine, z, None).ok()?;
+        }
+        for (j, &unknown) in group.unknowns.iter().enumerate() {
+            self.residuals(t, routine, z, Some(&[unknown as usize])).ok()?;
+            for (i, &out) in routine.outputs.iter().enumerate() {
+                jacobian[i * columns + j] = self.frame.d[out as usize];
+            }
+        }
+        let residual: Vec<f64> = routine.outputs.iter().map(|&out| self.frame.r[out as usize]).collect();
+        let finite = residual.iter().chain(&jacobian).all(|v| v.is_finite());
+        finite.then_some((residual, jacobian))
+    }
+
+    /// Runs a routine at the start, with derivatives along the given unknowns together.
+    fn residuals(&mut self, t: f64, routine: &Routine, z: &[f64], along: Option<&[usize]>) -> Result<(), Failure> {
+        let states = self.program.states.len();
+        self.conserved.copy_from_slice(&z[states..]);
+        self.place(t, &z[..states]);
+        let run = match along {
+            None => self.frame.run(routine),
+            Some(unknowns) => {
+                self.still();
+                for &u in unknowns {
+                    let base = if u < states { self.layout.states as usize } else { self.layout.conserved as usize };
+                    self.frame.d[base + if u < states { u } else { u - states }] = 1.0;
+                }
+                self.frame.run_along(routine)
+            }
+        };
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    fn routine_for(&mut self, wanted: &[Value]) -> Routine {
+        let routine = self.program.routine(&self.layout, wanted);
+        self.frame.reserve(&routine);
+        routine
+    }
+
+    /// Start conditions in groups that share no unknown.
+    fn groups(&self) -> Vec<Group> {
+        let n = self.program.states.len() + self.conserved.len();
+        let mut leader: Vec<u32> = (0..n as u32).collect();
+        fn find(leader: &mut [u32], u: u32) -> u32 {
+            let mut u = u;
+            while leader[u as usize] != u {
+                leader[u as usize] = leader[leader[u as usize] as usize];
+                u = leader[u as usize];
+            }
+            u
+        }
+        for condition in &self.program.start {
+            for pair in condition.reads.windows(2) {
+                let (a, b) = (find(&mut leader, pair[0]), find(&mut leader, pair[1]));
+                leader[a.max(b) as usize] = a.min(b);
+            }
+        }
+        let mut groups: BTreeMap<Option<u32>, Group> = BTreeMap::new();
+        for (index, condition) in self.program.start.iter().enumerate() {
+            let of = condition.reads.first().map(|&u| find(&mut leader, u));
+            groups.entry(of).or_default().conditions.push(index);
+        }
+        for u in 0..n as u32 {
+            if let Some(group) = groups.get_mut(&Some(find(&mut leader, u))) {
+                group.unknowns.push(u);
+            }
+        }
+        groups.into_values().collect()
+    }
+}

@@ -1,0 +1,272 @@
+//! The model as a system to integrate.
+
+use super::{Held, Model};
+use crate::bytecode::{Hold, Trouble};
+use halfarrow_sim::{Failure, Sparsity, System};
+
+/// Which routine is run.
+#[derive(Debug, Clone, Copy)]
+enum What {
+    Rates,
+    Recorded,
+    Switches,
+}
+
+impl Model {
+    fn once(&mut self, what: What, along: bool) -> Result<bool, Trouble> {
+        let routine = match what {
+            What::Rates => &self.rates,
+            What::Recorded => &self.observe,
+            What::Switches => &self.switching,
+        };
+        match along {
+            false => self.frame.run(routine)?,
+            true => self.frame.run_along(routine)?,
+        }
+        let registers = if along { &self.frame.d } else { &self.frame.r };
+        Ok(routine.outputs.iter().all(|&out| registers[out as usize].is_finite()))
+    }
+
+    /// Runs a routine with conditions as held. Beyond a switch the held branch may have no value any more: then the
+    /// conditions are followed instead.
+    fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
+        let first = self.once(what, along);
+        let held = self.frame.conditions.state == Hold::Keep && !self.switches.is_empty();
+        if !held || matches!(first, Ok(true)) {
+            return first.map(|_| ()).map_err(|trouble| self.failure(t, trouble));
+        }
+        self.frame.conditions.state = Hold::Follow;
+        let second = self.once(what, along);
+        let good = matches!(second, Ok(true));
+        let last = if good { second } else { self.frame.conditions.state = Hold::Keep; self.once(what, along) };
+        self.frame.conditions.state = Hold::Keep;
+        last.map(|_| ()).map_err(|trouble| self.failure(t, trouble))
+    }
+
+    /// Runs the rates at `(t, x)` and leaves them in `dx`.
+    pub(super) fn rates_at(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let mut dx = std::mem::take(&mut self.dx);
+        let result = self.rates(t, x, &mut dx);
+        self.dx = dx;
+        result
+    }
+
+    /// Commits the Newton solutions found last.
+    fn remember(&mut self, shown: bool) {
+        let blocks = if shown { self.observe.solves.iter() } else { self.rates.solves.iter() };
+        for solve in blocks.filter(|s| !shown || self.shown_blocks.contains(&s.block)) {
+            let newton = &mut self.frame.solvers[solve.block.0 as usize].newton;
+            newton.memory.copy_from_slice(&newton.x);
+        }
+    }
+
+    /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
+    fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.rates_at(t, x)?;
+        self.still();
+        let Model { frame, layout, inputs, held, dx, crossed, .. } = self;
+        frame.d[layout.time as usize] = 1.0;
+        inputs.iter().enumerate().for_each(|(i, s)| frame.d[layout.inputs as usize + i] = s.at(t).1);
+        for (i, held) in held.iter().enumerate() {
+            let slope = if let Held::Delay(delay) = held { delay.at(t, *crossed).1 } else { 0.0 };
+            frame.d[layout.held as usize + i] = slope;
+        }
+        frame.d[layout.states as usize..][..dx.len()].copy_from_slice(dx);
+        let run = self.frame.run_along(&self.sources);
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    fn source(&self, i: usize) -> (f64, f64) {
+        let register = self.sources.outputs[i] as usize;
+        (self.frame.r[register], self.frame.d[register])
+    }
+
+    /// Held signals at the start of a run. They may read each other: passes until nothing changes.
+    pub(super) fn begin_held(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        for _ in 0..self.held.len() {
+            self.place(t, x);
+            self.run_sources(t, x)?;
+            for i in 0..self.held.len() {
+                let (value, slope) = self.source(i);
+                match &mut self.held[i] {
+                    Held::Delay(delay) => delay.begin(t, value, slope),
+                    Held::Sample(sample) => sample.begin(t, value),
+                }
+            }
+        }
+        self.place(t, x);
+        Ok(())
+    }
+
+    /// Takes the samples that are due, in order: each sees those taken before it.
+    fn take_samples(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        for i in 0..self.held.len() {
+            if matches!(&self.held[i], Held::Sample(sample) if sample.is_due(t)) {
+                self.place(t, x);
+                self.run_sources(t, x)?;
+                let (value, _) = self.source(i);
+                if let Held::Sample(sample) = &mut self.held[i] {
+                    sample.value = value;
+                    sample.pass(t);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take_sides(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        if self.switches.is_empty() {
+            self.frame.conditions.state = Hold::Keep;
+            return Ok(());
+        }
+        self.frame.conditions.state = Hold::Take;
+        let run = self.frame.run(&self.switching);
+        let frame = &mut self.frame;
+        for (&condition, &register) in self.switches.iter().zip(&self.switching.outputs) {
+            frame.conditions.value(condition, frame.r[register as usize], &frame.tables);
+        }
+        frame.conditions.state = Hold::Keep;
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    fn has_delays(&self) -> bool {
+        self.held.iter().any(|h| matches!(h, Held::Delay(_)))
+    }
+}
+
+impl System for Model {
+    fn states(&self) -> usize {
+        self.program.states.len()
+    }
+
+    fn state_name(&self, state: usize) -> String {
+        self.program.states[state].name.clone()
+    }
+
+    fn switch_name(&self, switch: usize) -> String {
+        format!("condition {}", switch + 1)
+    }
+
+    fn observed_name(&self, value: usize) -> String {
+        self.program.observed[self.recorded[value]].name.clone()
+    }
+
+    fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+
+    fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.evaluate(What::Rates, false, t)?;
+        for (state, (dx, &register)) in dx.iter_mut().zip(&self.rates.outputs).enumerate() {
+            *dx = self.frame.r[register as usize];
+            if !dx.is_finite() {
+                return Err(Failure::NotFinite { time: t, what: format!("the rate of {}", self.state_name(state)) });
+            }
+        }
+        Ok(())
+    }
+
+    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.still();
+        self.frame.d[self.layout.states as usize..][..v.len()].copy_from_slice(v);
+        self.evaluate(What::Rates, true, t)?;
+        for (state, (jv, &register)) in jv.iter_mut().zip(&self.rates.outputs).enumerate() {
+            *jv = self.frame.d[register as usize];
+            if !jv.is_finite() {
+                let what = format!("the derivative of the rate of {}", self.state_name(state));
+                return Err(Failure::NotFinite { time: t, what });
+            }
+        }
+        Ok(())
+    }
+
+    fn sparsity(&self) -> &Sparsity {
+        &self.sparsity
+    }
+
+    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.evaluate(What::Recorded, false, t)?;
+        out.iter_mut().zip(&self.observe.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
+        self.remember(true);
+        Ok(())
+    }
+
+    fn observed(&self) -> usize {
+        self.recorded.len()
+    }
+
+    fn next_jump(&mut self, t: f64) -> Option<f64> {
+        let inputs = self.inputs.iter().filter_map(|signal| signal.next_corner(t));
+        let held = self.held.iter().filter_map(|held| match held {
+            Held::Delay(delay) => delay.next_jump(t),
+            Held::Sample(sample) => Some(sample.next_time()),
+        });
+        inputs.chain(held).chain(self.clock.next).filter(|&next| next > t).reduce(f64::min)
+    }
+
+    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        if t < self.crossed {
+            self.restart();
+        }
+        self.crossed = t;
+        self.inputs.iter_mut().for_each(|signal| signal.hold(t));
+        self.frame.conditions.state = Hold::Follow;
+        self.clock.cross(&mut self.frame, t);
+        if !self.begun {
+            self.begin_held(t, x)?;
+            self.begun = true;
+        } else {
+            self.take_samples(t, x)?;
+        }
+        self.take_sides(t, x)?;
+        if self.has_delays() {
+            self.run_sources(t, x)?;
+            for i in 0..self.held.len() {
+                let (value, slope) = self.source(i);
+                if let Held::Delay(delay) = &mut self.held[i] {
+                    delay.jump(t, value, slope);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.has_delays() {
+            self.place(t, x);
+            self.run_sources(t, x)?;
+            for i in 0..self.held.len() {
+                let (value, slope) = self.source(i);
+                if let Held::Delay(delay) = &mut self.held[i] {
+                    delay.append(t, value, slope);
+                }
+            }
+        } else if !self.rates.solves.is_empty() {
+            self.rates_at(t, x)?;
+        }
+        self.remember(false);
+        Ok(())
+    }
+
+    fn switches(&self) -> usize {
+        self.switches.iter().map(|&c| self.program.conditions[c].kind.switches()).sum()
+    }
+
+    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.evaluate(What::Switches, false, t)?;
+        let frame = &self.frame;
+        let mut next = 0;
+        for (&condition, &register) in self.switches.iter().zip(&self.switching.outputs) {
+            let beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
+            let count = self.program.conditions[condition].kind.switches();
+            g[next..next + count].copy_from_slice(&beyond[..count]);
+            next += count;
+        }
+        Ok(())
+    }
+}
