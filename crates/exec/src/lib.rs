@@ -9,5 +9,6 @@ pub mod math;
 mod model;
 
 pub use model::{
-    Equilibrium, EquilibriumError, InputError, Model, ParameterError, RecordError, StartConflict, StartError, StartValue,
+    Equilibrium, EquilibriumError, InputError, Model, ParameterError, RecordError, StartConflict, StartError,
+    StartValue,
 };

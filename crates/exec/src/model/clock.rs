@@ -42,8 +42,7 @@ impl Clock {
         }
         frame.conditions.clock = Hold::Keep;
         let lines = self.next_on_lines(frame, t);
-        let curves: Vec<usize> =
-            (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
+        let curves: Vec<usize> = (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
         let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
         self.next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);

@@ -45,7 +45,9 @@ impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             InputError::Unknown(name) => write!(f, "there is no input `{name}`"),
-            InputError::Points(name, why) => write!(f, "the values for the input `{name}` are no function of time: {why}"),
+            InputError::Points(name, why) => {
+                write!(f, "the values for the input `{name}` are no function of time: {why}")
+            }
         }
     }
 }

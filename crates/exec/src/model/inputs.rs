@@ -74,6 +74,7 @@ impl Signal {
         self.held = Some((after - 1, last));
     }
 
+    /// Follows the points again.
     pub fn release(&mut self) {
         self.held = None;
     }

@@ -189,6 +189,7 @@ impl Model {
         self.begun = false;
         self.crossed = f64::NEG_INFINITY;
         self.follow();
+        self.inputs.iter_mut().for_each(Signal::release);
         self.frame.solvers.iter_mut().for_each(|s| s.newton.memory.fill(0.0));
         let time = |i: usize| self.layout.registers.get(&self.program.held[i].time).map(|&r| self.frame.r[r as usize]);
         let held = self.program.held.iter().enumerate().map(|(i, h)| {

@@ -38,7 +38,12 @@ impl Model {
         self.frame.conditions.state = Hold::Follow;
         let second = self.once(what, along);
         let good = matches!(second, Ok(true));
-        let last = if good { second } else { self.frame.conditions.state = Hold::Keep; self.once(what, along) };
+        let last = if good {
+            second
+        } else {
+            self.frame.conditions.state = Hold::Keep;
+            self.once(what, along)
+        };
         self.frame.conditions.state = Hold::Keep;
         last.map(|_| ()).map_err(|trouble| self.failure(t, trouble))
     }
