@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
 use super::signals::{NodeId, signal_graph};
 use super::strokes::{Strokes, parts, sits_here};
-use super::{CausalGraph, Combination, Ports, Role, Stroke, break_set, contradiction, local};
+use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, local};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
 use crate::diagnostic::{Diagnostic, Diagnostics};
@@ -36,6 +36,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
+    ports.kept = wanted.why;
     ports.ports.sort_by_key(|p| p.port);
     let mut strokes = strokes.table();
     erase(&graph, &mut strokes, &undrawn);
@@ -222,21 +223,23 @@ fn causality_of(here: bool) -> PortCausality {
 struct Wanted {
     independent: Vec<PortRef>,
     virtual_speeds: Vec<Virtual>,
+    why: BTreeMap<Symbol, Kept>,
 }
 
 impl Wanted {
     /// `prefer`, then common variables of junctions whose integrals occur in moduli. Source: `method.md`, 5.2.
     fn of(x: &mut Exprs, graph: &BondGraph) -> Wanted {
-        let mut symbols: Vec<Symbol> = graph.preferences.iter().map(|p| p.symbol).collect();
-        symbols.extend(integrated_in_moduli(x, graph));
-        let mut wanted = Wanted { independent: Vec::new(), virtual_speeds: Vec::new() };
-        for symbol in symbols {
-            wanted.add(x, graph, symbol);
+        let mut wanted = Wanted { independent: Vec::new(), virtual_speeds: Vec::new(), why: BTreeMap::new() };
+        for preference in &graph.preferences {
+            wanted.add(x, graph, preference.symbol, Kept::Preferred);
+        }
+        for symbol in integrated_in_moduli(x, graph) {
+            wanted.add(x, graph, symbol, Kept::IntegralInModulus);
         }
         wanted
     }
 
-    fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol) {
+    fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol, why: Kept) {
         let (bond, flow) = match graph.variables.get(&symbol).map(|v| v.meaning) {
             Some(Meaning::Flow(bond)) => (bond, true),
             Some(Meaning::Effort(bond)) => (bond, false),
@@ -245,7 +248,9 @@ impl Wanted {
         let ends = [graph.bonds[bond].from, graph.bonds[bond].to];
         let is_junction = |k: &Kind| matches!((k, flow), (Kind::One, true) | (Kind::Zero, false));
         let Some(junction) = ends.iter().map(|p| p.element).find(|&e| is_junction(&graph.elements[e].kind)) else {
-            self.independent.extend(ends.iter().copied().filter(|&p| gives(graph, p, flow)));
+            for port in ends.into_iter().filter(|&p| gives(graph, p, flow)) {
+                self.keep(graph, port, why);
+            }
             return;
         };
         let own = ends.iter().copied().find(|&p| gives(graph, p, flow));
@@ -255,21 +260,28 @@ impl Wanted {
         };
         let neighbours = graph.elements[junction].ports.iter().map(|p| opposite(p.bond));
         match own.or_else(|| neighbours.into_iter().find(|&p| gives(graph, p, flow))) {
-            Some(port) if !self.independent.contains(&port) => self.independent.push(port),
-            Some(_) => {}
+            Some(port) => self.keep(graph, port, why),
             None if self.virtual_speeds.iter().any(|v| v.junction == junction) => {}
             None => {
                 let name = &graph.elements[junction].name;
                 let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
                 let mut fresh = |suffix: &str| {
                     let name = format!("{name}.{suffix}");
-                    let taken = graph.variables.keys().any(|&s| x.name(s) == name);
+                    let taken = x.find_symbol(&name).is_some();
                     x.symbol(&if taken { format!("{name}*") } else { name }, Default::default())
                 };
                 let speed = fresh(own);
                 let reaction = fresh(&format!("{conjugate}*"));
+                self.why.insert(speed, why);
                 self.virtual_speeds.push(Virtual { junction, speed, reaction });
             }
+        }
+    }
+
+    fn keep(&mut self, graph: &BondGraph, port: PortRef, why: Kept) {
+        if !self.independent.contains(&port) {
+            self.independent.push(port);
+            self.why.extend(graph.storage_symbols(port).map(|(z, _)| (z, why)));
         }
     }
 

@@ -65,8 +65,19 @@ pub struct Ports {
     pub undetermined: Vec<Symbol>,
     /// Independent variables that sit on no storage, `method.md`, 5.2.
     pub virtual_speeds: Vec<Virtual>,
+    /// Why variables were asked to be independent ahead of the order of the model.
+    pub kept: BTreeMap<Symbol, Kept>,
     /// Relations among imposed variables alone that the structure demands; they hold, else there were an error.
     pub demands: Vec<Combination>,
+}
+
+/// Why a variable is asked to stay independent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kept {
+    /// The modeller prefers it.
+    Preferred,
+    /// Its integral occurs in a modulus.
+    IntegralInModulus,
 }
 
 /// One port and its causality.

@@ -53,7 +53,9 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         _ => Vec::new(),
     });
     let implicit = implicit.collect();
-    let display::Shown { display, aliases, sources } = display::display(&mut d, &states, &ordered);
+    let follows: Vec<Symbol> =
+        causal.ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output).collect();
+    let display::Shown { display, aliases, sources, dependent } = display::display(&mut d, &states, &ordered, &follows);
     let dof =
         causal.ports.ports.iter().filter(|p| p.role == Role::Independent).count() + causal.ports.virtual_speeds.len();
     let graph = BondGraph { exprs: d.x, ..graph.clone() };
@@ -69,6 +71,7 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         meanings,
         aliases,
         sources,
+        dependent,
         index: 0,
         dof,
         implicit,

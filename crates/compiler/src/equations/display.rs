@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::blocks::{LinearRow, Ordered};
 use super::definitions::{Definition, Definitions};
-use super::{DisplayEquation, State, Step};
+use super::{Dependent, DisplayEquation, State, Step};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 
@@ -21,10 +21,12 @@ pub struct Shown {
     pub aliases: BTreeMap<Symbol, String>,
     /// Sources that stand in the equations by name, with their values.
     pub sources: Vec<(Symbol, Expr)>,
+    /// The rows of the dependent storages.
+    pub dependent: Vec<Dependent>,
 }
 
 /// The equations for people, with everything put in that can be.
-pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered) -> Shown {
+pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered, follows: &[Symbol]) -> Shown {
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
     let named = named_sources(d);
     let small = ordered.steps.len() <= SMALL;
@@ -37,8 +39,16 @@ pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered) -> Show
         read.extend(d.x.symbols_of(equation.right));
         equation.closed = (d.x.substitute(equation.left, &named), d.x.substitute(equation.right, &named));
     }
+    let mut dependent = Vec::with_capacity(follows.len());
+    for &variable in follows {
+        if let Some(row) = d.of.get(&variable).map(|f| f.expr()) {
+            let value = put_in(&mut d.x, row, &known);
+            read.extend(d.x.symbols_of(value));
+            dependent.push(Dependent { variable, value });
+        }
+    }
     let sources = named.into_iter().filter(|(s, _)| read.contains(s)).collect();
-    Shown { display, aliases, sources }
+    Shown { display, aliases, sources, dependent }
 }
 
 /// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.

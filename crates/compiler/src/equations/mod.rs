@@ -17,7 +17,7 @@ use crate::span::Span;
 use crate::unit::Unit;
 
 pub use derive::derive_equations;
-pub use text::{Style, print, print_expr, print_meanings};
+pub use text::{Style, print, print_dependent, print_expr, print_meanings};
 
 /// A formulation, `method.md`, section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,6 +49,8 @@ pub struct Equations {
     pub conditions: Vec<Condition>,
     /// The equations as a person would write them: one for each state, then what stays implicit.
     pub display: Vec<DisplayEquation>,
+    /// Each dependent storage with its co-energy variable as a combination of independent ones: its row of `S`.
+    pub dependent: Vec<Dependent>,
     /// Sources that stand in `display` by name, with their values.
     pub sources: Vec<(Symbol, Expr)>,
     /// What a state is that is no variable of its own (`pi = X + S^T X_d`), in stored quantities.
@@ -87,6 +89,15 @@ pub enum StateKind {
     Storage(Option<ElementId>),
     /// An integrated signal.
     Signal,
+}
+
+/// A storage whose co-energy variable follows from others.
+#[derive(Debug, Clone, Copy)]
+pub struct Dependent {
+    /// Its co-energy variable.
+    pub variable: Symbol,
+    /// What it follows from, with everything put in that can be.
+    pub value: Expr,
 }
 
 /// A combination of stored quantities that no motion changes.

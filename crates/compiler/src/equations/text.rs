@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{DisplayEquation, Equations, Step};
+use super::{Dependent, DisplayEquation, Equations, Step};
 use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
 use crate::bond_graph::{BondGraph, Element, Kind, Meaning};
 
@@ -40,6 +40,19 @@ pub fn print_meanings(equations: &Equations, style: Style) -> Vec<String> {
     let conserved = equations.conserved.iter().map(|c| (c.symbol, c.value));
     let all = equations.sources.iter().copied().chain(equations.meanings.iter().copied()).chain(conserved);
     all.map(|(symbol, value)| format!("{} = {}", name(symbol), text(value))).collect()
+}
+
+/// The dependent storages, each with its row of `S`, one a line.
+pub fn print_dependent(equations: &Equations, style: Style) -> Vec<String> {
+    let names = Written::of(equations);
+    let x = &equations.graph.exprs;
+    let name = |s: Symbol| match style {
+        Style::Ascii => names.ascii(s),
+        Style::Unicode => names.unicode(s),
+        Style::Latex => names.latex(s),
+    };
+    let line = |d: &Dependent| format!("{} = {}", name(d.variable), expression(x, d.value, &names, style));
+    equations.dependent.iter().map(line).collect()
 }
 
 /// One expression in the names of these equations.
@@ -168,6 +181,9 @@ impl Display for Equations {
         }
         for line in print_meanings(self, Style::Unicode) {
             writeln!(f, "  where {line}")?;
+        }
+        for line in print_dependent(self, Style::Unicode) {
+            writeln!(f, "  dependent {line}")?;
         }
         writeln!(f, "\nsteps")?;
         for step in &self.steps {
