@@ -6,6 +6,31 @@
 //! held signals, and the effort, flow and stored quantity of bonds and ports. What the modeller wrote as `R1.f` is the
 //! flow of the bond at `R1`; `w.f` of a 1-junction is the flow of any of its bonds.
 
+mod blocks;
+mod builder;
+mod csv;
+mod decls;
+mod dimension;
+mod elaborate;
+mod elements;
+mod files;
+mod flatten;
+mod intent;
+mod load;
+mod lookup;
+mod measure;
+mod overrides;
+mod scope;
+mod symbols;
+mod value;
+mod verify;
+mod wire;
+
+pub use elaborate::{Elaborated, elaborate};
+pub use files::{FileError, Files, NoFiles};
+pub use overrides::Override;
+pub use verify::verify;
+
 use std::collections::BTreeMap;
 
 use crate::algebra::{Expr, Exprs, Symbol};

@@ -1,0 +1,306 @@
+//! What is known while a graph is being built: symbols, dimensions, values of names.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::dimension::{Clash, Dimensions, Quantity, Reason};
+use super::files::Files;
+use super::flatten::{Flat, Part, Word};
+use super::scope::DeclId;
+use super::wire::Wiring;
+use super::{
+    BondId, ElementId, Held, HeldId, Input, InputId, Meaning, Named, Parameter, ParameterId, PortRef, Signal, SignalId,
+};
+use crate::algebra::{Expr, Exprs, Facts, Symbol};
+use crate::ast;
+use crate::diagnostic::{Diagnostic, Sources, codes};
+use crate::ids::{Id, Table};
+use crate::span::Span;
+use crate::unit::Dimension as Dim;
+
+/// A value that has been read: its expression in SI and its dimension.
+#[derive(Debug, Clone)]
+pub(super) struct Value {
+    /// The expression.
+    pub expr: Expr,
+    /// Its dimension.
+    pub quantity: Quantity,
+    /// Whether it is a truth value.
+    pub truth: bool,
+}
+
+impl Value {
+    /// A number.
+    pub fn number(expr: Expr, quantity: Quantity) -> Value {
+        Value { expr, quantity, truth: false }
+    }
+}
+
+/// A signal whose rate is lowered when all names are known.
+pub(super) struct OpenSignal<'a> {
+    /// The signal in the table.
+    pub id: SignalId,
+    /// The state as written, if it is one.
+    pub state: &'a ast::State,
+    /// The declaration.
+    pub decl: DeclId,
+}
+
+/// What a signal block reads, lowered when all names are known.
+pub(super) struct OpenBlock<'a> {
+    /// The input as written.
+    pub input: &'a ast::Expr,
+    /// Where names are looked up.
+    pub scope: usize,
+    /// The part whose argument it is in, if it is in one.
+    pub own: Option<usize>,
+    /// Whether the part's own variables come first.
+    pub law: bool,
+    /// Name of what it stands in.
+    pub owner: String,
+    /// Where the value goes.
+    pub goes: BlockInput,
+}
+
+/// Where the value of a block's input goes.
+#[derive(Clone, Copy)]
+pub(super) enum BlockInput {
+    /// It is delayed or sampled.
+    Held(HeldId),
+    /// It is added, divided by an expression, to the rate of a signal.
+    Rate(SignalId, Expr),
+}
+
+/// Effort and flow of a bond, with their dimensions.
+#[derive(Debug, Clone)]
+pub(super) struct Pair {
+    /// The effort.
+    pub effort: Symbol,
+    /// The flow.
+    pub flow: Symbol,
+    /// Dimension of the effort.
+    pub effort_in: Quantity,
+    /// Dimension of the flow.
+    pub flow_in: Quantity,
+}
+
+/// A graph while it is being built.
+pub(super) struct Builder<'a, 'f> {
+    pub flat: &'f Flat<'a>,
+    pub wiring: &'f Wiring,
+    pub sources: &'f Sources,
+    pub files: &'f dyn Files,
+    pub exprs: Exprs,
+    pub dims: Dimensions,
+    pub faults: Vec<Diagnostic>,
+    /// Meaning and dimension of every symbol, by its number.
+    pub meanings: Vec<Option<(Meaning, Quantity)>>,
+    /// Variables of every bond.
+    pub pairs: Vec<Pair>,
+    /// Variables of the bond of every constraint.
+    pub reactions: Vec<Pair>,
+    /// Stored quantities of every port of every part.
+    pub stored: Vec<Vec<Symbol>>,
+    /// Values of the declarations; `None` before they are known and where they are at fault.
+    pub values: Vec<Option<Value>>,
+    /// Functions: their formal arguments and value.
+    pub functions: HashMap<DeclId, (Vec<Symbol>, Expr)>,
+    pub parameters: Table<ParameterId, Parameter>,
+    /// Values of the parameters, as numbers.
+    pub numbers: Vec<f64>,
+    pub inputs: Table<InputId, Input>,
+    pub signals: Table<SignalId, Signal>,
+    pub held: Table<HeldId, Held>,
+    pub lets: Vec<Named>,
+    pub outputs: Vec<Named>,
+    /// Dimensions of the named expressions.
+    pub named_quantities: BTreeMap<String, Quantity>,
+    pub open_signals: Vec<OpenSignal<'a>>,
+    pub open_blocks: Vec<OpenBlock<'a>>,
+    /// Rates of signals that expressions ask for, and the signal of each.
+    pub rate_symbols: HashMap<Symbol, SignalId>,
+    /// Whether a bond carries no power.
+    pub pseudo: Vec<bool>,
+    /// Columns of the tables that were read.
+    pub csv: HashMap<String, Option<super::csv::Columns>>,
+    pub time: Symbol,
+}
+
+impl<'a, 'f> Builder<'a, 'f> {
+    /// A builder that knows the symbols of all bonds.
+    pub fn new(flat: &'f Flat<'a>, wiring: &'f Wiring, sources: &'f Sources, files: &'f dyn Files) -> Self {
+        let mut exprs = Exprs::default();
+        let time = exprs.symbol("t", Facts::default());
+        let mut b = Builder {
+            flat,
+            wiring,
+            sources,
+            files,
+            exprs,
+            dims: Dimensions::default(),
+            faults: Vec::new(),
+            meanings: Vec::new(),
+            pairs: Vec::with_capacity(wiring.wires.len()),
+            reactions: Vec::new(),
+            stored: Vec::with_capacity(flat.parts.len()),
+            values: vec![None; flat.names.decls.len()],
+            functions: HashMap::new(),
+            parameters: Table::new(),
+            numbers: Vec::new(),
+            inputs: Table::new(),
+            signals: Table::new(),
+            held: Table::new(),
+            lets: Vec::new(),
+            outputs: Vec::new(),
+            named_quantities: BTreeMap::new(),
+            open_signals: Vec::new(),
+            open_blocks: Vec::new(),
+            rate_symbols: HashMap::new(),
+            pseudo: Vec::new(),
+            csv: HashMap::new(),
+            time,
+        };
+        b.mean(time, Meaning::Time, Quantity::Any);
+        b
+    }
+
+    /// Reports a fault.
+    pub fn fault(&mut self, fault: Diagnostic) {
+        self.faults.push(fault);
+    }
+
+    /// Says what a symbol means.
+    pub fn mean(&mut self, symbol: Symbol, meaning: Meaning, quantity: Quantity) {
+        let at = symbol.0 as usize;
+        if self.meanings.len() <= at {
+            self.meanings.resize(at + 1, None);
+        }
+        self.meanings[at] = Some((meaning, quantity));
+    }
+
+    /// What a symbol means.
+    pub fn meaning(&self, symbol: Symbol) -> Option<Meaning> {
+        self.meanings.get(symbol.0 as usize).and_then(|m| m.as_ref()).map(|m| m.0)
+    }
+
+    /// The dimension of a symbol.
+    pub fn quantity(&self, symbol: Symbol) -> Quantity {
+        self.meanings.get(symbol.0 as usize).and_then(|m| m.as_ref()).map_or(Quantity::Any, |m| m.1.clone())
+    }
+
+    /// A new symbol of that name, or of one like it if that is taken.
+    pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
+        if self.exprs.find_symbol(name).is_none() {
+            return self.exprs.symbol(name, facts);
+        }
+        let mut n = 2;
+        loop {
+            let other = format!("{name}_{n}");
+            if self.exprs.find_symbol(&other).is_none() {
+                return self.exprs.symbol(&other, facts);
+            }
+            n += 1;
+        }
+    }
+
+    /// A part of the flat model.
+    pub fn part(&self, part: usize) -> &'f Part<'a> {
+        &self.flat.parts[part]
+    }
+
+    /// The bond at a port of a part, unless the model is at fault there.
+    pub fn wire_at(&self, part: usize, port: usize) -> Option<usize> {
+        self.wiring.ports[part].get(port).copied().flatten().map(|(wire, _)| wire)
+    }
+
+    /// The bond whose variable stands for the common one of a junction: at a 1 that of an `I`, at a 0 that of a `C`, else
+    /// one inside the junction structure, else the first.
+    pub fn representative(&self, junction: usize) -> Option<usize> {
+        let favourite = if self.part(junction).word == Word::One { Word::I } else { Word::C };
+        let wires = || self.wiring.ports[junction].iter().flatten().map(|(wire, _)| *wire);
+        let other = |wire: usize| {
+            let w = &self.wiring.wires[wire];
+            self.part(if w.from.0 == junction { w.to.0 } else { w.from.0 }).word
+        };
+        let inner = |word: Word| word.is_junction() || word.is_two_port();
+        wires()
+            .find(|w| other(*w) == favourite)
+            .or_else(|| wires().find(|w| inner(other(*w))))
+            .or_else(|| wires().next())
+    }
+
+    /// Requires two quantities to have one dimension; reports a clash in general words.
+    pub fn equal(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str) {
+        let reason = Reason { span, part: None };
+        for clash in self.dims.equal(left, right, &reason) {
+            self.clash(&clash, what, span);
+        }
+    }
+
+    /// Requires two quantities to have one dimension because the law of a part says so.
+    pub fn equal_by_law(&mut self, left: &Quantity, right: &Quantity, part: usize) {
+        let span = self.part(part).ast.span;
+        let reason = Reason { span, part: Some(part) };
+        for clash in self.dims.equal(left, right, &reason) {
+            self.clash(&clash, "the two sides of its law", span);
+        }
+    }
+
+    fn clash(&mut self, clash: &Clash, what: &str, here: Span) {
+        if let Some((_, says, is, why)) = &clash.unknown
+            && let Some(part) = clash.reason.part
+        {
+            return self.clash_of_parts(part, *says, *is, why);
+        }
+        let what = if clash.reason.span == here { what } else { "two quantities" };
+        let title = format!("units do not agree: {} and {}", clash.left, clash.right);
+        let mut d = Diagnostic::error(codes::U003, title, clash.reason.span, format!("{what} differ"));
+        if let Some((_, _, is, why)) = &clash.unknown {
+            d = d.also(why.span, format!("this made it {is}"));
+        }
+        self.fault(d.hint("units are optional: a number without one fits everywhere"));
+    }
+
+    /// Two elements that ask for different flows (or efforts) of one junction structure.
+    fn clash_of_parts(&mut self, part: usize, says: Dim, is: Dim, why: &Reason) {
+        let name = &self.part(part).name;
+        let title = match why.part {
+            Some(other) => format!("`{name}` and `{}` do not belong to one junction structure", self.part(other).name),
+            None => format!("the units of `{name}` do not fit where it is bonded"),
+        };
+        let d = Diagnostic::error(codes::U005, title, self.part(part).ast.span, format!("asks for a flow in {says}"))
+            .also(why.span, format!("here the flow is in {is}"))
+            .note("effort times flow is a power, and all bonds between 0 and 1 share their units");
+        let turning = Dim::of(0, 0, -1, 0);
+        let moving = Dim::of(1, 0, -1, 0);
+        let hint = match (says, is) {
+            (a, b) if (a, b) == (turning, moving) || (a, b) == (moving, turning) => {
+                "put a TF between rotation and translation (its modulus is a radius), or correct a unit"
+            }
+            _ => "put a TF or GY between the two domains, or correct a unit",
+        };
+        self.fault(d.hint(hint));
+    }
+
+    /// The number that an expression of parameters is; `None` if it reads anything else.
+    pub fn value_of(&self, expr: Expr) -> Option<f64> {
+        let mut known = true;
+        let value = self.exprs.eval(expr, &mut |symbol| match self.meaning(symbol) {
+            Some(Meaning::Parameter(id)) => self.numbers[id.index()],
+            _ => {
+                known = false;
+                f64::NAN
+            }
+        });
+        known.then_some(value)
+    }
+
+    /// The reference of a port.
+    pub fn port_ref(part: usize, port: usize) -> PortRef {
+        PortRef { element: ElementId::new(part), port: port as u32 }
+    }
+
+    /// The id of a bond.
+    pub fn bond_id(wire: usize) -> BondId {
+        BondId::new(wire)
+    }
+}

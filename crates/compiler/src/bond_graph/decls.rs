@@ -1,0 +1,417 @@
+//! Parameters, inputs, signals and functions: brought into an order in which each reads only what is known.
+
+use std::collections::BTreeMap;
+
+use super::builder::{Builder, OpenSignal, Value};
+use super::dimension::Quantity;
+use super::scope::{DeclId, DeclKind, Node, ScopeId};
+use super::value::Reading;
+use super::{Input, Meaning, Named, Parameter, Signal};
+use crate::algebra::{Expr, Facts};
+use crate::ast::{self, ExprKind};
+use crate::diagnostic::{Diagnostic, codes};
+use crate::ids::Id;
+use crate::span::Span;
+use crate::unit::Dimension as Dim;
+
+/// How far a declaration has got.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Waiting,
+    Open,
+    Done,
+}
+
+impl<'a> Builder<'a, '_> {
+    /// Gives every declaration its value.
+    pub fn make_values(&mut self) {
+        let decls = self.flat.names.decls.len();
+        for decl in 0..decls {
+            self.symbol_of_signal(decl);
+        }
+        let mut stage = vec![Stage::Waiting; decls];
+        for decl in 0..decls {
+            self.reach(decl, &mut stage);
+        }
+        self.make_rates();
+    }
+
+    /// Inputs and states have their symbols before anything reads them.
+    fn symbol_of_signal(&mut self, decl: DeclId) {
+        let d = &self.flat.names.decls[decl];
+        let (meaning, quantity) = match d.kind {
+            DeclKind::Input(_) => {
+                let quantity = d.unit.and_then(|u| self.unit(u)).map_or(Quantity::Any, |u| Quantity::of(u.dim));
+                (Meaning::Input(super::InputId::new(self.inputs.len())), quantity)
+            }
+            DeclKind::State(_) => {
+                let quantity = match d.unit.and_then(|u| self.unit(u)) {
+                    Some(u) => Quantity::of(u.dim),
+                    None => Quantity::var(self.dims.unknown()),
+                };
+                (Meaning::Signal(super::SignalId::new(self.signals.len())), quantity)
+            }
+            _ => return,
+        };
+        let symbol = self.fresh(&d.name, Facts::default());
+        self.mean(symbol, meaning, quantity.clone());
+        let zero = self.exprs.int(0);
+        let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
+        match d.kind {
+            DeclKind::State(state) => {
+                let id = self.signals.push(Signal {
+                    name: d.name.clone(),
+                    symbol,
+                    rate: zero,
+                    initial: None,
+                    unit,
+                    span: d.span,
+                });
+                self.open_signals.push(OpenSignal { id, state, decl });
+            }
+            _ => {
+                let (name, doc) = (d.name.clone(), d.doc.to_string());
+                self.inputs.push(Input { name, symbol, default: zero, unit, doc, span: d.span });
+            }
+        }
+        self.values[decl] = Some(Value::number(self.exprs.sym(symbol), quantity));
+    }
+
+    /// Gives a declaration its value, and before it those that it reads. Depth first, without recursion: models may have
+    /// long chains of declarations.
+    fn reach(&mut self, start: DeclId, stage: &mut [Stage]) {
+        if stage[start] != Stage::Waiting {
+            return;
+        }
+        stage[start] = Stage::Open;
+        let mut stack = vec![(start, self.reads(start).into_iter())];
+        while let Some((decl, rest)) = stack.last_mut() {
+            let decl = *decl;
+            match rest.next() {
+                None => {
+                    stack.pop();
+                    self.evaluate(decl);
+                    stage[decl] = Stage::Done;
+                }
+                Some((next, span)) => match stage[next] {
+                    Stage::Done => {}
+                    Stage::Waiting => {
+                        stage[next] = Stage::Open;
+                        stack.push((next, self.reads(next).into_iter()));
+                    }
+                    Stage::Open => {
+                        let around: Vec<DeclId> = stack.iter().map(|(d, _)| *d).skip_while(|d| *d != next).collect();
+                        self.circle(&around, span);
+                    }
+                },
+            }
+        }
+    }
+
+    /// Names that define one another.
+    fn circle(&mut self, around: &[DeclId], span: Span) {
+        let decls = &self.flat.names.decls;
+        let names: Vec<&str> = around.iter().map(|d| decls[*d].name.as_str()).collect();
+        let function = around.iter().all(|d| matches!(decls[*d].kind, DeclKind::Function(_)));
+        let title = match names.as_slice() {
+            [one] if function => format!("function `{one}` calls itself"),
+            [one] => format!("`{one}` is defined by itself"),
+            many => format!("{} are defined by one another", many.join(", ")),
+        };
+        let mut d = Diagnostic::error(codes::N004, title, span, format!("reads `{}` again", names[0]));
+        for decl in around {
+            d = d.also(decls[*decl].span, "declared here");
+        }
+        let hint = if function {
+            "functions cannot call themselves; write the result out"
+        } else {
+            "a `state` breaks such a circle, since it is known before its rate; so do `delay` and `sample`"
+        };
+        self.fault(d.hint(hint));
+    }
+
+    /// The declarations that must be known before this one, and where it reads them.
+    fn reads(&self, decl: DeclId) -> Vec<(DeclId, Span)> {
+        let d = &self.flat.names.decls[decl];
+        let mut found = Vec::new();
+        match d.kind {
+            DeclKind::Function(f) => {
+                let formals: Vec<&str> = f.params.iter().map(|p| p.text.as_str()).collect();
+                self.collect(d.reads, &f.body, &formals, &mut found);
+            }
+            DeclKind::State(_) => {}
+            _ => {
+                if let Some(value) = d.value() {
+                    self.collect(d.reads, value, &[], &mut found);
+                }
+            }
+        }
+        found
+    }
+
+    /// The declarations that an expression reads at once: not through a state, a delay, a sample or a transfer function
+    /// without direct path.
+    fn collect(&self, scope: ScopeId, e: &ast::Expr, formals: &[&str], found: &mut Vec<(DeclId, Span)>) {
+        match &e.kind {
+            ExprKind::Path(path) => {
+                if let Some(decl) = self.decl_of(scope, path, formals)
+                    && !matches!(self.flat.names.decls[decl].kind, DeclKind::State(_) | DeclKind::Input(_))
+                {
+                    found.push((decl, path.span));
+                }
+            }
+            ExprKind::Call(call) => {
+                if let Some(decl) = self.flat.names.value(scope, &call.function.text) {
+                    found.push((decl, call.function.span));
+                }
+                let skip = usize::from(super::blocks::is_lagging(call));
+                for arg in call.args.iter().skip(skip) {
+                    self.collect(scope, &arg.value, formals, found);
+                }
+            }
+            ExprKind::Rate(inner) => self.collect(scope, inner, formals, found),
+            ExprKind::List(list) => list.iter().for_each(|e| self.collect(scope, e, formals, found)),
+            ExprKind::Unary(u) => self.collect(scope, &u.operand, formals, found),
+            ExprKind::Binary(b) => {
+                self.collect(scope, &b.left, formals, found);
+                self.collect(scope, &b.right, formals, found);
+            }
+            ExprKind::If(i) => {
+                for part in [&i.cond, &i.yes, &i.no] {
+                    self.collect(scope, part, formals, found);
+                }
+            }
+            ExprKind::Number(_) | ExprKind::Text(_) | ExprKind::Missing => {}
+        }
+    }
+
+    /// The declaration that a path names, if it names one.
+    fn decl_of(&self, scope: ScopeId, path: &ast::Path, formals: &[&str]) -> Option<DeclId> {
+        let first = path.parts[0].name.text.as_str();
+        if path.parts.len() == 1 {
+            return (!formals.contains(&first)).then(|| self.flat.names.value(scope, first)).flatten();
+        }
+        match self.flat.names.node(scope, path) {
+            Ok((Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
+                self.flat.names.scopes[inner].values.get(path.parts[used].name.text.as_str()).copied()
+            }
+            _ => None,
+        }
+    }
+
+    fn evaluate(&mut self, decl: DeclId) {
+        let d = &self.flat.names.decls[decl];
+        match d.kind {
+            DeclKind::Parameter { value, constant } => self.parameter(decl, value, constant),
+            DeclKind::Input(value) => self.input_default(decl, value),
+            DeclKind::Let(value) => self.named(decl, value, false),
+            DeclKind::Output(value) => self.named(decl, value, true),
+            DeclKind::Function(f) => self.function(decl, f),
+            DeclKind::State(_) => {}
+        }
+    }
+
+    fn missing_value(&mut self, decl: DeclId) {
+        let d = &self.flat.names.decls[decl];
+        let in_component = self.flat.names.scopes[d.reads].instance.is_some();
+        if !in_component {
+            let fault = Diagnostic::error(codes::N009, format!("`{}` has no value", d.name), d.span, "declared here")
+                .hint(format!("write `{} = …`", d.name));
+            self.fault(fault);
+        }
+    }
+
+    fn parameter(&mut self, decl: DeclId, value: Option<&'a ast::Expr>, constant: bool) {
+        let Some(e) = value else { return self.missing_value(decl) };
+        let d = &self.flat.names.decls[decl];
+        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        if !self.only_parameters(value.expr, e.span, "a parameter") {
+            return;
+        }
+        if let Some(alias) = self.alias(decl, &value) {
+            self.values[decl] = Some(alias);
+            return;
+        }
+        let value = self.with_unit(value, d.unit, e.span);
+        let number = self.value_of(value.expr).unwrap_or(f64::NAN);
+        if !number.is_finite() {
+            let title = format!("`{}` has no finite value", d.name);
+            self.fault(Diagnostic::error(codes::N016, title, e.span, format!("this is {number}")));
+            return;
+        }
+        let facts = Facts { nonzero: number != 0.0, positive: number > 0.0, given: Some(value.expr) };
+        let symbol = self.fresh(&d.name, facts);
+        let written = d.unit.or(unit_of_literal(e));
+        let unit = written.and_then(|u| self.unit(u)).and_then(|u| u.unit);
+        let (name, doc) = (d.name.clone(), d.doc.to_string());
+        let parameter = Parameter { name, symbol, value: value.expr, constant, unit, doc, span: d.span };
+        let id = self.parameters.push(parameter);
+        self.numbers.push(number);
+        self.mean(symbol, Meaning::Parameter(id), value.quantity.clone());
+        self.values[decl] = Some(Value::number(self.exprs.sym(symbol), value.quantity));
+    }
+
+    /// A parameter of an instance that is given another parameter is that parameter.
+    fn alias(&mut self, decl: DeclId, value: &Value) -> Option<Value> {
+        let d = &self.flat.names.decls[decl];
+        let is_symbol = matches!(self.exprs.node(value.expr), crate::algebra::Node::Symbol(_));
+        let inside = d.name.contains('.');
+        (inside && is_symbol).then(|| self.with_unit(value.clone(), d.unit, d.span))
+    }
+
+    /// Whether an expression reads parameters only; says so if not.
+    pub fn only_parameters(&mut self, expr: Expr, span: Span, what: &str) -> bool {
+        let other =
+            self.exprs.symbols_of(expr).into_iter().find(|s| !matches!(self.meaning(*s), Some(Meaning::Parameter(_))));
+        let Some(other) = other else { return true };
+        let kind = match self.meaning(other) {
+            Some(Meaning::Time) => "time",
+            Some(Meaning::Input(_)) => "an input",
+            Some(Meaning::Signal(_) | Meaning::Held(_)) => "a signal",
+            _ => "a variable of an element",
+        };
+        let name = self.exprs.name(other).to_string();
+        let title = format!("{what} must be known before the run, but reads `{name}`");
+        self.fault(
+            Diagnostic::error(codes::N016, title, span, format!("`{name}` is {kind}"))
+                .hint("use numbers and parameters; for a value that varies write `let`"),
+        );
+        false
+    }
+
+    /// A value with the unit that stands after `:`. A value without a unit is a number of it.
+    pub fn with_unit(&mut self, value: Value, unit: Option<&ast::UnitText>, span: Span) -> Value {
+        let Some(scale) = unit.and_then(|u| self.unit(u)) else { return value };
+        if value.quantity == Quantity::Any && self.exprs.symbols_of(value.expr).is_empty() {
+            return self.in_unit(value.expr, &scale);
+        }
+        self.equal(&value.quantity, &Quantity::of(scale.dim), span, "the value and its unit");
+        Value { quantity: Quantity::of(scale.dim), ..value }
+    }
+
+    fn input_default(&mut self, decl: DeclId, value: Option<&'a ast::Expr>) {
+        let Some(e) = value else { return };
+        let d = &self.flat.names.decls[decl];
+        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        if !self.only_parameters(value.expr, e.span, "the default of an input") {
+            return;
+        }
+        let value = self.with_unit(value, d.unit, e.span);
+        let symbol = self.values[decl].as_ref().map(|v| v.expr);
+        let found = self.inputs.iter_mut().find(|(_, i)| i.name == d.name);
+        if let (Some((_, input)), Some(_)) = (found, symbol) {
+            input.default = value.expr;
+        }
+    }
+
+    fn named(&mut self, decl: DeclId, value: Option<&'a ast::Expr>, output: bool) {
+        let Some(e) = value else { return self.missing_value(decl) };
+        let d = &self.flat.names.decls[decl];
+        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        let value = self.with_unit(value, d.unit, e.span);
+        let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
+        let (name, doc) = (d.name.clone(), d.doc.to_string());
+        self.named_quantities.insert(name.clone(), value.quantity.clone());
+        let named = Named { name, value: value.expr, unit, doc, span: d.span };
+        if output {
+            self.outputs.push(named)
+        } else {
+            self.lets.push(named)
+        }
+        self.values[decl] = Some(value);
+    }
+
+    fn function(&mut self, decl: DeclId, f: &'a ast::Function) {
+        let d = &self.flat.names.decls[decl];
+        let mut formals: Vec<(&str, crate::algebra::Symbol)> = Vec::new();
+        for p in &f.params {
+            if let Some((_, _)) = formals.iter().find(|(n, _)| *n == p.text) {
+                let title = format!("`{}` is an argument twice", p.text);
+                self.fault(
+                    Diagnostic::error(codes::N002, title, p.span, "again").hint("give one of them another name"),
+                );
+                return;
+            }
+            let symbol = self.fresh(&format!("{}({})", d.name, p.text), Facts::default());
+            formals.push((&p.text, symbol));
+        }
+        let cx = Reading { formals: &formals, plain: true, ..Reading::of(d.reads, &d.name) };
+        if let Some(body) = self.number(&cx, &f.body) {
+            let symbols = formals.iter().map(|(_, s)| *s).collect();
+            self.functions.insert(decl, (symbols, body.expr));
+        }
+    }
+
+    /// Rates and start values of states, when all names are known.
+    fn make_rates(&mut self) {
+        for open in std::mem::take(&mut self.open_signals) {
+            let d = &self.flat.names.decls[open.decl];
+            let cx = Reading::of(d.reads, &d.name);
+            let own = self.quantity(self.signals[open.id].symbol);
+            if let Some(rate) = self.number(&cx, &open.state.rate) {
+                let per_second = own.over(&Quantity::of(Dim::SECOND));
+                self.equal(&rate.quantity, &per_second, open.state.rate.span, "the rate and the signal over time");
+                self.signals[open.id].rate = rate.expr;
+            }
+            let Some(start) = &open.state.start else { continue };
+            if let Some(value) = self.number(&cx, start)
+                && self.only_parameters(value.expr, start.span, "a start value")
+            {
+                let value = self.with_unit(value, open.state.unit.as_ref(), start.span);
+                self.equal(&value.quantity, &own, start.span, "the start value and the signal");
+                self.signals[open.id].initial = Some(value.expr);
+            }
+        }
+    }
+
+    /// Puts the rates of integrated signals in where expressions ask for them. Gives the map of what is replaced; says so
+    /// if rates define one another.
+    pub fn rates_of_signals(&mut self) -> BTreeMap<crate::algebra::Symbol, Expr> {
+        let asked: BTreeMap<_, _> = self.rate_symbols.iter().map(|(s, id)| (*s, *id)).collect();
+        let mut known = BTreeMap::new();
+        let mut left: Vec<_> = asked.into_iter().collect();
+        while !left.is_empty() {
+            let before = left.len();
+            let mut later = Vec::new();
+            for (symbol, id) in left {
+                let rate = self.exprs.substitute(self.signals[id].rate, &known);
+                let open = self.exprs.depends_on_any(rate, &|s| self.rate_symbols.contains_key(&s));
+                if open {
+                    later.push((symbol, id));
+                } else {
+                    known.insert(symbol, rate);
+                }
+            }
+            if later.len() == before {
+                self.rates_in_a_circle(&later);
+                break;
+            }
+            left = later;
+        }
+        known
+    }
+
+    fn rates_in_a_circle(&mut self, signals: &[(crate::algebra::Symbol, super::SignalId)]) {
+        let names: Vec<String> = signals.iter().map(|(_, id)| format!("{}'", self.signals[*id].name)).collect();
+        let span = self.signals[signals[0].1].span;
+        let mut d = Diagnostic::error(
+            codes::N004,
+            format!("{} are defined by one another", names.join(", ")),
+            span,
+            "declared here",
+        );
+        for (_, id) in &signals[1..] {
+            d = d.also(self.signals[*id].span, "declared here");
+        }
+        self.fault(d.hint("write the rates without one another"));
+    }
+}
+
+/// The unit that stands at a value which is one number.
+fn unit_of_literal(e: &ast::Expr) -> Option<&ast::UnitText> {
+    match &e.kind {
+        ExprKind::Number(n) => n.unit.as_ref(),
+        ExprKind::Unary(u) => unit_of_literal(&u.operand),
+        _ => None,
+    }
+}

@@ -1,0 +1,266 @@
+//! The stage: from syntax trees to a bond graph.
+
+use std::collections::BTreeMap;
+
+use super::builder::Builder;
+use super::files::Files;
+use super::flatten::{self, Flat};
+use super::load::{Loaded, load};
+use super::overrides::{self, Override};
+use super::wire::{Wiring, wire};
+use super::{Bond, BondGraph, Element, Kind, Port, Variable};
+use crate::algebra::{Expr, Symbol};
+use crate::ast::Ast;
+use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
+use crate::ids::Table;
+
+/// What has become of a model.
+#[derive(Debug)]
+pub struct Elaborated {
+    /// The graph, if there is no error.
+    pub graph: Option<BondGraph>,
+    /// All faults of this stage, and of the syntax of imported files, in the order of the text.
+    pub diagnostics: Diagnostics,
+    /// The texts of the model: the main file, what it imports, and the overrides.
+    pub sources: Sources,
+}
+
+/// Elaborates a model: names, units, components, laws, signal blocks and constraints.
+///
+/// `main` is the tree of the first file of `sources`; the others are read through `files`. `overrides` replace the
+/// values of parameters before anything is derived from them. The tree may have faults; what is missing in it is passed
+/// over, so that the faults of this stage are found too.
+///
+/// ```
+/// use halfarrow_compiler::{ast, bond_graph, diagnostic::Sources};
+/// let mut sources = Sources::new();
+/// let text = "model Drop\nSe:weight(9.81 N) -> I:mass(1 kg)\n";
+/// let file = sources.add("drop.bond", text);
+/// let tree = ast::parse(text, file).ast;
+/// let result = bond_graph::elaborate(tree, sources, &bond_graph::NoFiles, &[]);
+/// assert_eq!(result.graph.unwrap().bonds.len(), 1);
+/// ```
+pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: &[Override]) -> Elaborated {
+    let Loaded { files: mut trees, mut faults } = load(main, &mut sources, files);
+    let given = overrides::parse(overrides, &mut sources, &mut faults);
+    let header = trees.first_mut().and_then(|t| t.header.take());
+    let mut flat = flatten::flatten(&trees);
+    faults.append(&mut flat.faults);
+    overrides::apply(&given, &mut flat, &mut faults);
+    let mut wiring = wire(&flat);
+    faults.append(&mut wiring.faults);
+    let (graph, more) = build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error));
+    faults.extend(more);
+    in_order(&mut faults);
+    let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error)).map(|mut graph| {
+        if let Some(header) = header {
+            graph.name = header.name.text;
+            graph.doc = header.doc.map_or(String::new(), |d| d.text);
+        }
+        graph
+    });
+    drop(flat);
+    Elaborated { graph, diagnostics: Diagnostics(faults), sources }
+}
+
+/// Brings faults into the order of the text, each once.
+fn in_order(faults: &mut Vec<Diagnostic>) {
+    faults.sort_by_key(|d| (d.primary.span.file, d.primary.span.start, d.code.name));
+    faults.dedup();
+}
+
+/// Builds the graph of a flat model, as far as its faults allow.
+fn build(
+    flat: &Flat<'_>,
+    wiring: &Wiring,
+    sources: &Sources,
+    files: &dyn Files,
+    faulty: bool,
+) -> (Option<BondGraph>, Vec<Diagnostic>) {
+    let mut b = Builder::new(flat, wiring, sources, files);
+    b.make_symbols();
+    b.make_values();
+    let kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
+    b.finish_blocks();
+    let preferences = b.preferences();
+    let forced_causality = b.forced_causality();
+    let forced_strokes = b.forced_strokes();
+    let replaced = b.rates_of_signals();
+    for (_, c, span) in &flat.constraints {
+        let title = format!("constraint `{}` cannot be built yet", c.name.text);
+        b.fault(Diagnostic::error(crate::diagnostic::codes::S008, title, *span, "not supported by this version"));
+    }
+    let complete = !faulty && b.faults.is_empty() && kinds.iter().all(Option::is_some);
+    if !complete {
+        //b.check(&replaced);
+        return (None, b.faults);
+    }
+    let kinds: Vec<Kind> = kinds.into_iter().flatten().collect();
+    let mut graph = b.assemble(kinds);
+    graph.preferences = preferences;
+    graph.forced_causality = forced_causality;
+    graph.forced_strokes = forced_strokes;
+    //b.recog_storages(&mut graph, &mut replaced);
+    let mut graph = b.finish(graph);
+    if !replaced.is_empty() {
+        graph.replace_symbols(&replaced);
+    }
+    (Some(graph), b.faults)
+}
+
+impl Builder<'_, '_> {
+    /// The graph without constraints and without the table of its variables.
+    fn assemble(&mut self, kinds: Vec<Kind>) -> BondGraph {
+        let elements: Table<_, Element> =
+            kinds.into_iter().enumerate().map(|(part, kind)| self.element(part, kind)).collect();
+        let bonds: Table<_, Bond> = self.wiring.wires.iter().enumerate().map(|(wire, w)| self.bond(wire, w)).collect();
+        BondGraph {
+            name: String::new(),
+            doc: String::new(),
+            exprs: crate::algebra::Exprs::default(),
+            variables: BTreeMap::new(),
+            elements,
+            bonds,
+            parameters: std::mem::take(&mut self.parameters),
+            inputs: std::mem::take(&mut self.inputs),
+            signals: std::mem::take(&mut self.signals),
+            held: std::mem::take(&mut self.held),
+            lets: std::mem::take(&mut self.lets),
+            outputs: self.outputs_in_order(),
+            preferences: Vec::new(),
+            forced_causality: Vec::new(),
+            forced_strokes: Vec::new(),
+            constraints: Vec::new(),
+            time: self.time,
+        }
+    }
+
+    fn outputs_in_order(&mut self) -> Vec<super::Named> {
+        let mut outputs = std::mem::take(&mut self.outputs);
+        outputs.sort_by_key(|o| o.span);
+        self.lets.sort_by_key(|l| l.span);
+        outputs
+    }
+
+    fn element(&self, part: usize, kind: Kind) -> Element {
+        let p = self.part(part);
+        let name_of = |port: usize| match p.word {
+            w if w.is_two_port() => ["in", "out"][port].to_string(),
+            _ => p.ast.ports.get(port).map_or(String::new(), |n| n.text.clone()),
+        };
+        let ports = self.wiring.ports[part].iter().flatten().enumerate();
+        let ports = ports.map(|(port, (wire, inward))| Port {
+            name: name_of(port),
+            bond: Self::bond_id(*wire),
+            inward: *inward,
+        });
+        Element { name: p.name.clone(), kind, ports: ports.collect(), span: p.ast.span, label: self.label(part) }
+    }
+
+    fn bond(&self, wire: usize, w: &super::wire::Wire) -> Bond {
+        Bond {
+            from: Self::port_ref(w.from.0, w.from.1),
+            to: Self::port_ref(w.to.0, w.to.1),
+            name: w.name.clone(),
+            effort: self.pairs[wire].effort,
+            flow: self.pairs[wire].flow,
+            pseudo: self.pseudo[wire],
+            span: w.span,
+        }
+    }
+
+    /// Adds the expressions and the table of variables.
+    fn finish(&mut self, mut graph: BondGraph) -> BondGraph {
+        let mut variables = Vec::with_capacity(self.meanings.len());
+        for (at, known) in self.meanings.iter().enumerate() {
+            if let Some((meaning, quantity)) = known {
+                let unit = self.written_unit(*meaning, &graph).or_else(|| self.si_unit(quantity));
+                variables.push((Symbol(at as u32), Variable { meaning: *meaning, unit }));
+            }
+        }
+        graph.variables = variables.into_iter().collect();
+        for named in graph.lets.iter_mut().chain(&mut graph.outputs) {
+            if let (None, Some(quantity)) = (&named.unit, self.named_quantities.get(&named.name)) {
+                named.unit = self.dims.value(quantity).map(crate::unit::Unit::si);
+            }
+        }
+        graph.exprs = std::mem::take(&mut self.exprs);
+        graph
+    }
+
+    /// The SI unit of what a declaration gave a unit: it keeps its radians.
+    fn written_unit(&self, meaning: super::Meaning, graph: &BondGraph) -> Option<crate::unit::Unit> {
+        let unit = match meaning {
+            super::Meaning::Parameter(id) => graph.parameters[id].unit.as_ref(),
+            super::Meaning::Input(id) => graph.inputs[id].unit.as_ref(),
+            super::Meaning::Signal(id) => graph.signals[id].unit.as_ref(),
+            super::Meaning::Time => return Some(crate::unit::Unit::si(crate::unit::Dimension::SECOND)),
+            _ => None,
+        };
+        unit.map(crate::unit::Unit::to_si_unit)
+    }
+}
+
+impl BondGraph {
+    /// Puts expressions in the place of symbols, everywhere.
+    fn replace_symbols(&mut self, map: &BTreeMap<Symbol, Expr>) {
+        let mut roots = Vec::new();
+        self.for_each_expr(&mut |e| roots.push(*e));
+        let new = self.exprs.substitute_all(&roots, map);
+        let mut new = new.into_iter();
+        self.for_each_expr(&mut |e| *e = new.next().unwrap_or(*e));
+    }
+
+    /// Visits every expression, always in the same order.
+    pub(super) fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        for (_, element) in self.elements.iter_mut() {
+            element.kind.for_each_expr(visit);
+        }
+        for (_, signal) in self.signals.iter_mut() {
+            visit(&mut signal.rate);
+            signal.initial.iter_mut().for_each(&mut *visit);
+        }
+        self.held.iter_mut().for_each(|(_, h)| visit(&mut h.source));
+        self.lets.iter_mut().chain(&mut self.outputs).for_each(|n| visit(&mut n.value));
+        self.constraints.iter_mut().for_each(|c| visit(&mut c.expr));
+    }
+}
+
+impl Kind {
+    /// Visits every expression of the element.
+    fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        match self {
+            Kind::Zero | Kind::One | Kind::EffortDetector | Kind::FlowDetector => {}
+            Kind::EffortSource { value: e } | Kind::FlowSource { value: e } | Kind::ZeroCompliance { flow: e } => {
+                visit(e)
+            }
+            Kind::Transformer { modulus: e } | Kind::Gyrator { modulus: e } => visit(e),
+            Kind::ResidualEffort { residual } | Kind::ResidualFlow { residual } => residual.iter_mut().for_each(visit),
+            Kind::Inertance(s) | Kind::Compliance(s) => s.for_each_expr(visit),
+            Kind::Resistor(laws) => laws.iter_mut().for_each(|law| match law {
+                super::ResistorLaw::Resistive(e)
+                | super::ResistorLaw::Conductive(e)
+                | super::ResistorLaw::Implicit(e) => {
+                    visit(e);
+                }
+            }),
+        }
+    }
+}
+
+impl super::Storage {
+    fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        for law in &mut self.laws {
+            match law {
+                super::StorageLaw::Integral(e) | super::StorageLaw::Derivative(e) | super::StorageLaw::Implicit(e) => {
+                    visit(e)
+                }
+                super::StorageLaw::Known { displacement, law } => {
+                    visit(displacement);
+                    visit(law);
+                }
+            }
+        }
+        self.energy.iter_mut().for_each(visit);
+    }
+}

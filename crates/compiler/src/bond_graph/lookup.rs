@@ -1,0 +1,414 @@
+//! What names in expressions stand for.
+
+use super::Meaning;
+use super::builder::{Builder, Value};
+use super::dimension::Quantity;
+use super::flatten::Word;
+use super::scope::{DeclId, DeclKind, Node, ScopeId};
+use super::value::Reading;
+use crate::algebra::{Expr, Facts, Symbol};
+use crate::ast;
+use crate::diagnostic::nearest;
+use crate::diagnostic::{Diagnostic, codes};
+use crate::span::Span;
+use crate::unit::Dimension as Dim;
+
+impl<'a> Builder<'a, '_> {
+    /// The value of a name, bare or dotted.
+    pub fn path(&mut self, cx: &Reading<'_>, path: &ast::Path) -> Option<Value> {
+        if path.parts.iter().any(|p| p.index.is_some()) {
+            return None;
+        }
+        if path.parts.len() == 1 { self.bare(cx, &path.parts[0].name) } else { self.dotted(cx, path) }
+    }
+
+    fn bare(&mut self, cx: &Reading<'_>, name: &ast::Name) -> Option<Value> {
+        let text = name.text.as_str();
+        if let Some((_, symbol)) = cx.formals.iter().find(|(n, _)| *n == text) {
+            return Some(Value::number(self.exprs.sym(*symbol), Quantity::Any));
+        }
+        if cx.law
+            && let Some(found) = self.own(cx, text, None, name.span)
+        {
+            return found;
+        }
+        match text {
+            "t" => return Some(self.symbol_value(self.time)),
+            "pi" => return Some(Value::number(self.exprs.pi(), Quantity::NONE)),
+            _ => {}
+        }
+        if let Some(decl) = self.flat.names.value(cx.scope, text) {
+            return self.declared(decl, name.span);
+        }
+        if let Some(found) = self.own(cx, text, None, name.span) {
+            return found;
+        }
+        self.unknown(cx, name);
+        None
+    }
+
+    /// The value of a symbol.
+    pub fn symbol_value(&mut self, symbol: Symbol) -> Value {
+        let quantity = self.quantity(symbol);
+        Value::number(self.exprs.sym(symbol), quantity)
+    }
+
+    /// The value of a declaration. `None` if it is at fault or a function.
+    pub fn declared(&mut self, decl: DeclId, span: Span) -> Option<Value> {
+        if let DeclKind::Function(f) = self.flat.names.decls[decl].kind {
+            let title = format!("`{}` is a function", f.name.text);
+            let d = Diagnostic::error(codes::N017, title, span, "used as a value").also(f.name.span, "declared here");
+            self.fault(d.hint(format!("write `{}( … )`", f.name.text)));
+            return None;
+        }
+        self.values[decl].clone()
+    }
+
+    /// One of the element's own variables, `e f q p`, if the element has it. The outer `None`: it has not.
+    fn own(&mut self, cx: &Reading<'_>, name: &str, port: Option<&ast::Name>, span: Span) -> Option<Option<Value>> {
+        let part = cx.own?;
+        let p = self.part(part);
+        let has = match name {
+            "e" | "f" => !p.word.is_junction(),
+            "q" => p.word == Word::C,
+            "p" => p.word == Word::I,
+            _ => false,
+        };
+        if !has || p.word.is_two_port() {
+            return None;
+        }
+        let slot = match (port, p.ast.ports.len()) {
+            (None, 0 | 1) => 0,
+            (None, _) if !cx.law => return None,
+            (None, _) => {
+                let first = &p.ast.ports[0].text;
+                self.fault(
+                    Diagnostic::error(codes::B009, format!("`{name}` of which port?"), span, "the element has several")
+                        .hint(format!("write `{name}.{first}`")),
+                );
+                return Some(None);
+            }
+            (Some(port), _) => p.ast.ports.iter().position(|n| n.text == port.text)?,
+        };
+        Some(self.port_variable(part, slot, name))
+    }
+
+    /// Effort, flow or stored quantity at a port; `None` if the model is at fault there.
+    pub fn port_variable(&mut self, part: usize, port: usize, name: &str) -> Option<Value> {
+        let symbol = match name {
+            "e" => self.pairs[self.wire_at(part, port)?].effort,
+            "f" => self.pairs[self.wire_at(part, port)?].flow,
+            _ => *self.stored[part].get(port)?,
+        };
+        Some(self.symbol_value(symbol))
+    }
+
+    fn unknown(&mut self, cx: &Reading<'_>, name: &ast::Name) {
+        let text = name.text.as_str();
+        let d = Diagnostic::error(
+            codes::N001,
+            format!("`{text}` is not declared"),
+            name.span,
+            "no such parameter or signal",
+        );
+        if let Some((node, span)) = self.flat.names.scopes[cx.scope].nodes.get(text).copied() {
+            let variable = self.example_variable(node);
+            return self.fault(
+                d.also(span, "there is an element of that name")
+                    .note("a bare name is a parameter or signal; what belongs to an element has a dot")
+                    .hint(format!("write `{text}.{variable}`")),
+            );
+        }
+        if matches!(text, "e" | "f" | "q" | "p") && cx.own.is_some() {
+            let word = cx.own.map_or("", |p| self.part(p).word.text());
+            return self.fault(
+                d.note(format!("a {word} has no `{text}` of its own"))
+                    .hint("an I has e, f, p; a C has e, f, q; an R has e, f"),
+            );
+        }
+        let near = nearest(text, self.flat.names.visible_values(cx.scope));
+        self.fault(match near {
+            Some(near) => d.hint(format!("did you mean `{near}`?")),
+            None => d.hint(format!("declare it: `param {text} = …`")),
+        });
+    }
+
+    fn example_variable(&self, node: Node) -> &'static str {
+        match node {
+            Node::Part(part) => match self.part(part).word {
+                Word::Zero => "e",
+                Word::C => "q",
+                w if w.is_two_port() => "in.e",
+                _ => "f",
+            },
+            Node::Instance(_) => "name",
+            _ => "e",
+        }
+    }
+
+    fn dotted(&mut self, cx: &Reading<'_>, path: &ast::Path) -> Option<Value> {
+        let first = &path.parts[0].name;
+        if path.parts.len() == 2
+            && matches!(first.text.as_str(), "e" | "f" | "q" | "p")
+            && let Some(found) = self.own(cx, &first.text, Some(&path.parts[1].name), path.span)
+        {
+            return found;
+        }
+        let (node, used) = match self.flat.names.node(cx.scope, path) {
+            Ok(found) => found,
+            Err(fault) => {
+                self.fault(fault);
+                return None;
+            }
+        };
+        let rest: Vec<&ast::Name> = path.parts[used..].iter().map(|p| &p.name).collect();
+        match (node, rest.as_slice()) {
+            (Node::Broken, _) => None,
+            (Node::Part(part), [variable]) => self.element_variable(part, variable),
+            (Node::Part(part), [port, variable]) => self.named_port_variable(part, port, variable),
+            (Node::Instance(inner), [name]) => self.inner_value(inner, name),
+            (Node::Joint(joint), [variable]) => self.pair_variable(self.wiring.of_joint[joint], variable),
+            (Node::Bond(drawn), [variable]) => self.pair_variable(self.wiring.of_drawn[drawn], variable),
+            (Node::Constraint(c), [variable]) => self.reaction_variable(c, variable),
+            (_, []) => self.incomplete(node, path),
+            (_, [.., last]) => {
+                self.fault(
+                    Diagnostic::error(
+                        codes::N001,
+                        format!("`{}` means nothing here", last.text),
+                        last.span,
+                        "one part too many",
+                    )
+                    .hint("an element's variables are e, f, q and p"),
+                );
+                None
+            }
+        }
+    }
+
+    fn incomplete(&mut self, node: Node, path: &ast::Path) -> Option<Value> {
+        let variable = self.example_variable(node);
+        let name: Vec<&str> = path.parts.iter().map(|p| p.name.text.as_str()).collect();
+        self.fault(
+            Diagnostic::error(codes::N017, "an element is no number", path.span, "this is an element")
+                .hint(format!("write `{}.{variable}`", name.join("."))),
+        );
+        None
+    }
+
+    fn inner_value(&mut self, inner: ScopeId, name: &ast::Name) -> Option<Value> {
+        match self.flat.names.scopes[inner].values.get(name.text.as_str()) {
+            Some(&decl) => self.declared(decl, name.span),
+            None => {
+                let names = &self.flat.names;
+                let owner = names.scopes[inner].prefix.trim_end_matches('.');
+                let title = format!("`{owner}` has no signal `{}`", name.text);
+                let d = Diagnostic::error(codes::N001, title, name.span, "not declared in the component");
+                let near = nearest(&name.text, names.scopes[inner].values.keys().copied());
+                self.fault(match near {
+                    Some(near) => d.hint(format!("did you mean `{near}`?")),
+                    None => d.hint("declare it in the component: `let name = …`"),
+                });
+                None
+            }
+        }
+    }
+
+    /// `name.e` and the like.
+    fn element_variable(&mut self, part: usize, variable: &ast::Name) -> Option<Value> {
+        let p = self.part(part);
+        let name = variable.text.as_str();
+        let slot = match (p.word, name) {
+            (Word::Zero, "e") | (Word::One, "f") => {
+                let wire = self.representative(part)?;
+                let pair = &self.pairs[wire];
+                let symbol = if name == "e" { pair.effort } else { pair.flow };
+                return Some(self.symbol_value(symbol));
+            }
+            (w, "e" | "f") if w.is_junction() || w.is_two_port() => None,
+            (_, "e" | "f") | (Word::C, "q") | (Word::I, "p") => (p.ast.ports.len() < 2).then_some(0),
+            _ => {
+                self.no_such_variable(part, variable);
+                return None;
+            }
+        };
+        match slot {
+            Some(slot) => self.port_variable(part, slot, name),
+            None => {
+                self.which_port(part, variable);
+                None
+            }
+        }
+    }
+
+    /// A variable that an element has more than one of.
+    fn which_port(&mut self, part: usize, variable: &ast::Name) {
+        let p = self.part(part);
+        let (short, name) = (&p.ast.name.text, &variable.text);
+        let (title, hint) = match p.word {
+            Word::Zero => (
+                format!("a 0-junction has no common flow: the flows of `{}` differ", p.name),
+                format!("ask for the flow of an element at it, or name a bond: `{short} -> x as b1`, then `b1.f`"),
+            ),
+            Word::One => (
+                format!("a 1-junction has no common effort: the efforts of `{}` differ", p.name),
+                format!("ask for the effort of an element at it, or name a bond: `{short} -> x as b1`, then `b1.e`"),
+            ),
+            w if w.is_two_port() => (
+                format!("`{name}` of which side of `{}`?", p.name),
+                format!("write `{short}.in.{name}` or `{short}.out.{name}`"),
+            ),
+            _ => {
+                let first = &p.ast.ports[0].text;
+                (format!("`{name}` of which port of `{}`?", p.name), format!("write `{short}.{first}.{name}`"))
+            }
+        };
+        self.fault(
+            Diagnostic::error(codes::N018, title, variable.span, "which one?")
+                .also(p.ast.span, "declared here")
+                .hint(hint),
+        );
+    }
+
+    fn no_such_variable(&mut self, part: usize, variable: &ast::Name) {
+        let p = self.part(part);
+        let word = p.word.text();
+        let has = match p.word {
+            Word::I => "e, f and p (its momentum)",
+            Word::C => "e, f and q (its displacement)",
+            Word::Zero => "e, common to all its bonds",
+            Word::One => "f, common to all its bonds",
+            w if w.is_two_port() => "in.e, in.f, out.e and out.f",
+            _ => "e and f",
+        };
+        let title = format!("{word} `{}` has no `{}`", p.name, variable.text);
+        let d = Diagnostic::error(codes::N018, title, variable.span, "not a variable of this element");
+        self.fault(d.also(p.ast.span, "declared here").hint(format!("it has {has}")));
+    }
+
+    fn named_port_variable(&mut self, part: usize, port: &ast::Name, variable: &ast::Name) -> Option<Value> {
+        let p = self.part(part);
+        let slot = match (p.word.is_two_port(), port.text.as_str()) {
+            (true, "in") => Some(0),
+            (true, "out") => Some(1),
+            _ => p.ast.ports.iter().position(|n| n.text == port.text),
+        };
+        let Some(slot) = slot else {
+            let list: Vec<&str> = p.ast.ports.iter().map(|n| n.text.as_str()).collect();
+            let title = format!("`{}` has no port `{}`", p.name, port.text);
+            let d = Diagnostic::error(codes::N001, title, port.span, "not known").also(p.ast.span, "declared here");
+            self.fault(if list.is_empty() { d } else { d.hint(format!("its ports are {}", list.join(", "))) });
+            return None;
+        };
+        let fits = match variable.text.as_str() {
+            "e" | "f" => true,
+            "q" => p.word == Word::C,
+            "p" => p.word == Word::I,
+            _ => false,
+        };
+        if !fits {
+            self.no_such_variable(part, variable);
+            return None;
+        }
+        self.port_variable(part, slot, &variable.text)
+    }
+
+    fn pair_variable(&mut self, wire: Option<usize>, variable: &ast::Name) -> Option<Value> {
+        let wire = wire?;
+        match variable.text.as_str() {
+            "e" => Some(self.symbol_value(self.pairs[wire].effort)),
+            "f" => Some(self.symbol_value(self.pairs[wire].flow)),
+            _ => {
+                let title = format!("a bond has no `{}`", variable.text);
+                self.fault(
+                    Diagnostic::error(codes::N018, title, variable.span, "not a variable of a bond")
+                        .hint("it has e and f"),
+                );
+                None
+            }
+        }
+    }
+
+    fn reaction_variable(&mut self, constraint: usize, variable: &ast::Name) -> Option<Value> {
+        match variable.text.as_str() {
+            "e" => Some(self.symbol_value(self.reactions[constraint].effort)),
+            "f" => Some(self.symbol_value(self.reactions[constraint].flow)),
+            _ => {
+                let title = format!("a constraint has no `{}`", variable.text);
+                let d = Diagnostic::error(codes::N018, title, variable.span, "not a variable of a constraint");
+                self.fault(d.hint("it has e, its multiplier"));
+                None
+            }
+        }
+    }
+
+    /// `x'`: the rate of an expression.
+    pub fn rate(&mut self, cx: &Reading<'_>, inner: &'a ast::Expr, span: Span) -> Option<Value> {
+        let value = self.number(cx, inner)?;
+        if cx.plain {
+            self.fault(
+                Diagnostic::error(codes::L004, "a function cannot differentiate in time", span, "here")
+                    .hint("make it a `let` value, or give the rate as an argument"),
+            );
+            return None;
+        }
+        let expr = self.rate_of(value.expr, span)?;
+        Some(Value::number(expr, value.quantity.over(&Quantity::of(Dim::SECOND))))
+    }
+
+    /// The rate of an expression in time.
+    pub fn rate_of(&mut self, expr: Expr, span: Span) -> Option<Expr> {
+        let mut terms = Vec::new();
+        for symbol in self.exprs.symbols_of(expr) {
+            let slope = self.exprs.derivative(expr, symbol);
+            if let Some(rate) = self.symbol_rate(symbol, span)? {
+                terms.push(self.exprs.mul(&[slope, rate]));
+            }
+        }
+        Some(self.exprs.add(&terms))
+    }
+
+    /// The rate of a symbol; the inner `None` if it is constant.
+    fn symbol_rate(&mut self, symbol: Symbol, span: Span) -> Option<Option<Expr>> {
+        let rate = match self.meaning(symbol)? {
+            Meaning::Parameter(_) => return Some(None),
+            Meaning::Time => return Some(Some(self.exprs.int(1))),
+            Meaning::Stored(port) => {
+                let wire = self.wire_at(port.element.0 as usize, port.port as usize)?;
+                match self.part(port.element.0 as usize).word {
+                    Word::I => self.pairs[wire].effort,
+                    _ => self.pairs[wire].flow,
+                }
+            }
+            Meaning::Held(_) => {
+                self.fault(
+                    Diagnostic::error(
+                        codes::L004,
+                        "a delayed or sampled signal has no rate here",
+                        span,
+                        "differentiated here",
+                    )
+                    .hint("differentiate first, then delay or sample"),
+                );
+                return None;
+            }
+            _ => self.rate_symbol(symbol),
+        };
+        Some(Some(self.exprs.sym(rate)))
+    }
+
+    /// The symbol of the rate of another.
+    pub fn rate_symbol(&mut self, symbol: Symbol) -> Symbol {
+        let name = format!("{}'", self.exprs.name(symbol));
+        if let Some(known) = self.exprs.find_symbol(&name) {
+            return known;
+        }
+        let rate = self.exprs.symbol(&name, Facts::default());
+        let quantity = self.quantity(symbol).over(&Quantity::of(Dim::SECOND));
+        self.mean(rate, Meaning::Rate(symbol), quantity);
+        if let Some(Meaning::Signal(id)) = self.meaning(symbol) {
+            self.rate_symbols.insert(rate, id);
+        }
+        rate
+    }
+}

@@ -1,0 +1,344 @@
+//! From expressions as written to exact ones, with their dimensions.
+
+use super::builder::{Builder, Value};
+use super::dimension::Quantity;
+use super::scope::{DeclKind, FUNCTIONS, ScopeId};
+use crate::algebra::{Comparison, Expr, Function, Symbol};
+use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
+use crate::diagnostic::{Diagnostic, codes};
+use crate::span::Span;
+use crate::unit::{Dimension as Dim, WHOLE};
+
+/// What an expression may read, and where it stands.
+#[derive(Clone, Copy)]
+pub(super) struct Reading<'r> {
+    /// Where names are looked up.
+    pub scope: ScopeId,
+    /// The part whose argument it is, if it is one.
+    pub own: Option<usize>,
+    /// Whether `e f q p` are the part's own before anything else.
+    pub law: bool,
+    /// Formal arguments, in the body of a function.
+    pub formals: &'r [(&'r str, Symbol)],
+    /// Whether signal blocks and derivatives have no place here: in functions.
+    pub plain: bool,
+    /// Name of what the expression belongs to, for the states of signal blocks.
+    pub owner: &'r str,
+}
+
+impl<'r> Reading<'r> {
+    /// An expression that belongs to a name.
+    pub fn of(scope: ScopeId, owner: &'r str) -> Reading<'r> {
+        Reading { scope, own: None, law: false, formals: &[], plain: false, owner }
+    }
+}
+
+impl<'a> Builder<'a, '_> {
+    /// Reads a number, not a truth value. `None` if it is at fault, which has been said.
+    pub fn number(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
+        let value = self.read(cx, e)?;
+        if value.truth {
+            self.fault(
+                Diagnostic::error(codes::N017, "a number is needed here", e.span, "this is true or false")
+                    .hint("write `if … then 1 else 0`"),
+            );
+            return None;
+        }
+        Some(value)
+    }
+
+    /// Reads a truth value.
+    fn truth(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
+        let value = self.read(cx, e)?;
+        if !value.truth {
+            self.fault(
+                Diagnostic::error(codes::N017, "a condition is needed here", e.span, "this is a number")
+                    .hint("compare it, such as `x > 0`"),
+            );
+            return None;
+        }
+        Some(value)
+    }
+
+    fn read(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
+        match &e.kind {
+            ExprKind::Number(n) => self.literal(cx, n, e.span),
+            ExprKind::Path(path) => self.path(cx, path),
+            ExprKind::Rate(inner) => self.rate(cx, inner, e.span),
+            ExprKind::Call(call) => self.call(cx, call, e.span),
+            ExprKind::Unary(u) => self.unary(cx, u),
+            ExprKind::Binary(b) => self.binary(cx, b, e.span),
+            ExprKind::If(i) => self.choice(cx, i, e.span),
+            ExprKind::Text(_) => self.misplaced(e.span, "text", "text is only read by `table`"),
+            ExprKind::List(_) => {
+                self.misplaced(e.span, "a list", "lists are only read by `tf` and by matrices of fields")
+            }
+            ExprKind::Missing => None,
+        }
+    }
+
+    fn misplaced(&mut self, span: Span, what: &str, why: &str) -> Option<Value> {
+        self.fault(
+            Diagnostic::error(codes::N017, "a number is needed here", span, format!("this is {what}")).note(why),
+        );
+        None
+    }
+
+    fn literal(&mut self, cx: &Reading<'_>, n: &ast::Number, span: Span) -> Option<Value> {
+        let Some(number) = self.exprs.decimal(&n.text) else {
+            self.fault(Diagnostic::error(codes::N017, "this number cannot be read", span, "not a decimal number"));
+            return None;
+        };
+        let Some(unit) = &n.unit else { return Some(Value::number(number, Quantity::Any)) };
+        self.refuse_name_as_unit(cx, n, unit);
+        let scale = self.unit(unit)?;
+        Some(self.in_unit(number, &scale))
+    }
+
+    fn unary(&mut self, cx: &Reading<'_>, u: &'a ast::Unary) -> Option<Value> {
+        match u.op {
+            UnaryOp::Neg => {
+                let v = self.number(cx, &u.operand)?;
+                Some(Value { expr: self.exprs.neg(v.expr), ..v })
+            }
+            UnaryOp::Not => {
+                let v = self.truth(cx, &u.operand)?;
+                Some(Value { expr: self.exprs.not(v.expr), ..v })
+            }
+        }
+    }
+
+    fn binary(&mut self, cx: &Reading<'_>, b: &'a ast::Binary, span: Span) -> Option<Value> {
+        if matches!(b.op, BinaryOp::And | BinaryOp::Or) {
+            let (l, r) = (self.truth(cx, &b.left), self.truth(cx, &b.right));
+            let (l, r) = (l?.expr, r?.expr);
+            let expr = if b.op == BinaryOp::And { self.exprs.and(l, r) } else { self.exprs.or(l, r) };
+            return Some(Value { expr, quantity: Quantity::NONE, truth: true });
+        }
+        let (l, r) = (self.number(cx, &b.left), self.number(cx, &b.right));
+        let (l, r) = (l?, r?);
+        match b.op {
+            BinaryOp::Add => Some(self.sum(&l, &r, false, span)),
+            BinaryOp::Sub => Some(self.sum(&l, &r, true, span)),
+            BinaryOp::Mul => Some(Value::number(self.exprs.mul(&[l.expr, r.expr]), l.quantity.times(&r.quantity))),
+            BinaryOp::Div => self.quotient(&l, &r, b.right.span),
+            BinaryOp::Pow => Some(self.power(&l, &r, b.right.span)),
+            op => {
+                self.equal(&l.quantity, &r.quantity, span, "the two sides");
+                let expr = self.exprs.compare(comparison(op), l.expr, r.expr);
+                Some(Value { expr, quantity: Quantity::NONE, truth: true })
+            }
+        }
+    }
+
+    fn sum(&mut self, l: &Value, r: &Value, minus: bool, span: Span) -> Value {
+        self.equal(&l.quantity, &r.quantity, span, if minus { "what is subtracted" } else { "the terms of this sum" });
+        let expr = if minus { self.exprs.sub(l.expr, r.expr) } else { self.exprs.add(&[l.expr, r.expr]) };
+        Value::number(expr, known_of(&l.quantity, &r.quantity))
+    }
+
+    fn quotient(&mut self, l: &Value, r: &Value, span: Span) -> Option<Value> {
+        if self.exprs.is_number(r.expr).is_some_and(|n| n.is_zero()) {
+            self.fault(Diagnostic::error(codes::L008, "division by zero", span, "this is 0"));
+            return None;
+        }
+        Some(Value::number(self.exprs.div(l.expr, r.expr), l.quantity.over(&r.quantity)))
+    }
+
+    fn power(&mut self, base: &Value, exponent: &Value, span: Span) -> Value {
+        self.no_dimension(&exponent.quantity, span, "an exponent");
+        let sixtieths = self.exprs.is_number(exponent.expr).and_then(|n| {
+            let scaled = n.to_f64() * f64::from(WHOLE);
+            (scaled == scaled.trunc() && scaled.abs() < 1e6).then_some(scaled as i32)
+        });
+        let quantity = match sixtieths {
+            Some(n) => base.quantity.power(n),
+            None if self.dims.value(&base.quantity) == Some(Dim::NONE) => Quantity::NONE,
+            None => Quantity::Any,
+        };
+        Value::number(self.exprs.pow(base.expr, exponent.expr), quantity)
+    }
+
+    /// Requires a quantity to be a number or an angle.
+    pub fn no_dimension(&mut self, quantity: &Quantity, span: Span, what: &str) {
+        if let Some(dim) = self.dims.value(quantity).filter(|d| *d != Dim::NONE) {
+            let title = format!("{what} has no unit, but this is in {dim}");
+            let d = Diagnostic::error(codes::U006, title, span, format!("this is in {dim}"));
+            return self.fault(d.hint("divide it by something of that unit"));
+        }
+        self.equal(quantity, &Quantity::NONE, span, what);
+    }
+
+    fn choice(&mut self, cx: &Reading<'_>, i: &'a ast::If, span: Span) -> Option<Value> {
+        let condition = self.truth(cx, &i.cond);
+        let (yes, no) = (self.read(cx, &i.yes), self.read(cx, &i.no));
+        let (condition, yes, no) = (condition?, yes?, no?);
+        if yes.truth != no.truth {
+            self.fault(Diagnostic::error(
+                codes::N017,
+                "the two branches do not match",
+                span,
+                "one is a number, one a condition",
+            ));
+            return None;
+        }
+        self.equal(&yes.quantity, &no.quantity, span, "the two branches");
+        let expr = self.exprs.select(condition.expr, yes.expr, no.expr);
+        Some(Value { expr, quantity: known_of(&yes.quantity, &no.quantity), truth: yes.truth })
+    }
+
+    fn call(&mut self, cx: &Reading<'_>, call: &'a ast::Call, span: Span) -> Option<Value> {
+        let name = call.function.text.as_str();
+        let declared = self.flat.names.value(cx.scope, name);
+        if let Some(decl) = declared
+            && let DeclKind::Function(f) = self.flat.names.decls[decl].kind
+        {
+            return self.call_declared(cx, decl, f, call, span);
+        }
+        let Some(&(_, least, most)) = FUNCTIONS.iter().find(|f| f.0 == name) else {
+            self.unknown_function(cx, &call.function, declared.is_some());
+            return None;
+        };
+        let positional = call.args.iter().filter(|a| a.label.is_none()).count();
+        if positional < least || positional > most {
+            let takes = if least == most { least.to_string() } else { format!("at least {least}") };
+            let title =
+                format!("`{name}` takes {takes} argument{}, not {positional}", if most == 1 { "" } else { "s" });
+            self.fault(Diagnostic::error(codes::N007, title, span, "here").hint(usage(name)));
+            return None;
+        }
+        match name {
+            "table" => self.table_call(cx, call, span),
+            "pid" | "tf" | "delay" | "sample" => self.block(cx, name, call, span),
+            _ => self.elementary(cx, name, call, span),
+        }
+    }
+
+    fn unknown_function(&mut self, cx: &Reading<'_>, name: &ast::Name, is_value: bool) {
+        let title = format!("there is no function `{}`", name.text);
+        let d =
+            Diagnostic::error(codes::N006, title, name.span, if is_value { "this is a value" } else { "not known" });
+        let known = FUNCTIONS.iter().map(|f| f.0).chain(self.visible_functions(cx.scope));
+        self.fault(match crate::diagnostic::nearest(&name.text, known) {
+            _ if is_value => d.hint(format!("write `{}*( … )` for a product", name.text)),
+            Some(near) => d.hint(format!("did you mean `{near}`?")),
+            None => d.hint("write `let f(x) = …` to declare one"),
+        });
+    }
+
+    fn visible_functions(&self, scope: ScopeId) -> impl Iterator<Item = &'a str> + '_ {
+        let names = &self.flat.names;
+        names.visible_values(scope).filter(move |name| {
+            let decl = names.value(scope, name);
+            decl.is_some_and(|d| matches!(names.decls[d].kind, DeclKind::Function(_)))
+        })
+    }
+
+    fn call_declared(
+        &mut self,
+        cx: &Reading<'_>,
+        decl: usize,
+        f: &'a ast::Function,
+        call: &'a ast::Call,
+        span: Span,
+    ) -> Option<Value> {
+        let args: Vec<Option<Value>> = call.args.iter().map(|a| self.number(cx, &a.value)).collect();
+        if let Some(labelled) = call.args.iter().find(|a| a.label.is_some()) {
+            let title = format!("`{}` takes its arguments in order", f.name.text);
+            self.fault(Diagnostic::error(codes::N007, title, labelled.span, "no name is needed here"));
+            return None;
+        }
+        if args.len() != f.params.len() {
+            let n = f.params.len();
+            let title =
+                format!("`{}` takes {n} argument{}, not {}", f.name.text, if n == 1 { "" } else { "s" }, args.len());
+            let d = Diagnostic::error(codes::N007, title, span, "here").also(f.name.span, "declared here");
+            self.fault(d);
+            return None;
+        }
+        let args: Vec<Expr> = args.into_iter().map(|a| a.map(|v| v.expr)).collect::<Option<_>>()?;
+        let (formals, body) = self.functions.get(&decl)?.clone();
+        let map = formals.into_iter().zip(args).collect();
+        let expr = self.exprs.substitute(body, &map);
+        let quantity = match &f.unit {
+            Some(unit) => self.unit(unit).map_or(Quantity::Any, |u| Quantity::of(u.dim)),
+            None => Quantity::Any,
+        };
+        Some(Value::number(expr, quantity))
+    }
+
+    fn elementary(&mut self, cx: &Reading<'_>, name: &str, call: &'a ast::Call, span: Span) -> Option<Value> {
+        if let Some(labelled) = call.args.iter().find(|a| a.label.is_some()) {
+            self.fault(Diagnostic::error(
+                codes::N007,
+                format!("`{name}` takes no named argument"),
+                labelled.span,
+                "here",
+            ));
+            return None;
+        }
+        let args: Vec<Option<Value>> = call.args.iter().map(|a| self.number(cx, &a.value)).collect();
+        let args: Vec<Value> = args.into_iter().collect::<Option<_>>()?;
+        let f = Function::named(if name == "ln" { "log" } else { name })?;
+        let quantity = self.function_units(f, &args, call, span);
+        let exprs: Vec<Expr> = args.iter().map(|a| a.expr).collect();
+        let expr = match exprs.as_slice() {
+            [first, rest @ ..] if matches!(f, Function::Min | Function::Max) => {
+                rest.iter().fold(*first, |a, b| self.exprs.call(f, &[a, *b]))
+            }
+            all => self.exprs.call(f, all),
+        };
+        Some(Value::number(expr, quantity))
+    }
+
+    fn function_units(&mut self, f: Function, args: &[Value], call: &ast::Call, span: Span) -> Quantity {
+        use Function::*;
+        match f {
+            Sqrt => args[0].quantity.power(WHOLE / 2),
+            Abs | Floor => args[0].quantity.clone(),
+            Sign => Quantity::NONE,
+            Min | Max | Mod | Atan2 => {
+                let mut all = args[0].quantity.clone();
+                for other in &args[1..] {
+                    self.equal(&all, &other.quantity, span, "the arguments");
+                    all = known_of(&all, &other.quantity);
+                }
+                if f == Atan2 { Quantity::NONE } else { all }
+            }
+            _ => {
+                let what = format!("the argument of `{}`", f.name());
+                self.no_dimension(&args[0].quantity, call.args[0].span, &what);
+                Quantity::NONE
+            }
+        }
+    }
+}
+
+/// The one of two equal quantities that is known.
+pub(super) fn known_of(a: &Quantity, b: &Quantity) -> Quantity {
+    if *a == Quantity::Any { b.clone() } else { a.clone() }
+}
+
+fn comparison(op: BinaryOp) -> Comparison {
+    match op {
+        BinaryOp::Lt => Comparison::Lt,
+        BinaryOp::Le => Comparison::Le,
+        BinaryOp::Gt => Comparison::Gt,
+        BinaryOp::Ge => Comparison::Ge,
+        BinaryOp::Eq => Comparison::Eq,
+        _ => Comparison::Ne,
+    }
+}
+
+/// How a function is written.
+fn usage(name: &str) -> String {
+    match name {
+        "table" => "write `table(\"file.csv\", x)`".to_string(),
+        "pid" => "write `pid(u, kp, ki, kd)`".to_string(),
+        "tf" => "write `tf(u, [num], [den])`, highest power of s first".to_string(),
+        "delay" | "sample" => format!("write `{name}(u, T)`"),
+        "min" | "max" | "mod" => format!("write `{name}(a, b)`"),
+        "atan2" => "write `atan2(y, x)`".to_string(),
+        _ => format!("write `{name}(x)`"),
+    }
+}

@@ -1,0 +1,101 @@
+//! What holds of every graph that this stage gives; a breach is our fault, not the modeller's.
+
+use super::{BondGraph, Held, Kind, Meaning, PortRef, Signal, Storage};
+use crate::algebra::{Expr, Symbol};
+use crate::ids::Id;
+
+/// Checks the invariants of a [`BondGraph`].
+///
+/// # Errors
+/// The first breach, in words for us.
+pub fn verify(graph: &BondGraph) -> Result<(), String> {
+    bonds(graph)?;
+    elements(graph)?;
+    symbols(graph)
+}
+
+fn bonds(graph: &BondGraph) -> Result<(), String> {
+    for (id, bond) in graph.bonds.iter() {
+        let number = id.index() + 1;
+        if bond.from == bond.to {
+            return Err(format!("bond {number} joins a port to itself"));
+        }
+        for (end, inward) in [(bond.from, false), (bond.to, true)] {
+            let port = graph.elements.get(end.element).and_then(|e| e.ports.get(end.port as usize));
+            match port {
+                Some(port) if port.bond == id && port.inward == inward => {}
+                _ => return Err(format!("bond {number} ends at a port that does not know it")),
+            }
+        }
+        let (effort, flow) = (graph.variables.get(&bond.effort), graph.variables.get(&bond.flow));
+        let fits = effort.is_some_and(|v| v.meaning == Meaning::Effort(id))
+            && flow.is_some_and(|v| v.meaning == Meaning::Flow(id));
+        if !fits {
+            return Err(format!("the variables of bond {number} mean something else"));
+        }
+    }
+    Ok(())
+}
+
+fn elements(graph: &BondGraph) -> Result<(), String> {
+    for (id, element) in graph.elements.iter() {
+        let name = &element.name;
+        for (i, port) in element.ports.iter().enumerate() {
+            let at = PortRef { element: id, port: i as u32 };
+            let bond = graph.bonds.get(port.bond).ok_or(format!("`{name}` has a port without a bond"))?;
+            if at != if port.inward { bond.to } else { bond.from } {
+                return Err(format!("port {i} of `{name}` is not an end of its bond"));
+            }
+        }
+        let ports = element.ports.len();
+        let fine = match &element.kind {
+            Kind::Zero | Kind::One => ports > 0,
+            Kind::Transformer { .. } | Kind::Gyrator { .. } => {
+                ports == 2 && element.ports[0].inward && !element.ports[1].inward
+            }
+            Kind::Inertance(s) | Kind::Compliance(s) => {
+                ports > 0 && s.laws.len() == ports && s.stored.len() == ports && element.ports.iter().all(|p| p.inward)
+            }
+            Kind::Resistor(laws) => ports > 0 && laws.len() == ports && element.ports.iter().all(|p| p.inward),
+            _ => ports == 1,
+        };
+        if !fine {
+            return Err(format!("the ports of `{name}` do not fit a {}", element.kind.word()));
+        }
+        if let Kind::Inertance(Storage { stored, .. }) | Kind::Compliance(Storage { stored, .. }) = &element.kind {
+            for (i, symbol) in stored.iter().enumerate() {
+                let at = PortRef { element: id, port: i as u32 };
+                if graph.variables.get(symbol).is_none_or(|v| v.meaning != Meaning::Stored(at)) {
+                    return Err(format!("what port {i} of `{name}` stores means something else"));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn symbols(graph: &BondGraph) -> Result<(), String> {
+    let known = |symbol: Symbol| graph.variables.contains_key(&symbol);
+    let check = |e: Expr, what: &dyn Fn() -> String| match graph.exprs.symbols_of(e).into_iter().find(|s| !known(*s)) {
+        Some(symbol) => Err(format!("{} reads `{}`, which means nothing", what(), graph.exprs.name(symbol))),
+        None => Ok(()),
+    };
+    let mut copy = graph.clone();
+    let mut all = Vec::new();
+    copy.for_each_expr(&mut |e| all.push(*e));
+    for e in all {
+        check(e, &|| "an expression".to_string())?;
+    }
+    for p in graph.parameters.values() {
+        check(p.value, &|| format!("parameter `{}`", p.name))?;
+    }
+    for Held { time, name, .. } in graph.held.values() {
+        check(*time, &|| format!("`{name}`"))?;
+    }
+    for Signal { symbol, name, .. } in graph.signals.values() {
+        if !known(*symbol) {
+            return Err(format!("signal `{name}` has no symbol"));
+        }
+    }
+    Ok(())
+}
