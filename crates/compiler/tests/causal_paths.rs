@@ -6,11 +6,11 @@ use std::collections::BTreeSet;
 
 use halfarrow_compiler::algebra::{Expr, Exprs};
 use halfarrow_compiler::bond_graph::Kind;
-use halfarrow_compiler::causal_graph::CausalGraph;
+use halfarrow_compiler::causal_graph::{CausalGraph, assign_causality};
 use halfarrow_compiler::causal_paths::{CausalPaths, Path, counts, find_paths, find_paths_capped, invert};
 use serde_json::Value;
 use support::formula::formula;
-use support::paper::{causal_graph, example, examples, strokes};
+use support::paper::{bond_graph, causal_graph, example, examples, strokes};
 
 fn name(value: &Value) -> &str {
     value["name"].as_str().expect("a name")
@@ -162,4 +162,34 @@ fn over_the_cap_every_break_variable_keeps_a_path() {
             assert!(capped.paths.iter().any(|path| path.class == 1 && path.elements.contains(&port.element)));
         }
     }
+}
+
+#[test]
+fn free_choice_of_resistor_causality_needs_no_more_breaks_than_the_best() {
+    for example in examples().iter().filter(|e| e["structural_breaks"].is_u64()) {
+        let causal = assign_causality(&bond_graph(example)).expect("a causality exists");
+        let least = example["least_structural_breaks_over_resistor_choices"].as_u64().expect("a number");
+        assert!(break_count(&find_paths(&causal)) <= least, "{}", name(example));
+    }
+}
+
+#[test]
+fn the_text_is_stable() {
+    let example = example("class2");
+    let causal = causal_graph(&example, strokes(&example));
+    let expected = "\
+causal_paths class2
+
+paths
+  class 2  R1 - R2
+    gain   -R1/R2
+    along  b2.e b3.e b3.f b2.f
+    meets  R1 0 R2 0
+    breaks b2.e
+
+components
+  4 signals, broken at b2.e
+    determinant R1/R2 + 1
+";
+    assert_eq!(find_paths(&causal).text(&causal), expected);
 }

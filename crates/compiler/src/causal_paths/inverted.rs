@@ -14,7 +14,7 @@ use crate::causal_graph::{CausalGraph, Stroke};
 use crate::ids::{Id, Table};
 
 /// Work allowed: bonds looked at in all tries together.
-const BUDGET: usize = 20_000_000;
+const BUDGET: usize = 2_000_000;
 /// Distances from the paths at which storages are tried.
 const RINGS: usize = 6;
 
@@ -56,8 +56,8 @@ pub fn invert(causal: &CausalGraph) -> Inverted {
 fn score_of(graph: &BondGraph, inverted: &Inverted) -> Score {
     let signals = signal_graph(graph, &inverted.strokes);
     let breaks = count(&signals.algebraic_successors());
-    let ours = |element: ElementId| inverted.ports.iter().any(|port| port.element == element);
-    let edges = derivative_edges(&signals).into_iter().filter(|edge| ours(edge.element));
+    let ours: BTreeSet<ElementId> = inverted.ports.iter().map(|port| port.element).collect();
+    let edges = derivative_edges(&signals).into_iter().filter(|edge| ours.contains(&edge.element));
     let mixed = edges.filter(|edge| shortest_of(&signals, edge).is_some()).count();
     (breaks + mixed, inverted.ports.len())
 }

@@ -7,6 +7,7 @@ mod dependent;
 mod determinant;
 mod inverted;
 mod numeric;
+mod text;
 mod trace;
 
 pub use counts::{Count, Counts, counts};

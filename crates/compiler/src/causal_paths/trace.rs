@@ -1,6 +1,6 @@
 //! From a cycle of signals to a path: its class, what it runs between, its gain.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::Path;
 use crate::algebra::{Expr, Exprs};
@@ -39,16 +39,15 @@ impl Tracer<'_> {
         }
     }
 
-    /// The path of a cycle of algebraic edges; `breaks` are all break variables.
+    /// The path of a cycle of algebraic edges, as [`without_duals`] gives it; `breaks` are all break variables.
     pub fn path(&self, cycle: &[NodeId], component: usize, breaks: &BTreeSet<NodeId>, exprs: &mut Exprs) -> Path {
         let class = self.class(&self.edges(cycle));
-        let cycle = if class == 4 { effort_turn(cycle) } else { cycle.to_vec() };
-        let dual = if class == 4 { dual(&cycle) } else { Vec::new() };
+        let dual = if class == 4 { dual(cycle) } else { Vec::new() };
         let ends = |edge: &SignalEdge| {
             if class == 4 { self.is_junction(edge.element) } else { edge.kind != EdgeKind::Structure }
         };
-        let start = self.start(&cycle, ends);
-        let cycle = rotated(&cycle, start);
+        let start = self.start(cycle, ends);
+        let cycle = rotated(cycle, start);
         let on_path = breaks.iter().filter(|node| cycle.contains(node) || dual.contains(node));
         Path {
             class,
@@ -120,13 +119,13 @@ fn rotated(cycle: &[NodeId], start: usize) -> Vec<NodeId> {
 }
 
 /// The cycle from its lowest signal.
-pub(super) fn canonical(cycle: &[NodeId]) -> Vec<NodeId> {
+fn canonical(cycle: &[NodeId]) -> Vec<NodeId> {
     let lowest = (0..cycle.len()).min_by_key(|&i| cycle[i]).unwrap_or(0);
     rotated(cycle, lowest)
 }
 
 /// The cycle of the conjugate variables, backwards.
-pub(super) fn dual(cycle: &[NodeId]) -> Vec<NodeId> {
+fn dual(cycle: &[NodeId]) -> Vec<NodeId> {
     let backwards: Vec<NodeId> = cycle.iter().rev().map(|node| node.conjugate()).collect();
     canonical(&backwards)
 }
@@ -142,18 +141,14 @@ fn effort_turn(cycle: &[NodeId]) -> Vec<NodeId> {
     }
 }
 
-/// Keeps one of each cycle inside the junction structure and its dual.
+/// Each cycle once; of a cycle inside the junction structure and its dual only the effort turn.
 pub(super) fn without_duals(cycles: Vec<Vec<NodeId>>, tracer: &Tracer) -> Vec<Vec<NodeId>> {
-    let mut seen: BTreeMap<Vec<NodeId>, ()> = BTreeMap::new();
-    let mut kept = Vec::new();
-    for cycle in cycles {
+    let turned = |cycle: Vec<NodeId>| {
         let inner = tracer.class(&tracer.edges(&cycle)) == 4;
-        let key = if inner { effort_turn(&cycle) } else { canonical(&cycle) };
-        if seen.insert(key, ()).is_none() {
-            kept.push(cycle);
-        }
-    }
-    kept
+        if inner { effort_turn(&cycle) } else { canonical(&cycle) }
+    };
+    let distinct: BTreeSet<Vec<NodeId>> = cycles.into_iter().map(turned).collect();
+    distinct.into_iter().collect()
 }
 
 /// Signals by their indices.
