@@ -12,14 +12,18 @@ pub enum Method {
     Explicit,
     /// Backward differentiation formulas of order 1 to 5 with variable step, for stiff systems.
     Bdf,
-    /// Explicit until the system proves stiff, then backward differentiation formulas.
+    /// Explicit until the system proves stiff, then backward differentiation formulas to the end. Stiff is a system
+    /// whose steps times the spectral radius of its Jacobian stay above what accuracy allows, look after look, while many
+    /// steps are still to come, or one in which no explicit step is short enough.
     Auto,
 }
 
 /// Absolute error allowed in a step of a variable-step method, on top of the relative one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AbsoluteTolerance {
-    /// `rtol` times the magnitude of each state: the system's scale of it or the greatest value so far.
+    /// A part of the magnitude of each state: `rtol / 1000`, or 1e-12 where that is less, but never more than `rtol`. The
+    /// magnitude is the system's scale of the state or, if larger, the greatest value so far; where the state is 0 and
+    /// its scale not known, it is guessed from the rates.
     Scaled,
     /// The same number for every state, each in its own unit.
     Same(f64),

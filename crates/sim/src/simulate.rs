@@ -129,8 +129,8 @@ impl<'a> Run<'a> {
 
     /// A step to `(t, x)` is accepted.
     pub(crate) fn reach(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.shared.system().accept(t, x)?;
         self.time = t;
+        self.shared.system().accept(t, x)?;
         match self.sink.progress(t) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Failure::Interrupted { time: t }),

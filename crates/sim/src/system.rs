@@ -82,7 +82,7 @@ pub trait System {
     /// As [`rates`](System::rates).
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure>;
 
-    /// The step that ends at `(t, x)` is accepted: Newton starting points and delay buffers, which belong to the
+    /// The step that ends at `(t, x)` is accepted, or the run starts there: Newton starting points and delay buffers, which belong to the
     /// model's state, move on. Times never decrease from call to call.
     ///
     /// # Errors

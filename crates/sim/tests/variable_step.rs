@@ -175,6 +175,16 @@ fn a_failure_at_the_start_is_reported() {
 }
 
 #[test]
+fn a_jacobian_that_is_not_a_number_does_no_harm() {
+    for mut system in [prothero_robinson(), rod()] {
+        system.tangent = |_, _, _, _, jv| jv.fill(f64::NAN);
+        let (samples, end) = system.run(&options(Bdf, 1e-6, 1e-3));
+        end.unwrap();
+        assert!(system.error(&samples) < 1e-5);
+    }
+}
+
+#[test]
 fn the_sink_may_stop_the_run() {
     struct Impatient(Vec<f64>);
     impl Sink for Impatient {

@@ -163,7 +163,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
             } else {
                 self.run.settle(x)?;
             }
-            if let Some(end) = self.hand_over(x) {
+            if let Some(end) = self.hand_over(stop, x) {
                 return Ok(Some(end));
             }
         }
@@ -212,9 +212,9 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     }
 
     /// Whether another integrator should go on from here.
-    fn hand_over(&mut self, x: &[f64]) -> Option<End> {
+    fn hand_over(&mut self, stop: f64, x: &[f64]) -> Option<End> {
         let (time, step) = (self.run.time, self.method.time() - self.method.start());
-        let remaining = self.run.options.to - time;
+        let remaining = stop - time;
         if self.tolerances.watch(x) {
             return Some(End::Grown);
         }

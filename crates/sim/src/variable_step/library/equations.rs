@@ -135,11 +135,12 @@ impl<M: Matrix<T = f64>> NonLinearOpJacobian for Equations<'_, M> {
         values.for_each_batch_host([x], |values, [x], _| {
             let write = |_, _, place: usize, value| values[place] = value;
             let visited = newton.jacobian.borrow_mut().visit(&mut *self.shared.system(), t, x, write);
-            if let Err(failure) = visited {
+            let finite = visited.and_then(|()| match values.iter().all(|value| value.is_finite()) {
+                true => Ok(()),
+                false => Err(Failure::NotFinite { time: t, what: "a derivative of the rates".into() }),
+            });
+            if let Err(failure) = finite {
                 self.shared.keep(failure);
-                values.fill(0.0);
-            }
-            if values.iter().any(|value| !value.is_finite()) {
                 values.fill(0.0);
             }
         });

@@ -144,13 +144,18 @@ where
         self.problem.eqn.shared()
     }
 
-    /// Where the step of the library ended; `None` if it failed. An explicit step in which the system failed counts as
-    /// failed even where the library accepts it: its error norm overlooks what is not a number.
+    /// Where the step of the library ended; `None` if it failed. An explicit step in which the system failed or a state
+    /// overflowed counts as failed even where the library accepts it: its error norm overlooks what is not a number.
     fn try_step(&mut self, stop: f64) -> Option<f64> {
+        let (explicit, shared) = (self.explicit, self.shared());
         let solver = self.solver.as_mut().expect(STARTED);
         solver.set_stop_time(stop).and_then(|()| solver.step()).ok()?;
-        let overlooked = self.explicit && self.problem.eqn.shared().has_failure();
-        (!overlooked).then(|| solver.state().t)
+        let (time, y) = (solver.state().t, solver.state().y);
+        let escaped = (0..self.x.len()).find(|&state| !y.get_index(state).is_finite());
+        if let Some(state) = escaped.filter(|_| !shared.has_failure()) {
+            shared.keep(Failure::NotFinite { time, what: shared.system().state_name(state) });
+        }
+        (escaped.is_none() && !(explicit && shared.has_failure())).then_some(time)
     }
 
     /// Goes back to the start of a step in which the system failed, for one of length `step`.
