@@ -1,9 +1,10 @@
 //! What the parser makes of texts: `tests/ast/*.bond` and beside each a `.txt` with its tree and its faults.
 //! `UPDATE=1 cargo test -p halfarrow-compiler --test ast` rewrites them.
 
-use halfarrow_compiler::ast::{Parsed, format, parse};
-use halfarrow_compiler::diagnostic::Label;
+use halfarrow_compiler::ast::{MAX_DIAGNOSTICS, Parsed, format, parse};
+use halfarrow_compiler::diagnostic::{Diagnostics, Label, Sources, render};
 use halfarrow_compiler::span::FileId;
+use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
 fn bond_files(folder: &Path) -> Vec<PathBuf> {
@@ -116,4 +117,277 @@ fn layouts_keep_the_meaning_of_all_texts() {
 fn texts_with_errors_are_not_laid_out() {
     assert!(format("model M\nparam = 3\n").is_err());
     assert!(format("model M\nfor i in 1..3 { a -> b }\n").is_ok());
+}
+
+/// Checks what holds for every text whatever.
+fn survives(text: &str) {
+    let parsed = parse(text, FileId(0));
+    let inside = |span: halfarrow_compiler::span::Span| {
+        let (start, end) = (span.start as usize, span.end as usize);
+        assert!(start <= end && text.get(start..end).is_some(), "{start}..{end} in {text:?}");
+    };
+    for d in &parsed.diagnostics {
+        inside(d.primary.span);
+        d.others.iter().for_each(|l| inside(l.span));
+    }
+    parsed.ast.statements.iter().for_each(|s| inside(s.span));
+    assert!(parsed.diagnostics.len() <= MAX_DIAGNOSTICS);
+    let mut sources = Sources::new();
+    sources.add("any.bond", text);
+    let few = Diagnostics(parsed.diagnostics.into_iter().take(3).collect());
+    render(&few, &sources, false);
+    laid_out(text);
+}
+
+#[test]
+fn nothing_exhausts_the_stack() {
+    let many = 30_000;
+    let inner = [
+        "(",
+        "[",
+        "{",
+        "-",
+        "not ",
+        "x^",
+        "if ",
+        "if a then ",
+        "if a then b else ",
+        "f(",
+        "x[",
+        "a + ",
+        "a.",
+        "x'",
+        "'",
+        "1 + (",
+        "-(",
+        "[[",
+        "a -> ",
+        "R:r(",
+        "I[",
+        "component X {",
+        "component X(param a = ",
+        "for i in 1..2 {",
+        "domain d {",
+        "when a {",
+        "0:n[",
+        "\"",
+        "/",
+        "}",
+        ")",
+        ",",
+        "2 m/(",
+        "2 m/",
+        "2 m^",
+        "f(a = ",
+        "c(0.a = ",
+        "constraint a: ",
+        "prefer a,",
+        "let f(",
+        "if (",
+        "(-",
+        "((x)'",
+        "x'(",
+        "sin -",
+    ];
+    for piece in inner {
+        for prefix in ["", "model M\nlet y = ", "model M\nR:r("] {
+            let text = format!("{prefix}{}", piece.repeat(many));
+            let parsed = parse(&text, FileId(0));
+            drop(parsed.ast.clone());
+            assert!(!parsed.ast.to_string().is_empty() || !parsed.diagnostics.is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_tree_is_never_too_high() {
+    let sum = |n: usize| format!("model M\nlet y = {}x\n", "x + ".repeat(n));
+    assert!(parse(&sum(500), FileId(0)).diagnostics.is_empty());
+    let long = parse(&sum(600), FileId(0)).diagnostics;
+    assert!(long.len() == 1 && long[0].code.name == "S006", "{long:?}");
+    let nested = |n: usize| format!("model M\nlet y = {}x{}\nlet z = \n", "(".repeat(n), ")".repeat(n));
+    assert_eq!(parse(&nested(100), FileId(0)).diagnostics.len(), 1);
+    let deep: Vec<&str> = parse(&nested(1000), FileId(0)).diagnostics.iter().map(|d| d.code.name).collect();
+    assert_eq!(deep, ["S006", "S001"], "one error for the depth, and what follows is read");
+}
+
+/// Pieces that texts are made of, sound and unsound.
+const PIECES: &[&str] = &[
+    "model M\n",
+    "param ",
+    "const ",
+    "input ",
+    "output ",
+    "let ",
+    "state ",
+    "import ",
+    "component X",
+    "prefer ",
+    "causality ",
+    "stroke ",
+    "constraint ",
+    "domain ",
+    "when ",
+    "for ",
+    "pseudo ",
+    "from ",
+    "as ",
+    "at ",
+    "in ",
+    "port ",
+    "a",
+    "b3",
+    "x",
+    "φ",
+    "gap.el",
+    "Se:s",
+    "0:n",
+    "1:",
+    "R:r",
+    "2",
+    "1.5e-3",
+    "0",
+    "2 m",
+    "18 kN/m",
+    "5 1/s",
+    "3 W/(m.K)",
+    ".5",
+    "\"text\"",
+    "\"open",
+    " -> ",
+    "->",
+    " = ",
+    " : ",
+    ":",
+    ",",
+    ", ",
+    ";",
+    "(",
+    ")",
+    "[",
+    "]",
+    "{",
+    "}",
+    "{\n",
+    "\n}\n",
+    "\n",
+    "\n",
+    "\n\n\n",
+    "// c\n",
+    "  ",
+    "+",
+    " - ",
+    "-",
+    "*",
+    "/",
+    "^",
+    "'",
+    ".",
+    "..",
+    "<",
+    " <= ",
+    "==",
+    "!=",
+    "and ",
+    "or ",
+    "not ",
+    "if ",
+    " then ",
+    " else ",
+    "sin(",
+    "integral",
+    "§",
+    "µ",
+    "°C",
+    "%",
+    "²",
+    "reset ",
+    "(a = 1)",
+    "(x)",
+    "e = ",
+    "0 = ",
+    "f.a = ",
+];
+
+fn soup() -> impl Strategy<Value = String> {
+    prop::collection::vec(prop::sample::select(PIECES), 0..60).prop_map(|pieces| pieces.concat())
+}
+
+/// White space between tokens, where any is allowed.
+fn gap() -> impl Strategy<Value = &'static str> {
+    prop::sample::select(&["", " ", "  "][..])
+}
+
+fn expr() -> impl Strategy<Value = String> {
+    let leaf = prop::sample::select(
+        &[
+            "x",
+            "m.e",
+            "gap.el.q",
+            "2",
+            "1.5e-3",
+            "2 m",
+            "3 N.s/m",
+            "x'",
+            "table(\"f.csv\", x, column = 2)",
+            "[1, [a, b]]",
+        ][..],
+    );
+    leaf.prop_map(str::to_owned).prop_recursive(5, 40, 3, |inner| {
+        let op = prop::sample::select(&["+", "-", "*", "/", "^", "+\n", " -\n// c\n "][..]);
+        let loose = prop::sample::select(&[" < ", "==", "and", " or\n", ">="][..]);
+        prop_oneof![
+            (inner.clone(), gap(), op, gap(), inner.clone()).prop_map(|(a, g, op, h, b)| format!("({a}){g}{op}{h}{b}")),
+            (inner.clone(), loose, inner.clone()).prop_map(|(a, op, b)| format!("(({a}){op}({b}))")),
+            (inner.clone(), gap()).prop_map(|(a, g)| format!("(-{g}{a})")),
+            inner.clone().prop_map(|a| format!("(not {a})")),
+            (inner.clone(), inner.clone(), inner.clone()).prop_map(|(a, b, c)| format!("(if {a} then {b} else\n{c})")),
+            (inner.clone(), inner).prop_map(|(a, b)| format!("f({a},\n\n\n k={b})")),
+        ]
+    })
+}
+
+fn statement() -> impl Strategy<Value = String> {
+    prop_oneof![
+        (expr(), gap(), gap()).prop_map(|(e, g, h)| format!("param{g} a{h}={g}{e},b=2kg{h}\"doc\"")),
+        (expr(), gap()).prop_map(|(e, g)| format!("output y={e}{g}:{g}N.m/rad")),
+        (expr(), expr()).prop_map(|(a, b)| format!("state z' = {a} from {b}")),
+        (expr(), gap()).prop_map(|(e, g)| format!("R:r{g}(e={g}{e})->0:n\n// c\n->1:k \"doc\"")),
+        (expr(), gap())
+            .prop_map(|(e, g)| format!("C:c[a,{g}b](energy={e},q0.a=1) as b3 \"bond\"").replace(") as", ") -> n as")),
+        expr().prop_map(|e| format!("constraint h:{e}=0 // why")),
+        expr().prop_map(|e| format!("component X(param a={e};port p){{\n\n\na->b{g}\n}}", g = " // c")),
+        gap().prop_map(|g| format!("domain d pseudo{{{g}x->y{g}}}")),
+        Just("stroke a->b at b\n\n\n".to_owned()),
+        Just("  // alone".to_owned()),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_survived(text in "\\PC{0,200}|(?s:.{0,60})") {
+        survives(&text);
+    }
+
+    #[test]
+    fn any_soup_of_tokens_is_survived(text in soup()) {
+        survives(&text);
+    }
+
+    #[test]
+    fn any_change_of_a_model_is_survived(from in 0usize..3000, length in 0usize..40, to in 0usize..3000) {
+        let text = include_str!("ast/language.bond");
+        let cut = |n: usize| text.floor_char_boundary(n.min(text.len()));
+        let (a, b, c) = (cut(from), cut(from + length), cut(to));
+        survives(&format!("{}{}", &text[..a], &text[b..]));
+        survives(&format!("{}{}{}", &text[..c], &text[a..b], &text[c..]));
+    }
+
+    #[test]
+    fn sound_models_are_read_without_a_fault_and_laid_out(statements in prop::collection::vec(statement(), 0..6)) {
+        let text = format!("model M\n{}\n", statements.join("\n"));
+        let parsed = parse(&text, FileId(0));
+        prop_assert!(parsed.diagnostics.is_empty(), "{}", shown(&text, &parsed));
+        prop_assert!(laid_out(&text).is_some());
+    }
 }

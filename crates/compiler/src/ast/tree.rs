@@ -78,29 +78,29 @@ pub enum StatementKind {
     /// `let name = expr`.
     Let(Vec<Declaration>),
     /// `let f(x, y) = expr`.
-    Function(Function),
+    Function(Box<Function>),
     /// `state x' = rate from start`.
-    State(State),
+    State(Box<State>),
     /// `import "file.bond"`.
     Import(Import),
     /// `component Name(...) { ... }`.
-    Component(Component),
+    Component(Box<Component>),
     /// `prefer w.f, spring`: what stays independent.
     Prefer(Vec<Path>),
     /// `causality m2 derivative, R1 conductive`.
     Causality(Vec<ForcedCausality>),
     /// `stroke a -> b at b`.
-    Stroke(ForcedStroke),
+    Stroke(Box<ForcedStroke>),
     /// `constraint hinge: left = right`.
-    Constraint(Constraint),
+    Constraint(Box<Constraint>),
     /// `domain thermal pseudo { ... }`.
-    Domain(Domain),
+    Domain(Box<Domain>),
     /// Nodes and the bonds between them: `Sf:ground(v) -> 0:tyre -> hub`.
     Chain(Chain),
     /// `when cond { ... }`: reserved; an error of the parser says so.
-    When(When),
+    When(Box<When>),
     /// `for i in 1..n { ... }`: reserved; an error of the parser says so.
-    For(For),
+    For(Box<For>),
 }
 
 /// A named value: `name : unit = value "doc"` (or the unit after the value).

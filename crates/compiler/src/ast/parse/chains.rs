@@ -10,7 +10,7 @@ impl Parser<'_> {
         let doc = self.doc();
         let left_over = document(&mut first, doc);
         self.idle_doc(left_over);
-        let mut bonds = Vec::new();
+        let mut bonds = Vec::with_capacity(1);
         while self.is(TokenKind::Arrow) {
             bonds.push(self.bond());
         }

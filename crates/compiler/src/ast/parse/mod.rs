@@ -461,7 +461,7 @@ impl Parser<'_> {
         let open = self.span();
         self.bump();
         self.brackets += 1;
-        let mut items = Vec::new();
+        let mut items = Vec::with_capacity(1);
         while !self.boundary() && !matches!(self.kind(), TokenKind::RParen | TokenKind::RBracket) {
             items.extend(item(self));
             if !self.after_item(close) {

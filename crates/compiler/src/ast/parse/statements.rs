@@ -15,9 +15,10 @@ enum Value {
 impl Parser<'_> {
     pub(super) fn model(&mut self) -> Ast {
         let header = self.header();
-        let mut statements = Vec::new();
+        let lines = self.tokens.iter().filter(|t| t.newlines > 0).count();
+        let mut statements = Vec::with_capacity(lines);
         loop {
-            statements.extend(self.statements());
+            self.statements_into(&mut statements);
             if self.kind() == TokenKind::End {
                 break;
             }
@@ -64,6 +65,11 @@ impl Parser<'_> {
     /// Statements up to a closing brace or the end.
     fn statements(&mut self) -> Vec<Statement> {
         let mut statements = Vec::new();
+        self.statements_into(&mut statements);
+        statements
+    }
+
+    fn statements_into(&mut self, statements: &mut Vec<Statement>) {
         while !matches!(self.kind(), TokenKind::End | TokenKind::RBrace) {
             let before = self.pos;
             statements.extend(self.statement());
@@ -71,7 +77,6 @@ impl Parser<'_> {
                 self.bump(); // whatever it is, it has been reported
             }
         }
-        statements
     }
 
     fn statement(&mut self) -> Option<Statement> {
@@ -137,16 +142,16 @@ impl Parser<'_> {
             "input" => StatementKind::Input(self.declarations(Value::Optional)),
             "output" => StatementKind::Output(self.declarations(Value::Needed)),
             "let" => self.let_statement()?,
-            "state" => StatementKind::State(self.state()?),
+            "state" => StatementKind::State(Box::new(self.state()?)),
             "import" => StatementKind::Import(self.import()?),
-            "component" => StatementKind::Component(self.component()?),
+            "component" => StatementKind::Component(Box::new(self.component()?)),
             "prefer" => StatementKind::Prefer(self.listed(|p| p.element_path("a variable or an element"))),
             "causality" => StatementKind::Causality(self.listed(Self::forced_causality)),
-            "stroke" => StatementKind::Stroke(self.stroke()?),
-            "constraint" => StatementKind::Constraint(self.constraint()?),
-            "domain" => StatementKind::Domain(self.domain()?),
-            "when" => StatementKind::When(self.when(start)),
-            "for" => StatementKind::For(self.for_loop(start)?),
+            "stroke" => StatementKind::Stroke(Box::new(self.stroke()?)),
+            "constraint" => StatementKind::Constraint(Box::new(self.constraint()?)),
+            "domain" => StatementKind::Domain(Box::new(self.domain()?)),
+            "when" => StatementKind::When(Box::new(self.when(start))),
+            "for" => StatementKind::For(Box::new(self.for_loop(start)?)),
             _ => {
                 let hint = "put the other model into a file of its own, or make it a `component`";
                 let fault =
@@ -262,7 +267,7 @@ impl Parser<'_> {
         let body = self.expr();
         let unit = self.unit();
         let doc = self.doc();
-        Some(StatementKind::Function(Function { name, params, body, unit, doc }))
+        Some(StatementKind::Function(Box::new(Function { name, params, body, unit, doc })))
     }
 
     fn state(&mut self) -> Option<State> {
