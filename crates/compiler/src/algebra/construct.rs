@@ -392,6 +392,10 @@ impl Exprs {
         if sign_stays && zero_stays_out {
             return self.pow_number(inner, &both);
         }
+        if m_number.is_integer() && n.is_integer() && !zero_stays_out && m != MINUS_ONE {
+            let inverse = self.pow_number(inner, &Rational::from(-1));
+            return self.pow_number(inverse, &-&both);
+        }
         if is_even(&m_number) && !n.is_integer() && zero_stays_out {
             let size = self.call(Function::Abs, &[inner]);
             return self.pow_number(size, &both);

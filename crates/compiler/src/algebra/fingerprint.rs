@@ -106,6 +106,8 @@ impl Exprs {
         use Function::*;
         let value = self.at(x[0], lane)?;
         let opaque = |value: u64| random(lane, mix(function_tag(f), value));
+        let even = |value: u64| opaque(value.min(field::neg(value)));
+        let odd = |value: u64| if value <= P / 2 { opaque(value) } else { field::neg(opaque(field::neg(value))) };
         let exp = || self.exponential(x[0], lane, None, &|term| random(lane, mix(0xe4b, term)));
         let point = || self.point(x[0], lane);
         let half = field::pow(2, P - 2);
@@ -133,7 +135,9 @@ impl Exprs {
             Asin | Atan | Abs | Sign | Floor if value == 0 => 0,
             Atan2 | Min | Max | Mod => opaque(mix(value, self.at(x[1], lane)?)),
             Sqrt => return power(value, &Rational::new(1, 2), lane),
-            Asin | Acos | Atan | Log | Log10 | Abs | Sign | Floor => opaque(value),
+            Abs => even(value),
+            Asin | Atan | Sign => odd(value),
+            Acos | Log | Log10 | Floor => opaque(value),
         })
     }
 

@@ -213,13 +213,30 @@ impl Exprs {
         if self.nonnegative(minus) {
             return minus;
         }
-        let (number, x) = self.coefficient(x);
+        let (known, x) = self.without_known_signs(x);
         let x = self.without_sign(x).1;
         let size = match self.node(x) {
-            Node::Call(Function::Abs, _) => x,
+            Node::Number(_) | Node::Call(Function::Abs, _) => x,
             _ => self.intern(Node::Call(Function::Abs, vec![x])),
         };
-        self.scale(&number.abs(), size)
+        let known = self.abs_of_known(known);
+        self.mul(&[known, size])
+    }
+
+    fn abs_of_known(&mut self, e: Expr) -> Expr {
+        if self.nonnegative(e) { e } else { self.neg(e) }
+    }
+
+    /// A product as the factors that are above or below zero for sure and defined everywhere, and the others.
+    fn without_known_signs(&mut self, e: Expr) -> (Expr, Expr) {
+        let Node::Mul(factors) = self.node(e) else { return (ONE, e) };
+        let (mut known, mut other) = (Vec::new(), Vec::new());
+        for factor in factors.clone() {
+            let sure =
+                self.total(factor) && (self.positive(factor) || self.is_number(factor).is_some_and(|n| !n.is_zero()));
+            if sure { known.push(factor) } else { other.push(factor) }
+        }
+        (self.mul(&known), self.mul(&other))
     }
 
     fn sign(&mut self, x: Expr) -> Expr {
@@ -233,10 +250,10 @@ impl Exprs {
         if self.total(x) && self.positive(minus) {
             return MINUS_ONE;
         }
+        let (known, x) = self.without_known_signs(x);
         let (negative, x) = self.without_sign(x);
-        let monomial = self.coefficient(x).1;
-        let value = self.intern(Node::Call(Function::Sign, vec![monomial]));
-        if negative { self.neg(value) } else { value }
+        let value = self.intern(Node::Call(Function::Sign, vec![x]));
+        if negative == self.positive(known) { self.neg(value) } else { value }
     }
 
     fn extreme(&mut self, f: Function, a: Expr, b: Expr) -> Expr {

@@ -16,6 +16,7 @@ mod linear;
 mod node;
 mod order;
 mod polynomial;
+mod precise;
 mod properties;
 mod rational;
 mod simplify;
@@ -32,3 +33,6 @@ pub use node::{Comparison, Expr, Facts, Function, Node, Symbol};
 pub use rational::Rational;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
 pub use text::{Names, PlainNames, ascii, latex, latex_name, unicode, unicode_name};
+
+#[cfg(test)]
+mod tests;

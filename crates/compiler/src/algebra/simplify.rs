@@ -42,11 +42,18 @@ impl Exprs {
         let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
         for part in self.below(&[e], &|_| true) {
             let mut length: u64 = match self.node(part) {
-                Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 0,
+                Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 1,
                 Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
                 Node::Add(terms) => terms.len() as u64,
                 Node::Mul(factors) => factors.len() as u64 - 1,
-                Node::Pow(_, n) if *n == super::MINUS_ONE => 1,
+                // A fraction within a fraction reads badly.
+                Node::Pow(base, n) if *n == super::MINUS_ONE => {
+                    if self.holds_fraction(*base) {
+                        6
+                    } else {
+                        2
+                    }
+                }
                 // An exponent is short however it is written, and a square is shorter than a product.
                 Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.is_integer()) => 0,
                 Node::Pow(..) => 1,
@@ -56,6 +63,17 @@ impl Exprs {
             lengths.insert(part, length);
         }
         lengths[&e]
+    }
+
+    /// Whether a term of the sum has a denominator.
+    fn holds_fraction(&self, sum: Expr) -> bool {
+        let divides =
+            |e: &Expr| matches!(self.node(*e), Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.signum() < 0));
+        let Node::Add(terms) = self.node(sum) else { return false };
+        terms.iter().any(|t| match self.node(*t) {
+            Node::Mul(factors) => factors.iter().any(divides),
+            _ => divides(t),
+        })
     }
 
     fn shortest_form(&mut self, e: Expr) -> Expr {

@@ -3,20 +3,65 @@
 use super::exprs::Exprs;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::Expr;
-use std::ops::Range;
+use super::precise::{Point, Verdict};
+use astro_float::{BigFloat, Consts};
+
+/// Points that have to agree before an expression counts as zero by its values.
+const POINTS: usize = 12;
+/// Points that are tried for that: at some of them the expression may be undefined.
+const TRIED: u64 = 48;
 
 impl Exprs {
-    /// Whether the expression is zero for all values of its symbols (up to a probability of about 2^-60).
+    /// Whether the expression is zero for all values of its symbols for which it is defined (up to a probability of
+    /// about 2^-60).
+    ///
+    /// Where the fingerprint decides, nothing else is looked at: for rational expressions, sine, cosine and
+    /// exponential of sums of symbols. Else values at random points with 50 digits and more decide. Expressions with
+    /// corners or jumps are never called zero by their values: what a rare branch does shows at no random point.
     pub fn is_zero(&self, e: Expr) -> bool {
-        self.is_zero_in(e, GENERIC)
+        self.is_zero_in(e, false)
     }
 
     /// Whether the expression is zero at the given parameters, for all values of what is not given.
     pub fn is_zero_given(&self, e: Expr) -> bool {
-        self.is_zero_in(e, GIVEN)
+        self.is_zero_in(e, true)
     }
 
-    fn is_zero_in(&self, e: Expr, lanes: Range<usize>) -> bool {
-        self.fingerprint(e)[lanes].iter().all(|&v| v == 0 && v != POISON)
+    fn is_zero_in(&self, e: Expr, given: bool) -> bool {
+        let lanes = &self.fingerprint(e)[if given { GIVEN } else { GENERIC }];
+        let known = lanes.iter().filter(|&&v| v != POISON);
+        let poisoned = known.clone().count() == 0;
+        let zero = !poisoned && known.clone().all(|&v| v == 0);
+        let properties = &self.entry(e).properties;
+        if zero && !properties.radical {
+            return true;
+        }
+        if !zero && !poisoned && !properties.opaque[usize::from(given)] {
+            return false;
+        }
+        if !zero && properties.piecewise {
+            return false;
+        }
+        self.is_zero_by_values(e, given)
+    }
+
+    fn is_zero_by_values(&self, e: Expr, given: bool) -> bool {
+        let Ok(mut constants) = Consts::new() else { return false };
+        let mut zeros = 0;
+        for number in 0..TRIED {
+            let point = Point { pool: self, number, given };
+            if point.verdict::<f64>(e, &mut constants) == Verdict::Nonzero {
+                return false;
+            }
+            match point.verdict::<BigFloat>(e, &mut constants) {
+                Verdict::Nonzero => return false,
+                Verdict::Zero => zeros += 1,
+                Verdict::Unknown => {}
+            }
+            if zeros == POINTS || (zeros > 0 && self.is_constant(e)) {
+                return true;
+            }
+        }
+        false
     }
 }

@@ -1,0 +1,82 @@
+use super::super::*;
+use super::reader::read;
+
+fn printed(text: &str, print: fn(&Exprs, Expr, &dyn Names) -> String) -> String {
+    let mut x = Exprs::default();
+    let e = read(&mut x, text);
+    print(&x, e, &PlainNames(&x))
+}
+
+macro_rules! prints {
+    ($($name:ident $style:ident: $text:literal => $expected:literal;)*) => {
+        $(#[test]
+        fn $name() {
+            assert_eq!(printed($text, $style), $expected);
+        })*
+    };
+}
+
+prints! {
+    gain ascii: "-R1/R2" => "-R1/R2";
+    divided_by_product ascii: "a/(b*c)" => "a/(b*c)";
+    positive_first ascii: "-b + a" => "a - b";
+    all_negative ascii: "-b - a" => "-a - b";
+    number_last ascii: "exp(e/V) - 1" => "exp(e/V) - 1";
+    number_first_if_positive ascii: "1 - x" => "1 - x";
+    square ascii: "x*x" => "x^2";
+    negative_base ascii: "(a - b)^2*(-2)" => "-2*(a - b)^2";
+    minus_goes_into_sum ascii: "K*(x - y)*(-1)" => "K*(y - x)";
+    flipped_divisor ascii: "x/(b - a)" => "x/(b - a)";
+    decimal_number ascii: "9.81*M" => "9.81*M";
+    third ascii: "x/3" => "x/3";
+    two_thirds ascii: "2*x/3" => "2*x/3";
+    lone_third ascii: "1/3" => "1/3";
+    small_number ascii: "1.4e-13" => "1.4e-13";
+    large_number ascii: "6.02e23*x" => "6.02e23*x";
+    negative_exponent ascii: "x^-2" => "1/x^2";
+    odd_exponent ascii: "P*(V/(V - q))^1.4" => "P*(V/(V - q))^1.4";
+    third_power ascii: "abs(x)^(1/3)" => "abs(x)^(1/3)";
+    root ascii: "sqrt(K/M)" => "sqrt(K/M)";
+    choice ascii: "if x > 0 then a else b" => "if x > 0 then a else b";
+    choice_in_sum ascii: "1 + (if x > 0 then a else b)" => "(if x > 0 then a else b) + 1";
+    exponent_of_sum ascii: "M^(x + 1)" => "M^(x + 1)";
+    pendulum unicode: "-M*g*A*cos(phi)" => "-M A g cos φ";
+    inertia unicode: "(J + M*A^2)*omega'" => "(J + M A²) ω'";
+    power_of_sine unicode: "M*sin(phi)^2*omega" => "M ω sin² φ";
+    sine_of_product unicode: "sin(2*phi)" => "sin(2 φ)";
+    fraction unicode: "K1*x/(K1 + K2)" => "K1 x/(K1 + K2)";
+    subscript unicode: "phi_1 + omega2" => "ω2 + φ_1";
+    small_unicode unicode: "1.4e-13*x" => "1.4·10⁻¹³ x";
+    pendulum_latex latex: "-M*g*A*cos(phi)" => "-M A g \\cos\\varphi";
+    fraction_latex latex: "K1*x/(K1 + K2)" => "\\frac{K_{1} x}{K_{1} + K_{2}}";
+    half_latex latex: "M*v^2/2" => "\\frac{M v^{2}}{2}";
+    squared_latex latex: "sin(phi)^2*omega'" => "\\dot{\\omega} \\sin^{2}\\varphi";
+    diode_latex latex: "I0*(exp(d.e/V) - 1)" => "I_{0} \\left(e^{\\frac{e_{d}}{V}} - 1\\right)";
+}
+
+#[test]
+fn endless_expressions_are_cut() {
+    let mut x = Exprs::default();
+    let mut e = read(&mut x, "q");
+    for _ in 0..5000 {
+        let parts = [Function::Sin, Function::Exp].map(|f| x.call(f, &[e]));
+        e = x.add(&parts);
+    }
+    assert!(ascii(&x, e, &PlainNames(&x)).contains('…'));
+}
+
+#[test]
+fn what_is_printed_reads_back() {
+    for text in [
+        "a - (b - c)/D*x^2",
+        "-(x + y)^3/(2*z)",
+        "if a < b then sin(x)^2 else -y/3",
+        "M^(x - 1)*exp(-x/K)",
+        "(x/(y/z))^2",
+    ] {
+        let mut x = Exprs::default();
+        let e = read(&mut x, text);
+        let printed = ascii(&x, e, &PlainNames(&x));
+        assert_eq!(read(&mut x, &printed), e, "{text} printed as {printed}");
+    }
+}
