@@ -15,13 +15,20 @@ pub fn improve(net: &Network, start: Vec<Cell>) -> Vec<Cell> {
     let branches = if n <= BRANCHED { branches(net) } else { Vec::new() };
     let tries = (n * 1500).min(MOVES);
     let mut best: Option<(i64, Vec<Cell>)> = None;
+    let mut again = 0;
     for (round, &threshold) in thresholds(n).iter().enumerate() {
         let Some(mut board) = Board::new(net, start.clone()) else { return start };
         anneal(&mut board, &branches, tries, Dice::new(round), threshold);
         let all: Vec<usize> = (0..n).collect();
         let cost = board.cost(&all);
-        if best.as_ref().is_none_or(|b| cost < b.0) {
-            best = Some((cost, board.at));
+        match &best {
+            Some((least, _)) if cost == *least => again += 1,
+            Some((least, _)) if cost > *least => {}
+            _ => (best, again) = (Some((cost, board.at)), 0),
+        }
+        // Found three times from different sides: it will hardly get better.
+        if again == 2 {
+            break;
         }
     }
     best.map_or(start, |b| b.1)

@@ -67,9 +67,9 @@ fn check(net: &Network) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
     #[test]
-    fn no_two_nodes_overlap(net in network(9)) {
+    fn no_two_nodes_overlap(net in network(7)) {
         check(&net);
     }
 }
