@@ -1,4 +1,5 @@
 use super::*;
+use proptest::prelude::*;
 
 fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap_or_else(|e| panic!("{text}: {e:?}"))
@@ -142,4 +143,85 @@ fn the_first_symbol_is_found_for_the_clash_with_names() {
     assert_eq!(Unit::first_symbol("kN/m"), "kN");
     assert_eq!(Unit::first_symbol("1/s"), "s");
     assert_eq!(Unit::first_symbol("%"), "%");
+}
+
+/// Texts of units, sound and unsound.
+fn unit_text() -> impl Strategy<Value = String> {
+    const PIECES: &[&str] = &[
+        "m",
+        "kg",
+        "s",
+        "N",
+        "rpm",
+        "degC",
+        "mm",
+        "µF",
+        "%",
+        "°",
+        "1",
+        "2",
+        "3",
+        "²",
+        "⁻",
+        "^",
+        "-",
+        "(",
+        ")",
+        ".",
+        "*",
+        "/",
+        "·",
+        "0.5",
+        "1/2",
+        "99999999999",
+        "x",
+        " ",
+        "Ω",
+    ];
+    prop::collection::vec(prop::sample::select(PIECES), 0..8).prop_map(|pieces| pieces.concat())
+}
+
+proptest! {
+    #[test]
+    fn any_dimension_is_printed_so_that_it_reads_the_same(exponents in prop::array::uniform7(-300i32..300)) {
+        let dimension = Dimension(exponents);
+        prop_assert_eq!(unit(&dimension.to_string()).dimension, dimension);
+    }
+
+    #[test]
+    fn any_text_is_a_unit_or_none(text in unit_text(), other in "\\PC{0,12}") {
+        for text in [text, other] {
+            match Unit::parse(&text) {
+                Ok(unit) => {
+                    let again = Unit::parse(&unit.to_si_unit().to_string()).expect("what is printed can be read");
+                    prop_assert_eq!((again.dimension, again.angle), (unit.dimension, unit.angle));
+                    prop_assert!(unit.rational > BigRational::zero());
+                }
+                Err(fault) => {
+                    let span = Span { start: 0, end: text.len() as u32, ..Span::default() };
+                    let place = fault.at(span).primary.span;
+                    prop_assert!(text.get(place.start as usize..place.end as usize).is_some());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_go_to_si_and_back(value in -1e6f64..1e6, i in 0usize..20) {
+        let name = super::table::SYMBOLS[i * 3].name;
+        let there = unit(name).to_si_f64(value);
+        prop_assert!((unit(name).from_si_f64(there) - value).abs() <= 1e-9 * (1.0 + value.abs()), "{}", name);
+    }
+
+    #[test]
+    fn dimensions_multiply_as_exponents_add(a in prop::array::uniform7(-300i32..300), b in prop::array::uniform7(-300i32..300)) {
+        let (a, b) = (Dimension(a), Dimension(b));
+        prop_assert_eq!(a.times(b), b.times(a));
+        prop_assert_eq!(a.times(b).over(b), a);
+        prop_assert_eq!(a.times(a), a.power(2 * WHOLE).unwrap());
+        prop_assert_eq!(a.power(-WHOLE).unwrap(), a.inverse());
+        if let Some(root) = a.power(WHOLE / 2) {
+            prop_assert_eq!(root.times(root), a);
+        }
+    }
 }

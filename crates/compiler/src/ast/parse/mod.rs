@@ -415,7 +415,8 @@ impl Parser<'_> {
         let text = self.text_of(self.token());
         let title = format!("`{}` has no meaning here", shortened(text));
         let code: Code = codes::S003;
-        let fault = Diagnostic { code, title, ..fault };
+        let mut fault = Diagnostic { code, title, ..fault };
+        fault.primary.text.clear();
         match text.chars().next().and_then(remedy) {
             Some(hint) => fault.hint(hint),
             None => fault,
