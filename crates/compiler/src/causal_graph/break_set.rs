@@ -90,8 +90,11 @@ pub fn restrict(successors: &[Vec<u32>], vertices: &[usize]) -> Vec<Vec<u32>> {
 
 /// The break set of one strongly connected component.
 fn component_break_set(successors: &[Vec<u32>], rank: impl Fn(usize) -> u8) -> BreakSet {
-    let (vertices, lower_bound) = smallest(successors);
-    let set = prefer(successors, vertices, rank);
+    let (mut set, lower_bound) = smallest(successors);
+    Exchange::new(successors).improve(&mut set, rank);
+    if set.len() > lower_bound {
+        drop_superfluous(successors, &mut set);
+    }
     BreakSet { exact: set.len() == lower_bound, lower_bound, vertices: set.into_iter().collect() }
 }
 
@@ -173,80 +176,154 @@ fn drop_superfluous(successors: &[Vec<u32>], set: &mut BTreeSet<usize>) {
     }
 }
 
-/// Exchanges single vertices for such of lower rank, then lower index.
-fn prefer(successors: &[Vec<u32>], mut set: BTreeSet<usize>, rank: impl Fn(usize) -> u8) -> BTreeSet<usize> {
-    let predecessors = reverse(successors);
-    for _ in 0..3 {
-        let before = set.clone();
-        for &v in &before {
+/// Exchange of single vertices of a set that meets every cycle.
+struct Exchange<'a> {
+    successors: &'a [Vec<u32>],
+    predecessors: Vec<Vec<u32>>,
+    /// Who was reached forwards and backwards in the present search, by its number.
+    forward: Vec<u32>,
+    backward: Vec<u32>,
+    search: u32,
+    /// Place in topological order, of the vertices inside.
+    place: Vec<usize>,
+    /// Steps left before only the cheap exchanges are made.
+    budget: usize,
+}
+
+/// Steps allowed for exchanges in one component.
+const EXCHANGE_STEPS: usize = 200_000;
+
+impl<'a> Exchange<'a> {
+    fn new(successors: &'a [Vec<u32>]) -> Self {
+        let n = successors.len();
+        Exchange {
+            successors,
+            predecessors: reverse(successors),
+            forward: vec![0; n],
+            backward: vec![0; n],
+            search: 0,
+            place: vec![0; n],
+            budget: EXCHANGE_STEPS,
+        }
+    }
+
+    /// Exchanges vertices for such of lower rank, then lower index, until nothing is gained.
+    fn improve(&mut self, set: &mut BTreeSet<usize>, rank: impl Fn(usize) -> u8) {
+        for v in set.clone() {
+            let best = self.forced_with(v, set).into_iter().min_by_key(|&w| (rank(w), w)).unwrap_or(v);
             set.remove(&v);
-            let best = meeting_all(successors, &predecessors, v, &set).into_iter().min_by_key(|&w| (rank(w), w));
-            set.insert(best.unwrap_or(v));
+            set.insert(best);
         }
-        drop_superfluous(successors, &mut set);
-        if set == before {
-            break;
-        }
-    }
-    set
-}
-
-/// The vertices that can stand in for `v`: each meets all cycles that avoid `set`, given that `v` does.
-///
-/// Without `v` the cycles are paths from `v` to `v` through an acyclic graph; a vertex is on all of them if no edge jumps
-/// over it in topological order.
-fn meeting_all(successors: &[Vec<u32>], predecessors: &[Vec<u32>], v: usize, set: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let forward = reach(successors, v, set);
-    let backward = reach(predecessors, v, set);
-    let inner: BTreeSet<usize> = forward.intersection(&backward).copied().filter(|&w| w != v).collect();
-    let order = topological(successors, predecessors, &inner);
-    let place: std::collections::BTreeMap<usize, usize> = order.iter().enumerate().map(|(i, &w)| (w, i + 1)).collect();
-    let last = order.len() + 1;
-    let (mut furthest, mut meeting) = (0, BTreeSet::from([v]));
-    for (i, w) in std::iter::once(v).chain(order.iter().copied()).enumerate() {
-        if i > 0 && furthest <= i {
-            meeting.insert(w);
-        }
-        for head in successors[w].iter().map(|&h| h as usize) {
-            let to = if head == v { Some(last) } else { place.get(&head).copied() };
-            furthest = furthest.max(to.unwrap_or(0));
-        }
-    }
-    meeting
-}
-
-/// Vertices reached from `start` by at least one edge, avoiding `closed` and not going on through `start`.
-fn reach(successors: &[Vec<u32>], start: usize, closed: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let mut reached = BTreeSet::new();
-    let mut stack = vec![start];
-    while let Some(v) = stack.pop() {
-        for w in successors[v].iter().map(|&w| w as usize) {
-            if !closed.contains(&w) && reached.insert(w) && w != start {
-                stack.push(w);
+        for _ in 0..3 {
+            let before = set.clone();
+            for &v in before.iter() {
+                if self.budget == 0 {
+                    return;
+                }
+                set.remove(&v);
+                let best = self.meeting_all(v, set).into_iter().min_by_key(|&w| (rank(w), w));
+                set.insert(best.unwrap_or(v));
+            }
+            if *set == before {
+                return;
             }
         }
     }
-    reached
-}
 
-/// Topological order of an acyclic part; low indices first where there is a choice.
-fn topological(successors: &[Vec<u32>], predecessors: &[Vec<u32>], part: &BTreeSet<usize>) -> Vec<usize> {
-    let waits = |v: usize| predecessors[v].iter().filter(|&&u| part.contains(&(u as usize))).count();
-    let mut waiting: std::collections::BTreeMap<usize, usize> = part.iter().map(|&v| (v, waits(v))).collect();
-    let mut ready: BTreeSet<usize> = part.iter().copied().filter(|v| waiting[v] == 0).collect();
-    let mut order = Vec::with_capacity(part.len());
-    while let Some(v) = ready.pop_first() {
-        order.push(v);
-        for w in successors[v].iter().map(|&w| w as usize) {
-            if let Some(left) = waiting.get_mut(&w) {
-                *left -= 1;
-                if *left == 0 {
-                    ready.insert(w);
+    /// `v` and the vertices that every cycle through it passes because the way there or on is the only one.
+    fn forced_with(&self, v: usize, set: &BTreeSet<usize>) -> Vec<usize> {
+        let mut forced = vec![v];
+        for edges in [&self.predecessors[..], self.successors] {
+            let mut at = v;
+            while let [only] = edges[at][..] {
+                at = only as usize;
+                if forced.contains(&at) || set.contains(&at) || forced.len() > 64 {
+                    break;
+                }
+                forced.push(at);
+            }
+        }
+        forced
+    }
+
+    /// The vertices that can stand in for `v`: each meets all cycles that avoid `set`, given that `v` does.
+    ///
+    /// Without `v` the cycles are paths from `v` to `v` through an acyclic graph; a vertex is on all of them if no edge
+    /// jumps over it in topological order.
+    fn meeting_all(&mut self, v: usize, set: &BTreeSet<usize>) -> Vec<usize> {
+        let order = self.between(v, set);
+        let last = order.len() + 1;
+        let (mut furthest, mut meeting) = (0, vec![v]);
+        for (i, w) in std::iter::once(v).chain(order).enumerate() {
+            if i > 0 && furthest <= i {
+                meeting.push(w);
+            }
+            for head in self.successors[w].iter().map(|&h| h as usize) {
+                let to = if head == v { last } else { self.place_of(head) };
+                furthest = furthest.max(to);
+            }
+        }
+        meeting
+    }
+
+    fn is_inside(&self, w: usize) -> bool {
+        self.forward[w] == self.search && self.backward[w] == self.search
+    }
+
+    fn place_of(&self, w: usize) -> usize {
+        if self.is_inside(w) { self.place[w] } else { 0 }
+    }
+
+    /// The vertices on cycles through `v` that avoid `set`, in topological order, each with its place from 1.
+    fn between(&mut self, v: usize, set: &BTreeSet<usize>) -> Vec<usize> {
+        self.search += 1;
+        let reached = reach(self.successors, v, set, &mut self.forward, self.search);
+        let met = reach(&self.predecessors, v, set, &mut self.backward, self.search);
+        self.budget = self.budget.saturating_sub(reached.len() + met.len());
+        (self.forward[v], self.backward[v]) = (0, 0);
+        let mut inside: Vec<usize> = met.into_iter().filter(|&w| self.is_inside(w)).collect();
+        inside.sort_unstable();
+        let waits = |w: usize| self.predecessors[w].iter().filter(|&&u| self.is_inside(u as usize)).count();
+        let waiting: Vec<usize> = inside.iter().map(|&w| waits(w)).collect();
+        inside.iter().zip(waiting).for_each(|(&w, waits)| self.place[w] = waits);
+        let mut order: Vec<usize> = inside.into_iter().filter(|&w| self.place[w] == 0).collect();
+        let mut done = 0;
+        while done < order.len() {
+            for w in self.successors[order[done]].iter().map(|&w| w as usize) {
+                if self.is_inside(w) {
+                    self.place[w] -= 1;
+                    order.extend((self.place[w] == 0).then_some(w));
                 }
             }
+            done += 1;
         }
+        order.iter().enumerate().for_each(|(i, &w)| self.place[w] = i + 1);
+        order
     }
-    order
+}
+
+/// Vertices reached from `start` by at least one edge, avoiding `closed` and not going on through `start`; they are
+/// marked with `number`.
+fn reach(
+    successors: &[Vec<u32>],
+    start: usize,
+    closed: &BTreeSet<usize>,
+    marks: &mut [u32],
+    number: u32,
+) -> Vec<usize> {
+    let (mut reached, mut done) = (Vec::new(), 0);
+    let mut next = Some(start);
+    while let Some(v) = next {
+        for w in successors[v].iter().map(|&w| w as usize) {
+            if marks[w] != number && w != start && !closed.contains(&w) {
+                marks[w] = number;
+                reached.push(w);
+            }
+        }
+        next = reached.get(done).copied();
+        done += 1;
+    }
+    reached
 }
 
 fn reverse(successors: &[Vec<u32>]) -> Vec<Vec<u32>> {
