@@ -91,6 +91,8 @@ pub(super) struct Builder<'a, 'f> {
     pub files: &'f dyn Files,
     pub exprs: Exprs,
     pub dims: Dimensions,
+    /// Equalities of dimensions that are put off.
+    pub later: Option<Vec<(Quantity, Quantity, Span, String)>>,
     pub faults: Vec<Diagnostic>,
     /// Meaning and dimension of every symbol, by its number.
     pub meanings: Vec<Option<(Meaning, Quantity)>>,
@@ -137,6 +139,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             files,
             exprs,
             dims: Dimensions::default(),
+            later: None,
             faults: Vec::new(),
             meanings: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
@@ -228,11 +231,23 @@ impl<'a, 'f> Builder<'a, 'f> {
             .or_else(|| wires().next())
     }
 
-    /// Requires two quantities to have one dimension; reports a clash in general words.
+    /// Requires two quantities to have one dimension; reports a clash in general words. While values of names are read
+    /// this is put off until the laws of the elements have spoken, so that a wrong output is not blamed on the elements.
     pub fn equal(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str) {
+        if let Some(later) = &mut self.later {
+            later.push((left.clone(), right.clone(), span, what.to_string()));
+            return;
+        }
         let reason = Reason { span, part: None };
         for clash in self.dims.equal(left, right, &reason) {
             self.clash(&clash, what, span);
+        }
+    }
+
+    /// Requires what was put off.
+    pub fn settle_units(&mut self) {
+        for (left, right, span, what) in self.later.take().unwrap_or_default() {
+            self.equal(&left, &right, span, &what);
         }
     }
 

@@ -122,7 +122,10 @@ impl<'a> Builder<'a, '_> {
         for decl in around {
             d = d.also(decls[*decl].span, "declared here");
         }
-        let hint = if function {
+        let parameters = around.iter().all(|d| matches!(decls[*d].kind, DeclKind::Parameter { .. }));
+        let hint = if parameters {
+            "give one of them a number"
+        } else if function {
             "functions cannot call themselves; write the result out"
         } else {
             "a `state` breaks such a circle, since it is known before its rate; so do `delay` and `sample`"
@@ -233,6 +236,7 @@ impl<'a> Builder<'a, '_> {
             return;
         }
         let value = self.with_unit(value, d.unit, e.span);
+        let value = self.like_replaced(value, d.replaced_unit, e.span);
         let number = self.value_of(value.expr).unwrap_or(f64::NAN);
         if !number.is_finite() {
             let title = format!("`{}` has no finite value", d.name);
@@ -241,7 +245,7 @@ impl<'a> Builder<'a, '_> {
         }
         let facts = Facts { nonzero: number != 0.0, positive: number > 0.0, given: Some(value.expr) };
         let symbol = self.fresh(&d.name, facts);
-        let written = d.unit.or(unit_of_literal(e));
+        let written = d.unit.or(d.replaced_unit).or(unit_of_literal(e));
         let unit = written.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
         let parameter = Parameter { name, symbol, value: value.expr, constant, unit, doc, span: d.span };
@@ -286,6 +290,13 @@ impl<'a> Builder<'a, '_> {
             return self.in_unit(value.expr, &scale);
         }
         self.equal(&value.quantity, &Quantity::of(scale.dim), span, "the value and its unit");
+        Value { quantity: Quantity::of(scale.dim), ..value }
+    }
+
+    /// The value of an override has the dimension of what it replaces; without a unit it is SI.
+    fn like_replaced(&mut self, value: Value, unit: Option<&ast::UnitText>, span: Span) -> Value {
+        let Some(scale) = unit.and_then(|u| self.unit(u)) else { return value };
+        self.equal(&value.quantity, &Quantity::of(scale.dim), span, "the new value and the one in the model");
         Value { quantity: Quantity::of(scale.dim), ..value }
     }
 
@@ -408,7 +419,7 @@ impl<'a> Builder<'a, '_> {
 }
 
 /// The unit that stands at a value which is one number.
-fn unit_of_literal(e: &ast::Expr) -> Option<&ast::UnitText> {
+pub(super) fn unit_of_literal(e: &ast::Expr) -> Option<&ast::UnitText> {
     match &e.kind {
         ExprKind::Number(n) => n.unit.as_ref(),
         ExprKind::Unary(u) => unit_of_literal(&u.operand),

@@ -79,20 +79,21 @@ fn build(
 ) -> (Option<BondGraph>, Vec<Diagnostic>) {
     let mut b = Builder::new(flat, wiring, sources, files);
     b.make_symbols();
+    b.later = Some(Vec::new());
     b.make_values();
+    let later = b.later.take();
     let kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
+    b.later = later;
+    b.settle_units();
     b.finish_blocks();
     let preferences = b.preferences();
     let forced_causality = b.forced_causality();
     let forced_strokes = b.forced_strokes();
-    let replaced = b.rates_of_signals();
-    for (_, c, span) in &flat.constraints {
-        let title = format!("constraint `{}` cannot be built yet", c.name.text);
-        b.fault(Diagnostic::error(crate::diagnostic::codes::S008, title, *span, "not supported by this version"));
-    }
+    let sides = b.constraint_sides();
+    let rates = b.rates_of_signals();
+    let relations = b.relations(&sides, &rates);
     let complete = !faulty && b.faults.is_empty() && kinds.iter().all(Option::is_some);
     if !complete {
-        //b.check(&replaced);
         return (None, b.faults);
     }
     let kinds: Vec<Kind> = kinds.into_iter().flatten().collect();
@@ -100,11 +101,11 @@ fn build(
     graph.preferences = preferences;
     graph.forced_causality = forced_causality;
     graph.forced_strokes = forced_strokes;
-    //b.recog_storages(&mut graph, &mut replaced);
+    b.build_constraints(&mut graph, &relations);
+    let repeated = b.recognise_storages(&mut graph, &rates);
     let mut graph = b.finish(graph);
-    if !replaced.is_empty() {
-        graph.replace_symbols(&replaced);
-    }
+    graph.replace_symbols(&rates);
+    graph.replace_symbols(&repeated);
     (Some(graph), b.faults)
 }
 
@@ -204,6 +205,9 @@ impl Builder<'_, '_> {
 impl BondGraph {
     /// Puts expressions in the place of symbols, everywhere.
     fn replace_symbols(&mut self, map: &BTreeMap<Symbol, Expr>) {
+        if map.is_empty() {
+            return;
+        }
         let mut roots = Vec::new();
         self.for_each_expr(&mut |e| roots.push(*e));
         let new = self.exprs.substitute_all(&roots, map);
@@ -228,7 +232,7 @@ impl BondGraph {
 
 impl Kind {
     /// Visits every expression of the element.
-    fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+    pub(super) fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
         match self {
             Kind::Zero | Kind::One | Kind::EffortDetector | Kind::FlowDetector => {}
             Kind::EffortSource { value: e } | Kind::FlowSource { value: e } | Kind::ZeroCompliance { flow: e } => {

@@ -361,7 +361,7 @@ impl<'a> Builder<'a, '_> {
         let value = self.arg(part, &arg.value, true)?;
         let wire = self.wire_at(part, 0)?;
         if !self.pseudo[wire] {
-            self.equal_by_law(&value.quantity, &Quantity::of(Dim::JOULE), part);
+            self.equal(&value.quantity, &Quantity::of(Dim::JOULE), arg.span, "this and an energy");
         }
         let ports = self.wiring.ports[part].len();
         for port in 0..ports {
@@ -390,7 +390,7 @@ impl<'a> Builder<'a, '_> {
             let value = self.arg(part, law.value, true)?;
             if law.gives != '0' {
                 let own = self.port_variable(part, slot, law.gives.encode_utf8(&mut [0; 4]))?;
-                self.equal_by_law(&value.quantity, &own.quantity, part);
+                self.equal(&value.quantity, &own.quantity, law.span, "the two sides of this law");
             }
             laws.push(PortLaw { gives: law.gives, expr: value.expr, span: law.span });
         }

@@ -328,6 +328,7 @@ impl<'a> Flat<'a> {
             reads,
             kind,
             unit,
+            replaced_unit: None,
             doc: doc.map_or("", |d| &d.text),
             span: name.span,
         };
@@ -336,9 +337,14 @@ impl<'a> Flat<'a> {
         }
     }
 
-    fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) {
-        if let Err(fault) = self.names.place(scope, name, node) {
-            self.faults.push(fault);
+    /// Gives a node its name; false if the name is taken, which is said.
+    fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> bool {
+        match self.names.place(scope, name, node) {
+            Ok(()) => true,
+            Err(fault) => {
+                self.faults.push(fault);
+                false
+            }
         }
     }
 
@@ -363,8 +369,9 @@ impl<'a> Flat<'a> {
         };
         let node = Node::Part(self.parts.len());
         let name = full_name(&self.names.scopes[scope].prefix, &element.name.text);
-        self.place(scope, &element.name, node);
-        self.parts.push(Part { name, scope, word, ast: element, pseudo });
+        if self.place(scope, &element.name, node) {
+            self.parts.push(Part { name, scope, word, ast: element, pseudo });
+        }
     }
 
     fn too_large(&mut self, span: Span) {
@@ -384,9 +391,13 @@ impl<'a> Flat<'a> {
         };
         if let Some(fault) = self.endless(scope, component, element) {
             self.faults.push(fault);
-            return self.place(scope, &element.name, Node::Broken);
+            self.place(scope, &element.name, Node::Broken);
+            return;
         }
         let id = self.names.scopes.len();
+        if !self.place(scope, &element.name, Node::Instance(id)) {
+            return;
+        }
         self.names.scopes.push(Scope {
             prefix: format!("{}{}.", self.names.scopes[scope].prefix, element.name.text),
             parent: Some(written),
@@ -397,7 +408,6 @@ impl<'a> Flat<'a> {
             nodes: HashMap::new(),
             components: HashMap::new(),
         });
-        self.place(scope, &element.name, Node::Instance(id));
         self.refuse_odd_arguments(component, element);
         self.interface(id, scope, component, element);
         self.components(id, &component.body);

@@ -8,6 +8,7 @@
 
 mod blocks;
 mod builder;
+mod constraint;
 mod csv;
 mod decls;
 mod dimension;
@@ -20,16 +21,20 @@ mod load;
 mod lookup;
 mod measure;
 mod overrides;
+mod print;
+mod recognise;
 mod scope;
 mod symbols;
 mod value;
 mod verify;
+mod warnings;
 mod wire;
 
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
 pub use overrides::Override;
 pub use verify::verify;
+pub use warnings::warnings;
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,6 @@
 //! Values of parameters that replace those of the model (`--set k=3`).
 
+use super::decls::unit_of_literal;
 use super::flatten::Flat;
 use super::scope::DeclKind;
 use crate::ast::{self, Expr, StatementKind};
@@ -64,6 +65,7 @@ pub(super) fn apply<'a>(given: &'a [Given], flat: &mut Flat<'a>, faults: &mut Ve
         let fault = match found {
             Some(d) => match &mut d.kind {
                 DeclKind::Parameter { value, constant: false } => {
+                    d.replaced_unit = value.and_then(unit_of_literal);
                     *value = Some(&g.value);
                     d.reads = 0;
                     continue;

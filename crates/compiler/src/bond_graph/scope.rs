@@ -92,6 +92,8 @@ pub(super) struct Decl<'a> {
     pub kind: DeclKind<'a>,
     /// Unit after `:`, if written.
     pub unit: Option<&'a ast::UnitText>,
+    /// The unit of the value that an override replaces.
+    pub replaced_unit: Option<&'a ast::UnitText>,
     /// Documentation.
     pub doc: &'a str,
     /// Where its name stands.
@@ -199,7 +201,11 @@ impl<'a> Names<'a> {
     /// Adds an element, instance, port, bond or constraint under a name, unless the name is taken; says so if it is.
     pub fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> Result<(), Diagnostic> {
         if let Some((_, first)) = self.scopes[scope].nodes.get(name.text.as_str()) {
-            return Err(twice(&name.text, name.span, *first));
+            let hint = format!(
+                "the kind stands only where the element first stands: write `{}` here, or use another name",
+                name.text
+            );
+            return Err(Diagnostic { hint: Some(hint), ..twice(&name.text, name.span, *first) });
         }
         self.scopes[scope].nodes.insert(&name.text, (node, name.span));
         Ok(())
@@ -228,6 +234,15 @@ impl<'a> Names<'a> {
         }
     }
 
+    /// What an instance has, for a hint.
+    fn inner_names(&self, scope: ScopeId) -> String {
+        let s = &self.scopes[scope];
+        let mut names: Vec<&str> = s.nodes.keys().chain(s.values.keys()).copied().collect();
+        names.sort_unstable();
+        names.truncate(12);
+        format!("it has: {}", names.join(", "))
+    }
+
     /// The diagnostic for an element that nobody declared.
     fn unknown_node(&self, scope: ScopeId, name: &ast::Name, inside: bool) -> Diagnostic {
         let owner = self.scopes[scope].prefix.trim_end_matches('.');
@@ -240,6 +255,7 @@ impl<'a> Names<'a> {
             None if !inside && self.value(scope, &name.text).is_some() => d
                 .note(format!("`{}` is a parameter or signal; a dotted name belongs to an element", name.text))
                 .hint("use the bare name"),
+            None if inside => d.hint(self.inner_names(scope)),
             None => d.hint("write `Kind:name` where it first stands, such as `1:hub` or `R:damper(10)`"),
         };
         match self.scopes[scope].nodes.get(near_key(&d).as_str()) {

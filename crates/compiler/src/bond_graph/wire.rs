@@ -33,6 +33,8 @@ pub(super) struct Wiring {
     pub of_joint: Vec<Option<usize>>,
     /// What is wrong with the drawing.
     pub faults: Vec<Diagnostic>,
+    /// Parts with more bonds than fit.
+    crowded_parts: Vec<usize>,
 }
 
 /// A side of a joint: the drawn bond there, and whether the bond starts at the joint.
@@ -253,6 +255,7 @@ impl Wiring {
             }
             Some((first, _)) => {
                 let first = self.wires.get(first).map_or(p.ast.span, |w| w.span);
+                self.crowded_parts.push(part);
                 self.fault(taken(p, slot, drawn, first));
                 None
             }
@@ -314,7 +317,7 @@ impl Wiring {
             }
             if !touched[i] && found == 0 {
                 self.fault(unconnected(p, &flat.names));
-            } else if p.word.is_two_port() && found == 1 {
+            } else if p.word.is_two_port() && found == 1 && !self.crowded_parts.contains(&i) {
                 self.fault(half_connected(p, self.ports[i][0].is_none()));
             } else if p.ast.ports.len() > 1 && found > 0 {
                 let ports = self.ports[i].clone();

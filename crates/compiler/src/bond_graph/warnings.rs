@@ -1,0 +1,169 @@
+//! What is legal but odd about a graph.
+
+use std::collections::BTreeMap;
+
+use super::{BondGraph, Element, Kind, Meaning, Storage, StorageLaw};
+use crate::algebra::{Expr, Symbol};
+use crate::diagnostic::{Diagnostic, codes};
+use crate::ids::Id;
+
+/// The warnings of this stage, in the order of the elements: junctions that join nothing, parts that nothing connects,
+/// fields whose laws come from no energy.
+pub fn warnings(graph: &BondGraph) -> Vec<Diagnostic> {
+    let mut found = lonely_junctions(graph);
+    found.extend(isolated_parts(graph));
+    found.extend(fields_without_energy(graph));
+    found
+}
+
+/// Junctions with one bond: a 0 lets nothing flow, a 1 lets nothing push.
+fn lonely_junctions(graph: &BondGraph) -> Vec<Diagnostic> {
+    let lonely = graph.elements.values().filter(|e| matches!(e.kind, Kind::Zero | Kind::One) && e.ports.len() == 1);
+    let warning = |e: &Element| {
+        let (what, hint) = match e.kind {
+            Kind::Zero => ("flow", "the flow of its bond is 0; remove the junction, or join more to it"),
+            _ => ("effort", "the effort of its bond is 0; remove the junction, or join more to it"),
+        };
+        let title = format!("{}-junction `{}` has one bond", e.kind.word(), e.name);
+        Diagnostic::warning(codes::B021, title, e.span, format!("no {what} can pass")).hint(hint)
+    };
+    lonely.map(warning).collect()
+}
+
+/// Parts that neither a bond nor a value that one reads of the other connects with the first part.
+fn isolated_parts(graph: &BondGraph) -> Vec<Diagnostic> {
+    let mut sets = Sets((0..graph.elements.len() + graph.signals.len() + graph.held.len()).collect());
+    for bond in graph.bonds.values() {
+        sets.join(bond.from.element.index(), bond.to.element.index());
+    }
+    let mut reads = Reads { graph, sets };
+    for (id, element) in graph.elements.iter() {
+        let mut exprs = Vec::new();
+        element.kind.clone().for_each_expr(&mut |e| exprs.push(*e));
+        exprs.into_iter().for_each(|e| reads.by(id.index(), e));
+    }
+    let elements = graph.elements.len();
+    for (id, signal) in graph.signals.iter() {
+        reads.by(elements + id.index(), signal.rate);
+    }
+    for (id, held) in graph.held.iter() {
+        reads.by(elements + graph.signals.len() + id.index(), held.source);
+    }
+    let mut sets = reads.sets;
+    let mut seen: BTreeMap<usize, &Element> = BTreeMap::new();
+    for (id, element) in graph.elements.iter() {
+        seen.entry(sets.find(id.index())).or_insert(element);
+    }
+    let mut parts: Vec<&Element> = seen.into_values().collect();
+    parts.sort_by_key(|e| e.span);
+    let main = parts.first().map(|e| e.span);
+    let warning = |e: &&Element| {
+        let title = format!("the part around `{}` is not connected with the rest", e.name);
+        let d =
+            Diagnostic::warning(codes::B020, title, e.span, "no bond and no signal leads from here to the first part");
+        match main {
+            Some(main) => d.also(main, "the first part").hint("join them, or make two models of them"),
+            None => d,
+        }
+    };
+    parts.iter().skip(1).map(warning).collect()
+}
+
+/// Which elements and signals one expression joins, because it reads them.
+struct Reads<'g> {
+    graph: &'g BondGraph,
+    sets: Sets,
+}
+
+impl Reads<'_> {
+    fn by(&mut self, reader: usize, expr: Expr) {
+        for symbol in self.graph.exprs.symbols_of(expr) {
+            self.symbol(reader, symbol);
+        }
+    }
+
+    fn symbol(&mut self, reader: usize, symbol: Symbol) {
+        let elements = self.graph.elements.len();
+        match self.graph.variables.get(&symbol).map(|v| v.meaning) {
+            Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => {
+                self.sets.join(reader, self.graph.bonds[bond].from.element.index());
+            }
+            Some(Meaning::Stored(port)) => self.sets.join(reader, port.element.index()),
+            Some(Meaning::Signal(id)) => self.sets.join(reader, elements + id.index()),
+            Some(Meaning::Held(id)) => self.sets.join(reader, elements + self.graph.signals.len() + id.index()),
+            Some(Meaning::Rate(of)) if of != symbol => self.symbol(reader, of),
+            _ => {}
+        }
+    }
+}
+
+/// Sets joined step by step.
+struct Sets(Vec<usize>);
+
+impl Sets {
+    fn find(&mut self, mut x: usize) -> usize {
+        while self.0[x] != x {
+            self.0[x] = self.0[self.0[x]];
+            x = self.0[x];
+        }
+        x
+    }
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// Fields whose laws have a Jacobian that is not symmetric: a cycle of motion would make or eat energy.
+fn fields_without_energy(graph: &BondGraph) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    let mut exprs = None;
+    for element in graph.elements.values().filter(|e| e.ports.len() > 1) {
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { continue };
+        let pool = exprs.get_or_insert_with(|| graph.exprs.clone());
+        let Some((i, j)) = asymmetric(graph, pool, element, storage) else { continue };
+        let (a, b) = (&element.ports[i].name, &element.ports[j].name);
+        let title = format!("the laws of {} `{}` come from no energy", element.kind.word(), element.name);
+        found.push(
+            Diagnostic::warning(codes::L005, title, element.span, format!("ports `{a}` and `{b}` do not act alike on one another"))
+                .note(format!("the law of `{a}` by what `{b}` stores is not the law of `{b}` by what `{a}` stores: a cycle makes or eats energy"))
+                .hint("give `energy = …`, or laws that are its derivatives, if the field is to conserve energy"),
+        );
+    }
+    found
+}
+
+/// Two ports of a field whose laws do not fit one energy.
+fn asymmetric(
+    graph: &BondGraph,
+    pool: &mut crate::algebra::Exprs,
+    element: &Element,
+    storage: &Storage,
+) -> Option<(usize, usize)> {
+    let compliance = matches!(element.kind, Kind::Compliance(_));
+    let z = |port: usize| {
+        let bond = &graph.bonds[element.ports[port].bond];
+        if compliance { bond.effort } else { bond.flow }
+    };
+    let law = |port: usize| match storage.laws[port] {
+        StorageLaw::Integral(e) => Some((e, true)),
+        StorageLaw::Derivative(e) => Some((e, false)),
+        _ => None,
+    };
+    for i in 0..element.ports.len() {
+        for j in 0..i {
+            let (Some((a, integral)), Some((b, also))) = (law(i), law(j)) else { continue };
+            if integral != also {
+                continue;
+            }
+            let variable = |port: usize| if integral { storage.stored[port] } else { z(port) };
+            let cross = pool.derivative(a, variable(j));
+            let back = pool.derivative(b, variable(i));
+            let difference = pool.sub(cross, back);
+            if !pool.is_zero(difference) {
+                return Some((j, i));
+            }
+        }
+    }
+    None
+}
