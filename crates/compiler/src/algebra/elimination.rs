@@ -60,8 +60,8 @@ enum Quality {
 /// ```
 pub fn eliminate(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) -> Elimination {
     let mut work = Work::new(x, rows, classes);
-    for class in 0..classes.len() {
-        work.eliminate_class(x, &classes[class]);
+    for class in classes {
+        work.eliminate_class(x, class);
     }
     work.finish()
 }

@@ -239,7 +239,7 @@ impl Point<'_> {
                 Some(product)
             }
             Node::Pow(base, n) => self.power(at(base)?, self.pool.is_number(*n), at(n)?, constants),
-            Node::Call(f, x) => self.call(*f, at(&x[0])?, x.get(1).map(|y| at(y)), constants),
+            Node::Call(f, x) => self.call(*f, at(&x[0])?, x.get(1).map(at), constants),
             Node::Compare(c, a, b) => compare(*c, at(a)?, at(b)?, constants),
             Node::Select(c, a, b) => {
                 if truth(at(c)?)? {

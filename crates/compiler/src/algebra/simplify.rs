@@ -47,13 +47,7 @@ impl Exprs {
                 Node::Add(terms) => terms.len() as u64,
                 Node::Mul(factors) => factors.len() as u64 - 1,
                 // A fraction within a fraction reads badly.
-                Node::Pow(base, n) if *n == super::MINUS_ONE => {
-                    if self.holds_fraction(*base) {
-                        6
-                    } else {
-                        2
-                    }
-                }
+                Node::Pow(base, n) if *n == super::MINUS_ONE => 2 + 4 * u64::from(self.holds_fraction(*base)),
                 // An exponent is short however it is written, and a square is shorter than a product.
                 Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.is_integer()) => 0,
                 Node::Pow(..) => 1,

@@ -1,7 +1,9 @@
 //! Laws of the kernel, one line each. Names that start with a capital are positive parameters.
 
+mod eliminate;
 mod laws;
 mod numbers;
+mod random;
 mod reader;
 mod text;
 mod zero;
