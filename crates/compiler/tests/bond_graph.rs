@@ -440,3 +440,150 @@ fn ladders_take_time_in_proportion_to_their_length() {
     println!("500: {short:?}, 5000: {long:?}");
     assert!(long < short * 40, "500 sections {short:?}, 5000 sections {long:?}");
 }
+
+/// Numbers that look random and are the same in every run.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % n.max(1)
+    }
+}
+
+/// Pieces of text that may break something when they stand in the wrong place.
+const ODD: &[&str] = &[
+    " ",
+    "\n",
+    "(",
+    ")",
+    "[",
+    "]",
+    "{",
+    "}",
+    "->",
+    ":",
+    ",",
+    ".",
+    "'",
+    "=",
+    "^",
+    "*",
+    "-",
+    "0",
+    "1",
+    "1e300",
+    "9^9",
+    "t",
+    "e",
+    "f",
+    "q",
+    "p",
+    "I:",
+    "C:",
+    "R:",
+    "TF:",
+    "0:",
+    "1:",
+    "constraint x: ",
+    "state ",
+    "param ",
+    "let ",
+    "energy = ",
+    "m/s",
+    "if ",
+    "then ",
+    "else ",
+    "pid(",
+    "tf(",
+    "delay(",
+    "table(",
+    "prefer ",
+    "stroke ",
+    "causality ",
+    "component ",
+    "port ",
+    "import ",
+    "domain d pseudo {",
+    "1e99999999",
+    "2^1000000",
+    "0.0000001",
+    " rad",
+    " kN",
+    " degC",
+    "x.y.z",
+    ".in",
+    ".out",
+    "//",
+    "\"",
+];
+
+#[test]
+fn broken_models_are_answered_and_never_break_the_compiler() {
+    let mut files = Vec::new();
+    model_files(&models(), &mut files);
+    model_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faulty"), &mut files);
+    let texts: Vec<String> = files.iter().map(|p| std::fs::read_to_string(p).unwrap()).collect();
+    let rounds = std::env::var("FUZZ_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(400);
+    let mut dice = Dice(std::env::var("FUZZ_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(7));
+    for _ in 0..rounds {
+        let mut text: Vec<char> = texts[dice.below(texts.len())].chars().collect();
+        for _ in 0..1 + dice.below(4) {
+            let at = dice.below(text.len() + 1);
+            match dice.below(3) {
+                0 => {
+                    let end = (at + 1 + dice.below(12)).min(text.len());
+                    text.drain(at.min(end)..end);
+                }
+                1 => {
+                    text.splice(at..at, ODD[dice.below(ODD.len())].chars());
+                }
+                _ => {
+                    let other: Vec<char> = texts[dice.below(texts.len())].chars().collect();
+                    let start = dice.below(other.len());
+                    let end = (start + dice.below(40)).min(other.len());
+                    text.splice(at..at, other[start..end].iter().copied());
+                }
+            }
+        }
+        let text: String = text.into_iter().collect();
+        let start = std::time::Instant::now();
+        let result = elaborate(&text);
+        let time = start.elapsed();
+        assert!(time.as_secs() < 5, "{time:?} for\n{text}");
+        match result.graph {
+            Some(graph) => {
+                bond_graph::verify(&graph).unwrap_or_else(|why| panic!("{why}\n{text}"));
+                let _ = bond_graph::warnings(&graph);
+                let _ = graph.to_string();
+            }
+            None => assert!(result.diagnostics.has_errors(), "no graph and no reason\n{text}"),
+        }
+    }
+}
+
+#[test]
+fn a_known_displacement_needs_only_its_stiffness() {
+    let g = graph(
+        "model M\nstate x' = a.f from 1 m\nSe:push(1 N) -> 1:a -> I:mass(2 kg)\na -> TF:lever(x/sqrt(x^2 + 4 m2)) -> C:cable(k = 3 N/m, q = sqrt(x^2 + 4 m2) - 2 m)\n",
+    );
+    let cable = g.elements.values().find(|e| e.name == "cable").unwrap();
+    let bond_graph::Kind::Compliance(s) = &cable.kind else { panic!() };
+    assert!(matches!(s.laws[0], bond_graph::StorageLaw::Known { .. }));
+}
+
+#[test]
+fn a_parameter_may_be_called_like_a_bond() {
+    let g = graph("model M\nparam e2 = 3\nSe:push(e2) -> 0:a -> 1:b -> I:mass(2)\na -> R:r(1)\n");
+    assert_eq!(g.exprs.name(g.parameters.values().next().unwrap().symbol), "e2");
+    let g = graph("model M\nparam e2 = 3\nSe:push(e2) -> 1:x -> 1:y -> I:mass(2)\nx -> R:r(1)\n");
+    assert_eq!(g.exprs.name(g.parameters.values().next().unwrap().symbol), "e2");
+}
+
+#[test]
+fn rotation_shows_its_units() {
+    let g = graph("model M\nSe:push(1 N.m) -> 1:a -> I:rotor(2 kg.m2)\n");
+    let unit = |s| g.variables[&s].unit.as_ref().unwrap().to_string();
+    let bond = g.bonds.values().next().unwrap();
+    assert_eq!((unit(bond.effort), unit(bond.flow)), ("N.m".to_string(), "rad/s".to_string()));
+}

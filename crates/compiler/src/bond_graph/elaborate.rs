@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::builder::Builder;
 use super::files::Files;
-use super::flatten::{self, Flat};
+use super::flatten::{self, Flat, Word};
 use super::load::{Loaded, load};
 use super::overrides::{self, Override};
 use super::wire::{Wiring, wire};
@@ -12,7 +12,7 @@ use super::{Bond, BondGraph, Element, Kind, Port, Variable};
 use crate::algebra::{Expr, Symbol};
 use crate::ast::Ast;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
-use crate::ids::Table;
+use crate::ids::{Id, Table};
 
 /// What has become of a model.
 #[derive(Debug)]
@@ -175,7 +175,10 @@ impl Builder<'_, '_> {
         let mut variables = Vec::with_capacity(self.meanings.len());
         for (at, known) in self.meanings.iter().enumerate() {
             if let Some((meaning, quantity)) = known {
-                let unit = self.written_unit(*meaning, &graph).or_else(|| self.si_unit(quantity));
+                let unit = self
+                    .written_unit(*meaning, &graph)
+                    .or_else(|| self.turning_unit(*meaning))
+                    .or_else(|| self.si_unit(quantity));
                 variables.push((Symbol(at as u32), Variable { meaning: *meaning, unit }));
             }
         }
@@ -187,6 +190,20 @@ impl Builder<'_, '_> {
         }
         graph.exprs = std::mem::take(&mut self.exprs);
         graph
+    }
+
+    /// Speeds and angles of rotation are shown with their radians: `rad/s` and `rad` where efforts are torques.
+    fn turning_unit(&self, meaning: super::Meaning) -> Option<crate::unit::Unit> {
+        let (wire, text) = match meaning {
+            super::Meaning::Flow(bond) => (bond.index(), "rad/s"),
+            super::Meaning::Stored(port) if self.part(port.element.index()).word == Word::C => {
+                (self.wire_at(port.element.index(), port.port as usize)?, "rad")
+            }
+            _ => return None,
+        };
+        let pair = self.pairs.get(wire).filter(|_| !self.pseudo[wire])?;
+        let torque = self.dims.value(&pair.effort_in) == Some(crate::unit::Dimension::JOULE);
+        torque.then(|| crate::unit::Unit::parse(text).ok()).flatten()
     }
 
     /// The SI unit of what a declaration gave a unit: it keeps its radians.

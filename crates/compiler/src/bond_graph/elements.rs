@@ -259,8 +259,12 @@ impl<'a> Builder<'a, '_> {
         if wrong {
             let (has, stores) = if p.word == Word::I { ("p0", "momentum p") } else { ("q0", "displacement q") };
             let title = format!("{} `{}` has no `{}`", p.word.text(), p.name, label.name.text);
-            let d =
-                Diagnostic::error(codes::I001, title, label.span, format!("a {} stores its {stores}", p.word.text()));
+            let d = Diagnostic::error(
+                codes::I001,
+                title,
+                label.span,
+                format!("{} stores its {stores}", p.word.with_article()),
+            );
             self.fault(d.hint(format!("give `{has}`, `e0` or `f0`")));
             return false;
         }
@@ -456,16 +460,16 @@ impl<'a> Builder<'a, '_> {
             return Some(());
         }
         let (word, own, between) = match self.part(part).word {
-            Word::I => ("I", "e", "f and p"),
-            _ => ("C", "f", "e and q"),
+            Word::I => ("an I", "e", "f and p"),
+            _ => ("a C", "f", "e and q"),
         };
         let d = Diagnostic::error(
             codes::L004,
-            format!("the law of {word} `{}` reads its own `{own}`", self.part(part).name),
+            format!("the law of {} reads its own `{own}`", what(self.part(part))),
             law.span,
             "here",
         )
-        .note(format!("the law of a {word} is between {between}"));
+        .note(format!("the law of {word} is between {between}"));
         self.fault(d.hint("put what depends on it into an R at the same junction"));
         None
     }
@@ -705,7 +709,7 @@ impl<'a> Builder<'a, '_> {
         let p = self.part(part);
         let text = self.sources.slice(arg.value.span).to_string();
         let label = if bare {
-            format!("the value of a {} is its {takes}", p.word.text())
+            format!("the value of {} is its {takes}", p.word.with_article())
         } else {
             format!("`{letter}` is the {takes}")
         };

@@ -65,6 +65,15 @@ impl Word {
     pub fn text(self) -> &'static str {
         WORDS.iter().find(|(_, kind)| *kind == self).map_or("", |(word, _)| word)
     }
+    /// The word with its article.
+    pub fn with_article(self) -> String {
+        let article = if matches!(self, Word::I | Word::R | Word::Se | Word::Sf | Word::ResidualSe | Word::ResidualSf) {
+            "an"
+        } else {
+            "a"
+        };
+        format!("{article} {}", self.text())
+    }
     /// Whether it is a junction.
     pub fn is_junction(self) -> bool {
         matches!(self, Word::Zero | Word::One)

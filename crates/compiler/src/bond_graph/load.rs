@@ -89,7 +89,8 @@ impl Loader<'_> {
             Ok((found, text)) => {
                 let file = self.sources.add(found.clone(), text);
                 let parsed = ast::parse(self.sources.text(file), file);
-                self.faults.extend(parsed.diagnostics);
+                // A file that is imported needs no model line.
+                self.faults.extend(parsed.diagnostics.into_iter().filter(|d| d.code != codes::S005));
                 self.trees.push(parsed.ast);
                 self.open.push(true);
                 self.imported_at.push(Some((from, span)));

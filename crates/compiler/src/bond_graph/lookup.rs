@@ -120,9 +120,9 @@ impl<'a> Builder<'a, '_> {
             );
         }
         if matches!(text, "e" | "f" | "q" | "p") && cx.own.is_some() {
-            let word = cx.own.map_or("", |p| self.part(p).word.text());
+            let word = cx.own.map_or(String::new(), |p| self.part(p).word.with_article());
             return self.fault(
-                d.note(format!("a {word} has no `{text}` of its own"))
+                d.note(format!("{word} has no `{text}` of its own"))
                     .hint("an I has e, f, p; a C has e, f, q; an R has e, f"),
             );
         }
@@ -164,6 +164,7 @@ impl<'a> Builder<'a, '_> {
         let rest: Vec<&ast::Name> = path.parts[used..].iter().map(|p| &p.name).collect();
         match (node, rest.as_slice()) {
             (Node::Broken, _) => None,
+            (Node::Part(part), [port]) if self.is_port(part, &port.text) => self.incomplete_port(port, path),
             (Node::Part(part), [variable]) => self.element_variable(part, variable),
             (Node::Part(part), [port, variable]) => self.named_port_variable(part, port, variable),
             (Node::Instance(inner), [name]) => self.inner_value(inner, name),
@@ -184,6 +185,21 @@ impl<'a> Builder<'a, '_> {
                 None
             }
         }
+    }
+
+    fn is_port(&self, part: usize, name: &str) -> bool {
+        let p = self.part(part);
+        p.word.is_two_port() && matches!(name, "in" | "out")
+            || p.ast.ports.iter().any(|n| n.text == name) && !matches!(name, "e" | "f" | "q" | "p")
+    }
+
+    fn incomplete_port(&mut self, port: &ast::Name, path: &ast::Path) -> Option<Value> {
+        let name: Vec<&str> = path.parts.iter().map(|p| p.name.text.as_str()).collect();
+        self.fault(
+            Diagnostic::error(codes::N017, "a port is no number", port.span, "this is a port")
+                .hint(format!("write `{0}.e` or `{0}.f`", name.join("."))),
+        );
+        None
     }
 
     fn incomplete(&mut self, node: Node, path: &ast::Path) -> Option<Value> {

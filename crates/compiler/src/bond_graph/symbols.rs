@@ -110,7 +110,15 @@ impl Builder<'_, '_> {
         let base = self.outer_end(wire).or(named).or_else(|| two_port(w.to, "in")).or_else(|| two_port(w.from, "out"));
         match base {
             Some(base) => (format!("{base}.e"), format!("{base}.f")),
-            None => (format!("e{}", wire + 1), format!("f{}", wire + 1)),
+            None => (self.unused(format!("e{}", wire + 1)), self.unused(format!("f{}", wire + 1))),
+        }
+    }
+
+    /// The name, or one like it if a parameter or signal is called so.
+    fn unused(&self, name: String) -> String {
+        match self.flat.names.scopes[0].values.contains_key(name.as_str()) {
+            true => self.unused(format!("{name}_")),
+            false => name,
         }
     }
 

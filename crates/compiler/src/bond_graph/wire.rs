@@ -288,7 +288,7 @@ impl Wiring {
                     "out of it here",
                 )
                 .note("power is positive into I, C and R, so that energy and dissipation have the right sign")
-                .hint(format!("turn the bond: `… -> {name}`; turn the junction's other signs with it if you must")),
+                .hint(format!("turn the bond: `… -> {name}`")),
             );
             return None;
         }
