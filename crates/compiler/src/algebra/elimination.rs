@@ -236,7 +236,7 @@ fn coefficient(row: &[(usize, Expr)], column: usize) -> Option<Expr> {
 }
 
 /// How good a pivot is, and how long it is written.
-fn quality(x: &Exprs, e: Expr) -> (Quality, usize) {
+fn quality(x: &Exprs, e: Expr) -> (Quality, u32) {
     if e == ONE || e == MINUS_ONE {
         return (Quality::Unit, 0);
     }
@@ -250,7 +250,7 @@ fn quality(x: &Exprs, e: Expr) -> (Quality, usize) {
         (false, false) => Quality::DoubtfulParameters,
         (true, false) => Quality::Doubtful,
     };
-    (quality, x.cost(&[e]).total())
+    (quality, x.entry(e).size)
 }
 
 /// Columns expressed by those that are no pivots, worked out when asked for and kept.

@@ -45,6 +45,8 @@ pub(super) struct Entry {
     /// From names and structure only: equal in every pool.
     pub hash: u64,
     pub depth: u32,
+    /// Entries below it, shared ones each time; at most `u32::MAX`.
+    pub size: u32,
     pub properties: Properties,
     pub symbols: SetId,
     /// The product without its number; itself if it has none.
@@ -220,6 +222,7 @@ impl Exprs {
         let entry = Entry {
             hash,
             depth: self.depth_of(&node),
+            size: self.size_of(&node),
             properties: self.properties_of(&node),
             symbols: self.symbols_of_node(&node),
             monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),
@@ -246,6 +249,12 @@ impl Exprs {
         let mut depth = 0;
         node.for_each_child(|c| depth = depth.max(self.entry(c).depth + 1));
         depth
+    }
+
+    fn size_of(&self, node: &Node) -> u32 {
+        let mut size = 1u32;
+        node.for_each_child(|c| size = size.saturating_add(self.entry(c).size));
+        size
     }
 
     fn hash_of(&self, node: &Node) -> u64 {

@@ -46,8 +46,16 @@ impl Exprs {
     pub(super) fn fingerprint_of(&self, node: &Node) -> Fingerprint {
         match node {
             Node::Number(value) => [residue(value).unwrap_or(POISON); LANES],
-            _ => std::array::from_fn(|lane| self.lane(node, lane).unwrap_or(POISON)),
+            Node::Pow(base, n) => match self.is_number(*n).and_then(|n| n.as_integer()) {
+                Some(n) if n < 0 => inverses(self.fingerprint(*base).map(|v| whole_power(v, n.unsigned_abs()))),
+                _ => self.lanes(node),
+            },
+            _ => self.lanes(node),
         }
+    }
+
+    fn lanes(&self, node: &Node) -> Fingerprint {
+        std::array::from_fn(|lane| self.lane(node, lane).unwrap_or(POISON))
     }
 
     fn at(&self, e: Expr, lane: usize) -> Option<u64> {
@@ -244,6 +252,32 @@ fn residue(value: &Rational) -> Option<u64> {
         }
     };
     Some(field::mul(n, field::inverse(d)?))
+}
+
+fn whole_power(value: u64, n: u64) -> u64 {
+    if value == POISON { POISON } else { field::pow(value, n) }
+}
+
+/// The inverses of all lanes by one inversion.
+fn inverses(values: Fingerprint) -> Fingerprint {
+    let usable = |v: u64| v != POISON && v != 0;
+    let mut before = [1; LANES];
+    let mut product = 1;
+    for (lane, &value) in values.iter().enumerate() {
+        before[lane] = product;
+        if usable(value) {
+            product = field::mul(product, value);
+        }
+    }
+    let mut inverse = field::inverse(product).unwrap_or(1);
+    let mut result = [POISON; LANES];
+    for (lane, &value) in values.iter().enumerate().rev() {
+        if usable(value) {
+            result[lane] = field::mul(inverse, before[lane]);
+            inverse = field::mul(inverse, value);
+        }
+    }
+    result
 }
 
 fn power(value: u64, exponent: &Rational, lane: usize) -> Option<u64> {

@@ -71,7 +71,7 @@ impl Exprs {
     }
 
     fn shortest_form(&mut self, e: Expr) -> Expr {
-        if !matches!(self.node(e), Node::Add(_) | Node::Mul(_) | Node::Pow(..)) || self.written_length(e) > LONGEST {
+        if !self.has_other_forms(e) || u64::from(self.entry(e).size) > LONGEST || self.written_length(e) > LONGEST {
             return e;
         }
         let mut best = (self.written_length(e), e);
@@ -86,6 +86,23 @@ impl Exprs {
             }
         }
         best.1
+    }
+
+    /// Whether there is anything to multiply out, take out or bring over one denominator.
+    fn has_other_forms(&self, e: Expr) -> bool {
+        let is_sum = |e: Expr| match *self.node(e) {
+            Node::Add(_) => true,
+            Node::Pow(base, _) => matches!(self.node(base), Node::Add(_)),
+            _ => false,
+        };
+        match self.node(e) {
+            Node::Add(terms) => terms.iter().any(|&t| {
+                let monomial = self.entry(t).monomial;
+                matches!(self.node(monomial), Node::Mul(_) | Node::Pow(..))
+            }),
+            Node::Mul(factors) => factors.iter().any(|&f| is_sum(f)),
+            _ => is_sum(e),
+        }
     }
 
     /// Multiplied out, and with common factors taken out of that.
