@@ -124,7 +124,7 @@ fn courses(paths: &CausalPaths) -> Vec<Course> {
     let mut keys: std::collections::BTreeMap<(u8, BTreeSet<ElementId>, BTreeSet<usize>), usize> = Default::default();
     for path in &paths.paths {
         let bonds = bonds_of(path);
-        let gain = unicode(&paths.exprs, path.gain, &PlainNames(&paths.exprs));
+        let gain = unicode(&paths.exprs, path.gain, &PlainNames(&paths.exprs)).replace('-', "−");
         let ends = if path.class == 4 { BTreeSet::new() } else { path.elements.iter().copied().collect() };
         let known = *keys.entry((path.class, ends, bonds.iter().copied().collect())).or_insert(courses.len());
         match courses.get_mut(known) {
@@ -152,7 +152,7 @@ fn legend(graph: &BondGraph, course: &Course) -> Loop {
 
 /// Gains of paths along the same bonds: `±G/R1` for a pair of opposite ones.
 fn gains(gains: &[String]) -> String {
-    let opposite = |a: &str, b: &str| a.strip_prefix('−').or(a.strip_prefix('-')) == Some(b);
+    let opposite = |a: &str, b: &str| a.strip_prefix('−') == Some(b);
     match gains {
         [a, b] if opposite(a, b) => format!("±{b}"),
         [a, b] if opposite(b, a) => format!("±{a}"),

@@ -163,14 +163,26 @@ impl Glyph {
             Side::North | Side::South => Room { east: even.east + text + 2.0, ..even },
         }
     }
+    /// Where the law of a one-port begins, from the edge of the sign where its name begins.
+    pub fn law_indent(&self, neighbour: Side) -> f64 {
+        let sign = width(&self.kind, KIND, true);
+        match neighbour {
+            _ if self.name.is_empty() => sign / 2.0 + 4.0,
+            Side::North | Side::South => sign / 2.0 + 8.0,
+            Side::East | Side::West => sign + 6.0,
+        }
+    }
     fn one_port_room(&self, even: Room, neighbour: Side) -> Room {
         let law = if self.law.is_empty() { 0.0 } else { LEADING };
-        let text = self.name_width().max(width(&self.law, LAW, false) - 8.0);
+        let sign = width(&self.kind, KIND, true);
+        let long = self.law_indent(neighbour) + width(&self.law, LAW, false);
+        let text = if self.law.is_empty() { self.main_width() } else { long.max(self.main_width()) };
+        let out = even.east.max(text - sign / 2.0 + 2.0);
         let below = Room { south: even.south + law, ..even };
         match neighbour {
-            Side::East => Room { west: even.west + text, ..below },
-            Side::West | Side::North => Room { east: even.east + text, ..below },
-            Side::South => Room { east: even.east + text, north: even.north + law, ..even },
+            Side::East => Room { west: out, ..below },
+            Side::West | Side::North => Room { east: out, ..below },
+            Side::South => Room { east: out, north: even.north + law, ..even },
         }
     }
 }

@@ -312,8 +312,7 @@ impl Svg {
         self.paper.add_box(Area::around([at[0] + out * (half + text / 2.0), at[1]], [text, 16.0]));
         if !glyph.law.is_empty() {
             let row = if facing == Side::South { y - LEADING - 3.0 } else { y + LEADING };
-            let indent = if facing == Side::North || facing == Side::South { half + 8.0 } else { 2.0 * half + 6.0 };
-            let indent = if glyph.name.is_empty() { half + 4.0 } else { indent };
+            let indent = glyph.law_indent(facing);
             self.small([x + out * indent, row], anchor, true, &glyph.law);
         }
     }

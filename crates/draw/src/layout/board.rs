@@ -25,10 +25,12 @@ pub struct Board<'a> {
     /// The last evaluation that saw each bond, and each node.
     seen: [Vec<u64>; 2],
     now: u64,
+    /// Cells and bonds looked at so far: a measure of time that is the same on every machine.
+    pub work: u64,
 }
 
 impl<'a> Board<'a> {
-    /// The board with a placement; `None` if the placement is too sprawling for a dense grid.
+    /// The board with a placement; `None` if the placement is too sprawling for a dense grid, or its bonds too long.
     pub fn new(net: &'a Network, at: Vec<Cell>) -> Option<Board<'a>> {
         let edge = |k: usize, f: fn(i32, i32) -> i32| at.iter().map(|c| c[k]).reduce(f).unwrap_or(0);
         let corner = [edge(0, i32::min) - MARGIN, edge(1, i32::min) - MARGIN];
@@ -50,12 +52,18 @@ impl<'a> Board<'a> {
             through: vec![Vec::new(); area],
             seen,
             now: 0,
+            work: 0,
         };
         for v in 0..net.nodes.len() {
             let cell = board.index(board.at[v]);
             board.node[cell] = Some(v as u32);
         }
-        (0..net.bonds.len()).for_each(|b| board.draw_bond(b));
+        for bond in 0..net.bonds.len() {
+            board.draw_bond(bond);
+            if board.work > 20_000_000 {
+                return None;
+            }
+        }
         Some(board)
     }
     /// Whether a node hangs at another as its one-port.
@@ -123,6 +131,7 @@ impl<'a> Board<'a> {
         for c in line(a, b) {
             let cell = self.index(c);
             self.through[cell].push(bond as u32);
+            self.work += 1;
         }
     }
     fn rub_out_bond(&mut self, bond: usize) {
@@ -130,19 +139,21 @@ impl<'a> Board<'a> {
         for c in line(a, b) {
             let cell = self.index(c);
             let list = &mut self.through[cell];
+            self.work += 1 + list.len() as u64 / 8;
             if let Some(i) = list.iter().position(|&x| x == bond as u32) {
                 list.swap_remove(i);
             }
         }
     }
     /// Cost of a bond: its shape, what it crosses and what it passes.
-    fn bond_cost(&self, bond: usize) -> i64 {
+    fn bond_cost(&mut self, bond: usize) -> i64 {
         let [from, to] = self.net.bonds[bond];
         let [a, b] = self.ends(bond);
         let mut total = self.shape_cost(bond);
         let mut crossed: Vec<u32> = Vec::new();
         for c in line(a, b) {
             let cell = self.index(c);
+            self.work += 1 + self.through[cell].len() as u64;
             if let Some(v) = self.node[cell].map(|v| v as usize)
                 && v != from
                 && v != to

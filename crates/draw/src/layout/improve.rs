@@ -6,6 +6,8 @@ use super::{Cell, Network, parts};
 
 /// Upper bound on the moves tried, whatever the size of the graph.
 const MOVES: usize = 300_000;
+/// Upper bound on the cells and bonds looked at in one round.
+const WORK: u64 = 60_000_000;
 /// Largest graph whose branches are moved as a whole.
 const BRANCHED: usize = 400;
 
@@ -69,6 +71,9 @@ fn anneal(board: &mut Board, branches: &[Branch], tries: usize, mut dice: Dice, 
     for i in 0..tries {
         if i == warm && board.net.nodes.len() <= BRANCHED {
             squeeze(board);
+        }
+        if board.work > WORK {
+            break;
         }
         let threshold = start * warm.saturating_sub(i) as i64 / warm.max(1) as i64;
         if let Some(moves) = propose(board, branches, &mut dice) {
