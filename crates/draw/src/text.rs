@@ -1,5 +1,7 @@
 //! Width of text and its way into XML.
 
+use halfarrow_compiler::algebra::unicode_name;
+
 /// Families named in every drawing, the widest first: text is measured in DejaVu Sans and fits in the others.
 pub const FAMILIES: &str = "DejaVu Sans, Verdana, Noto Sans, Segoe UI, Helvetica, Arial, sans-serif";
 
@@ -67,7 +69,7 @@ pub fn typeset(expr: &str) -> String {
     while let Some(c) = rest.chars().next() {
         let word = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
         let length = if c.is_alphabetic() || c == '_' {
-            out.push_str(greek(&rest[..word]).unwrap_or(&rest[..word]));
+            out.push_str(&unicode_name(&rest[..word]));
             word
         } else if c.is_ascii_digit() {
             let end = number_end(rest);
@@ -122,30 +124,37 @@ fn raised(digit: char) -> char {
     }
 }
 
-fn greek(word: &str) -> Option<&'static str> {
-    const LETTERS: [(&str, &str); 22] = [
-        ("alpha", "α"),
-        ("beta", "β"),
-        ("gamma", "γ"),
-        ("delta", "δ"),
-        ("epsilon", "ε"),
-        ("eps", "ε"),
-        ("eta", "η"),
-        ("theta", "θ"),
-        ("kappa", "κ"),
-        ("lambda", "λ"),
-        ("mu", "μ"),
-        ("nu", "ν"),
-        ("xi", "ξ"),
-        ("pi", "π"),
-        ("rho", "ρ"),
-        ("sigma", "σ"),
-        ("tau", "τ"),
-        ("phi", "φ"),
-        ("psi", "ψ"),
-        ("omega", "ω"),
-        ("Omega", "Ω"),
-        ("Phi", "Φ"),
-    ];
-    LETTERS.iter().find(|l| l.0 == word).map(|l| l.1)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_are_set_as_in_print() {
+        for (written, set) in [
+            ("e = b*f^3", "e = b·f³"),
+            ("-a*sin(phi1)", "−a·sin(φ1)"),
+            ("x^-2 + y^2.5", "x^−2 + y^2.5"),
+            ("is*(exp(e/vt) - 1e-9)", "is·(exp(e/vt) − 1e-9)"),
+            ("k = 18 kN/m", "k = 18 kN/m"),
+            ("", ""),
+        ] {
+            assert_eq!(typeset(written), set);
+        }
+    }
+
+    #[test]
+    fn text_is_safe_in_xml() {
+        assert_eq!(escape("a<b & \"c\"\u{1}"), "a&lt;b &amp; &quot;c&quot;\u{fffd}");
+    }
+
+    #[test]
+    fn long_text_ends_in_an_ellipsis() {
+        assert_eq!((shorten("spring", 6), shorten("springs", 6)), ("spring".into(), "sprin…".into()));
+    }
+
+    #[test]
+    fn bold_and_greek_take_room() {
+        assert!(width("I : m", 12.0, true) > width("I : m", 12.0, false));
+        assert!(width("φ", 10.0, false) > 5.0);
+    }
 }
