@@ -8,6 +8,8 @@ use super::node::{Expr, Node};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use rustc_hash::FxHashSet;
+
 /// A linear relation: the sum of coefficient times column is zero. Sorted by column; no coefficient is zero.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SparseRow(pub Vec<(usize, Expr)>);
@@ -59,14 +61,16 @@ enum Quality {
 /// assert_eq!(done.pivots.len(), 2);
 /// ```
 pub fn eliminate(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) -> Elimination {
-    let mut work = Work::new(x, rows, classes);
+    let mut work = Eliminator::new(x, rows, classes.iter().flatten().copied().max().map_or(0, |c| c + 1));
     for class in classes {
-        work.eliminate_class(x, class);
+        work.eliminate(x, class);
     }
     work.finish()
 }
 
-struct Work {
+/// An elimination under way, for those who choose the next class by what the last ones have left.
+#[derive(Debug, Clone)]
+pub struct Eliminator {
     rows: Vec<Vec<(usize, Expr)>>,
     active: Vec<bool>,
     /// The rows of a column; some may have lost it since, or stand there twice.
@@ -79,11 +83,11 @@ struct Work {
 /// Quality, fill, column; then row and stamp. `row` is `None` as long as the entry is a lower bound.
 type Candidate = Reverse<(Quality, usize, usize, u32, Option<u32>)>;
 
-impl Work {
-    fn new(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) -> Work {
-        let from_rows = rows.iter().flat_map(|r| r.0.iter().map(|e| e.0));
-        let columns = from_rows.chain(classes.iter().flatten().copied()).max().map_or(0, |c| c + 1);
-        let mut work = Work {
+impl Eliminator {
+    /// A system of rows over at least this many columns.
+    pub fn new(x: &mut Exprs, rows: Vec<SparseRow>, columns: usize) -> Eliminator {
+        let columns = rows.iter().flat_map(|r| r.0.iter().map(|e| e.0 + 1)).max().unwrap_or(0).max(columns);
+        let mut work = Eliminator {
             rows: Vec::with_capacity(rows.len()),
             active: vec![true; rows.len()],
             column_rows: vec![Vec::new(); columns],
@@ -114,12 +118,13 @@ impl Work {
         degenerate
     }
 
-    fn eliminate_class(&mut self, x: &mut Exprs, columns: &[usize]) {
-        let mut in_class = vec![false; self.column_rows.len()];
-        columns.iter().for_each(|&c| in_class[c] = true);
+    /// Eliminates the columns of one class as far as rows hold them; gives the number of pivots.
+    pub fn eliminate(&mut self, x: &mut Exprs, columns: &[usize]) -> usize {
+        let before = self.done.pivots.len();
+        let mut open: FxHashSet<usize> = columns.iter().copied().collect();
         let mut heap: BinaryHeap<Candidate> = columns.iter().map(|&c| self.bound(c)).collect();
         while let Some(Reverse((quality, _, column, stamp, row))) = heap.pop() {
-            if !in_class[column] || stamp != self.stamps[column] {
+            if !open.contains(&column) || stamp != self.stamps[column] {
                 continue;
             }
             let Some(row) = row else {
@@ -128,17 +133,24 @@ impl Work {
                 }
                 continue;
             };
-            in_class[column] = false;
+            open.remove(&column);
             if quality >= Quality::DoubtfulParameters {
                 self.watch(x, row as usize, column);
             }
             for touched in self.eliminate_column(x, row as usize, column) {
                 self.stamps[touched] += 1;
-                if in_class[touched] {
+                if open.contains(&touched) {
                     heap.push(self.bound(touched));
                 }
             }
         }
+        self.done.pivots.len() - before
+    }
+
+    /// What a column would be divided by if it were eliminated next; `None` if no row holds it.
+    pub fn divisor(&mut self, x: &Exprs, column: usize) -> Option<Expr> {
+        let Reverse((.., row)) = self.best_row(x, column)?;
+        coefficient(&self.rows[row? as usize], column)
     }
 
     fn bound(&self, column: usize) -> Candidate {
@@ -209,6 +221,7 @@ impl Work {
         match row.binary_search_by_key(&column, |e| e.0) {
             Ok(at) => {
                 let sum = x.add(&[row[at].1, change]);
+                let sum = if x.is_number(sum).is_some() { sum } else { x.simplify(sum) };
                 if self.vanishes(x, sum) {
                     row.remove(at);
                 } else {
@@ -224,7 +237,8 @@ impl Work {
         }
     }
 
-    fn finish(mut self) -> Elimination {
+    /// What has been eliminated, and what is left.
+    pub fn finish(mut self) -> Elimination {
         let rows = self.rows.into_iter().zip(&self.active);
         self.done.rest = rows.filter(|(r, active)| **active && !r.is_empty()).map(|(r, _)| SparseRow(r)).collect();
         self.done

@@ -26,7 +26,7 @@ mod text;
 mod zero;
 
 pub use cost::Cost;
-pub use elimination::{BackSubstitution, Elimination, Pivot, SparseRow, back_substitute, eliminate};
+pub use elimination::{BackSubstitution, Elimination, Eliminator, Pivot, SparseRow, back_substitute, eliminate};
 pub use evaluate::Evaluator;
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use node::{Comparison, Expr, Facts, Function, Node, Symbol};

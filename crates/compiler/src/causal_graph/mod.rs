@@ -10,7 +10,6 @@ mod local;
 mod ports;
 pub mod signals;
 mod strokes;
-mod tableau;
 mod text;
 
 use std::collections::BTreeMap;

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::tableau::Tableau;
 use super::{Combination, PortState, Role};
-use crate::algebra::{Expr, Exprs, Symbol};
+use crate::algebra::{Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
 /// What the elimination is asked for, beyond the graph itself.
@@ -80,7 +79,7 @@ struct NetPort {
 struct Net {
     symbols: Vec<Symbol>,
     column: BTreeMap<Symbol, usize>,
-    rows: Vec<Vec<(usize, Expr)>>,
+    rows: Vec<SparseRow>,
     ports: Vec<NetPort>,
     inner: Vec<usize>,
 }
@@ -88,8 +87,8 @@ struct Net {
 /// Solves the junction structure of one connected part.
 pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Solved {
     let net = Net::new(x, graph, members, wishes);
-    let mut tableau = Tableau::new(net.symbols.len(), net.rows.clone());
-    tableau.eliminate(x, &net.inner);
+    let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len());
+    work.eliminate(x, &net.inner);
 
     // Outputs are chosen from the least wanted input to the most wanted one: reactions, rates, laws, co-energies.
     let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
@@ -98,25 +97,26 @@ pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishe
     let mut solved = Solved::default();
     let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
     for &p in &imposed {
-        let determined = tableau.pivot(x, net.ports[p].conjugate());
+        let determined = work.eliminate(x, &[net.ports[p].conjugate()]) == 1;
         outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
     }
     for &p in &storages {
-        tableau.pivot(x, net.ports[p].conjugate());
+        work.eliminate(x, &[net.ports[p].conjugate()]);
     }
     for &p in laws.iter().rev() {
         let port = &net.ports[p];
-        let causality = law_causality(x, &tableau, port, wishes);
-        tableau.pivot(x, port.column(causality == PortCausality::Conductive));
+        let causality = law_causality(x, &mut work, port, wishes);
+        work.eliminate(x, &[port.column(causality == PortCausality::Conductive)]);
         outputs.insert(p, Role::Algebraic(causality));
     }
     for &p in storages.iter().rev() {
-        let dependent = tableau.pivot(x, net.ports[p].given());
+        let dependent = work.eliminate(x, &[net.ports[p].given()]) == 1;
         outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
     }
-    let rest: Vec<Vec<(usize, Expr)>> = tableau.rest().cloned().collect();
-    solved.demands = circuits(x, net.symbols.len(), rest).into_iter().map(|(_, row)| net.combination(&row)).collect();
-    net.report(tableau, &outputs, wishes, &mut solved, x);
+    let done = work.finish();
+    let demands = circuits(x, done.rest.clone());
+    solved.demands = demands.into_iter().map(|(_, row)| net.combination(&row.0)).collect();
+    net.report(done, &outputs, wishes, &mut solved, x);
     solved
 }
 
@@ -186,7 +186,7 @@ impl Net {
                 for (own, common) in [(effort, bond.effort), (flow, bond.flow)] {
                     let mut row = vec![(self.of(own), one), (self.of(common), minus)];
                     row.sort_by_key(|e| e.0);
-                    self.rows.push(row);
+                    self.rows.push(SparseRow(row));
                 }
             }
             let port = PortRef { element, port: index as u32 };
@@ -255,7 +255,7 @@ impl Net {
     fn push(&mut self, mut row: Vec<(usize, Expr)>) {
         row.sort_by_key(|e| e.0);
         if row.windows(2).all(|w| w[0].0 != w[1].0) {
-            self.rows.push(row);
+            self.rows.push(SparseRow(row));
         }
     }
 
@@ -284,7 +284,7 @@ impl Net {
 
     fn report(
         &self,
-        tableau: Tableau,
+        done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         wishes: &Wishes,
         solved: &mut Solved,
@@ -312,10 +312,11 @@ impl Net {
             }
         }
         let mut defined = vec![false; self.symbols.len()];
-        for (column, row) in &tableau.pivots {
-            defined[*column] = true;
-            let negative: Vec<(usize, Expr)> = row.iter().map(|&(c, e)| (c, x.neg(e))).collect();
-            solved.definitions.push((self.symbols[*column], self.combination(&negative)));
+        for pivot in &done.pivots {
+            defined[pivot.column] = true;
+            let others = pivot.row.0.iter().filter(|e| e.0 != pivot.column);
+            let negative: Vec<(usize, Expr)> = others.map(|&(c, e)| (c, settled(x, e))).collect();
+            solved.definitions.push((self.symbols[pivot.column], self.combination(&negative)));
         }
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
@@ -324,8 +325,8 @@ impl Net {
                 solved.undetermined.push(self.symbols[self.ports[p].conjugate()]);
             }
         }
-        solved.watched = tableau.watched;
-        solved.degenerate = tableau.degenerate;
+        solved.watched = done.watched;
+        solved.degenerate = done.degenerate;
     }
 }
 
@@ -346,9 +347,9 @@ fn offer(graph: &BondGraph, port: PortRef) -> Offer {
 }
 
 /// The causality of an algebraic port: the one wished for if it is admissible and well conditioned.
-fn law_causality(x: &Exprs, tableau: &Tableau, port: &NetPort, wishes: &Wishes) -> PortCausality {
+fn law_causality(x: &Exprs, work: &mut Eliminator, port: &NetPort, wishes: &Wishes) -> PortCausality {
     let wish = port.port.and_then(|p| wishes.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
-    let size = |column| tableau.candidate(x, column).map(|e| super::magnitude(x, e));
+    let mut size = |column| work.divisor(x, column).map(|e| super::magnitude(x, e));
     match (size(port.effort), size(port.flow)) {
         (Some(_), None) => PortCausality::Conductive,
         (None, Some(_)) => PortCausality::Resistive,
@@ -362,50 +363,34 @@ fn law_causality(x: &Exprs, tableau: &Tableau, port: &NetPort, wishes: &Wishes) 
     }
 }
 
+/// An entry with its sign turned, in its simple form.
+fn settled(x: &mut Exprs, e: Expr) -> Expr {
+    let minus = x.neg(e);
+    if x.is_number(minus).is_some() { minus } else { x.simplify(minus) }
+}
+
 /// Fully reduces rows: each of the results is a relation of minimal support, with the column that leads it.
-pub(crate) fn circuits(
-    x: &mut Exprs,
-    columns: usize,
-    rows: Vec<Vec<(usize, Expr)>>,
-) -> Vec<(usize, Vec<(usize, Expr)>)> {
-    let mut used: Vec<usize> = rows.iter().flatten().map(|e| e.0).collect();
+pub(crate) fn circuits(x: &mut Exprs, rows: Vec<SparseRow>) -> Vec<(usize, SparseRow)> {
+    let mut used: Vec<usize> = rows.iter().flat_map(|r| &r.0).map(|e| e.0).collect();
     used.sort_unstable();
     used.dedup();
-    let mut tableau = Tableau::new(columns, rows);
-    for column in used {
-        tableau.pivot(x, column);
-    }
-    let one = x.int(1);
-    let mut reduced: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
-    for (column, row) in tableau.pivots.into_iter().rev() {
-        let mut sum: BTreeMap<usize, Expr> = BTreeMap::new();
-        for (c, e) in row {
-            let terms = reduced.get(&c).map_or_else(|| vec![(c, one)], |r| negated(x, r));
-            for (t, coefficient) in terms {
-                let product = x.mul(&[e, coefficient]);
-                let value = sum.get(&t).map_or(product, |&old| x.add(&[old, product]));
-                sum.insert(t, value);
-            }
-        }
-        sum.retain(|_, e| !x.is_zero_given(*e));
-        reduced.insert(column, sum.into_iter().collect());
-    }
-    let whole = |(column, mut row): (usize, Vec<(usize, Expr)>)| {
-        row.push((column, one));
+    let classes: Vec<Vec<usize>> = used.into_iter().map(|c| vec![c]).collect();
+    let done = eliminate(x, rows, &classes);
+    let mut reduced = back_substitute(&done);
+    let mut relations = Vec::with_capacity(done.pivots.len());
+    for pivot in &done.pivots {
+        let mut row: Vec<(usize, Expr)> =
+            reduced.express(x, pivot.column).0.into_iter().map(|(c, e)| (c, x.neg(e))).collect();
+        row.push((pivot.column, ONE));
         row.sort_by_key(|e| e.0);
-        (column, row)
-    };
-    reduced.into_iter().map(whole).collect()
+        relations.push((pivot.column, SparseRow(row)));
+    }
+    relations
 }
 
 /// The rank of a matrix, given by rows without zeros, at the given parameters.
-pub(crate) fn rank_given(x: &mut Exprs, columns: usize, rows: Vec<Vec<(usize, Expr)>>) -> usize {
-    let mut tableau = Tableau::new(columns, rows);
-    (0..columns).filter(|&c| tableau.pivot(x, c)).count()
-}
-
-fn negated(x: &mut Exprs, row: &[(usize, Expr)]) -> Vec<(usize, Expr)> {
-    row.iter().map(|&(c, e)| (c, x.neg(e))).collect()
+pub(crate) fn rank_given(x: &mut Exprs, columns: usize, rows: Vec<SparseRow>) -> usize {
+    eliminate(x, rows, &[(0..columns).collect()]).pivots.len()
 }
 
 /// Whether a port has its variable imposed: sources, constraints, detectors, compliances of known displacement.

@@ -7,7 +7,7 @@ use petgraph::graph::DiGraph;
 
 use super::Step;
 use super::definitions::{Definition, Definitions};
-use crate::algebra::{Expr, Exprs, Symbol};
+use crate::algebra::{Expr, Exprs, SparseRow, Symbol};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, rank_given};
 
@@ -191,7 +191,7 @@ pub fn is_singular(x: &mut Exprs, matrix: &[Vec<Expr>]) -> bool {
         return false; // left to the pivots of the run
     }
     let entries = |row: &Vec<Expr>| row.iter().copied().enumerate().filter(|(_, e)| !x.is_zero_given(*e)).collect();
-    let rows: Vec<Vec<(usize, Expr)>> = matrix.iter().map(entries).collect();
+    let rows: Vec<SparseRow> = matrix.iter().map(entries).map(SparseRow).collect();
     rank_given(x, matrix.len(), rows) < matrix.len()
 }
 

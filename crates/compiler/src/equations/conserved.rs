@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Conserved;
 use super::minimal::{Assembled, Balance};
-use crate::algebra::{Expr, Symbol};
+use crate::algebra::{Expr, SparseRow, Symbol};
 use crate::causal_graph::{CausalGraph, circuits};
 
 /// Finds them, and makes each a constant in place of one state.
@@ -72,13 +72,13 @@ fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[
         }
     }
     let x = &mut assembled.d.x;
-    let reduced = circuits(x, core.len(), transposed.into_values().collect());
+    let reduced = circuits(x, transposed.into_values().map(SparseRow).collect());
     let one = x.int(1);
     let mut pivot = vec![false; core.len()];
     let mut vectors: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
     for (leading, row) in &reduced {
         pivot[*leading] = true;
-        for &(k, e) in row.iter().filter(|t| t.0 != *leading) {
+        for &(k, e) in row.0.iter().filter(|t| t.0 != *leading) {
             let factor = x.neg(e);
             vectors.entry(k).or_default().push((core[*leading], factor));
         }
@@ -112,7 +112,7 @@ fn replace(
     let residual = assembled.d.x.sub(value, constant);
     for &(b, _) in vector.iter().rev() {
         let state = balances[b].state;
-        if let Some(solution) = assembled.d.x.solve_for(residual, state) {
+        if let Some(solution) = assembled.d.solve_for(residual, state) {
             assembled.states.retain(|s| s.symbol != state);
             assembled.d.states.remove(&state);
             assembled.d.constants.insert(symbol);

@@ -65,11 +65,18 @@ impl<'a> Definitions<'a> {
 
     /// Defines a symbol as what makes an expression vanish; solved for it where that can be written down.
     pub fn set_root(&mut self, symbol: Symbol, residual: Expr) {
-        let definition = match self.x.solve_for(residual, symbol) {
+        let definition = match self.solve_for(residual, symbol) {
             Some(value) => Definition::Explicit(value),
             None => Definition::Implicit(residual),
         };
         self.of.insert(symbol, definition);
+    }
+
+    /// The root of an expression, if it can be written down without dividing by what may vanish.
+    pub fn solve_for(&mut self, residual: Expr, symbol: Symbol) -> Option<Expr> {
+        let root = self.x.solve_for(residual, symbol)?;
+        let safe = self.x.divisors(root).into_iter().all(|d| self.x.nonzero(d));
+        safe.then_some(root)
     }
 
     /// Makes a symbol a state; gives the symbol of its rate.

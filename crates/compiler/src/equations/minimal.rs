@@ -244,9 +244,9 @@ impl<'a> Assembled<'a> {
                 let z = self.d.x.sym(cell.z);
                 let residual = self.d.x.sub(z, e);
                 let others = cell.storage.stored.iter().any(|s| *s != cell.stored && self.d.x.depends_on(e, *s));
-                if others { None } else { self.d.x.solve_for(residual, cell.stored) }
+                if others { None } else { self.d.solve_for(residual, cell.stored) }
             }
-            StorageLaw::Implicit(e) => self.d.x.solve_for(e, cell.stored),
+            StorageLaw::Implicit(e) => self.d.solve_for(e, cell.stored),
             StorageLaw::Known { .. } => None,
         }
     }
@@ -281,7 +281,7 @@ impl<'a> Assembled<'a> {
             StorageLaw::Derivative(e) => {
                 let stored = self.d.x.sym(cell.stored);
                 let residual = self.d.x.sub(stored, e);
-                let inverse = self.d.x.solve_for(residual, cell.z);
+                let inverse = self.d.solve_for(residual, cell.z);
                 let alone = cell.storage.laws.len() == 1;
                 match inverse.filter(|_| alone) {
                     Some(z) => {
