@@ -15,7 +15,7 @@ use crate::ast;
 use crate::diagnostic::{Diagnostic, Sources, codes};
 use crate::ids::{Id, Table};
 use crate::span::Span;
-use crate::unit::Dimension as Dim;
+use crate::unit::{Dimension as Dim, Domain};
 
 /// A value that has been read: its expression in SI and its dimension.
 #[derive(Debug, Clone)]
@@ -94,6 +94,8 @@ pub(super) struct Builder<'a, 'f> {
     /// Equalities of dimensions that are put off.
     pub later: Option<Vec<(Quantity, Quantity, Span, String)>>,
     pub faults: Vec<Diagnostic>,
+    /// Whether something in the tree is missing, which the parser has said.
+    pub incomplete: bool,
     /// Meaning and dimension of every symbol, by its number.
     pub meanings: Vec<Option<(Meaning, Quantity)>>,
     /// Variables of every bond.
@@ -141,6 +143,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             dims: Dimensions::default(),
             later: None,
             faults: Vec::new(),
+            incomplete: wiring.broken,
             meanings: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
             reactions: Vec::new(),
@@ -282,8 +285,12 @@ impl<'a, 'f> Builder<'a, 'f> {
             Some(other) => format!("`{name}` and `{}` do not belong to one junction structure", self.part(other).name),
             None => format!("the units of `{name}` do not fit where it is bonded"),
         };
-        let d = Diagnostic::error(codes::U005, title, self.part(part).ast.span, format!("asks for a flow in {says}"))
-            .also(why.span, format!("here the flow is in {is}"))
+        let asks = match Domain::of_flow(says) {
+            Some(_) => format!("asks for {}", flow_words(says)),
+            None => format!("its units do not fit {}", flow_words(is)),
+        };
+        let d = Diagnostic::error(codes::U005, title, self.part(part).ast.span, asks)
+            .also(why.span, format!("here the flow is {}", flow_words(is)))
             .note("effort times flow is a power, and all bonds between 0 and 1 share their units");
         let turning = Dim::of(0, 0, -1, 0);
         let moving = Dim::of(1, 0, -1, 0);
@@ -317,5 +324,16 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// The id of a bond.
     pub fn bond_id(wire: usize) -> BondId {
         BondId::new(wire)
+    }
+}
+
+/// A flow in words: `a velocity in m/s`.
+fn flow_words(dim: Dim) -> String {
+    match Domain::of_flow(dim).map(|d| d.words()[1]) {
+        Some((name, unit)) => {
+            let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+            format!("{article} {name} in {unit}")
+        }
+        None => format!("in {dim}"),
     }
 }

@@ -92,7 +92,7 @@ fn build(
     let sides = b.constraint_sides();
     let rates = b.rates_of_signals();
     let relations = b.relations(&sides, &rates);
-    let complete = !faulty && b.faults.is_empty() && kinds.iter().all(Option::is_some);
+    let complete = !faulty && !b.incomplete && b.faults.is_empty() && kinds.iter().all(Option::is_some);
     if !complete {
         return (None, b.faults);
     }

@@ -17,6 +17,7 @@ impl<'a> Builder<'a, '_> {
     /// The value of a name, bare or dotted.
     pub fn path(&mut self, cx: &Reading<'_>, path: &ast::Path) -> Option<Value> {
         if path.parts.iter().any(|p| p.index.is_some()) {
+            self.incomplete = true;
             return None;
         }
         if path.parts.len() == 1 { self.bare(cx, &path.parts[0].name) } else { self.dotted(cx, path) }

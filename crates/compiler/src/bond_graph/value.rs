@@ -73,7 +73,10 @@ impl<'a> Builder<'a, '_> {
             ExprKind::List(_) => {
                 self.misplaced(e.span, "a list", "lists are only read by `tf` and by matrices of fields")
             }
-            ExprKind::Missing => None,
+            ExprKind::Missing => {
+                self.incomplete = true;
+                None
+            }
         }
     }
 

@@ -33,6 +33,8 @@ pub(super) struct Wiring {
     pub of_joint: Vec<Option<usize>>,
     /// What is wrong with the drawing.
     pub faults: Vec<Diagnostic>,
+    /// Whether a bond ends at nothing, which has been said.
+    pub broken: bool,
     /// Parts with more bonds than fit.
     crowded_parts: Vec<usize>,
 }
@@ -181,7 +183,10 @@ impl Wiring {
         let (Some(from), Some(to)) = (from, to) else {
             return self.circle(flat, &chain, from.is_none() && to.is_none());
         };
-        let (At::Part(a, from_port), At::Part(b, to_port)) = (from.at, to.at) else { return };
+        let (At::Part(a, from_port), At::Part(b, to_port)) = (from.at, to.at) else {
+            self.broken = true;
+            return;
+        };
         if a == b {
             return self.to_itself(flat, a, flat.drawn[i].span);
         }
