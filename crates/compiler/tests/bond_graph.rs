@@ -320,7 +320,7 @@ fn overrides_come_before_what_is_derived() {
     let bad =
         [set("kk", "3"), set("c", "2"), set("u", "2"), set("k", "3 m"), set("k", "("), set("x", "1\nparam z = 2")];
     for one in bad {
-        let result = elaborate_with("main.bond", text, &NoFiles, &[one.clone()]);
+        let result = elaborate_with("main.bond", text, &NoFiles, std::slice::from_ref(&one));
         assert!(result.graph.is_none() && result.diagnostics.has_errors(), "{one:?}");
     }
 }
@@ -586,4 +586,21 @@ fn rotation_shows_its_units() {
     let unit = |s| g.variables[&s].unit.as_ref().unwrap().to_string();
     let bond = g.bonds.values().next().unwrap();
     assert_eq!((unit(bond.effort), unit(bond.flow)), ("N.m".to_string(), "rad/s".to_string()));
+}
+
+/// Prints how long a ladder of 10,000 sections takes: `cargo test --release --test bond_graph -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement, to be run in release"]
+fn time_of_a_long_ladder() {
+    let text = ladder(10_000);
+    for _ in 0..5 {
+        let mut sources = Sources::new();
+        let file = sources.add("ladder.bond", text.as_str());
+        let start = std::time::Instant::now();
+        let parsed = ast::parse(&text, file);
+        let read = start.elapsed();
+        let result = bond_graph::elaborate(parsed.ast, sources, &NoFiles, &[]);
+        println!("parsed in {read:?}, elaborated in {:?}", start.elapsed() - read);
+        assert!(result.graph.is_some());
+    }
 }

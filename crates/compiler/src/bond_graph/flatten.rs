@@ -342,7 +342,7 @@ impl<'a> Flat<'a> {
             span: name.span,
         };
         if let Err(fault) = self.names.declare(scope, name, decl) {
-            self.faults.push(fault);
+            self.faults.push(*fault);
         }
     }
 
@@ -351,7 +351,7 @@ impl<'a> Flat<'a> {
         match self.names.place(scope, name, node) {
             Ok(()) => true,
             Err(fault) => {
-                self.faults.push(fault);
+                self.faults.push(*fault);
                 false
             }
         }
@@ -639,7 +639,7 @@ impl<'a> Flat<'a> {
         let (node, used) = match self.names.node(scope, path) {
             Ok(found) => found,
             Err(fault) => {
-                self.faults.push(fault);
+                self.faults.push(*fault);
                 return At::Broken;
             }
         };

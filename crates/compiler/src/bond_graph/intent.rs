@@ -26,7 +26,7 @@ impl<'a> Builder<'a, '_> {
         match self.flat.names.node(scope, path) {
             Ok((node, used)) => Some((node, path.parts[used..].iter().map(|p| &p.name).collect())),
             Err(fault) => {
-                self.fault(fault);
+                self.fault(*fault);
                 None
             }
         }

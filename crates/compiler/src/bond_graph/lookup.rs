@@ -158,7 +158,7 @@ impl<'a> Builder<'a, '_> {
         let (node, used) = match self.flat.names.node(cx.scope, path) {
             Ok(found) => found,
             Err(fault) => {
-                self.fault(fault);
+                self.fault(*fault);
                 return None;
             }
         };

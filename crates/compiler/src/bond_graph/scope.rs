@@ -180,18 +180,18 @@ impl<'a> Names<'a> {
     }
 
     /// Adds a declaration under a name, unless the name is taken; says so if it is.
-    pub fn declare(&mut self, scope: ScopeId, name: &'a ast::Name, decl: Decl<'a>) -> Result<DeclId, Diagnostic> {
+    pub fn declare(&mut self, scope: ScopeId, name: &'a ast::Name, decl: Decl<'a>) -> Result<DeclId, Box<Diagnostic>> {
         let text = name.text.as_str();
         if RESERVED.contains(&text) {
-            return Err(reserved(name));
+            return Err(Box::new(reserved(name)));
         }
         if matches!(decl.kind, DeclKind::Function(_)) && FUNCTIONS.iter().any(|f| f.0 == text) {
-            return Err(Diagnostic::error(codes::N003, format!("`{text}` is a function already"), name.span, "here")
-                .hint("give the function another name"));
+            let d = Diagnostic::error(codes::N003, format!("`{text}` is a function already"), name.span, "here");
+            return Err(Box::new(d.hint("give the function another name")));
         }
         let id = self.decls.len();
         if let Some(&first) = self.scopes[scope].values.get(text) {
-            return Err(twice(text, name.span, self.decls[first].span));
+            return Err(Box::new(twice(text, name.span, self.decls[first].span)));
         }
         self.scopes[scope].values.insert(text, id);
         self.decls.push(decl);
@@ -199,26 +199,26 @@ impl<'a> Names<'a> {
     }
 
     /// Adds an element, instance, port, bond or constraint under a name, unless the name is taken; says so if it is.
-    pub fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> Result<(), Diagnostic> {
+    pub fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> Result<(), Box<Diagnostic>> {
         if let Some((_, first)) = self.scopes[scope].nodes.get(name.text.as_str()) {
             let hint = format!(
                 "the kind stands only where the element first stands: write `{}` here, or use another name",
                 name.text
             );
-            return Err(Diagnostic { hint: Some(hint), ..twice(&name.text, name.span, *first) });
+            return Err(Box::new(Diagnostic { hint: Some(hint), ..twice(&name.text, name.span, *first) }));
         }
         self.scopes[scope].nodes.insert(&name.text, (node, name.span));
         Ok(())
     }
 
     /// What a dotted name stands for as far as it names nodes, and how many of its parts that took.
-    pub fn node(&self, from: ScopeId, path: &ast::Path) -> Result<(Node, usize), Diagnostic> {
+    pub fn node(&self, from: ScopeId, path: &ast::Path) -> Result<(Node, usize), Box<Diagnostic>> {
         let mut scope = from;
         let mut at = 0;
         loop {
             let name = &path.parts[at].name;
             let Some(&(node, _)) = self.scopes[scope].nodes.get(name.text.as_str()) else {
-                return Err(self.unknown_node(scope, name, at > 0));
+                return Err(Box::new(self.unknown_node(scope, name, at > 0)));
             };
             at += 1;
             match node {

@@ -188,7 +188,7 @@ impl Wiring {
             return;
         };
         if a == b {
-            return self.to_itself(flat, a, flat.drawn[i].span);
+            return self.self_bond(flat, a, flat.drawn[i].span);
         }
         let bond = self.wires.len();
         let a_port = self.attach(&flat.parts, a, from_port, bond, false, from.span, flat.drawn[i].span);
@@ -219,7 +219,7 @@ impl Wiring {
         }
     }
 
-    fn to_itself(&mut self, flat: &Flat<'_>, part: usize, span: Span) {
+    fn self_bond(&mut self, flat: &Flat<'_>, part: usize, span: Span) {
         let p = &flat.parts[part];
         self.fault(
             Diagnostic::error(
