@@ -1,6 +1,8 @@
 //! What is known while a graph is being built: symbols, dimensions, values of names.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
 
 use super::dimension::{Clash, Dimensions, Quantity, Reason};
 use super::files::Files;
@@ -107,7 +109,7 @@ pub(super) struct Builder<'a, 'f> {
     /// Values of the declarations; `None` before they are known and where they are at fault.
     pub values: Vec<Option<Value>>,
     /// Functions: their formal arguments and value.
-    pub functions: HashMap<DeclId, (Vec<Symbol>, Expr)>,
+    pub functions: FxHashMap<DeclId, (Vec<Symbol>, Expr)>,
     pub parameters: Table<ParameterId, Parameter>,
     /// Values of the parameters, as numbers.
     pub numbers: Vec<f64>,
@@ -121,11 +123,11 @@ pub(super) struct Builder<'a, 'f> {
     pub open_signals: Vec<OpenSignal<'a>>,
     pub open_blocks: Vec<OpenBlock<'a>>,
     /// Rates of signals that expressions ask for, and the signal of each.
-    pub rate_symbols: HashMap<Symbol, SignalId>,
+    pub rate_symbols: FxHashMap<Symbol, SignalId>,
     /// Whether a bond carries no power.
     pub pseudo: Vec<bool>,
     /// Columns of the tables that were read.
-    pub csv: HashMap<String, Option<super::csv::Columns>>,
+    pub csv: FxHashMap<String, Option<super::csv::Columns>>,
     pub time: Symbol,
 }
 
@@ -149,7 +151,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             reactions: Vec::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
-            functions: HashMap::new(),
+            functions: FxHashMap::default(),
             parameters: Table::new(),
             numbers: Vec::new(),
             inputs: Table::new(),
@@ -160,9 +162,9 @@ impl<'a, 'f> Builder<'a, 'f> {
             named_quantities: BTreeMap::new(),
             open_signals: Vec::new(),
             open_blocks: Vec::new(),
-            rate_symbols: HashMap::new(),
+            rate_symbols: FxHashMap::default(),
             pseudo: Vec::new(),
-            csv: HashMap::new(),
+            csv: FxHashMap::default(),
             time,
         };
         b.mean(time, Meaning::Time, Quantity::Any);

@@ -1,7 +1,5 @@
 //! Dimensions of quantities, known or to be inferred, and the solver that carries them through the equations of a model.
 
-use std::collections::BTreeMap;
-
 use crate::span::Span;
 use crate::unit::{Dimension as Dim, WHOLE};
 
@@ -14,41 +12,73 @@ pub(super) struct Var(pub u32);
 pub(super) enum Quantity {
     /// Not known and fits everywhere: numbers and parameters without a unit, and what is made with them.
     Any,
-    /// A product of a known dimension and powers (in sixtieths) of unknown ones.
-    Known(Dim, Vec<(Var, i32)>),
+    /// A product of a known dimension and powers of unknown ones.
+    Known(Dim, Powers),
 }
 
 /// Products of more unknown dimensions than this are taken as [`Quantity::Any`].
-const MAX_VARS: usize = 6;
+const MAX_VARS: usize = 4;
+
+/// Powers (in sixtieths) of unknown dimensions: each once, none zero, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Powers {
+    len: usize,
+    items: [(Var, i32); MAX_VARS],
+}
+
+impl Powers {
+    /// None.
+    pub const NONE: Powers = Powers { len: 0, items: [(Var(0), 0); MAX_VARS] };
+
+    /// The powers.
+    pub fn as_slice(&self) -> &[(Var, i32)] {
+        &self.items[..self.len]
+    }
+
+    /// With one more factor; `None` if there are too many.
+    fn with(mut self, var: Var, exponent: i32) -> Option<Powers> {
+        let at = self.as_slice().partition_point(|(v, _)| *v < var);
+        if self.as_slice().get(at).is_some_and(|(v, _)| *v == var) {
+            let sum = self.items[at].1.saturating_add(exponent);
+            self.items[at].1 = sum;
+            if sum == 0 {
+                self.items.copy_within(at + 1..self.len, at);
+                self.len -= 1;
+                self.items[self.len] = (Var(0), 0);
+            }
+            return Some(self);
+        }
+        if exponent == 0 {
+            return Some(self);
+        }
+        if self.len == MAX_VARS {
+            return None;
+        }
+        self.items.copy_within(at..self.len, at + 1);
+        self.items[at] = (var, exponent);
+        self.len += 1;
+        Some(self)
+    }
+}
 
 impl Quantity {
     /// No dimension.
-    pub const NONE: Quantity = Quantity::Known(Dim::NONE, Vec::new());
+    pub const NONE: Quantity = Quantity::Known(Dim::NONE, Powers::NONE);
 
     /// A known dimension.
     pub fn of(dim: Dim) -> Quantity {
-        Quantity::Known(dim, Vec::new())
+        Quantity::Known(dim, Powers::NONE)
     }
     /// An unknown dimension.
     pub fn var(var: Var) -> Quantity {
-        Quantity::Known(Dim::NONE, vec![(var, WHOLE)])
+        let powers = Powers::NONE.with(var, WHOLE);
+        powers.map_or(Quantity::Any, |powers| Quantity::Known(Dim::NONE, powers))
     }
     /// The product.
     pub fn times(&self, other: &Quantity) -> Quantity {
         let (Quantity::Known(a, av), Quantity::Known(b, bv)) = (self, other) else { return Quantity::Any };
-        if bv.is_empty() {
-            return Quantity::Known(a.times(*b), av.clone());
-        }
-        let mut sum: BTreeMap<Var, i32> = av.iter().copied().collect();
-        for (var, exponent) in bv {
-            let e = sum.entry(*var).or_insert(0);
-            *e = e.saturating_add(*exponent);
-        }
-        sum.retain(|_, e| *e != 0);
-        if sum.len() > MAX_VARS {
-            return Quantity::Any;
-        }
-        Quantity::Known(a.times(*b), sum.into_iter().collect())
+        let powers = bv.as_slice().iter().try_fold(*av, |sum, (var, exponent)| sum.with(*var, *exponent));
+        powers.map_or(Quantity::Any, |powers| Quantity::Known(a.times(*b), powers))
     }
     /// The quotient.
     pub fn over(&self, other: &Quantity) -> Quantity {
@@ -61,9 +91,10 @@ impl Quantity {
             let product = i64::from(e) * i64::from(exponent);
             (product % i64::from(WHOLE) == 0).then(|| i32::try_from(product / i64::from(WHOLE)).ok()).flatten()
         };
-        let powers: Option<Vec<(Var, i32)>> = vars.iter().map(|(v, e)| scaled(*e).map(|e| (*v, e))).collect();
+        let mut powers = vars.as_slice().iter();
+        let powers = powers.try_fold(Powers::NONE, |all, (var, e)| all.with(*var, scaled(*e)?));
         match (dim.power(exponent), powers) {
-            (Some(dim), Some(vars)) => Quantity::Known(dim, vars.into_iter().filter(|(_, e)| *e != 0).collect()),
+            (Some(dim), Some(powers)) => Quantity::Known(dim, powers),
             _ => Quantity::Any,
         }
     }
@@ -111,7 +142,7 @@ impl Dimensions {
     /// What is known of it.
     pub fn value(&self, quantity: &Quantity) -> Option<Dim> {
         match self.put_in(quantity) {
-            Quantity::Known(dim, vars) if vars.is_empty() => Some(dim),
+            Quantity::Known(dim, powers) if powers == Powers::NONE => Some(dim),
             _ => None,
         }
     }
@@ -120,12 +151,12 @@ impl Dimensions {
     pub fn put_in(&self, quantity: &Quantity) -> Quantity {
         let Quantity::Known(dim, vars) = quantity else { return Quantity::Any };
         let mut sum = *dim;
-        let mut open = Vec::new();
-        for (var, exponent) in vars {
+        let mut open = Powers::NONE;
+        for (var, exponent) in vars.as_slice() {
             match self.solved[var.0 as usize].as_ref().map(|(d, _)| d.power(*exponent)) {
                 Some(Some(d)) => sum = sum.times(d),
                 Some(None) => return Quantity::Any,
-                None => open.push((*var, *exponent)),
+                None => open = open.with(*var, *exponent).unwrap_or(open),
             }
         }
         Quantity::Known(sum, open)
@@ -175,8 +206,8 @@ impl Dimensions {
 
     fn clash(&self, product: &Quantity, dim: Dim, reason: Reason) -> Clash {
         let unknown = match product {
-            Quantity::Known(known, vars) if vars.len() == 1 => {
-                let (var, exponent) = vars[0];
+            Quantity::Known(known, powers) if powers.as_slice().len() == 1 => {
+                let (var, exponent) = powers.as_slice()[0];
                 let says = root(known.inverse(), exponent);
                 let is = self.solved[var.0 as usize].clone();
                 says.zip(is).map(|(says, (is, why))| (var, says, is, why))

@@ -3,16 +3,18 @@
 use std::collections::BTreeMap;
 
 use super::builder::Builder;
+use super::dimension::Quantity;
 use super::files::Files;
 use super::flatten::{self, Flat, Word};
 use super::load::{Loaded, load};
 use super::overrides::{self, Override};
 use super::wire::{Wiring, wire};
-use super::{Bond, BondGraph, Element, Kind, Port, Variable};
+use super::{Bond, BondGraph, Element, Kind, Meaning, Port, Variable};
 use crate::algebra::{Expr, Symbol};
 use crate::ast::Ast;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
 use crate::ids::{Id, Table};
+use crate::unit::{Dimension, Unit};
 
 /// What has become of a model.
 #[derive(Debug)]
@@ -173,49 +175,65 @@ impl Builder<'_, '_> {
     /// Adds the expressions and the table of variables.
     fn finish(&mut self, mut graph: BondGraph) -> BondGraph {
         let mut variables = Vec::with_capacity(self.meanings.len());
+        let mut units = BTreeMap::new();
         for (at, known) in self.meanings.iter().enumerate() {
             if let Some((meaning, quantity)) = known {
-                let unit = self
-                    .written_unit(*meaning, &graph)
-                    .or_else(|| self.turning_unit(*meaning))
-                    .or_else(|| self.si_unit(quantity));
+                let unit =
+                    self.written_unit(*meaning, &graph).or_else(|| self.shown_unit(*meaning, quantity, &mut units));
                 variables.push((Symbol(at as u32), Variable { meaning: *meaning, unit }));
             }
         }
         graph.variables = variables.into_iter().collect();
         for named in graph.lets.iter_mut().chain(&mut graph.outputs) {
             if let (None, Some(quantity)) = (&named.unit, self.named_quantities.get(&named.name)) {
-                named.unit = self.dims.value(quantity).map(crate::unit::Unit::si);
+                named.unit = self.dims.value(quantity).map(Unit::si);
             }
         }
         graph.exprs = std::mem::take(&mut self.exprs);
         graph
     }
 
-    /// Speeds and angles of rotation are shown with their radians: `rad/s` and `rad` where efforts are torques.
-    fn turning_unit(&self, meaning: super::Meaning) -> Option<crate::unit::Unit> {
-        let (wire, text) = match meaning {
-            super::Meaning::Flow(bond) => (bond.index(), "rad/s"),
-            super::Meaning::Stored(port) if self.part(port.element.index()).word == Word::C => {
-                (self.wire_at(port.element.index(), port.port as usize)?, "rad")
-            }
-            _ => return None,
+    /// The SI unit of a quantity, if it is known. Speeds and angles of rotation are shown with their radians: `rad/s` and
+    /// `rad` where efforts are torques. `units` remembers what was made before.
+    fn shown_unit(
+        &self,
+        meaning: Meaning,
+        quantity: &Quantity,
+        units: &mut BTreeMap<(Dimension, bool), Unit>,
+    ) -> Option<Unit> {
+        let dim = self.dims.value(quantity)?;
+        let turning = self.is_turning(meaning);
+        let make = || match (turning, dim == Dimension::NONE) {
+            (true, true) => Unit::parse("rad").unwrap_or_else(|_| Unit::si(dim)),
+            (true, false) => Unit::parse("rad/s").unwrap_or_else(|_| Unit::si(dim)),
+            _ => Unit::si(dim),
         };
-        let pair = self.pairs.get(wire).filter(|_| !self.pseudo[wire])?;
-        let torque = self.dims.value(&pair.effort_in) == Some(crate::unit::Dimension::JOULE);
-        torque.then(|| crate::unit::Unit::parse(text).ok()).flatten()
+        Some(units.entry((dim, turning)).or_insert_with(make).clone())
+    }
+
+    /// Whether it is the flow of a bond, or the displacement of a C, whose effort is a torque.
+    fn is_turning(&self, meaning: Meaning) -> bool {
+        let wire = match meaning {
+            Meaning::Flow(bond) => Some(bond.index()),
+            Meaning::Stored(port) if self.part(port.element.index()).word == Word::C => {
+                self.wire_at(port.element.index(), port.port as usize)
+            }
+            _ => None,
+        };
+        let pair = wire.and_then(|w| self.pairs.get(w).filter(|_| !self.pseudo[w]));
+        pair.is_some_and(|pair| self.dims.value(&pair.effort_in) == Some(Dimension::JOULE))
     }
 
     /// The SI unit of what a declaration gave a unit: it keeps its radians.
-    fn written_unit(&self, meaning: super::Meaning, graph: &BondGraph) -> Option<crate::unit::Unit> {
+    fn written_unit(&self, meaning: Meaning, graph: &BondGraph) -> Option<Unit> {
         let unit = match meaning {
-            super::Meaning::Parameter(id) => graph.parameters[id].unit.as_ref(),
-            super::Meaning::Input(id) => graph.inputs[id].unit.as_ref(),
-            super::Meaning::Signal(id) => graph.signals[id].unit.as_ref(),
-            super::Meaning::Time => return Some(crate::unit::Unit::si(crate::unit::Dimension::SECOND)),
+            Meaning::Parameter(id) => graph.parameters[id].unit.as_ref(),
+            Meaning::Input(id) => graph.inputs[id].unit.as_ref(),
+            Meaning::Signal(id) => graph.signals[id].unit.as_ref(),
+            Meaning::Time => return Some(Unit::si(Dimension::SECOND)),
             _ => None,
         };
-        unit.map(crate::unit::Unit::to_si_unit)
+        unit.map(Unit::to_si_unit)
     }
 }
 

@@ -1,6 +1,6 @@
 //! From statements to flat lists: every instance of a component becomes a scope with its own elements and bonds.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::scope::{Decl, DeclKind, Names, Node, Scope, ScopeId};
 use crate::ast::{self, StatementKind};
@@ -171,9 +171,9 @@ pub(super) fn flatten<'a>(files: &'a [ast::Ast]) -> Flat<'a> {
         instance: None,
         user: 0,
         depth: 0,
-        values: HashMap::new(),
-        nodes: HashMap::new(),
-        components: HashMap::new(),
+        values: FxHashMap::default(),
+        nodes: FxHashMap::default(),
+        components: FxHashMap::default(),
     });
     for file in files {
         flat.components(0, &file.statements);
@@ -413,9 +413,9 @@ impl<'a> Flat<'a> {
             instance: Some((component, element.span)),
             user: scope,
             depth: self.names.scopes[scope].depth + 1,
-            values: HashMap::new(),
-            nodes: HashMap::new(),
-            components: HashMap::new(),
+            values: FxHashMap::default(),
+            nodes: FxHashMap::default(),
+            components: FxHashMap::default(),
         });
         self.refuse_odd_arguments(component, element);
         self.interface(id, scope, component, element);
@@ -467,7 +467,7 @@ impl<'a> Flat<'a> {
     /// Says which arguments of an instance belong to nothing.
     fn refuse_odd_arguments(&mut self, component: &'a ast::Component, element: &'a ast::Element) {
         let known: Vec<&str> = component.params.iter().chain(&component.ins).map(|d| d.name.text.as_str()).collect();
-        let mut given: HashMap<&str, Span> = HashMap::new();
+        let mut given: FxHashMap<&str, Span> = FxHashMap::default();
         for arg in &element.args {
             let Some(label) = &arg.label else {
                 let example = known.first().copied().unwrap_or("a");

@@ -1,6 +1,6 @@
 //! Imports: the files of a model, each read once.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::files::{FileError, Files, read_beside};
 use crate::ast::{self, Ast, StatementKind};
@@ -23,7 +23,7 @@ pub(super) fn load(main: Ast, sources: &mut Sources, files: &dyn Files) -> Loade
     let mut loader = Loader {
         files,
         sources,
-        known: HashMap::new(),
+        known: FxHashMap::default(),
         open: vec![true],
         imported_at: vec![None],
         trees: vec![main],
@@ -39,7 +39,7 @@ struct Loader<'f> {
     files: &'f dyn Files,
     sources: &'f mut Sources,
     /// Index of the tree of every path that was read, or `None` if it could not be.
-    known: HashMap<String, usize>,
+    known: FxHashMap<String, usize>,
     /// Whether the imports of the tree are being followed.
     open: Vec<bool>,
     /// The import that brought the tree, and the tree that it stands in.

@@ -56,9 +56,4 @@ impl Builder<'_, '_> {
                 )),
         );
     }
-
-    /// The SI unit of a quantity, where it is known.
-    pub fn si_unit(&self, quantity: &Quantity) -> Option<Unit> {
-        self.dims.value(quantity).map(Unit::si)
-    }
 }

@@ -1,6 +1,6 @@
 //! What the names of a model mean: two namespaces a scope, one for values, one for elements.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::ast;
 use crate::diagnostic::nearest;
@@ -58,11 +58,11 @@ pub(super) struct Scope<'a> {
     /// Number of instances around it.
     pub depth: usize,
     /// Parameters, signals and functions.
-    pub values: HashMap<&'a str, DeclId>,
+    pub values: FxHashMap<&'a str, DeclId>,
     /// Elements, instances, ports, named bonds and constraints.
-    pub nodes: HashMap<&'a str, (Node, Span)>,
+    pub nodes: FxHashMap<&'a str, (Node, Span)>,
     /// Components written here.
-    pub components: HashMap<&'a str, &'a ast::Component>,
+    pub components: FxHashMap<&'a str, &'a ast::Component>,
 }
 
 /// What a name of the second namespace stands for.

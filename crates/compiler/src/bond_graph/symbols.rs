@@ -90,7 +90,12 @@ impl Builder<'_, '_> {
         let mut names: Vec<(String, String)> = (0..self.wiring.wires.len()).map(|w| self.bond_name(w)).collect();
         for (junction, p) in self.flat.parts.iter().enumerate().filter(|(_, p)| p.word.is_junction()) {
             let Some(wire) = self.representative(junction) else { continue };
-            if self.outer_end(wire).is_some() {
+            let w = &self.wiring.wires[wire];
+            let inner = |end: (usize, usize)| {
+                let word = self.part(end.0).word;
+                word.is_junction() || word.is_two_port()
+            };
+            if !inner(w.from) || !inner(w.to) {
                 continue;
             }
             match p.word {
