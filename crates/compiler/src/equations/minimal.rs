@@ -73,7 +73,9 @@ pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, U
     let mut d = Definitions::new(graph.exprs.clone(), graph);
     let mut rows = BTreeMap::new();
     for state in &causal.ports.ports {
-        causal.ports.resolve(&mut d.x, state.output, &mut rows);
+        let row = causal.ports.resolve(&mut d.x, state.output, &mut rows);
+        // Where two elements share a bond, what one gives is what the other takes.
+        rows.entry(state.output).or_insert(row);
     }
     for v in &causal.ports.virtual_speeds {
         causal.ports.resolve(&mut d.x, v.reaction, &mut rows);
@@ -85,7 +87,7 @@ pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, U
         d.missing.insert(symbol, Unavailable::Undetermined);
     }
     drop_vanishing_sources(&mut d, causal, &mut rows);
-    for (&symbol, row) in &rows {
+    for (&symbol, row) in rows.iter().filter(|(s, row)| row.coefficient(**s).is_none()) {
         let value = row.expr(&mut d.x);
         d.set(symbol, value);
     }
