@@ -23,7 +23,7 @@ pub enum Method {
 pub enum AbsoluteTolerance {
     /// A part of the magnitude of each state: `rtol / 1000`, or 1e-12 where that is less, but never more than `rtol`. The
     /// magnitude is the system's scale of the state or, if larger, the greatest value so far; where the state is 0 and
-    /// its scale not known, it is guessed from the rates.
+    /// its scale not known, it is guessed from the rates and from how the states act on each other.
     Scaled,
     /// The same number for every state, each in its own unit.
     Same(f64),

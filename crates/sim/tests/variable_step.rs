@@ -53,6 +53,63 @@ work!(auto_turns_stiff_on_a_large_system: Auto, rod(), rtol = 1e-9 => steps <= 8
 work!(auto_pulse: Auto, pulse(), rtol = 1e-6 => steps <= 60, rates <= 400, error < 1e-10);
 work!(auto_late: Auto, late(), rtol = 1e-6 => steps <= 60, rates <= 700, error < 1e-6);
 
+/// Greatest distance of the last sample from the solution, relative to the magnitude of its kind.
+fn error_at_rest<const SECTIONS: usize>(method: Method, rtol: f64, to: f64) -> f64 {
+    let mut system = ladder::<SECTIONS>();
+    let (samples, end) = system.run(&Options { every: None, ..options(method, rtol, to) });
+    assert!(end.is_ok(), "{SECTIONS} {method:?} {rtol:e}: {end:?}");
+    let (last, exact) = (samples.values.last().unwrap(), (system.solution)(to));
+    let error = |kind: usize| {
+        let size = exact.iter().skip(kind).step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()));
+        let distance = last.iter().zip(&exact).skip(kind).step_by(2).map(|(x, exact)| (x - exact).abs() / size);
+        distance.fold(0.0, f64::max)
+    };
+    error(0).max(error(1))
+}
+
+#[test]
+fn a_ladder_at_rest_starts_and_comes_to_rest() {
+    for (method, rtol, bound) in
+        [(Auto, 1e-6, 5e-5), (Explicit, 1e-6, 5e-5), (Bdf, 1e-6, 1e-5), (Auto, 1e-12, 1e-10), (Bdf, 1e-12, 1e-10)]
+    {
+        let error = error_at_rest::<10>(method, rtol, 0.02);
+        assert!(error < bound, "{method:?} {rtol:e}: {error:e}");
+    }
+}
+
+#[test]
+fn long_ladders_start_from_rest() {
+    // What runs down the ladder does not depend on how many sections follow that it has not reached.
+    for (method, rtol, bound) in [(Auto, 1e-6, 1e-5), (Explicit, 1e-12, 1e-10), (Bdf, 1e-6, 5e-5)] {
+        let last = |system: &mut Known| {
+            let (samples, end) = system.run(&Options { every: None, ..options(method, rtol, 5e-4) });
+            assert!(end.is_ok(), "{method:?} {rtol:e}: {end:?}");
+            samples.values.last().unwrap()[..60].to_vec()
+        };
+        let (long, short) = (last(&mut ladder::<300>()), last(&mut ladder::<100>()));
+        for i in 0..60 {
+            let distance = (long[i] - short[i]).abs() / [1e-4, 1e-5][i % 2];
+            assert!(distance < bound, "{method:?} {rtol:e}, state {i}: {distance:e}");
+        }
+    }
+}
+
+#[test]
+fn what_nothing_moves_does_no_harm() {
+    // The second state stands still, the third moves only once the first has, the fourth follows the third.
+    for method in [Explicit, Bdf, Auto] {
+        let mut system = Known::new(
+            &[0.0; 4],
+            |_, x, _, dx| dx.copy_from_slice(&[1.0, 0.0, 1e-9 * x[0].powi(8), 1e6 * x[2]]),
+            |_, x, v, _, jv| jv.copy_from_slice(&[0.0, 0.0, 8e-9 * x[0].powi(7) * v[0], 1e6 * v[2]]),
+            |t| vec![t, 0.0, 1e-9 * t.powi(9) / 9.0, 1e-3 * t.powi(10) / 90.0],
+        );
+        let (samples, end) = system.run(&options(method, 1e-9, 1.0));
+        assert!(end.is_ok(), "{method:?}: {end:?}");
+        assert!(system.error(&samples) < 1e-7, "{method:?}: {:e}, {end:?}", system.error(&samples));
+    }
+}
+
 #[test]
 fn bdf_meets_the_published_values_of_robertson() {
     for (method, rtol, bound) in [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7)] {

@@ -2,6 +2,7 @@
 
 mod first_step;
 mod library;
+mod magnitudes;
 mod stiffness;
 mod tolerances;
 

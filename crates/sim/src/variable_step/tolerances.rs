@@ -1,6 +1,6 @@
 //! How exact each state has to be.
 
-use crate::jacobian::Jacobian;
+use super::magnitudes::guess_magnitudes;
 use crate::{AbsoluteTolerance, Failure, Options, System};
 
 /// Growth of a state beyond its magnitude after which the tolerances are taken anew.
@@ -80,9 +80,8 @@ impl Tolerances {
         self.given.is_none() && grown.any(|growth| growth > GROWTH)
     }
 
-    /// Guesses the magnitudes that are not known where the system stands at `(t, x)`, `interval` s before the next jump:
-    /// what the rate makes of a state in the shortest time the system knows. A low guess costs steps, a high one
-    /// accuracy. `true` if any is known now that was not.
+    /// Guesses the magnitudes that are not known where the system stands at `(t, x)`, `interval` s before the next jump.
+    /// `true` if any is known now that was not.
     ///
     /// # Errors
     /// What the system reports.
@@ -91,17 +90,10 @@ impl Tolerances {
         if self.given.is_some() || unknown.is_empty() {
             return Ok(false);
         }
-        let mut rates = vec![0.0; x.len()];
-        system.rates(t, x, &mut rates)?;
-        let mut entries = vec![];
-        let mut jacobian = Jacobian::new(system.sparsity());
-        jacobian.visit(system, t, x, |row, column, _, value| entries.push((row, column, value.abs())))?;
-        let time = shortest_time(&entries, x.len()).min(interval);
-        for _ in 0..3 {
-            let mut sums: Vec<f64> = rates.iter().map(|rate| rate.abs()).collect();
-            entries.iter().for_each(|&(row, column, value)| sums[row] += value * self.magnitudes[column]);
-            unknown.iter().for_each(|&i| self.magnitudes[i] = UNKNOWN.max(time * sums[i]));
-        }
+        unknown.iter().for_each(|&i| self.magnitudes[i] = 0.0);
+        let guessed = guess_magnitudes(system, (t, x), interval, &mut self.magnitudes);
+        unknown.iter().for_each(|&i| self.magnitudes[i] = self.magnitudes[i].max(UNKNOWN));
+        guessed?;
         Ok(unknown.iter().any(|&i| self.magnitudes[i] > UNKNOWN))
     }
 
@@ -112,21 +104,4 @@ impl Tolerances {
             .zip(&self.greatest)
             .for_each(|(magnitude, greatest)| *magnitude = magnitude.max(*greatest));
     }
-}
-
-/// The reciprocal of the spectral radius of a matrix of absolute values, by the growth of its powers.
-fn shortest_time(entries: &[(usize, usize, f64)], states: usize) -> f64 {
-    let mut powers = vec![1.0; states];
-    let mut growth = 0.0;
-    for iteration in 0..16 {
-        let mut next = vec![0.0; states];
-        entries.iter().for_each(|&(row, column, value)| next[row] += value * powers[column]);
-        let most = next.iter().fold(0.0, |most: f64, value| most.max(*value));
-        if most == 0.0 || !most.is_finite() {
-            return f64::INFINITY;
-        }
-        powers = next.iter().map(|value| value / most).collect();
-        growth += if iteration >= 8 { most.ln() / 8.0 } else { 0.0 };
-    }
-    (-growth).exp()
 }

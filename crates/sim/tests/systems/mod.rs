@@ -360,3 +360,33 @@ pub fn late() -> Known {
         |t| vec![(t - 5.0).max(0.0).powi(3) / 3.0],
     )
 }
+
+/// A ladder of `SECTIONS` coils and capacitors, everything at rest, with a source of 10 V at one end and a resistor at the
+/// other: momenta in Vs and charges in C, coil by capacitor. It rests at 10 V behind every coil as soon as the waves have
+/// died away, and keeps the law of energy until then.
+pub fn ladder<const SECTIONS: usize>() -> Known {
+    const COIL: f64 = 1e-3;
+    const CAPACITOR: f64 = 1e-6;
+    const WIRE: f64 = 5.0;
+    fn flow(x: &[f64], supply: f64, dx: &mut [f64]) {
+        let sections = x.len() / 2;
+        let voltage = |i: usize| if i == 0 { supply } else { x[2 * i - 1] / CAPACITOR };
+        let current = |i: usize| if i < sections { x[2 * i] / COIL } else { voltage(sections) / 50.0 };
+        for i in 0..sections {
+            dx[2 * i] = voltage(i) - WIRE * current(i) - voltage(i + 1);
+            dx[2 * i + 1] = current(i) - current(i + 1);
+        }
+    }
+    let mut system = Known::new(
+        &vec![0.0; 2 * SECTIONS],
+        |_, x, _, dx| flow(x, 10.0, dx),
+        |_, _, v, _, jv| flow(v, 0.0, jv),
+        |_| {
+            let current = 10.0 / (50.0 + WIRE * SECTIONS as f64);
+            (0..SECTIONS).flat_map(|i| [COIL * current, CAPACITOR * (10.0 - WIRE * current * (i + 1) as f64)]).collect()
+        },
+    );
+    let near = |i: usize| (i.saturating_sub(1)..=(i + 1).min(2 * SECTIONS - 1)).collect();
+    system.sparsity = Sparsity::from_columns((0..2 * SECTIONS).map(near));
+    system
+}

@@ -1,0 +1,167 @@
+//! Magnitudes of states of which nothing is known but the system itself: most machines start at rest.
+
+use crate::jacobian::Jacobian;
+use crate::{Failure, System};
+
+/// Times the system is looked at: at the start, then where the states known so far will have moved.
+const LOOKS: usize = 4;
+
+/// Steps of the growth of a matrix's powers, of which the last half is believed.
+const POWERS: usize = 16;
+
+/// A nonzero of the Jacobian: row, column and absolute value, in 1/s once row and column are measured alike.
+type Entry = (usize, usize, f64);
+
+/// Guesses the magnitudes that are 0 in `magnitudes`, where the system stands at `(t, x)`, `interval` s before the next
+/// jump. A state that nothing can move keeps 0. A low guess costs steps, a high one accuracy.
+///
+/// A state that moves at once gets what its rate makes of it in the shortest time that the system knows. From there
+/// magnitudes spread along the Jacobian, from states that have one to those that have none, as energy does: where two
+/// states act on each other, as the momentum and the displacement of a wave do, they hold the same energy, so that
+/// `|J_ij| m_j² = |J_ji| m_i²`. Damping bounds what reaches a state. Every bound carries its unit, so that states of
+/// 1e-13 and of 1e5 may stand side by side.
+///
+/// # Errors
+/// What the system reports at `(t, x)`.
+pub(super) fn guess_magnitudes(
+    system: &mut dyn System,
+    (t, x): (f64, &[f64]),
+    interval: f64,
+    magnitudes: &mut [f64],
+) -> Result<(), Failure> {
+    let mut jacobian = Jacobian::new(system.sparsity());
+    let (mut looked_at, mut rates) = (x.to_vec(), vec![0.0; x.len()]);
+    for look in 0..LOOKS {
+        let entries = match entries(system, &mut jacobian, t, &looked_at, &mut rates) {
+            Ok(entries) => entries,
+            Err(failure) if look == 0 => return Err(failure),
+            Err(_) => return Ok(()), // the system need not exist there
+        };
+        let couplings = Couplings::new(entries, interval, x.len());
+        let known = magnitudes.iter().filter(|&&magnitude| magnitude > 0.0).count();
+        couplings.seed(&rates, magnitudes);
+        couplings.spread(magnitudes);
+        let now_known = magnitudes.iter().filter(|&&magnitude| magnitude > 0.0).count();
+        if now_known == x.len() || now_known == known {
+            return Ok(());
+        }
+        for (i, looked_at) in looked_at.iter_mut().enumerate() {
+            let moved = couplings.shortest * rates[i];
+            *looked_at = x[i] + if moved == 0.0 { magnitudes[i] } else { moved };
+        }
+    }
+    Ok(())
+}
+
+/// Absolute values of the Jacobian that are not 0; writes the rates.
+fn entries(
+    system: &mut dyn System,
+    jacobian: &mut Jacobian,
+    t: f64,
+    x: &[f64],
+    rates: &mut [f64],
+) -> Result<Vec<Entry>, Failure> {
+    let mut entries = vec![];
+    system.rates(t, x, rates)?;
+    jacobian.visit(system, t, x, |row, column, _, value| {
+        if value != 0.0 && value.is_finite() {
+            entries.push((row, column, value.abs()));
+        }
+    })?;
+    Ok(entries)
+}
+
+/// How the states act on each other.
+struct Couplings {
+    /// Sorted by column.
+    entries: Vec<Entry>,
+    /// First entry of each column, and the end of the last.
+    starts: Vec<usize>,
+    /// Nonzeros beside the diagonal, row by row.
+    neighbours: Vec<usize>,
+    /// Rate at which each state decays or grows by itself, in 1/s.
+    own: Vec<f64>,
+    /// The shortest time that the system knows, in s; at most the way to the next jump.
+    shortest: f64,
+    interval: f64,
+}
+
+impl Couplings {
+    fn new(mut entries: Vec<Entry>, interval: f64, states: usize) -> Couplings {
+        entries.sort_unstable_by_key(|&(row, column, _)| (column, row));
+        let starts = (0..=states).map(|column| entries.partition_point(|entry| entry.1 < column)).collect();
+        let (mut neighbours, mut own) = (vec![0; states], vec![0.0; states]);
+        for &(row, column, value) in &entries {
+            if row == column { own[row] = value } else { neighbours[row] += 1 }
+        }
+        let shortest = shortest_time(&entries, states).min(interval);
+        Couplings { entries, starts, neighbours, own, shortest, interval }
+    }
+
+    fn column(&self, column: usize) -> &[Entry] {
+        &self.entries[self.starts[column]..self.starts[column + 1]]
+    }
+
+    /// How strongly state `by` acts on `on`; 0 if it does not.
+    fn action(&self, on: usize, by: usize) -> f64 {
+        let column = self.column(by);
+        column.binary_search_by_key(&on, |entry| entry.0).map_or(0.0, |place| column[place].2)
+    }
+
+    /// Magnitudes of states that move at once.
+    fn seed(&self, rates: &[f64], magnitudes: &mut [f64]) {
+        let mut sums: Vec<f64> = rates.iter().map(|rate| rate.abs()).collect();
+        self.entries.iter().for_each(|&(row, column, value)| sums[row] += value * magnitudes[column]);
+        for (magnitude, sum) in magnitudes.iter_mut().zip(sums) {
+            let moved = self.shortest * sum;
+            if *magnitude == 0.0 && moved.is_finite() {
+                *magnitude = moved;
+            }
+        }
+    }
+
+    /// Spreads magnitudes, one coupling further at a time.
+    fn spread(&self, magnitudes: &mut [f64]) {
+        let mut front: Vec<usize> = (0..magnitudes.len()).filter(|&i| magnitudes[i] > 0.0).collect();
+        while !front.is_empty() {
+            let mut reached: Vec<(usize, f64)> = vec![];
+            for &by in &front {
+                let free = self.column(by).iter().filter(|entry| magnitudes[entry.0] == 0.0);
+                reached.extend(free.map(|&(on, _, action)| (on, action * self.time(on, by, action) * magnitudes[by])));
+            }
+            front = reached.iter().map(|&(on, _)| on).collect();
+            front.sort_unstable();
+            front.dedup();
+            reached.iter().for_each(|&(on, magnitude)| magnitudes[on] = magnitudes[on].max(magnitude));
+            front.retain(|&on| magnitudes[on] > 0.0);
+        }
+    }
+
+    /// How long `by` acts on `on` until that acts back or is held by its own damping, which it shares with what else acts
+    /// on it.
+    fn time(&self, on: usize, by: usize, action: f64) -> f64 {
+        let back = self.action(by, on);
+        let damping = self.own[on] / self.neighbours[on].max(1) as f64;
+        match back > 0.0 {
+            true => (action * back).sqrt().max(damping).recip().min(self.interval),
+            false => self.shortest,
+        }
+    }
+}
+
+/// The reciprocal of the spectral radius of a matrix of absolute values, by the growth of its powers.
+fn shortest_time(entries: &[Entry], states: usize) -> f64 {
+    let mut powers = vec![1.0; states];
+    let mut growth = 0.0;
+    for iteration in 0..POWERS {
+        let mut next = vec![0.0; states];
+        entries.iter().for_each(|&(row, column, value)| next[row] += value * powers[column]);
+        let most = next.iter().fold(0.0, |most: f64, value| most.max(*value));
+        if most == 0.0 || !most.is_finite() {
+            return f64::INFINITY;
+        }
+        powers = next.iter().map(|value| value / most).collect();
+        growth += if 2 * iteration >= POWERS { 2.0 * most.ln() / POWERS as f64 } else { 0.0 };
+    }
+    (-growth).exp()
+}
