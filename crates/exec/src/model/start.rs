@@ -16,6 +16,8 @@ const ITERATIONS: usize = 60;
 struct Unknowns {
     z: Vec<f64>,
     known: Vec<bool>,
+    /// Start conditions that hold because an unknown was solved from them.
+    met: Vec<bool>,
 }
 
 /// Start conditions that share unknowns.
@@ -37,7 +39,8 @@ impl Model {
         let n = states + self.conserved.len();
         let mut z = vec![0.0; n];
         for _ in 0..20 {
-            let mut unknowns = Unknowns { z: vec![0.0; n], known: vec![false; n] };
+            let met = vec![false; self.program.start.len()];
+            let mut unknowns = Unknowns { z: vec![0.0; n], known: vec![false; n], met };
             self.solve_direct(t, &mut unknowns)?;
             self.solve_groups(t, &mut unknowns)?;
             let settled = z == unknowns.z;
@@ -108,8 +111,9 @@ impl Model {
                 break;
             }
         }
-        for (&unknown, &done) in targets.iter().zip(&done) {
+        for ((&unknown, &condition), &done) in targets.iter().zip(chosen.values()).zip(&done) {
             unknowns.known[unknown] = done;
+            unknowns.met[condition] = done;
             if !done {
                 unknowns.z[unknown] = 0.0;
             }
@@ -120,6 +124,9 @@ impl Model {
     /// Whatever is not met yet is solved together with all that shares unknowns with it.
     fn solve_groups(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
         for group in self.groups() {
+            if group.conditions.iter().all(|&c| unknowns.met[c]) {
+                continue;
+            }
             let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.program.start[c].residual).collect();
             let routine = self.routine_for(&wanted);
             let known = group.unknowns.iter().all(|&u| unknowns.known[u as usize]);

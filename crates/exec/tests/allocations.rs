@@ -1,0 +1,70 @@
+//! Evaluation takes no memory once the model is made.
+
+mod common;
+
+use common::Sketch;
+use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::equations::Step;
+use halfarrow_sim::System;
+use std::alloc::{GlobalAlloc, Layout, System as Memory};
+use std::cell::Cell;
+
+struct Counting;
+
+thread_local!(static COUNT: Cell<usize> = const { Cell::new(0) });
+
+// SAFETY: every call goes to the system's allocator unchanged.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get() + 1));
+        unsafe { Memory.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        unsafe { Memory.dealloc(place, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations_during(work: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    work();
+    COUNT.with(Cell::get) - before
+}
+
+/// A linear block, a diode and a condition, evaluated, differentiated, recorded and accepted.
+#[test]
+fn a_step_takes_no_memory() {
+    let mut s = Sketch::default();
+    let x = s.state("x");
+    let (u, ue) = s.symbol("u");
+    let (three, one) = (s.number(3.0), s.number(1.0));
+    s.step(Step::Linear { unknowns: vec![u], matrix: vec![vec![three]], right: vec![x], elements: vec![] });
+    let (e, ee) = s.symbol("e");
+    let exp = s.call(Function::Exp, ee);
+    let terms = [exp, ee, ue];
+    let residual = s.x.add(&terms);
+    s.step(Step::Newton { unknowns: vec![e], body: vec![], residuals: vec![residual], elements: vec![] });
+    let size = s.call(Function::Abs, x);
+    let limit = s.x.call(Function::Min, &[size, one]);
+    let rate = s.x.mul(&[ee, limit]);
+    s.rate("x", rate);
+    let mut model = s.model();
+    let mut x = model.initialise(0.0).unwrap();
+    model.cross_jump(0.0, &mut x).unwrap();
+    let (mut dx, mut out, mut g) = ([0.0], [0.0], vec![0.0; model.switches()]);
+    let count = allocations_during(|| {
+        for i in 0..100 {
+            let (t, x) = (0.01 * f64::from(i), [0.1 + f64::from(i)]);
+            model.rates(t, &x, &mut dx).unwrap();
+            model.tangent(t, &x, &[1.0], &mut dx).unwrap();
+            model.observe(t, &x, &mut out).unwrap();
+            model.switch_values(t, &x, &mut g).unwrap();
+            model.accept(t, &x).unwrap();
+            assert_eq!(model.next_jump(t), None);
+        }
+    });
+    assert_eq!(count, 0);
+}

@@ -1,0 +1,160 @@
+//! Equations made by hand.
+#![allow(dead_code)]
+
+use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
+use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
+use halfarrow_compiler::equations::{Condition, Conserved, Equations, Form, Observed, State, StateKind, Step};
+use halfarrow_compiler::ids::Table;
+use halfarrow_compiler::program::schedule;
+use halfarrow_compiler::span::Span;
+use halfarrow_exec::Model;
+use std::collections::BTreeMap;
+
+pub struct Sketch {
+    pub x: Exprs,
+    pub t: Expr,
+    time: Symbol,
+    parameters: Vec<Parameter>,
+    inputs: Vec<Input>,
+    held: Vec<Held>,
+    elements: Table<ElementId, Element>,
+    states: Vec<State>,
+    conserved: Vec<Conserved>,
+    steps: Vec<Step>,
+    observed: Vec<Observed>,
+    conditions: Vec<Condition>,
+}
+
+impl Default for Sketch {
+    fn default() -> Self {
+        let mut x = Exprs::default();
+        let time = x.symbol("t", Facts::default());
+        let t = x.sym(time);
+        Sketch {
+            x,
+            t,
+            time,
+            parameters: Vec::new(),
+            inputs: Vec::new(),
+            held: Vec::new(),
+            elements: Table::new(),
+            states: Vec::new(),
+            conserved: Vec::new(),
+            steps: Vec::new(),
+            observed: Vec::new(),
+            conditions: Vec::new(),
+        }
+    }
+}
+
+impl Sketch {
+    pub fn symbol(&mut self, name: &str) -> (Symbol, Expr) {
+        let symbol = self.x.symbol(name, Facts::default());
+        (symbol, self.x.sym(symbol))
+    }
+    pub fn number(&mut self, value: f64) -> Expr {
+        self.x.float(value)
+    }
+    pub fn parameter(&mut self, name: &str, value: Expr) -> Expr {
+        let (symbol, e) = self.symbol(name);
+        let (unit, doc, span) = (None, String::new(), Span::default());
+        self.parameters.push(Parameter { name: name.into(), symbol, value, constant: false, unit, doc, span });
+        e
+    }
+    pub fn input(&mut self, name: &str, default: f64) -> Expr {
+        let (symbol, e) = self.symbol(name);
+        let default = self.number(default);
+        let (unit, doc, span) = (None, String::new(), Span::default());
+        self.inputs.push(Input { name: name.into(), symbol, default, unit, doc, span });
+        e
+    }
+    pub fn held(&mut self, name: &str, kind: HeldKind, source: Expr, time: f64) -> Expr {
+        let (symbol, e) = self.symbol(name);
+        let time = self.number(time);
+        self.held.push(Held { name: name.into(), symbol, source, time, kind, span: Span::default() });
+        e
+    }
+    pub fn element(&mut self, name: &str) -> ElementId {
+        let (ports, label) = (Vec::new(), String::new());
+        self.elements.push(Element { name: name.into(), kind: Kind::Zero, ports, span: Span::default(), label })
+    }
+    /// A state, recorded by default; its rate is given by [`rate`](Sketch::rate).
+    pub fn state(&mut self, name: &str) -> Expr {
+        let (symbol, e) = self.symbol(name);
+        let rate = self.x.symbol(&format!("{name}'"), Facts::default());
+        let (kind, unit, span) = (StateKind::Signal, None, Span::default());
+        self.states.push(State { symbol, rate, name: name.into(), kind, unit, span });
+        self.observe(name, e);
+        e
+    }
+    pub fn conserved(&mut self, name: &str) -> Expr {
+        let (symbol, value) = self.symbol(name);
+        self.conserved.push(Conserved { symbol, name: name.into(), value });
+        value
+    }
+    pub fn rate(&mut self, name: &str, value: Expr) {
+        let symbol = self.x.symbol(&format!("{name}'"), Facts::default());
+        self.steps.push(Step::Assign { symbol, value });
+    }
+    pub fn step(&mut self, step: Step) {
+        self.steps.push(step);
+    }
+    pub fn observe(&mut self, name: &str, value: Expr) {
+        self.observed.push(Observed { name: name.into(), value: Ok(value), unit: None, default: true });
+    }
+    pub fn hidden(&mut self, name: &str, value: Expr) {
+        self.observed.push(Observed { name: name.into(), value: Ok(value), unit: None, default: false });
+    }
+    /// `what` has a value at the start.
+    pub fn start(&mut self, name: &str, what: Expr, value: f64) {
+        let value = self.number(value);
+        let residual = self.x.sub(what, value);
+        self.conditions.push(Condition { residual, name: name.into(), value, span: Span::default() });
+    }
+    pub fn call(&mut self, f: Function, a: Expr) -> Expr {
+        self.x.call(f, &[a])
+    }
+    pub fn less(&mut self, a: Expr, b: Expr) -> Expr {
+        self.x.compare(Comparison::Lt, a, b)
+    }
+    pub fn equations(self) -> Equations {
+        let graph = BondGraph {
+            name: "sketch".into(),
+            doc: String::new(),
+            exprs: self.x,
+            variables: BTreeMap::new(),
+            elements: self.elements,
+            bonds: Table::new(),
+            parameters: self.parameters.into_iter().collect(),
+            inputs: self.inputs.into_iter().collect(),
+            signals: Table::new(),
+            held: self.held.into_iter().collect(),
+            lets: Vec::new(),
+            outputs: Vec::new(),
+            preferences: Vec::new(),
+            forced_causality: Vec::new(),
+            forced_strokes: Vec::new(),
+            constraints: Vec::new(),
+            time: self.time,
+        };
+        Equations {
+            form: Form::Minimal,
+            graph,
+            dof: self.states.len(),
+            states: self.states,
+            conserved: self.conserved,
+            steps: self.steps,
+            observed: self.observed,
+            conditions: self.conditions,
+            display: Vec::new(),
+            sources: Vec::new(),
+            meanings: Vec::new(),
+            aliases: BTreeMap::new(),
+            index: 0,
+            implicit: Vec::new(),
+        }
+    }
+    pub fn model(self) -> Model {
+        Model::new(schedule(&self.equations())).expect("parameters have values")
+    }
+}
