@@ -1,0 +1,149 @@
+//! What is stored changes by what flows in.
+
+use crate::Finding;
+use crate::power::relative;
+use crate::quadrature::{gauss, integrate};
+use crate::regions::Classes;
+use crate::values::Values;
+use halfarrow_compiler::algebra::{Expr, Symbol};
+use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, Storage, StorageLaw};
+use std::collections::BTreeSet;
+
+/// Storages whose law reads more than their own variables and parameters: they make or eat energy.
+pub(crate) fn notes(graph: &BondGraph) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (id, element) in graph.elements.iter() {
+        if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
+            let names: Vec<&str> =
+                outside(graph, id, element, storage).into_iter().map(|s| graph.exprs.name(s)).collect();
+            if !names.is_empty() {
+                let names = names.join(", ");
+                notes.push(format!("{} makes or eats energy: its law changes with {names}", element.name));
+            }
+        }
+    }
+    notes
+}
+
+/// What the laws of a storage read besides its own variables and parameters.
+fn outside(graph: &BondGraph, id: ElementId, element: &Element, storage: &Storage) -> BTreeSet<Symbol> {
+    let mut own: BTreeSet<Symbol> = storage.stored.iter().copied().collect();
+    for port in 0..element.ports.len() as u32 {
+        if let Some((z, _)) = graph.storage_symbols(PortRef { element: id, port }) {
+            own.insert(z);
+        }
+    }
+    let laws = storage.laws.iter().flat_map(|law| match *law {
+        StorageLaw::Integral(e) | StorageLaw::Derivative(e) | StorageLaw::Implicit(e) => [Some(e), None],
+        // Its displacement is imposed; what it stores follows from its law alone.
+        StorageLaw::Known { law, .. } => [Some(law), None],
+    });
+    let read: BTreeSet<Symbol> = laws.flatten().flat_map(|e: Expr| graph.exprs.symbols_of(e)).collect();
+    let parameter = |s: &Symbol| matches!(graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
+    read.into_iter().filter(|s| !own.contains(s) && !parameter(s)).collect()
+}
+
+/// Stored quantities and integrated signals against the integrals of their rates.
+pub(crate) fn rates(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Finding> {
+    let mut greatest = None;
+    for (id, element) in graph.elements.iter() {
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { continue };
+        for (port, &stored) in storage.stored.iter().enumerate() {
+            let rate = graph.storage_symbols(PortRef { element: id, port: port as u32 }).map(|(_, rate)| rate);
+            match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
+                (Some(x), Some(rate)) => compare(values.times, x, rate, &element.name, &mut greatest),
+                _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
+            }
+        }
+    }
+    for signal in graph.signals.values() {
+        let Some(x) = values.column(signal.symbol) else {
+            unchecked.push(format!("the rate of {}: its value is not known", signal.name));
+            continue;
+        };
+        let mut rate = Vec::with_capacity(x.len());
+        match values.evaluate(&[signal.rate], |_, v| rate.push(v[0])) {
+            Ok(()) => compare(values.times, x, &rate, &signal.name, &mut greatest),
+            Err(missing) => unchecked.push(format!("the rate of {}: {missing} is not known", signal.name)),
+        }
+    }
+    greatest
+}
+
+fn compare(times: &[f64], x: &[f64], rate: &[f64], name: &str, greatest: &mut Option<Finding>) {
+    let integral = integrate(times, rate);
+    let scale = x.iter().chain(&integral.values).fold(0.0f64, |most, v| most.max(v.abs()));
+    for (k, &time) in times.iter().enumerate() {
+        let value = relative(x[k] - x[0] - integral.values[k], scale);
+        let resolution = relative(integral.uncertainty[k], scale);
+        judge(greatest, value, resolution, time, || format!("{name}: what it holds against its rate"));
+    }
+}
+
+/// Keeps the finding that stands out most above what the samples resolve.
+fn judge(greatest: &mut Option<Finding>, value: f64, resolution: f64, time: f64, place: impl Fn() -> String) {
+    let excess = |value: f64, resolution: f64| (value - resolution).max(0.0);
+    let above = |g: &Finding| {
+        let (new, old) = (excess(value, resolution), excess(g.value, g.resolution));
+        value.is_nan() || new > old || (new == old && value > g.value)
+    };
+    if greatest.as_ref().is_none_or(above) {
+        *greatest = Some(Finding { value, time, place: place(), resolution });
+    }
+}
+
+/// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
+pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Finding> {
+    let parts = Classes::new(graph, |kind| kind.is_inner());
+    let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
+    let n = values.times.len();
+    let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
+    let mut any = false;
+    for port in graph.outer_ports() {
+        let element = &graph.elements[port.element];
+        if pseudo.contains(&parts.of(graph.bond_of(port))) {
+            continue;
+        }
+        let Some(power) = values.power(port) else {
+            unchecked.push(format!("the energy balance: the power at {} is not known", element.name));
+            return None;
+        };
+        any = true;
+        let by_law = stored_by_law(graph, values, port);
+        let through = integrate(values.times, &power);
+        let own: &[f64] = by_law.as_deref().unwrap_or(&through.values);
+        for k in 0..n {
+            balance[k] += own[k];
+            moved[k] = moved[k].max(own[k].abs());
+            uncertainty[k] += if by_law.is_none() { through.uncertainty[k] } else { 0.0 };
+        }
+    }
+    let scale = moved.iter().fold(0.0f64, |most, v| most.max(*v));
+    let mut greatest = None;
+    for k in 0..if any { n } else { 0 } {
+        let (value, resolution) = (relative(balance[k], scale), relative(uncertainty[k], scale));
+        judge(&mut greatest, value, resolution, values.times[k], || "the whole model".to_string());
+    }
+    greatest
+}
+
+/// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample; `None` if its
+/// law is no function of its own stored quantity and parameters, or reads what is not known.
+fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Vec<f64>> {
+    let element = &graph.elements[port.element];
+    let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
+    let (StorageLaw::Integral(law) | StorageLaw::Known { law, .. }) = *storage.laws.first()? else { return None };
+    if storage.laws.len() != 1 || !outside(graph, port.element, element, storage).is_empty() {
+        return None;
+    }
+    let (own, x) = (storage.stored[0], values.column(storage.stored[0])?);
+    if graph.exprs.symbols_of(law).into_iter().any(|s| s != own && values.parameter(s).is_none()) {
+        return None;
+    }
+    let z = |x: f64| graph.exprs.eval(law, &mut |s| if s == own { x } else { values.parameter(s).unwrap_or(f64::NAN) });
+    let mut energy = vec![0.0; x.len()];
+    for k in 1..x.len() {
+        energy[k] = energy[k - 1] + gauss(x[k - 1], x[k], z);
+    }
+    Some(energy)
+}

@@ -1,0 +1,71 @@
+//! Integrals over samples.
+
+/// Integrals from the first sample to each, and what they are uncertain by.
+pub(crate) struct Integral {
+    pub values: Vec<f64>,
+    pub uncertainty: Vec<f64>,
+}
+
+/// Integrates samples: between jumps (times given twice) by the quintics through the six nearest samples; the
+/// uncertainty is the sum of the differences to quartics.
+pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
+    let n = times.len();
+    let mut integral = Integral { values: vec![0.0; n], uncertainty: vec![0.0; n] };
+    let mut start = 0;
+    for k in 1..n {
+        let (mut step, mut doubt) = (0.0, 0.0);
+        if times[k] > times[k - 1] {
+            let end = (k..n).find(|&j| j + 1 == n || times[j + 1] <= times[j]).unwrap_or(n - 1);
+            let fine = piece(times, rates, (start, end), k, 6);
+            step = fine;
+            doubt = (fine - piece(times, rates, (start, end), k, 5)).abs();
+            if end - start < 5 {
+                doubt = doubt.max((fine - piece(times, rates, (start, end), k, (end - start).max(1))).abs());
+            }
+        } else {
+            start = k;
+        }
+        integral.values[k] = integral.values[k - 1] + step;
+        integral.uncertainty[k] = integral.uncertainty[k - 1] + doubt;
+    }
+    integral
+}
+
+/// Integral from sample `k - 1` to `k` of the polynomial through up to `count` samples around them in `[first, last]`.
+fn piece(times: &[f64], rates: &[f64], (first, last): (usize, usize), k: usize, count: usize) -> f64 {
+    let count = count.min(last - first + 1);
+    let low = (k as isize - (count as isize + 1) / 2).max(first as isize) as usize;
+    let low = low.min(last + 1 - count);
+    let (t, mut c) = (&times[low..low + count], rates[low..low + count].to_vec());
+    for level in 1..count {
+        for i in (level..count).rev() {
+            c[i] = (c[i] - c[i - 1]) / (t[i] - t[i - level]);
+        }
+    }
+    let at = |s: f64| (0..count).rev().fold(0.0, |sum, i| sum * (s - t[i]) + c[i]);
+    gauss(times[k - 1], times[k], at)
+}
+
+/// Integral of a function by three points: exact for quintics.
+pub(crate) fn gauss(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let away = half * 0.6f64.sqrt();
+    half * (5.0 * f(middle - away) + 8.0 * f(middle) + 5.0 * f(middle + away)) / 9.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quintics_are_exact_and_jumps_are_kept_apart() {
+        let mut times: Vec<f64> = (0..=10).map(|k| 0.1 * k as f64).collect();
+        times.extend((0..=10).map(|k| 1.0 + 0.07 * k as f64));
+        let f = |i: usize, t: f64| if i <= 10 { 6.0 * t.powi(5) } else { -2.0 * t };
+        let rates: Vec<f64> = times.iter().enumerate().map(|(i, &t)| f(i, t)).collect();
+        let integral = integrate(&times, &rates);
+        assert!((integral.values[10] - 1.0).abs() < 1e-14);
+        assert!((integral.values[21] - (1.0 - (1.7f64.powi(2) - 1.0))).abs() < 1e-13);
+        assert!(integral.uncertainty[10] < 1e-3);
+    }
+}

@@ -1,0 +1,192 @@
+//! Recorded values by symbol.
+
+use crate::Run;
+use halfarrow_compiler::algebra::{Evaluator, Expr, Symbol};
+use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
+use halfarrow_compiler::ids::Table;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The names of the variables that an audit reads, as `--record` takes them: all efforts, flows and stored quantities
+/// of elements, junctions and named bonds, integrated signals, inputs and held signals.
+pub fn wanted(graph: &BondGraph) -> Vec<String> {
+    let all: BTreeSet<String> = named(graph).into_iter().map(|(name, _)| name).collect();
+    all.into_iter().collect()
+}
+
+fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
+    let mut all = Vec::new();
+    for element in graph.elements.values() {
+        for (index, port) in element.ports.iter().enumerate() {
+            let bond = &graph.bonds[port.bond];
+            let place = match port.name.as_str() {
+                "" => element.name.clone(),
+                port => format!("{}.{port}", element.name),
+            };
+            match &element.kind {
+                Kind::Zero => all.push((format!("{place}.e"), bond.effort)),
+                Kind::One => all.push((format!("{place}.f"), bond.flow)),
+                kind => {
+                    all.push((format!("{place}.e"), bond.effort));
+                    all.push((format!("{place}.f"), bond.flow));
+                    match kind {
+                        Kind::Inertance(s) => all.push((format!("{place}.p"), s.stored[index])),
+                        Kind::Compliance(s) => all.push((format!("{place}.q"), s.stored[index])),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+    for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
+        all.push((format!("{}.e", bond.name), bond.effort));
+        all.push((format!("{}.f", bond.name), bond.flow));
+    }
+    all.extend(graph.signals.values().map(|s| (s.name.clone(), s.symbol)));
+    all.extend(graph.inputs.values().map(|i| (i.name.clone(), i.symbol)));
+    all.extend(graph.held.values().map(|h| (h.name.clone(), h.symbol)));
+    all
+}
+
+/// Recorded values by symbol, with what the junctions say of unnamed bonds between them.
+pub(crate) struct Values<'a> {
+    graph: &'a BondGraph,
+    pub times: &'a [f64],
+    columns: BTreeMap<Symbol, &'a [f64]>,
+    parameters: BTreeMap<Symbol, f64>,
+    efforts: Table<BondId, Option<&'a [f64]>>,
+    flows: Table<BondId, Option<&'a [f64]>>,
+}
+
+impl<'a> Values<'a> {
+    pub fn new(graph: &'a BondGraph, run: &Run<'a>) -> Values<'a> {
+        let mut columns: BTreeMap<Symbol, &'a [f64]> = BTreeMap::new();
+        for (name, symbol) in named(graph) {
+            if let Some(&column) = run.columns.get(&name) {
+                columns.entry(symbol).or_insert(column);
+            }
+        }
+        let parameters = graph.parameters.values();
+        let parameters = parameters.filter_map(|p| Some((p.symbol, *run.parameters.get(&p.name)?))).collect();
+        let mut efforts: Table<BondId, Option<&[f64]>> =
+            graph.bonds.values().map(|b| columns.get(&b.effort).copied()).collect();
+        let mut flows: Table<BondId, Option<&[f64]>> =
+            graph.bonds.values().map(|b| columns.get(&b.flow).copied()).collect();
+        // A bond that was not recorded itself has the common variable of a junction it ends at.
+        for element in graph.elements.values() {
+            let table = match element.kind {
+                Kind::Zero => &mut efforts,
+                Kind::One => &mut flows,
+                _ => continue,
+            };
+            let common = element.ports.iter().find_map(|port| table[port.bond]);
+            element.ports.iter().for_each(|port| table[port.bond] = table[port.bond].or(common));
+        }
+        for (id, bond) in graph.bonds.iter() {
+            efforts[id].into_iter().for_each(|c| {
+                columns.entry(bond.effort).or_insert(c);
+            });
+            flows[id].into_iter().for_each(|c| {
+                columns.entry(bond.flow).or_insert(c);
+            });
+        }
+        Values { graph, times: run.times, columns, parameters, efforts, flows }
+    }
+
+    pub fn effort(&self, bond: BondId) -> Option<&'a [f64]> {
+        self.efforts[bond]
+    }
+
+    pub fn flow(&self, bond: BondId) -> Option<&'a [f64]> {
+        self.flows[bond]
+    }
+
+    pub fn parameter(&self, symbol: Symbol) -> Option<f64> {
+        self.parameters.get(&symbol).copied()
+    }
+
+    pub fn column(&self, symbol: Symbol) -> Option<&'a [f64]> {
+        self.columns.get(&symbol).copied()
+    }
+
+    /// Power into the element at a port, sample by sample.
+    pub fn power(&self, port: PortRef) -> Option<Vec<f64>> {
+        let at = &self.graph.elements[port.element].ports[port.port as usize];
+        let sign = if at.inward { 1.0 } else { -1.0 };
+        match (self.effort(at.bond), self.flow(at.bond)) {
+            (Some(e), Some(f)) => Some(e.iter().zip(f).map(|(e, f)| sign * e * f).collect()),
+            // An undetermined effort does no work where nothing flows, and the other way round.
+            (None, Some(zero)) | (Some(zero), None) if zero.iter().all(|&v| v == 0.0) => Some(zero.to_vec()),
+            _ => None,
+        }
+    }
+
+    /// Values of expressions at every sample, by `visit(sample, values)`; the name of what is missing if they read
+    /// something that was not recorded.
+    pub fn evaluate(&self, wanted: &[Expr], mut visit: impl FnMut(usize, &[f64])) -> Result<(), String> {
+        let x = &self.graph.exprs;
+        let mut read: BTreeSet<Symbol> = wanted.iter().flat_map(|&e| x.symbols_of(e)).collect();
+        // A rate of an integrated signal is the expression that it was declared with.
+        let mut rates = BTreeMap::new();
+        loop {
+            let more: Vec<(Symbol, Expr)> =
+                read.iter().filter(|s| !rates.contains_key(*s)).filter_map(|&s| Some((s, self.rate_of(s)?))).collect();
+            if more.is_empty() {
+                break;
+            }
+            for (symbol, rate) in more {
+                rates.insert(symbol, rate);
+                read.extend(x.symbols_of(rate));
+            }
+        }
+        let known = |s: &Symbol| {
+            *s == self.graph.time
+                || self.columns.contains_key(s)
+                || self.parameters.contains_key(s)
+                || rates.contains_key(s)
+                || self.same_as(*s).is_some_and(|s| self.columns.contains_key(&s))
+        };
+        if let Some(missing) = read.iter().find(|s| !known(s)) {
+            return Err(x.name(*missing).to_string());
+        }
+        let mut results = vec![0.0; wanted.len()];
+        for sample in 0..self.times.len() {
+            let mut at = |s: Symbol| self.at(s, sample, &rates);
+            let mut evaluator = Evaluator::new(x, &mut at);
+            results.iter_mut().zip(wanted).for_each(|(r, &e)| *r = evaluator.value(e));
+            visit(sample, &results);
+        }
+        Ok(())
+    }
+
+    fn at(&self, symbol: Symbol, sample: usize, rates: &BTreeMap<Symbol, Expr>) -> f64 {
+        if symbol == self.graph.time {
+            return self.times[sample];
+        }
+        if let Some(rate) = rates.get(&symbol) {
+            return self.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, rates));
+        }
+        let column = self.columns.get(&symbol).or_else(|| self.columns.get(&self.same_as(symbol)?));
+        match column {
+            Some(column) => column[sample],
+            None => self.parameters.get(&symbol).copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// What a rate is: the expression of an integrated signal.
+    fn rate_of(&self, symbol: Symbol) -> Option<Expr> {
+        let Meaning::Rate(of) = self.graph.variables.get(&symbol)?.meaning else { return None };
+        match self.graph.variables.get(&of)?.meaning {
+            Meaning::Signal(signal) => Some(self.graph.signals[signal].rate),
+            _ => None,
+        }
+    }
+
+    /// The effort or flow that the rate of a stored quantity is.
+    fn same_as(&self, symbol: Symbol) -> Option<Symbol> {
+        let Meaning::Rate(of) = self.graph.variables.get(&symbol)?.meaning else { return None };
+        match self.graph.variables.get(&of)?.meaning {
+            Meaning::Stored(port) => Some(self.graph.storage_symbols(port)?.1),
+            _ => None,
+        }
+    }
+}
