@@ -61,8 +61,11 @@ pub(crate) fn rates(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Stri
             unchecked.push(format!("the rate of {}: its value is not known", signal.name));
             continue;
         };
-        let mut rate = Vec::with_capacity(x.len());
-        match values.evaluate(&[signal.rate], |_, v| rate.push(v[0])) {
+        let mut rate = vec![f64::NAN; x.len()];
+        match values.evaluate(&[signal.rate], |k, v| rate[k] = v[0]) {
+            Ok(()) if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) => {
+                unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
+            }
             Ok(()) => compare(values.times, x, &rate, &signal.name, &mut greatest),
             Err(missing) => unchecked.push(format!("the rate of {}: {missing} is not known", signal.name)),
         }

@@ -29,6 +29,11 @@ pub(crate) fn residual(
     unchecked: &mut Vec<String>,
 ) -> Option<Finding> {
     let mut greatest = None;
+    for (name, left, right) in &values.same {
+        let scale = left.iter().chain(*right).fold(0.0f64, |most, v| most.max(v.abs()));
+        let mut miss = Miss { name, times: values.times, greatest: &mut greatest };
+        (0..left.len()).for_each(|i| miss.note(i, left[i] - right[i], scale, "two names of one variable"));
+    }
     for (id, element) in graph.elements.iter() {
         let mut laws = Laws { graph, values, regions, laws: Vec::new(), missing: false };
         laws.of(id, element);
@@ -203,11 +208,11 @@ fn check(
                 _ => vec![*expr],
             };
             let mut rows = Vec::new();
-            values.evaluate(&terms, |_, v| {
-                rows.push((v.iter().sum::<f64>(), v.iter().fold(0.0f64, |most, v| most.max(v.abs()))));
+            values.evaluate(&terms, |i, v| {
+                rows.push((i, v.iter().sum::<f64>(), v.iter().fold(0.0f64, |most, v| most.max(v.abs()))));
             })?;
-            let scale = rows.iter().fold(0.0f64, |most, r| most.max(r.1));
-            rows.iter().enumerate().for_each(|(i, r)| miss.note(i, r.0, scale, what));
+            let scale = rows.iter().fold(0.0f64, |most, r| most.max(r.2));
+            rows.iter().for_each(|&(i, sum, _)| miss.note(i, sum, scale, what));
         }
     }
     Ok(())

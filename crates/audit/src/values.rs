@@ -1,7 +1,7 @@
 //! Recorded values by symbol.
 
 use crate::Run;
-use halfarrow_compiler::algebra::{Evaluator, Expr, Symbol};
+use halfarrow_compiler::algebra::{Evaluator, Expr, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::ids::Table;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,7 +14,7 @@ pub fn wanted(graph: &BondGraph) -> Vec<String> {
 }
 
 fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
-    let mut all = Vec::new();
+    let (mut all, mut common) = (Vec::new(), Vec::new());
     for element in graph.elements.values() {
         for (index, port) in element.ports.iter().enumerate() {
             let bond = &graph.bonds[port.bond];
@@ -23,8 +23,8 @@ fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
                 port => format!("{}.{port}", element.name),
             };
             match &element.kind {
-                Kind::Zero => all.push((format!("{place}.e"), bond.effort)),
-                Kind::One => all.push((format!("{place}.f"), bond.flow)),
+                Kind::Zero => common.push((format!("{place}.e"), bond.effort)),
+                Kind::One => common.push((format!("{place}.f"), bond.flow)),
                 kind => {
                     all.push((format!("{place}.e"), bond.effort));
                     all.push((format!("{place}.f"), bond.flow));
@@ -44,7 +44,16 @@ fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
     all.extend(graph.signals.values().map(|s| (s.name.clone(), s.symbol)));
     all.extend(graph.inputs.values().map(|i| (i.name.clone(), i.symbol)));
     all.extend(graph.held.values().map(|h| (h.name.clone(), h.symbol)));
+    all.extend(common);
     all
+}
+
+/// The side of a jump that a sample shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Before,
+    After,
+    Inside,
 }
 
 /// Recorded values by symbol, with what the junctions say of unnamed bonds between them.
@@ -55,14 +64,21 @@ pub(crate) struct Values<'a> {
     parameters: BTreeMap<Symbol, f64>,
     efforts: Table<BondId, Option<&'a [f64]>>,
     flows: Table<BondId, Option<&'a [f64]>>,
+    /// Columns that say the same as that of a symbol, with their names.
+    pub same: Vec<(String, &'a [f64], &'a [f64])>,
 }
 
 impl<'a> Values<'a> {
     pub fn new(graph: &'a BondGraph, run: &Run<'a>) -> Values<'a> {
         let mut columns: BTreeMap<Symbol, &'a [f64]> = BTreeMap::new();
+        let mut same = Vec::new();
         for (name, symbol) in named(graph) {
-            if let Some(&column) = run.columns.get(&name) {
-                columns.entry(symbol).or_insert(column);
+            let Some(&column) = run.columns.get(&name) else { continue };
+            match columns.get(&symbol) {
+                Some(known) => same.push((name, column, *known)),
+                None => {
+                    columns.insert(symbol, column);
+                }
             }
         }
         let parameters = graph.parameters.values();
@@ -89,7 +105,7 @@ impl<'a> Values<'a> {
                 columns.entry(bond.flow).or_insert(c);
             });
         }
-        Values { graph, times: run.times, columns, parameters, efforts, flows }
+        Values { graph, times: run.times, columns, parameters, efforts, flows, same }
     }
 
     pub fn effort(&self, bond: BondId) -> Option<&'a [f64]> {
@@ -149,8 +165,21 @@ impl<'a> Values<'a> {
             return Err(x.name(*missing).to_string());
         }
         let mut results = vec![0.0; wanted.len()];
+        let jumpy = wanted.iter().any(|&e| self.jumps_with_state(e));
         for sample in 0..self.times.len() {
-            let mut at = |s: Symbol| self.at(s, sample, &rates);
+            let side = self.side(sample);
+            // At a switch the state stands just beyond the border while the old law still holds.
+            if jumpy && side == Side::Before {
+                continue;
+            }
+            let t = self.times[sample];
+            let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
+            let t = match side {
+                Side::Before => t - reach,
+                Side::After => t + reach,
+                Side::Inside => t,
+            };
+            let mut at = |s: Symbol| self.at(s, sample, t, &rates);
             let mut evaluator = Evaluator::new(x, &mut at);
             results.iter_mut().zip(wanted).for_each(|(r, &e)| *r = evaluator.value(e));
             visit(sample, &results);
@@ -158,12 +187,49 @@ impl<'a> Values<'a> {
         Ok(())
     }
 
-    fn at(&self, symbol: Symbol, sample: usize, rates: &BTreeMap<Symbol, Expr>) -> f64 {
+    /// On which side of a jump a sample stands. The start is the far side of one, and so is a single sample at the time
+    /// of a jump; the latter cannot be told from others, but a little later is as good there.
+    fn side(&self, sample: usize) -> Side {
+        let same = |a: usize, b: usize| self.times[a] == self.times[b];
+        match () {
+            () if sample + 1 < self.times.len() && same(sample, sample + 1) => Side::Before,
+            () if sample > 0 && same(sample - 1, sample) => Side::After,
+            () if sample + 1 == self.times.len() => Side::Inside,
+            () => Side::After,
+        }
+    }
+
+    /// Whether an expression jumps where something other than time crosses a border.
+    fn jumps_with_state(&self, e: Expr) -> bool {
+        let x = &self.graph.exprs;
+        let varies =
+            |e: Expr| x.symbols_of(e).into_iter().any(|s| s != self.graph.time && !self.parameters.contains_key(&s));
+        let (mut open, mut seen) = (vec![e], BTreeSet::from([e]));
+        while let Some(e) = open.pop() {
+            let jumps = match x.node(e) {
+                Node::Compare(..) => varies(e),
+                Node::Call(Function::Sign | Function::Floor | Function::Mod, _) => varies(e),
+                Node::Table(..) | Node::TableSlope(..) => varies(e),
+                _ => false,
+            };
+            if jumps {
+                return true;
+            }
+            x.node(e).for_each_child(|c| {
+                if seen.insert(c) {
+                    open.push(c);
+                }
+            });
+        }
+        false
+    }
+
+    fn at(&self, symbol: Symbol, sample: usize, t: f64, rates: &BTreeMap<Symbol, Expr>) -> f64 {
         if symbol == self.graph.time {
-            return self.times[sample];
+            return t;
         }
         if let Some(rate) = rates.get(&symbol) {
-            return self.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, rates));
+            return self.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, t, rates));
         }
         let column = self.columns.get(&symbol).or_else(|| self.columns.get(&self.same_as(symbol)?));
         match column {

@@ -16,7 +16,7 @@ pub(crate) enum Trouble {
     /// A linear block has no unique solution.
     Singular { block: u32 },
     /// A Newton block found none.
-    NoConvergence { block: u32, iterations: usize, residual: f64, singular: bool },
+    NoConvergence { block: u32, iterations: usize, residual: f64 },
 }
 
 /// Everything a routine reads and writes; all memory is taken in [`new`](Frame::new).

@@ -53,7 +53,6 @@ impl Newton {
 struct Miss {
     iterations: usize,
     residual: f64,
-    singular: bool,
 }
 
 impl Frame {
@@ -73,8 +72,8 @@ impl Frame {
         if self.approach(solve) {
             return Ok(());
         }
-        let Miss { iterations, residual, singular } = first;
-        Err(Trouble::NoConvergence { block: block as u32, iterations, residual, singular })
+        let Miss { iterations, residual } = first;
+        Err(Trouble::NoConvergence { block: block as u32, iterations, residual })
     }
 
     fn newton_of(&mut self, solve: &Solve) -> &mut Newton {
@@ -120,18 +119,16 @@ impl Frame {
         let newton = self.newton_of(solve);
         (0..n).for_each(|i| newton.size[i] = newton.x[i].abs());
         if !self.evaluate(solve, false) {
-            return Err(Miss { iterations: 0, residual: f64::NAN, singular: false });
+            return Err(Miss { iterations: 0, residual: f64::NAN });
         }
-        let mut singular = false;
         for iteration in 0..ITERATIONS {
             if self.residual(solve) == 0.0 {
                 return Ok(());
             }
             if !self.factor(solve) {
-                singular = true;
                 self.nudge(solve, iteration);
                 if !self.evaluate(solve, false) {
-                    return Err(Miss { iterations: iteration, residual: f64::NAN, singular });
+                    return Err(Miss { iterations: iteration, residual: f64::NAN });
                 }
                 continue;
             }
@@ -144,11 +141,11 @@ impl Frame {
                 Damped::Done => return Ok(()),
                 Damped::Moved => {}
                 Damped::Stuck => {
-                    return Err(Miss { iterations: iteration + 1, residual: self.residual(solve), singular });
+                    return Err(Miss { iterations: iteration + 1, residual: self.residual(solve) });
                 }
             }
         }
-        Err(Miss { iterations: ITERATIONS, residual: self.residual(solve), singular })
+        Err(Miss { iterations: ITERATIONS, residual: self.residual(solve) })
     }
 
     /// Takes the step, or as much of it as makes the next one shorter.

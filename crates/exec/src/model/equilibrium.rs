@@ -7,6 +7,8 @@ use halfarrow_sim::{Failure, System};
 const ITERATIONS: usize = 200;
 /// Rates below this fraction of the terms they are made of count as zero.
 const AT_REST: f64 = 1e-9;
+/// More states than this are not searched: the equations are dense.
+const LARGEST: usize = 2000;
 
 /// A state at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +31,9 @@ impl Model {
     pub fn equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         self.restart();
         let n = x.len();
+        if n > LARGEST {
+            return Err(EquilibriumError::TooLarge(n));
+        }
         let mut x = x.to_vec();
         let mut scale = vec![0.0f64; n];
         let mut pull = f64::INFINITY;
@@ -44,8 +49,7 @@ impl Model {
                 || rates.iter().all(|&rate| rate == 0.0);
             if settled || rates.iter().zip(&scale).all(|(r, s)| r.abs() <= 1e-15 * s) {
                 if rates.iter().zip(&scale).all(|(r, s)| r.abs() <= AT_REST * s) {
-                    let rank = self.rank_at(t, &x, &jacobian, n);
-                    return Ok(Equilibrium { x, free: n - rank, iterations: iteration });
+                    return Ok(Equilibrium { x, free: n - newton.rank, iterations: iteration });
                 }
                 if pull.is_infinite() {
                     break;
@@ -94,12 +98,8 @@ impl Model {
         Err(EquilibriumError::None(worst.into_iter().map(|i| (self.state_name(i), rates[i])).collect()))
     }
 
-    fn rank_at(&self, _t: f64, _x: &[f64], jacobian: &[f64], n: usize) -> usize {
-        minimum_norm::step(jacobian, &vec![0.0; n], n).map_or(0, |s| s.rank)
-    }
-
     /// Rates and, row by row, their derivatives.
-    fn at_rest(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+    pub(super) fn at_rest(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         let n = x.len();
         self.rates_at(t, x)?;
         let rates = self.dx.clone();

@@ -130,6 +130,8 @@ impl std::error::Error for StartError {}
 pub enum EquilibriumError {
     /// Something always moves: the states with the greatest rates at the nearest point found, with these rates.
     None(Vec<(String, f64)>),
+    /// So many states are beyond the dense equations that the search solves.
+    TooLarge(usize),
     /// The model has no value on the way.
     Failure(Failure),
 }
@@ -137,6 +139,10 @@ pub enum EquilibriumError {
 impl fmt::Display for EquilibriumError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            EquilibriumError::TooLarge(states) => write!(
+                f,
+                "an equilibrium of {states} states is not searched for: let the model run until it is at rest"
+            ),
             EquilibriumError::None(rates) => {
                 write!(f, "no equilibrium was found: at the nearest point")?;
                 for (i, (name, rate)) in rates.iter().enumerate() {

@@ -263,7 +263,7 @@ impl Model {
                 Failure::Singular { time, what: self.program.watches[watch as usize].elements.clone() }
             }
             Trouble::Singular { block } => Failure::Singular { time, what: elements(block) },
-            Trouble::NoConvergence { block, iterations, residual, .. } => {
+            Trouble::NoConvergence { block, iterations, residual } => {
                 Failure::NoConvergence { time, what: elements(block), iterations, residual }
             }
         }
