@@ -165,7 +165,10 @@ impl<'a> Values<'a> {
             return Err(x.name(*missing).to_string());
         }
         let mut results = vec![0.0; wanted.len()];
-        let jumpy = wanted.iter().any(|&e| self.jumps_with_state(e));
+        let time = self.graph.time;
+        let state = |s: Symbol| s != time && !self.parameters.contains_key(&s);
+        let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
+        let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
         for sample in 0..self.times.len() {
             let side = self.side(sample);
             // At a switch the state stands just beyond the border while the old law still holds.
@@ -175,9 +178,9 @@ impl<'a> Values<'a> {
             let t = self.times[sample];
             let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
             let t = match side {
-                Side::Before => t - reach,
-                Side::After => t + reach,
-                Side::Inside => t,
+                Side::Before if timed => t - reach,
+                Side::After if timed => t + reach,
+                _ => t,
             };
             let mut at = |s: Symbol| self.at(s, sample, t, &rates);
             let mut evaluator = Evaluator::new(x, &mut at);
@@ -199,11 +202,10 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// Whether an expression jumps where something other than time crosses a border.
-    fn jumps_with_state(&self, e: Expr) -> bool {
+    /// Whether an expression jumps where something for which `moves` holds crosses a border.
+    fn jumps(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
         let x = &self.graph.exprs;
-        let varies =
-            |e: Expr| x.symbols_of(e).into_iter().any(|s| s != self.graph.time && !self.parameters.contains_key(&s));
+        let varies = |e: Expr| x.symbols_of(e).into_iter().any(moves);
         let (mut open, mut seen) = (vec![e], BTreeSet::from([e]));
         while let Some(e) = open.pop() {
             let jumps = match x.node(e) {

@@ -8,8 +8,9 @@ use halfarrow_compiler::diagnostic::{Sources, render};
 use halfarrow_compiler::equations::{Form, derive_equations};
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
-use halfarrow_sim::{Method, Options, Sink, simulate};
+use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 fn models() -> PathBuf {
@@ -41,14 +42,20 @@ impl Sink for Samples {
         self.times.push(t);
         self.rows.push(values.to_vec());
     }
+    /// A few hundred steps are enough to judge.
+    fn progress(&mut self, _t: f64) -> ControlFlow<()> {
+        if self.times.len() < 300 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
 }
 
 fn run(model: &mut Model, to: f64) -> Result<Samples, String> {
     let mut x = model.initialise(0.0).map_err(|e| e.to_string())?;
     let mut samples = Samples::default();
     let options = Options { to, rtol: 1e-12, method: Method::Explicit, ..Options::default() };
-    simulate(model, &options, &mut x, &mut samples).map_err(|e| e.to_string())?;
-    Ok(samples)
+    match simulate(model, &options, &mut x, &mut samples).map_err(|stopped| stopped.failure) {
+        Ok(_) | Err(Failure::Interrupted { .. }) => Ok(samples),
+        Err(failure) => Err(failure.to_string()),
+    }
 }
 
 fn audit_of(graph: &BondGraph, model: &mut Model, to: f64) -> Result<Audit, String> {

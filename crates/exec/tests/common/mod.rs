@@ -147,6 +147,7 @@ impl Sketch {
             observed: self.observed,
             conditions: self.conditions,
             display: Vec::new(),
+            dependent: Vec::new(),
             sources: Vec::new(),
             meanings: Vec::new(),
             aliases: BTreeMap::new(),
