@@ -101,7 +101,7 @@ pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Str
     let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
     let n = values.times.len();
     let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
-    let mut any = false;
+    let (mut any, mut held) = (false, 0.0f64);
     for port in graph.outer_ports() {
         let element = &graph.elements[port.element];
         if pseudo.contains(&parts.of(graph.bond_of(port))) {
@@ -112,6 +112,7 @@ pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Str
             return None;
         };
         any = true;
+        held = held.max(energy_held(graph, values, port));
         let by_law = stored_by_law(graph, values, port);
         let through = integrate(values.times, &power);
         let own: &[f64] = by_law.as_deref().unwrap_or(&through.values);
@@ -121,13 +122,23 @@ pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Str
             uncertainty[k] += if by_law.is_none() { through.uncertainty[k] } else { 0.0 };
         }
     }
-    let scale = moved.iter().fold(0.0f64, |most, v| most.max(*v));
+    let scale = moved.iter().fold(held, |most, v| most.max(*v));
     let mut greatest = None;
     for k in 0..if any { n } else { 0 } {
         let (value, resolution) = (relative(balance[k], scale), relative(uncertainty[k], scale));
         judge(&mut greatest, value, resolution, values.times[k], || "the whole model".to_string());
     }
     greatest
+}
+
+/// How much energy a storage holds at most, within a factor: `|z X|`.
+fn energy_held(graph: &BondGraph, values: &Values, port: PortRef) -> f64 {
+    let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &graph.elements[port.element].kind else { return 0.0 };
+    let z = graph.storage_symbols(port).and_then(|(z, _)| values.column(z));
+    match (z, values.column(storage.stored[port.port as usize])) {
+        (Some(z), Some(x)) => z.iter().zip(x).fold(0.0, |most, (z, x)| most.max((z * x).abs())),
+        _ => 0.0,
+    }
 }
 
 /// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample; `None` if its

@@ -54,7 +54,7 @@ pub struct Finding {
 pub struct Audit {
     /// Power made or eaten by the junction structure, relative to the greatest power at a port of the connected part.
     pub power: Option<Finding>,
-    /// Stored less initial, supplied plus dissipated energy, relative to the energy that has moved.
+    /// Stored less initial, supplied plus dissipated energy, relative to the greatest energy held or moved at a port.
     pub energy: Option<Finding>,
     /// Laws of junctions and elements, relative to the greatest effort or flow in the joined region.
     pub residual: Option<Finding>,

@@ -11,8 +11,6 @@ const MET: f64 = 1e-9;
 /// Passes over conditions that one unknown is left in.
 const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
-/// Typical magnitudes of more states than this are those of the start alone.
-const MOST_LINEARISED: usize = 200;
 
 /// The unknowns of the start: states, then conserved constants.
 struct Unknowns {
@@ -55,32 +53,8 @@ impl Model {
             self.begin_held(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
-        self.find_scales(t, &z);
+        self.scales = z.iter().map(|x| x.abs()).collect();
         Ok(z)
-    }
-
-    /// Typical magnitudes: where a state starts and how far it is from where the linearised motion would take it; a
-    /// state for which both are zero goes by those of its unit.
-    fn find_scales(&mut self, t: f64, x: &[f64]) {
-        let mut scales: Vec<f64> = x.iter().map(|x| x.abs()).collect();
-        if x.len() <= MOST_LINEARISED
-            && let Ok((rates, jacobian)) = self.at_rest(t, x)
-            && let Some(way) = minimum_norm::step(&jacobian, &rates, x.len())
-        {
-            scales.iter_mut().zip(&way.step).for_each(|(scale, way)| *scale = scale.max(way.abs()));
-        }
-        let group = |i: usize| self.program.states[i].unit.as_ref().map(|unit| unit.to_string());
-        let mut groups: BTreeMap<String, f64> = BTreeMap::new();
-        for (i, &scale) in scales.iter().enumerate() {
-            if let Some(group) = group(i) {
-                let most = groups.entry(group).or_insert(0.0);
-                *most = most.max(scale);
-            }
-        }
-        for (i, scale) in scales.iter_mut().enumerate().filter(|(_, scale)| **scale == 0.0) {
-            *scale = group(i).and_then(|group| groups.get(&group).copied()).unwrap_or(0.0);
-        }
-        self.scales = scales;
     }
 
     /// Conditions in which one unknown is left determine it; all of one pass at once.
