@@ -99,7 +99,7 @@ impl Model {
     }
 
     /// Rates and, row by row, their derivatives.
-    fn at_rest(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+    pub(super) fn at_rest(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         let n = x.len();
         self.rates_at(t, x)?;
         let rates = self.dx.clone();

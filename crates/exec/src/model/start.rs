@@ -11,6 +11,8 @@ const MET: f64 = 1e-9;
 /// Passes over conditions that one unknown is left in.
 const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
+/// More states than this are not linearised to find typical magnitudes.
+const MOST_LINEARISED: usize = 200;
 
 /// The unknowns of the start: states, then conserved constants.
 struct Unknowns {
@@ -53,8 +55,29 @@ impl Model {
             self.begin_held(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
-        self.scales = z.iter().map(|x| x.abs()).collect();
+        self.scales = self.magnitudes(t, &z);
         Ok(z)
+    }
+
+    /// Typical magnitudes of the states: how great they are at the start, how far they are from where the linearised
+    /// motion would take them, and what that motion makes of them in the shortest time it knows. 0 where nothing moves.
+    fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let n = x.len();
+        let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
+        if n > MOST_LINEARISED {
+            return sizes;
+        }
+        let Ok((rates, jacobian)) = self.at_rest(t, x) else { return sizes };
+        let Some(way) = minimum_norm::step(&jacobian, &rates, n) else { return sizes };
+        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+        let fastest =
+            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
+        for (i, size) in sizes.iter_mut().enumerate() {
+            let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * way.step[j]).abs()).sum();
+            let soon = if fastest > 0.0 { pull.max(rates[i].abs()) / fastest } else { 0.0 };
+            *size = size.max(way.step[i].abs()).max(soon);
+        }
+        sizes
     }
 
     /// Conditions in which one unknown is left determine it; all of one pass at once.
