@@ -159,6 +159,31 @@ fn a_thousand_jumps() {
 }
 
 #[test]
+fn corners_do_not_start_anew() {
+    // 1000 rows in 10 s: an explicit step a row, 6 evaluations and one beyond the corner.
+    for (method, steps, rates) in [(Explicit, 1000, 7001), (Auto, 1000, 7001), (Bdf, 25_000, 40_000)] {
+        let mut system = zigzag();
+        let (samples, end) = system.run(&options(method, 1e-6, 10.0));
+        let summary = end.unwrap();
+        assert!(summary.steps <= steps && summary.rates <= rates, "{method:?}: {summary:?}");
+        let error = system.error(&samples);
+        assert!(error < 1e-6, "{method:?}: {error:e}, {summary:?}");
+    }
+}
+
+#[test]
+fn fine_tables_cost_few_steps_a_row() {
+    for (method, steps, rates) in [(Explicit, 1000, 7001), (Auto, 1000, 7001), (Bdf, 6500, 8500)] {
+        let mut system = table_of_a_sine();
+        let (samples, end) = system.run(&options(method, 1e-6, 1.0));
+        let summary = end.unwrap();
+        assert!(summary.steps <= steps && summary.rates <= rates, "{method:?}: {summary:?}");
+        let error = system.error(&samples);
+        assert!(error < 1e-6, "{method:?}: {error:e}, {summary:?}");
+    }
+}
+
+#[test]
 fn every_bounce_is_found() {
     // Half the speed is kept: each flight takes half the time of the one before.
     let first = (2.0_f64 / 9.81).sqrt();

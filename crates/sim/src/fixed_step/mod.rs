@@ -1,4 +1,8 @@
 //! Methods with a step of fixed length, for reproducible runs and real time. A step only computes.
+//!
+//! Announced jumps are met exactly, by a shorter step. Switches of the state are not located: the step in which one is
+//! crossed is finished on the old side, beyond the switch, and the new side holds from its end on. That costs at most an
+//! error of the order of the step where the rates jump, of its square where they only bend.
 
 mod implicit_midpoint;
 

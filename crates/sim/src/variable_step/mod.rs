@@ -21,6 +21,10 @@ trait Integrator {
     /// Starts anew at `(t, x)`, where the rates are `dx`, with a first step of about `h`.
     fn restart(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
 
+    /// Goes on at `(t, x)`, where the last step ended and the rates `dx` are what they were at its end, though they may
+    /// change otherwise than before: with a first step of at most `h`.
+    fn resume(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
+
     /// Takes one step that meets the tolerances and ends at `stop` at the latest.
     fn step(&mut self, stop: f64) -> Result<(), Failure>;
 
@@ -35,6 +39,9 @@ trait Integrator {
 
     /// The state where the last step ended.
     fn state(&self) -> &[f64];
+
+    /// Writes the rates where the last step ended, in the mode of that step.
+    fn end_rates(&self, dx: &mut [f64]) -> Result<(), Failure>;
 
     /// The state at a time inside the last step, to the accuracy of the step.
     fn between(&mut self, t: f64, x: &mut [f64]);
@@ -100,6 +107,12 @@ struct Drive<'r, 'a, 'i> {
     chatter: &'r mut Chatter,
     stiffness: Option<Stiffness>,
     interpolated: Vec<f64>,
+    /// Rates just before the last announced jump.
+    end_rates: Vec<f64>,
+    /// Step to go on with, where the run stands at an announced jump that left the state alone.
+    resume: Option<f64>,
+    /// Whether the last announced jump was a mere corner, over which the method went on.
+    corner: bool,
 }
 
 impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
@@ -111,7 +124,8 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         stiffness: Option<Stiffness>,
     ) -> Self {
         let interpolated = vec![0.0; method.state().len()];
-        Drive { run, method, tolerances, chatter, stiffness, interpolated }
+        let end_rates = interpolated.clone();
+        Drive { run, method, tolerances, chatter, stiffness, interpolated, end_rates, resume: None, corner: false }
     }
 
     fn run(mut self, x: &mut [f64]) -> Result<End, Failure> {
@@ -144,7 +158,8 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         if self.tolerances.guess(&mut *self.run.shared.system(), self.run.time, x, interval)? {
             return Ok(Some(End::Grown));
         }
-        self.restart(stop, x)?;
+        self.set_off(stop, x)?;
+        let mut longest: f64 = 0.0;
         while self.run.time < stop {
             let stop_now = self.run.options.step.map_or(stop, |longest| stop.min(self.run.time + longest));
             self.method.step(stop_now)?;
@@ -155,12 +170,16 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
                 self.cross(time, switch, x)?;
                 return Ok(None);
             }
+            longest = longest.max(end - self.run.time);
             x.copy_from_slice(self.method.state());
             self.run.reach(end, x)?;
             self.samples_before(end)?;
             if jump && end == stop {
                 self.run.counts.jumps += 1;
+                self.method.end_rates(&mut self.end_rates)?;
                 self.run.settle_at_jump(x)?;
+                let same = x == self.method.state();
+                self.resume = same.then(|| longest.max(self.method.next_step()));
             } else {
                 self.run.settle(x)?;
             }
@@ -171,15 +190,32 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         Ok(None)
     }
 
-    fn restart(&mut self, stop: f64, x: &[f64]) -> Result<(), Failure> {
-        let longest = (stop - self.run.time).min(self.run.options.step.unwrap_or(f64::INFINITY));
-        let mut rates = vec![0.0; x.len()];
+    /// Starts the method where the run stands, or goes on with it over a corner, where neither the state nor its rates
+    /// jump: rows of an input table are such corners.
+    fn set_off(&mut self, stop: f64, x: &[f64]) -> Result<(), Failure> {
+        let (time, mut rates) = (self.run.time, vec![0.0; x.len()]);
+        let longest = (stop - time).min(self.run.options.step.unwrap_or(f64::INFINITY));
+        let resume = self.resume.take();
+        if let Some(step) = resume {
+            self.run.shared.system().rates(time, x, &mut rates)?;
+            self.corner = self.is_corner(&rates, x);
+            if self.corner {
+                return self.method.resume(time, x, &rates, step.min(longest));
+            }
+        }
         let order = self.method.first_order();
         let step = {
             let system = &mut *self.run.shared.system();
-            first_step(system, self.tolerances, order, self.run.time, x, longest, &mut rates)?
+            first_step(system, self.tolerances, order, time, x, longest, &mut rates)?
         };
-        self.method.restart(self.run.time, x, &rates, step)
+        self.method.restart(time, x, &rates, step)
+    }
+
+    /// Whether the step that ended at `x` would not have told `rates` from its own.
+    fn is_corner(&self, rates: &[f64], x: &[f64]) -> bool {
+        let jump: Vec<f64> = self.end_rates.iter().zip(rates).map(|(before, after)| after - before).collect();
+        let length = self.method.time() - self.method.start();
+        self.tolerances.norm(&jump, x) * length <= 1.0
     }
 
     /// The first crossing of a switching function in the step that ends at `end`, and which it is.
@@ -215,7 +251,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     /// Whether another integrator should go on from here.
     fn hand_over(&mut self, stop: f64, x: &[f64]) -> Option<End> {
         let (time, step) = (self.run.time, self.method.time() - self.method.start());
-        let remaining = stop - time;
+        let remaining = if self.corner { self.run.options.to } else { stop } - time;
         if self.tolerances.watch(x) {
             return Some(End::Grown);
         }

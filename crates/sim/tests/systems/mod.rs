@@ -390,3 +390,46 @@ pub fn ladder<const SECTIONS: usize>() -> Known {
     system.sparsity = Sparsity::from_columns((0..2 * SECTIONS).map(near));
     system
 }
+
+/// `x' = a - x`, where `a` runs up and down between 0 and 1 in straight lines, one every 10 ms.
+pub fn zigzag() -> Known {
+    const ROW: f64 = 0.01;
+    fn input(t: f64, interval: usize) -> f64 {
+        let part = t / ROW - interval as f64;
+        if interval.is_multiple_of(2) { part } else { 1.0 - part }
+    }
+    let mut system = Known::new(
+        &[1.0],
+        |t, x, mode, dx| dx[0] = input(t, mode.interval) - x[0],
+        |_, _, v, _, jv| jv[0] = -v[0],
+        |t| {
+            // In a row that starts at `x` with `a` of slope `s`: the line `a - s`, and what decays towards it.
+            let row = |x: f64, interval: usize, time: f64| {
+                let slope = if interval.is_multiple_of(2) { 1.0 / ROW } else { -1.0 / ROW };
+                let start = (interval % 2) as f64;
+                start + slope * time - slope + (x - start + slope) * (-time).exp()
+            };
+            let rows = (t / ROW + 1e-9).floor() as usize;
+            let x = (0..rows).fold(1.0, |x, interval| row(x, interval, ROW));
+            vec![row(x, rows, t - rows as f64 * ROW)]
+        },
+    );
+    system.jumps = (1..=1000).map(|i| i as f64 * ROW).collect();
+    system
+}
+
+/// `x' = a - x`, where `a` is a table of `sin t` with a row every ms, straight in between.
+pub fn table_of_a_sine() -> Known {
+    const ROW: f64 = 1e-3;
+    let mut system = Known::new(
+        &[1.0],
+        |t, x, mode, dx| {
+            let (start, end) = (mode.interval as f64 * ROW, (mode.interval + 1) as f64 * ROW);
+            dx[0] = start.sin() + (t - start) / ROW * (end.sin() - start.sin()) - x[0];
+        },
+        |_, _, v, _, jv| jv[0] = -v[0],
+        |t| vec![0.5 * (t.sin() - t.cos()) + 1.5 * (-t).exp()],
+    );
+    system.jumps = (1..=10_000).map(|i| i as f64 * ROW).collect();
+    system
+}

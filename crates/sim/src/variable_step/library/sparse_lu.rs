@@ -1,0 +1,131 @@
+//! Sparse linear equations that say when they have no solution, where the library's own solver panics.
+
+use diffsol_la::error::{LaError, LinearSolverError};
+use diffsol_la::linear_solver::LinearSolver;
+use diffsol_la::{FaerContext, FaerSparseMat, FaerVec, IndexType, LinearOp, Matrix, MatrixCommon, Vector};
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+
+/// A sparse matrix and its triangular factors. A singular matrix leaves none; Newton is told so when it asks for a
+/// solution, and the integrator tries a shorter step.
+#[derive(Default)]
+pub(super) struct SparseLu {
+    matrix: Option<FaerSparseMat<f64>>,
+    symbolic: Option<SymbolicLu<IndexType>>,
+    factors: Option<Lu<IndexType, f64>>,
+}
+
+impl SparseLu {
+    /// Replaces `b` by what `solve` makes of it.
+    fn apply(
+        &self,
+        b: &mut FaerVec<f64>,
+        solve: impl FnOnce(&Lu<IndexType, f64>, &Mat<f64>) -> Mat<f64>,
+    ) -> Result<(), LaError> {
+        let factors = self.factors.as_ref().ok_or(LinearSolverError::LuSolveFailed)?;
+        let x = solve(factors, &Mat::from_fn(b.len(), 1, |i, _| b.get_index(i)));
+        (0..b.len()).for_each(|i| b.set_index(i, x[(i, 0)]));
+        match (0..b.len()).all(|i| x[(i, 0)].is_finite()) {
+            true => Ok(()),
+            false => Err(LinearSolverError::LuSolveFailed.into()),
+        }
+    }
+}
+
+impl LinearSolver<FaerSparseMat<f64>> for SparseLu {
+    fn set_sparsity<C>(&mut self, op: &C)
+    where
+        C: LinearOp<T = f64, V = FaerVec<f64>, M = FaerSparseMat<f64>, C = FaerContext>,
+    {
+        let matrix = FaerSparseMat::new_from_sparsity(op.nrows(), op.ncols(), op.sparsity(), *op.context());
+        self.symbolic = SymbolicLu::try_new(matrix.inner()[0].symbolic()).ok();
+        self.matrix = Some(matrix);
+        self.factors = None;
+    }
+
+    fn set_linearisation<C>(&mut self, op: &C)
+    where
+        C: LinearOp<T = f64, V = FaerVec<f64>, M = FaerSparseMat<f64>, C = FaerContext>,
+    {
+        self.factors = None;
+        if let (Some(matrix), Some(symbolic)) = (&mut self.matrix, &self.symbolic) {
+            op.matrix_inplace(matrix);
+            self.factors = Lu::try_new_with_symbolic(symbolic.clone(), matrix.inner()[0].as_ref()).ok();
+        }
+    }
+
+    fn solve_in_place(&self, b: &mut FaerVec<f64>) -> Result<(), LaError> {
+        self.apply(b, |factors, b| factors.solve(b))
+    }
+
+    fn solve_transpose_in_place(&self, b: &mut FaerVec<f64>) -> Result<(), LaError> {
+        self.apply(b, |factors, b| factors.solve_transpose(b))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use diffsol_la::VectorIndex;
+    use diffsol_la::matrix::sparsity::MatrixSparsity;
+
+    /// A matrix of three diagonals.
+    struct Tridiagonal {
+        context: FaerContext,
+        below: f64,
+        on: f64,
+        above: f64,
+    }
+
+    const ROWS: usize = 3;
+
+    impl LinearOp for Tridiagonal {
+        type T = f64;
+        type V = FaerVec<f64>;
+        type M = FaerSparseMat<f64>;
+        type C = FaerContext;
+
+        fn nrows(&self) -> IndexType {
+            ROWS
+        }
+        fn ncols(&self) -> IndexType {
+            ROWS
+        }
+        fn context(&self) -> &FaerContext {
+            &self.context
+        }
+        fn sparsity(&self) -> Option<<FaerSparseMat<f64> as Matrix>::Sparsity> {
+            let near = |i: usize| (i.saturating_sub(1)..=(i + 1).min(ROWS - 1)).map(move |row| (row, i));
+            MatrixSparsity::<FaerSparseMat<f64>>::try_from_indices(ROWS, ROWS, (0..ROWS).flat_map(near).collect()).ok()
+        }
+        fn matrix_inplace(&self, matrix: &mut FaerSparseMat<f64>) {
+            let values = [self.on, self.below, self.above, self.on, self.below, self.above, self.on];
+            let (indices, values) = ((0..7).collect::<Vec<_>>(), FaerVec::from_vec(values.to_vec(), *self.context()));
+            let index = VectorIndex::from_vec(indices, *self.context());
+            matrix.set_data_with_indices(&index, &index, &values);
+        }
+    }
+
+    fn solve(below: f64, on: f64, above: f64) -> Result<Vec<f64>, LaError> {
+        let (op, mut lu) = (Tridiagonal { context: FaerContext::default(), below, on, above }, SparseLu::default());
+        lu.set_sparsity(&op);
+        lu.set_linearisation(&op);
+        let mut b = FaerVec::from_vec(vec![0.0, 0.0, 4.0], *op.context());
+        lu.solve_in_place(&mut b)?;
+        Ok((0..ROWS).map(|i| b.get_index(i)).collect())
+    }
+
+    #[test]
+    fn solves_what_has_a_solution() {
+        let x = solve(-1.0, 2.0, -1.0).unwrap();
+        assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15), "{x:?}");
+    }
+
+    #[test]
+    fn says_what_has_none() {
+        assert!(solve(0.0, 0.0, 0.0).is_err());
+        assert!(solve(1.0, 0.0, 1.0).is_err());
+        assert!(solve(0.0, 0.0, 1.0).is_err());
+    }
+}
