@@ -227,7 +227,7 @@ struct Miss<'a> {
 impl Miss<'_> {
     fn note(&mut self, sample: usize, miss: f64, scale: f64, what: &str) {
         let value = relative(miss, scale);
-        if self.greatest.as_ref().is_none_or(|g| !(value <= g.value)) {
+        if self.greatest.as_ref().is_none_or(|g| value > g.value || value.is_nan()) {
             let place = format!("{}: {what}", self.name);
             keep(self.greatest, Finding { value, time: self.times[sample], place, resolution: 0.0 });
         }

@@ -31,7 +31,7 @@ pub(crate) fn power(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Stri
             let sum: f64 = powers.iter().map(|p| p[sample]).sum();
             let value = relative(sum, most);
             let place = format!("the part with {}", graph.elements[ports[0].element].name);
-            if greatest.as_ref().is_none_or(|g: &Finding| !(value <= g.value)) {
+            if greatest.as_ref().is_none_or(|g: &Finding| value > g.value || value.is_nan()) {
                 keep(&mut greatest, Finding { value, time, place, resolution: 0.0 });
             }
         }

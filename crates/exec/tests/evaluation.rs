@@ -260,3 +260,40 @@ fn a_ladder_is_sparse_and_small() {
     assert_eq!(model.sparsity().nonzeros(), 3 * n - 2);
     assert_eq!(model.sparsity().column(5), [4, 5, 6]);
 }
+
+/// Prints how long a ladder of 10,000 sections takes to become a model: `cargo test --release -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement"]
+fn measure_a_long_ladder() {
+    let n = 10_000;
+    let mut s = Sketch::default();
+    let one = s.number(1.0);
+    let states: Vec<Expr> = (0..n).map(|i| s.state(&format!("x{i}"))).collect();
+    let parameters: Vec<Expr> = (0..n).map(|i| s.parameter(&format!("r{i}"), one)).collect();
+    let mut flows = Vec::new();
+    for i in 0..n {
+        let (flow, e) = s.symbol(&format!("f{i}"));
+        let next = if i + 1 < n { states[i + 1] } else { one };
+        let drop = s.x.sub(states[i], next);
+        let value = s.x.div(drop, parameters[i]);
+        s.step(Step::Assign { symbol: flow, value });
+        s.hidden(&format!("R{i}.f"), e);
+        flows.push(e);
+    }
+    for i in 0..n {
+        let before = if i > 0 { flows[i - 1] } else { one };
+        let rate = s.x.sub(before, flows[i]);
+        s.rate(&format!("x{i}"), rate);
+        s.start(&format!("x{i}"), states[i], 1.0);
+    }
+    let equations = s.equations();
+    let start = std::time::Instant::now();
+    let program = schedule(&equations);
+    let scheduled = start.elapsed();
+    let mut model = Model::new(program).unwrap();
+    let made = start.elapsed();
+    let x = model.initialise(0.0).unwrap();
+    let begun = start.elapsed();
+    rates(&mut model, 0.0, &x);
+    println!("scheduled {scheduled:?}, made {made:?}, begun {begun:?}");
+}

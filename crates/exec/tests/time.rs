@@ -8,7 +8,7 @@ use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_exec::Model;
 use halfarrow_sim::{Method, Options, Sink, Summary, System, simulate};
 
-struct Last(Vec<(f64, Vec<f64>)>);
+struct Last(Rows);
 
 impl Sink for Last {
     fn sample(&mut self, t: f64, values: &[f64]) {
@@ -16,7 +16,9 @@ impl Sink for Last {
     }
 }
 
-fn run(model: &mut Model, to: f64, rtol: f64) -> (Vec<f64>, Summary, Vec<(f64, Vec<f64>)>) {
+type Rows = Vec<(f64, Vec<f64>)>;
+
+fn run(model: &mut Model, to: f64, rtol: f64) -> (Vec<f64>, Summary, Rows) {
     let mut x = model.initialise(0.0).unwrap();
     let mut sink = Last(Vec::new());
     let options = Options { to, rtol, method: Method::Explicit, ..Options::default() };
@@ -77,7 +79,7 @@ fn pulses_jump_at_their_edges_to_the_last_bit() {
     let found = jumps(&mut model, 100.0);
     assert_eq!(found.len(), 2000);
     for (i, &t) in found.iter().enumerate() {
-        let exact = 0.1 * ((i + 1) / 2) as f64 + if i % 2 == 0 { 0.03 } else { 0.0 };
+        let exact = 0.1 * i.div_ceil(2) as f64 + if i % 2 == 0 { 0.03 } else { 0.0 };
         assert!((t - exact).abs() <= 4.0 * f64::EPSILON * exact.max(1.0), "{i}: {t} {exact}");
     }
     let (x, ..) = run(&mut model, 2.0, 1e-6);

@@ -174,7 +174,7 @@ impl Model {
             let terms = group.unknowns.iter().enumerate().map(|(j, &u)| (jacobian[i * n + j] * z[u as usize]).abs());
             asked(i) + terms.sum::<f64>()
         };
-        (0..residual.len()).filter(|&i| !(residual[i].abs() <= MET * size(i))).collect()
+        (0..residual.len()).filter(|&i| residual[i].abs() > MET * size(i) || residual[i].is_nan()).collect()
     }
 
     /// Gauss-Newton of minimum norm, damped.
