@@ -6,7 +6,7 @@ use super::blocks::{Insoluble, Ordered, order};
 use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
 use super::{Equations, Form, State, StateKind, Step, Unavailable, conserved, display, observed};
-use crate::algebra::Symbol;
+use crate::algebra::{Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
@@ -20,17 +20,21 @@ use crate::unit::Unit;
 pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let Form::Minimal = form;
     let graph = &causal.graph;
-    let mut assembled = assemble(causal).map_err(|(symbol, reason)| needs_rate(graph, symbol, &reason))?;
+    let mut assembled =
+        assemble(causal).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     let conserved = conserved::eliminate(&mut assembled, causal);
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {
         if let Some(reason) = d.missing.get(&d.states[&state.symbol]) {
-            return Err(needs_rate(graph, state.symbol, reason));
+            return Err(needs_rate(graph, &d.x, state.symbol, reason));
         }
     }
     let mut ordered = sort(&mut d, &rates).map_err(|insoluble| no_solution(&d, &insoluble))?;
+    if let Some(lost) = lost_in_itself(&d) {
+        return Err(through_itself(graph, &d.x, lost));
+    }
     for &pivot in &causal.ports.watched {
         ordered.steps.push(Step::Watch { pivot, elements: readers(&d, pivot) });
     }
@@ -113,11 +117,27 @@ fn reachable(d: &Definitions, from: &BTreeSet<Symbol>) -> Vec<Symbol> {
     seen.into_iter().collect()
 }
 
-fn needs_rate(graph: &BondGraph, symbol: Symbol, reason: &Unavailable) -> Diagnostics {
-    let name = graph.exprs.name(symbol).trim_end_matches(['\'', '*']).to_string();
+/// An effort or flow that is defined only through itself: what the model does is then not known.
+fn lost_in_itself(d: &Definitions) -> Option<Symbol> {
+    let of_a_bond = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Effort(_) | Meaning::Flow(_)));
+    d.missing.iter().find(|(s, why)| **why == Unavailable::Unsolvable && of_a_bond(s)).map(|(s, _)| *s)
+}
+
+fn through_itself(graph: &BondGraph, x: &Exprs, symbol: Symbol) -> Diagnostics {
+    let name = x.name(symbol).trim_end_matches('*');
+    let span = span_of_symbols(graph, &[symbol]);
+    Diagnostic::error(codes::E002, format!("{name} is only defined through itself"), span, "it acts here")
+        .note("a source reads an effort or flow that exists only as the answer to that source")
+        .hint("put an R there instead of the source, or let the source read through a filter, `state y' = (x - y)/tau`")
+        .into()
+}
+
+fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable) -> Diagnostics {
+    let name = x.name(symbol).trim_end_matches(['\'', '*']).to_string();
     let input = match reason {
         Unavailable::NeedsRateOf(input) => input.clone(),
-        _ => "a variable that is not determined".into(),
+        Unavailable::Unsolvable => return through_itself(graph, x, symbol),
+        Unavailable::Undetermined => return not_determined(graph, symbol, &name),
     };
     let span = graph.inputs.values().find(|i| i.name == input).map(|i| i.span).unwrap_or_default();
     Diagnostic::error(
@@ -129,6 +149,15 @@ fn needs_rate(graph: &BondGraph, symbol: Symbol, reason: &Unavailable) -> Diagno
     .note("it sets the ratio between storages that depend on each other; when the ratio changes, so do their momenta")
     .hint(format!("pass it through a filter, `state n' = ({input} - n)/tau`, and use n"))
     .into()
+}
+
+fn not_determined(graph: &BondGraph, symbol: Symbol, name: &str) -> Diagnostics {
+    let span = span_of_symbols(graph, &[symbol]);
+    let title = format!("the rate of {name} reads a variable that is not determined");
+    Diagnostic::error(codes::E002, title, span, "this needs it")
+        .note("nothing in the structure says how large it is: a flow or an effort that circulates, or one that nothing takes up")
+        .hint("read another variable, or put an element where this one can do work")
+        .into()
 }
 
 fn no_solution(d: &Definitions, insoluble: &Insoluble) -> Diagnostics {

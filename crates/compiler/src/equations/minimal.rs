@@ -48,7 +48,7 @@ pub struct Balance {
 /// A rate whose definition waits until all states are known.
 enum Later {
     /// The rate of the state `z` makes the rate of `X(z)` equal to what the bond carries.
-    Speed { rate: Symbol, stored: Expr, bond: Symbol },
+    Speed { z: Symbol, rate: Symbol, stored: Expr, bond: Symbol },
     /// The rate of a dependent storage follows by differentiating what defines its stored quantity.
     Dependent { rate: Symbol, stored: Symbol },
     /// `pi' = structure + S'^T X_d`.
@@ -315,7 +315,7 @@ impl<'a> Assembled<'a> {
         self.d.set(cell.stored, stored);
         let rate = self.d.state(cell.z);
         self.choose(cell, cell.z);
-        self.later.push(Later::Speed { rate, stored, bond: cell.rate });
+        self.later.push(Later::Speed { z: cell.z, rate, stored, bond: cell.rate });
         let followers = self.followers(cell.z, group);
         self.balance(cell.z, stored, cell.rate, &followers);
     }
@@ -516,8 +516,8 @@ impl Assembled<'_> {
         for later in std::mem::take(&mut self.later) {
             let d = &mut self.d;
             match later {
-                Later::Speed { rate, stored, bond } => {
-                    let change = d.rate(stored).map_err(|reason| (rate, reason))?;
+                Later::Speed { z, rate, stored, bond } => {
+                    let change = d.rate(stored).map_err(|reason| (z, reason))?;
                     let bond = d.x.sym(bond);
                     let residual = d.x.sub(change, bond);
                     d.of.insert(rate, Definition::Implicit(residual));

@@ -151,12 +151,14 @@ fn check_all(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
 fn refused_for_cause(graph: &Graph, count: &Count, codes: &[&str]) -> bool {
     // A source that reads what it acts on may make the equations singular; or it could be found only by giving up that
     // it is a source.
-    if graph.senses() && (!count.consistent || !count.regular || codes == ["C001"] || codes == ["C002"]) {
+    if graph.senses()
+        && (!count.consistent || !count.regular || codes == ["C001"] || codes == ["C002"] || codes == ["E002"])
+    {
         return true;
     }
     // What is integrated has to be determined.
     let flow = |&j: &usize| !count.determined[graph.bonds_at(j)[0].0].1;
-    codes == ["E001"] && graph.integrals().iter().any(flow)
+    codes == ["E002"] && graph.integrals().iter().any(flow)
 }
 
 fn check_counts(built: &Built, count: &Count, seen: &mut Seen) -> Result<(), Fault> {
