@@ -6,13 +6,16 @@ use crate::{Failure, System};
 /// Times the system is looked at: at the start, then where the states known so far will have moved.
 const LOOKS: usize = 4;
 
+/// Part of what moves a state below which its magnitude is what rounding left of it: a machine at rest in equilibrium.
+const NOISE: f64 = 1e-12;
+
 /// Steps of the growth of a matrix's powers, of which the last half is believed.
 const POWERS: usize = 16;
 
 /// A nonzero of the Jacobian: row, column and absolute value, in 1/s once row and column are measured alike.
 type Entry = (usize, usize, f64);
 
-/// Guesses the magnitudes that are 0 in `magnitudes`, where the system stands at `(t, x)`, `interval` s before the next
+/// Guesses the magnitudes that are 0 or mere noise in `magnitudes`, where the system stands at `(t, x)`, `interval` s before the next
 /// jump. A state that nothing can move keeps 0. A low guess costs steps, a high one accuracy.
 ///
 /// A state that moves at once gets what its rate makes of it in the shortest time that the system knows. From there
@@ -39,6 +42,9 @@ pub(super) fn guess_magnitudes(
         };
         let couplings = Couplings::new(entries, interval, x.len());
         let known = magnitudes.iter().filter(|&&magnitude| magnitude > 0.0).count();
+        if look == 0 {
+            couplings.silence(magnitudes);
+        }
         couplings.seed(&rates, magnitudes);
         couplings.spread(magnitudes);
         let now_known = magnitudes.iter().filter(|&&magnitude| magnitude > 0.0).count();
@@ -108,12 +114,31 @@ impl Couplings {
         column.binary_search_by_key(&on, |entry| entry.0).map_or(0.0, |place| column[place].2)
     }
 
+    /// What the magnitudes, by themselves, make of each state in the shortest time.
+    fn moved(&self, magnitudes: &[f64]) -> Vec<f64> {
+        let mut moved = vec![0.0; magnitudes.len()];
+        self.entries
+            .iter()
+            .filter(|(row, column, _)| row != column)
+            .for_each(|&(row, column, value)| moved[row] += self.shortest * value * magnitudes[column]);
+        moved
+    }
+
+    /// Forgets magnitudes that are noise.
+    fn silence(&self, magnitudes: &mut [f64]) {
+        let moved = self.moved(magnitudes);
+        magnitudes
+            .iter_mut()
+            .zip(moved)
+            .filter(|(known, moved)| **known < NOISE * moved)
+            .for_each(|(known, _)| *known = 0.0);
+    }
+
     /// Magnitudes of states that move at once.
     fn seed(&self, rates: &[f64], magnitudes: &mut [f64]) {
-        let mut sums: Vec<f64> = rates.iter().map(|rate| rate.abs()).collect();
-        self.entries.iter().for_each(|&(row, column, value)| sums[row] += value * magnitudes[column]);
-        for (magnitude, sum) in magnitudes.iter_mut().zip(sums) {
-            let moved = self.shortest * sum;
+        let moved = self.moved(magnitudes);
+        for ((magnitude, moved), rate) in magnitudes.iter_mut().zip(moved).zip(rates) {
+            let moved = moved + self.shortest * rate.abs();
             if *magnitude == 0.0 && moved.is_finite() {
                 *magnitude = moved;
             }

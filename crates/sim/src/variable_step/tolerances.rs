@@ -26,6 +26,8 @@ pub(super) struct Tolerances {
     magnitudes: Vec<f64>,
     /// Greatest absolute value of each state so far.
     greatest: Vec<f64>,
+    /// Whether magnitudes were looked at for noise.
+    looked: bool,
 }
 
 impl Tolerances {
@@ -39,7 +41,7 @@ impl Tolerances {
         let greatest: Vec<f64> = x.iter().map(|x| x.abs()).collect();
         let mut magnitudes: Vec<f64> = greatest.iter().zip(system.scales()).map(|(x, scale)| x.max(*scale)).collect();
         magnitudes.iter_mut().for_each(|magnitude| *magnitude = magnitude.max(UNKNOWN));
-        Tolerances { relative: options.rtol, given, magnitudes, greatest }
+        Tolerances { relative: options.rtol, given, magnitudes, greatest, looked: false }
     }
 
     /// The relative one.
@@ -86,15 +88,15 @@ impl Tolerances {
     /// # Errors
     /// What the system reports.
     pub(super) fn guess(&mut self, system: &mut dyn System, t: f64, x: &[f64], interval: f64) -> Result<bool, Failure> {
-        let unknown: Vec<usize> = (0..x.len()).filter(|&i| self.magnitudes[i] == UNKNOWN).collect();
-        if self.given.is_some() || unknown.is_empty() {
+        let looked = std::mem::replace(&mut self.looked, true);
+        if self.given.is_some() || (looked && self.magnitudes.iter().all(|&magnitude| magnitude > UNKNOWN)) {
             return Ok(false);
         }
-        unknown.iter().for_each(|&i| self.magnitudes[i] = 0.0);
+        let before = self.magnitudes.clone();
+        self.magnitudes.iter_mut().filter(|magnitude| **magnitude == UNKNOWN).for_each(|magnitude| *magnitude = 0.0);
         let guessed = guess_magnitudes(system, (t, x), interval, &mut self.magnitudes);
-        unknown.iter().for_each(|&i| self.magnitudes[i] = self.magnitudes[i].max(UNKNOWN));
-        guessed?;
-        Ok(unknown.iter().any(|&i| self.magnitudes[i] > UNKNOWN))
+        self.magnitudes.iter_mut().zip(&before).for_each(|(magnitude, before)| *magnitude = magnitude.max(*before));
+        guessed.map(|()| self.magnitudes != before)
     }
 
     /// Takes the greatest values so far for the magnitudes where they are larger.

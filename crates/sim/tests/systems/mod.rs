@@ -433,3 +433,23 @@ pub fn table_of_a_sine() -> Known {
     system.jumps = (1..=10_000).map(|i| i as f64 * ROW).collect();
     system
 }
+
+/// A mass that hangs on a spring in equilibrium, to rounding, until the hook is drawn up and down from 1 s on: velocity
+/// in m/s, length in m.
+pub fn hanging() -> Known {
+    let mut system = Known::new(
+        &[0.0, 9.81 / 3.0],
+        |t, x, mode, dx| {
+            let hook = if mode.interval == 0 { 0.0 } else { 0.2 * (t - 1.0).sin() };
+            (dx[0], dx[1]) = (3.0 * x[1] - 9.81 * (1.0 + f64::EPSILON), hook - x[0]);
+        },
+        |_, _, v, _, jv| (jv[0], jv[1]) = (3.0 * v[1], -v[0]),
+        |t| {
+            let (late, root) = ((t - 1.0).max(0.0), 3.0_f64.sqrt());
+            let velocity = 0.3 * (late.sin() - (root * late).sin() / root);
+            vec![velocity, 9.81 / 3.0 + 0.1 * (late.cos() - (root * late).cos())]
+        },
+    );
+    system.jumps = vec![1.0];
+    system
+}
