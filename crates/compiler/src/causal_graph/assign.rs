@@ -74,20 +74,21 @@ impl Part<'_> {
         let drawn: BTreeMap<PortRef, bool> =
             outer_ports(self.graph, self.members).into_iter().filter_map(|p| Some((p, strokes.at(p)?))).collect();
         strokes.undo(mark);
-        let before = loop_size(self.graph, &table);
+        let start = turnable.keys().map(|&p| (p, drawn[&p])).collect();
+        let before = (loop_size(self.graph, &table, turned(self.graph, &turnable, &start)), start);
         let best = self.best_laws(strokes, &drawn, &turnable, before);
         strokes.undo(mark);
         self.laws = best.iter().map(|(&p, &here)| (p, causality_of(here))).collect();
         self.assign(strokes)
     }
 
-    /// Invertible laws whose port signals lie on a causal loop.
-    fn laws_on_loops(&mut self, table: &Table<BondId, Stroke>) -> Vec<PortRef> {
+    /// Invertible laws whose port signals lie on a causal loop, and whether they are linear.
+    fn laws_on_loops(&mut self, table: &Table<BondId, Stroke>) -> BTreeMap<PortRef, bool> {
         let signals = signal_graph(self.graph, table);
         let looped: BTreeSet<usize> =
             break_set::cyclic_components(&signals.algebraic_successors()).into_iter().flatten().collect();
         if looped.is_empty() {
-            return Vec::new();
+            return BTreeMap::new();
         }
         let ports = outer_ports(self.graph, self.members);
         let on_loop = |p: &PortRef| {
@@ -96,20 +97,22 @@ impl Part<'_> {
                 && [NodeId::effort(bond), NodeId::flow(bond)].iter().any(|n| looped.contains(&n.index()))
         };
         let found: Vec<PortRef> = ports.into_iter().filter(on_loop).collect();
-        found.into_iter().filter(|&p| self.is_invertible(p)).collect()
+        found.into_iter().filter_map(|p| Some((p, self.linear_if_invertible(p)?))).collect()
     }
 
-    fn is_invertible(&mut self, port: PortRef) -> bool {
-        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return false };
+    /// Whether a law is linear; `None` if it cannot be met in both directions.
+    fn linear_if_invertible(&mut self, port: PortRef) -> Option<bool> {
+        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return None };
         let bond = &self.graph.bonds[self.graph.bond_of(port)];
         let (given, law, wanted) = match laws[port.port as usize] {
             ResistorLaw::Resistive(e) => (bond.effort, e, bond.flow),
             ResistorLaw::Conductive(f) => (bond.flow, f, bond.effort),
-            ResistorLaw::Implicit(_) => return true,
+            ResistorLaw::Implicit(_) => return Some(true),
         };
         let given = self.x.sym(given);
         let residual = self.x.sub(given, law);
-        self.x.solve_for(residual, wanted).is_some()
+        self.x.solve_for(residual, wanted)?;
+        Some(self.x.linear_in(residual, &[wanted]).is_some())
     }
 
     /// The causality of laws that leaves the smallest loops, found by trial on the strokes.
@@ -117,13 +120,14 @@ impl Part<'_> {
         &mut self,
         strokes: &mut Strokes,
         drawn: &BTreeMap<PortRef, bool>,
-        turnable: &[PortRef],
-        before: Loops,
-    ) -> BTreeMap<PortRef, bool> {
-        let start: BTreeMap<PortRef, bool> = turnable.iter().map(|&p| (p, drawn[&p])).collect();
-        let mut best = (before, start.clone());
-        let mut consider = |choice: BTreeMap<PortRef, bool>, best: &mut (Loops, BTreeMap<PortRef, bool>)| {
-            if let Some(size) = self.try_laws(strokes, drawn, &choice)
+        turnable: &BTreeMap<PortRef, bool>,
+        before: (Loops, Choice),
+    ) -> Choice {
+        let start = before.1.clone();
+        let mut best = before;
+        let mut consider = |choice: Choice, best: &mut (Loops, Choice)| {
+            let turned = turned(self.graph, turnable, &choice);
+            if let Some(size) = self.try_laws(strokes, drawn, &choice, turned)
                 && size < best.0
             {
                 *best = (size, choice);
@@ -135,7 +139,7 @@ impl Part<'_> {
                 consider(start.iter().enumerate().map(turned).collect(), &mut best);
             }
         } else {
-            for port in turnable {
+            for port in turnable.keys() {
                 let mut choice = best.1.clone();
                 choice.entry(*port).and_modify(|here| *here = !*here);
                 consider(choice, &mut best);
@@ -149,7 +153,8 @@ impl Part<'_> {
         &mut self,
         strokes: &mut Strokes,
         drawn: &BTreeMap<PortRef, bool>,
-        choice: &BTreeMap<PortRef, bool>,
+        choice: &Choice,
+        turned: usize,
     ) -> Option<Loops> {
         let mark = strokes.mark();
         let mut fine = contradiction::force_strokes(self.graph, strokes, self.members).is_ok();
@@ -162,7 +167,7 @@ impl Part<'_> {
             }
         }
         fine = fine && strokes.complete(self.members).is_ok() && strokes.is_complete(self.members);
-        let size = fine.then(|| loop_size(self.graph, &strokes.table()));
+        let size = fine.then(|| loop_size(self.graph, &strokes.table(), turned));
         strokes.undo(mark);
         size
     }
@@ -196,13 +201,14 @@ impl Part<'_> {
     }
 }
 
-/// How unwelcome loops are: number of break variables, signals on loops that no law is on, signals on any loop.
+/// How unwelcome loops are: number of break variables, signals on loops that no law is on, curved laws met against the
+/// direction in which they are written, signals on any loop.
 ///
 /// Loops without a law are those that can be singular; dividing by their determinant spoils the equations even where
 /// the model is regular. Source: `method.md`, section 3 and 5.1.
-type Loops = (usize, usize, usize);
+type Loops = (usize, usize, usize, usize);
 
-fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>) -> Loops {
+fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>, turned: usize) -> Loops {
     let mut successors = signal_graph(graph, table).algebraic_successors();
     let size = |s: &[Vec<u32>]| break_set::cyclic_components(s).iter().map(Vec::len).sum();
     let (breaks, looped) = (break_set::count(&successors), size(&successors));
@@ -212,7 +218,16 @@ fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>) -> Loops {
             successors[NodeId::flow(port.bond).index()].clear();
         }
     }
-    (breaks, size(&successors), looped)
+    (breaks, size(&successors), turned, looped)
+}
+
+/// For each law whether its stroke sits at it.
+type Choice = BTreeMap<PortRef, bool>;
+
+/// Number of curved laws that a choice meets against the direction in which they are written.
+fn turned(graph: &BondGraph, linear: &BTreeMap<PortRef, bool>, choice: &Choice) -> usize {
+    let against = |(p, here): &(&PortRef, &bool)| !linear[p] && causality_of(**here) != wished(graph, **p);
+    choice.iter().filter(against).count()
 }
 
 fn causality_of(here: bool) -> PortCausality {
@@ -477,6 +492,13 @@ fn spanned(x: &mut Exprs, graph: &BondGraph, solved: &Solved, speed: &Virtual) -
 
 /// Strokes from the exact causality of the ports; what that leaves open is completed by matching.
 fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], solved: &Solved) {
+    for &symbol in &solved.undetermined {
+        if let Some(Meaning::Effort(bond) | Meaning::Flow(bond)) = graph.variables.get(&symbol).map(|v| v.meaning)
+            && is_inner_bond(graph, bond)
+        {
+            strokes.leave_out(bond);
+        }
+    }
     for state in &solved.ports {
         let inertance = matches!(graph.elements[state.port.element].kind, Kind::Inertance(_));
         let here = match (imposes(graph, state.port), state.role) {
@@ -492,11 +514,15 @@ fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], s
     let _ = strokes.complete(members);
 }
 
+fn is_inner_bond(graph: &BondGraph, bond: BondId) -> bool {
+    let bond = &graph.bonds[bond];
+    [bond.from, bond.to].iter().all(|p| graph.elements[p.element].kind.is_inner())
+}
+
 /// Bonds whose effort or flow is undetermined have no stroke, those at sources excepted.
 fn erase(graph: &BondGraph, strokes: &mut Table<BondId, Stroke>, undetermined: &BTreeSet<Symbol>) {
     for (id, bond) in graph.bonds.iter() {
-        let inner = [bond.from, bond.to].iter().all(|p| graph.elements[p.element].kind.is_inner());
-        if inner && (undetermined.contains(&bond.effort) || undetermined.contains(&bond.flow)) {
+        if is_inner_bond(graph, id) && (undetermined.contains(&bond.effort) || undetermined.contains(&bond.flow)) {
             strokes[id] = Stroke::Undetermined;
         }
     }

@@ -1,5 +1,7 @@
 //! Strokes: propagation of causality through the junction structure, with undo, and completion by matching.
 
+use std::collections::BTreeSet;
+
 use petgraph::algo::maximum_matching;
 use petgraph::graph::{NodeIndex, UnGraph};
 
@@ -15,6 +17,9 @@ pub struct Strokes<'a> {
     /// Number of strokes that sit at each element, and number of bonds not yet set.
     here: Table<ElementId, u32>,
     open: Table<ElementId, u32>,
+    /// Bonds at each element, those left out not counted.
+    degree: Table<ElementId, u32>,
+    left_out: BTreeSet<BondId>,
     trail: Vec<BondId>,
 }
 
@@ -30,12 +35,14 @@ pub enum Conflict {
 impl<'a> Strokes<'a> {
     /// Nothing set yet.
     pub fn new(graph: &'a BondGraph) -> Self {
-        let open = graph.elements.values().map(|e| e.ports.len() as u32).collect();
+        let open: Table<ElementId, u32> = graph.elements.values().map(|e| e.ports.len() as u32).collect();
         Strokes {
             graph,
             at_to: Table::filled(graph.bonds.len(), None),
             here: Table::filled(graph.elements.len(), 0),
+            degree: open.clone(),
             open,
+            left_out: BTreeSet::new(),
             trail: Vec::new(),
         }
     }
@@ -55,6 +62,16 @@ impl<'a> Strokes<'a> {
     pub fn set_at(&mut self, port: PortRef, here: bool) -> Result<(), Conflict> {
         let (bond, inward) = self.end(port);
         self.set(bond, here == inward)
+    }
+
+    /// Leaves a bond out: it carries what circulates, and says nothing about causality.
+    pub fn leave_out(&mut self, bond: BondId) {
+        if self.at_to[bond].is_none() && self.left_out.insert(bond) {
+            for (element, _) in self.ends(bond) {
+                self.open[element] -= 1;
+                self.degree[element] -= 1;
+            }
+        }
     }
 
     /// Whether the stroke at a port sits at its element, once it is known.
@@ -96,7 +113,7 @@ impl<'a> Strokes<'a> {
         for &element in members {
             let Some(vertex) = vertex_of[element] else { continue };
             for (index, port) in self.graph.elements[element].ports.iter().enumerate() {
-                if self.at_to[port.bond].is_some() {
+                if self.at_to[port.bond].is_some() || self.left_out.contains(&port.bond) {
                     continue;
                 }
                 let start = PortRef { element, port: index as u32 };
@@ -127,7 +144,8 @@ impl<'a> Strokes<'a> {
         for &element in members {
             for port in 0..self.graph.elements[element].ports.len() as u32 {
                 let port = PortRef { element, port };
-                if self.at(port).is_none() && self.graph.elements[element].kind.is_inner() {
+                let open = self.at(port).is_none() && !self.left_out.contains(&self.graph.bond_of(port));
+                if open && self.graph.elements[element].kind.is_inner() {
                     let unclaimed = !self.claiming_or(port, true);
                     if self.set_at(port, unclaimed).is_err() {
                         self.set_at(port, !unclaimed)?;
@@ -222,7 +240,7 @@ impl<'a> Strokes<'a> {
         while let Some(element) = work.pop() {
             let Some(rest_here) = self.rule(element)? else { continue };
             for port in &self.graph.elements[element].ports {
-                if self.at_to[port.bond].is_none() {
+                if self.at_to[port.bond].is_none() && !self.left_out.contains(&port.bond) {
                     self.put(port.bond, rest_here == port.inward, &mut work)?;
                 }
             }
@@ -232,7 +250,7 @@ impl<'a> Strokes<'a> {
 
     /// What follows at one element: where the strokes of all its open bonds must sit (here or not), if that is decided.
     fn rule(&self, element: ElementId) -> Result<Option<bool>, Conflict> {
-        let ports = self.graph.elements[element].ports.len() as u32;
+        let ports = self.degree[element];
         let (here, open) = (self.here[element], self.open[element]);
         let away = ports - here - open;
         let one_of = |set: u32, sits_here: bool| match (set, open) {
@@ -246,6 +264,11 @@ impl<'a> Strokes<'a> {
         match self.graph.elements[element].kind {
             Kind::Zero => one_of(here, true),
             Kind::One => one_of(away, false),
+            _ if ports < self.graph.elements[element].ports.len() as u32
+                && !is_junction(&self.graph.elements[element].kind) =>
+            {
+                Ok(None)
+            }
             Kind::Transformer { .. } => match (here, away, open) {
                 (1, 0, 1) => Ok(Some(false)),
                 (0, 1, 1) => Ok(Some(true)),
@@ -261,6 +284,10 @@ impl<'a> Strokes<'a> {
             _ => Ok(None),
         }
     }
+}
+
+fn is_junction(kind: &Kind) -> bool {
+    matches!(kind, Kind::Zero | Kind::One)
 }
 
 /// Whether the stroke of a port with this causality sits at its element, which is an `I` (or not).
