@@ -463,6 +463,28 @@ pub struct Constraint {
 }
 
 impl BondGraph {
+    /// The same graph over another pool, in which all its expressions mean the same.
+    pub fn with_exprs(&self, exprs: Exprs) -> BondGraph {
+        BondGraph {
+            name: self.name.clone(),
+            doc: self.doc.clone(),
+            exprs,
+            variables: self.variables.clone(),
+            elements: self.elements.clone(),
+            bonds: self.bonds.clone(),
+            parameters: self.parameters.clone(),
+            inputs: self.inputs.clone(),
+            signals: self.signals.clone(),
+            held: self.held.clone(),
+            lets: self.lets.clone(),
+            outputs: self.outputs.clone(),
+            preferences: self.preferences.clone(),
+            forced_causality: self.forced_causality.clone(),
+            forced_strokes: self.forced_strokes.clone(),
+            constraints: self.constraints.clone(),
+            time: self.time,
+        }
+    }
     /// The bond at a port.
     pub fn bond_of(&self, port: PortRef) -> BondId {
         self.elements[port.element].ports[port.port as usize].bond

@@ -16,15 +16,14 @@ use crate::ids::{Id, Table};
 /// Errors: sources, constraints or forced strokes that cannot hold together, with the smallest set that cannot.
 /// Source: `method.md`, section 2 and 5.1.
 pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
-    let mut graph = graph.clone();
     let mut x = graph.exprs.clone();
-    let wanted = Wanted::of(&mut x, &graph);
-    let mut strokes = Strokes::new(&graph);
+    let wanted = Wanted::of(&mut x, graph);
+    let mut strokes = Strokes::new(graph);
     let mut ports = Ports::default();
     let mut faults = Vec::new();
     let mut undrawn = BTreeSet::new();
-    for members in parts(&graph) {
-        let mut part = Part { x: &mut x, graph: &graph, wanted: &wanted, members: &members, laws: BTreeMap::new() };
+    for members in parts(graph) {
+        let mut part = Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new() };
         match part.assign_with_fewest_breaks(&mut strokes) {
             Ok(solved) => {
                 undrawn.extend(solved.undetermined.iter().copied());
@@ -39,9 +38,8 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     ports.kept = wanted.why;
     ports.ports.sort_by_key(|p| p.port);
     let mut strokes = strokes.table();
-    erase(&graph, &mut strokes, &undrawn);
-    graph.exprs = x;
-    Ok(CausalGraph { graph, strokes, ports })
+    erase(graph, &mut strokes, &undrawn);
+    Ok(CausalGraph { graph: graph.with_exprs(x), strokes, ports })
 }
 
 /// One connected part under assignment, with the causality chosen for some of its algebraic laws.
@@ -381,15 +379,47 @@ impl Part<'_> {
                 }
             }
         }
+        let mut first = solve_part(self.x, graph, members, &wishes);
+        let reading = self.sources_of_rates(&first);
+        if !reading.is_empty() {
+            wishes.sources_as_laws = reading;
+            first = solve_part(self.x, graph, members, &wishes);
+        }
         let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
         if !speeds.is_empty() {
-            let first = solve_part(self.x, graph, members, &wishes);
             wishes.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
-            if wishes.virtual_speeds.is_empty() {
-                return first;
+            if !wishes.virtual_speeds.is_empty() {
+                return solve_part(self.x, graph, members, &wishes);
             }
         }
-        solve_part(self.x, graph, members, &wishes)
+        first
+    }
+
+    /// Sources whose value reads the rate of a storage that they (or others) fix: `Se(1 - 2*c.f)` on the compliance `c`.
+    /// Such a source imposes nothing; it is an algebraic law between effort and flow.
+    fn sources_of_rates(&mut self, solved: &Solved) -> BTreeSet<PortRef> {
+        let rates: BTreeSet<Symbol> =
+            solved.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.input).collect();
+        let mut found = BTreeSet::new();
+        if rates.is_empty() {
+            return found;
+        }
+        let ports = Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() };
+        let mut known = BTreeMap::new();
+        for state in solved.ports.iter().filter(|p| p.role == Role::Source) {
+            let (Kind::EffortSource { value } | Kind::FlowSource { value }) =
+                self.graph.elements[state.port.element].kind
+            else {
+                continue;
+            };
+            for symbol in self.x.symbols_of(value) {
+                let row = ports.resolve(self.x, symbol, &mut known);
+                if row.0.iter().any(|t| rates.contains(&t.0)) {
+                    found.insert(state.port);
+                }
+            }
+        }
+        found
     }
 }
 
@@ -432,6 +462,16 @@ fn is_plain(x: &Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
     })
 }
 
+/// Whether the value of a source reads efforts or flows.
+fn reads_bonds(x: &Exprs, graph: &BondGraph, element: ElementId) -> bool {
+    let (Kind::EffortSource { value } | Kind::FlowSource { value }) = graph.elements[element].kind else {
+        return false;
+    };
+    x.depends_on_any(value, &|s| {
+        matches!(graph.variables.get(&s).map(|v| v.meaning), Some(Meaning::Effort(_) | Meaning::Flow(_)))
+    })
+}
+
 /// The definitions that the strokes give, if they are the whole truth: on trees, and on rings in which all storages are
 /// integral and no signal runs in a circle.
 fn whole_truth(
@@ -442,7 +482,8 @@ fn whole_truth(
 ) -> Option<(Vec<(Symbol, Combination)>, Vec<Expr>)> {
     let bonds: usize = members.iter().map(|&m| graph.elements[m].ports.len()).sum::<usize>() / 2;
     let tree = bonds + 1 == members.len();
-    if !tree && local::roles(graph, members, strokes).iter().any(|p| p.role == Role::Dependent) {
+    let sensing = members.iter().any(|&m| reads_bonds(x, graph, m));
+    if (!tree || sensing) && local::roles(graph, members, strokes).iter().any(|p| p.role == Role::Dependent) {
         return None;
     }
     let (definitions, divisors) = local::definitions(x, graph, members, strokes);

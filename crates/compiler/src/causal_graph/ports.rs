@@ -1,6 +1,6 @@
 //! The causality of ports by exact elimination. Source: `method.md`, 5.1.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Combination, PortState, Role};
 use crate::algebra::{Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate};
@@ -13,6 +13,8 @@ pub struct Wishes {
     pub derivative: Vec<PortRef>,
     /// Causality wished for algebraic ports.
     pub algebraic: BTreeMap<PortRef, PortCausality>,
+    /// Sources that are laws between effort and flow, since what they read depends on what they set.
+    pub sources_as_laws: BTreeSet<PortRef>,
     /// Storages that shall stay independent, first of all.
     pub independent: Vec<PortRef>,
     /// Common variables of junctions that shall stay independent although no storage has them.
@@ -151,7 +153,7 @@ impl Net {
         let minus = x.int(-1);
         for &element in members {
             if !graph.elements[element].kind.is_inner() {
-                net.add_ports(x, graph, element, one, minus);
+                net.add_ports(x, graph, element, one, minus, wishes);
             }
         }
         let outer = net.symbols.len();
@@ -173,7 +175,15 @@ impl Net {
     }
 
     /// Columns of the ports of an element. Where two elements meet on one bond the second gets variables of its own.
-    fn add_ports(&mut self, x: &mut Exprs, graph: &BondGraph, element: ElementId, one: Expr, minus: Expr) {
+    fn add_ports(
+        &mut self,
+        x: &mut Exprs,
+        graph: &BondGraph,
+        element: ElementId,
+        one: Expr,
+        minus: Expr,
+        wishes: &Wishes,
+    ) {
         for (index, port) in graph.elements[element].ports.iter().enumerate() {
             let bond = &graph.bonds[port.bond];
             let (mut effort, mut flow) = (bond.effort, bond.flow);
@@ -190,7 +200,8 @@ impl Net {
                 }
             }
             let port = PortRef { element, port: index as u32 };
-            let offer = offer(graph, port);
+            let law = wishes.sources_as_laws.contains(&port);
+            let offer = if law { Offer::Law } else { offer(graph, port) };
             let (effort, flow) = (self.of(effort), self.of(flow));
             self.ports.push(NetPort { port: Some(port), effort, flow, offer });
         }

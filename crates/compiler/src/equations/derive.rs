@@ -31,7 +31,8 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
             return Err(needs_rate(graph, &d.x, state.symbol, reason));
         }
     }
-    let mut ordered = sort(&mut d, &rates).map_err(|insoluble| no_solution(&d, &insoluble))?;
+    let given: BTreeSet<Symbol> = causal.ports.ports.iter().filter(|p| is_law(p.role)).map(|p| p.input).collect();
+    let mut ordered = sort(&mut d, &rates, &given).map_err(|insoluble| no_solution(&d, &insoluble))?;
     if let Some(lost) = lost_in_itself(&d) {
         return Err(through_itself(graph, &d.x, lost));
     }
@@ -62,7 +63,7 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
     let display::Shown { display, aliases, sources, dependent } = display::display(&mut d, &states, &ordered, &follows);
     let dof =
         causal.ports.ports.iter().filter(|p| p.role == Role::Independent).count() + causal.ports.virtual_speeds.len();
-    let graph = BondGraph { exprs: d.x, ..graph.clone() };
+    let graph = graph.with_exprs(d.x);
     Ok(Equations {
         form,
         graph,
@@ -82,8 +83,13 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
     })
 }
 
-/// All steps: first what the rates of the states need, then what can be observed besides.
-fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
+fn is_law(role: Role) -> bool {
+    matches!(role, Role::Source | Role::Algebraic(_))
+}
+
+/// All steps: first what the rates of the states need, then what can be observed besides. Loops of the latter may be
+/// insoluble (reactions that nobody determines), unless a source or law (`given`) is among them.
+fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>, given: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
     let needed = reachable(d, rates);
     let mut ordered = order(d, &needed, rates)?;
     let done: BTreeSet<Symbol> = needed.into_iter().collect();
@@ -94,6 +100,7 @@ fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>) -> Result<Ordered, Insolu
                 ordered.steps.extend(more.steps);
                 return Ok(ordered);
             }
+            Err(insoluble) if insoluble.members.iter().any(|s| given.contains(s)) => return Err(insoluble),
             Err(insoluble) => {
                 for symbol in insoluble.unknowns {
                     d.missing.insert(symbol, Unavailable::Unsolvable);

@@ -163,6 +163,9 @@ impl<'a> Assembled<'a> {
                     return self.d.set_root(state.input, residual);
                 }
             },
+            // A source whose value depends on what it sets.
+            Kind::EffortSource { value } => (bond.effort, *value, PortCausality::Resistive),
+            Kind::FlowSource { value } => (bond.flow, *value, PortCausality::Conductive),
             Kind::ResidualEffort { residual: Some(r) } | Kind::ResidualFlow { residual: Some(r) } => {
                 let residual = self.own(causal, state, *r);
                 return self.d.set_root(state.input, residual);
