@@ -20,6 +20,7 @@ pub struct Strokes<'a> {
     /// Bonds at each element, those left out not counted.
     degree: Table<ElementId, u32>,
     left_out: BTreeSet<BondId>,
+    /// Bonds set or left out, in order.
     trail: Vec<BondId>,
 }
 
@@ -67,6 +68,7 @@ impl<'a> Strokes<'a> {
     /// Leaves a bond out: it carries what circulates, and says nothing about causality.
     pub fn leave_out(&mut self, bond: BondId) {
         if self.at_to[bond].is_none() && self.left_out.insert(bond) {
+            self.trail.push(bond);
             for (element, _) in self.ends(bond) {
                 self.open[element] -= 1;
                 self.degree[element] -= 1;
@@ -89,7 +91,14 @@ impl<'a> Strokes<'a> {
     pub fn undo(&mut self, mark: usize) {
         while self.trail.len() > mark {
             let bond = self.trail.pop().expect("longer than the mark");
-            let to = self.at_to[bond].take().expect("set when on the trail");
+            let Some(to) = self.at_to[bond].take() else {
+                self.left_out.remove(&bond);
+                for (element, _) in self.ends(bond) {
+                    self.open[element] += 1;
+                    self.degree[element] += 1;
+                }
+                continue;
+            };
             for (element, end_is_to) in self.ends(bond) {
                 self.open[element] += 1;
                 self.here[element] -= u32::from(to == end_is_to);
