@@ -14,8 +14,10 @@ use crate::causal_graph::{break_set::break_set, rank_given};
 /// A loop that has no unique solution, whatever the values are.
 #[derive(Debug, Clone)]
 pub struct Insoluble {
-    /// The variables of the loop.
+    /// The variables at which the loop is torn.
     pub unknowns: Vec<Symbol>,
+    /// All variables of the loop.
+    pub members: Vec<Symbol>,
     /// The elements concerned.
     pub elements: Vec<ElementId>,
 }
@@ -116,7 +118,7 @@ fn block(
     let matrix: Vec<Vec<Expr>> = rows.iter().map(|r| r.0.iter().map(|&e| x.simplify(e)).collect()).collect();
     let right: Vec<Expr> = rows.iter().map(|r| x.neg(r.1)).collect();
     if is_singular(x, &matrix) {
-        return Err(Insoluble { unknowns: torn, elements });
+        return Err(Insoluble { unknowns: torn, members: symbols, elements });
     }
     for (row, &right) in matrix.iter().zip(&right) {
         let terms = torn.iter().copied().zip(row.iter().copied());
