@@ -319,7 +319,8 @@ impl Net {
                 None if role == Role::Independent => solved
                     .virtual_speeds
                     .extend(wishes.virtual_speeds.iter().filter(|v| v.speed == self.symbols[input])),
-                None => {}
+                // Nothing stands there: what does not lead takes up nothing.
+                None => solved.definitions.push((self.symbols[input], Combination::default())),
             }
         }
         let mut defined = vec![false; self.symbols.len()];

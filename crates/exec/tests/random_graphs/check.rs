@@ -156,6 +156,10 @@ fn refused_for_cause(graph: &Graph, count: &Count, codes: &[&str]) -> bool {
     {
         return true;
     }
+    // A modulus that turns with a source's value makes its rate count.
+    if codes == ["E001"] && !graph.inputs().is_empty() && !graph.has_constant_structure() {
+        return true;
+    }
     // What is integrated has to be determined.
     let flow = |&j: &usize| !count.determined[graph.bonds_at(j)[0].0].1;
     codes == ["E002"] && graph.integrals().iter().any(flow)
