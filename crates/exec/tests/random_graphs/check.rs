@@ -491,7 +491,7 @@ fn check_power(graph: &Graph, values: &Values, seen: &mut Seen) -> Result<(), Fa
         scale += signed.abs();
     }
     let error = if sum == 0.0 { 0.0 } else { f64::abs(sum) / scale };
-    seen.within("power", error, 1e-10, || format!("{sum} of {scale}"))
+    seen.within("power", error, 1e-12, || format!("{sum} of {scale}"))
 }
 
 /// The stored quantity of every storage moves as its bond says, by differences along the rates of the model.
