@@ -8,6 +8,7 @@ pub mod ast;
 pub mod bond_graph;
 pub mod causal_graph;
 pub mod causal_paths;
+pub mod compile;
 pub mod diagnostic;
 pub mod equations;
 pub mod ids;

@@ -1,2 +1,39 @@
-//! To be written.
+//! Bond graphs from text to trajectory: load a model, ask it for its causal loops, its equations, its picture, its motion.
+//!
+//! ```
+//! use halfarrow::{Model, Run};
+//! let model = Model::from_text("drop.bond", "model Drop\nSe:weight(9.81 N) -> I:mass(1 kg)\n", &[])?;
+//! let run = Run { to: 2.0, ..Run::default() };
+//! let result = model.simulate(&run, &mut |_| true)?;
+//! let speed = result.trace.columns[0].values.last().unwrap();
+//! assert!((speed - 9.81 * 2.0).abs() < 1e-6);
+//! # Ok::<(), halfarrow::Error>(())
+//! ```
 #![forbid(unsafe_code)]
+
+mod audited;
+mod check;
+mod disk;
+mod draw;
+mod equations;
+mod error;
+mod loops;
+mod model;
+mod run;
+mod stage;
+
+pub use audited::{AuditReport, Miss};
+pub use check::CheckReport;
+pub use draw::Picture;
+pub use equations::{EquationsReport, StateReport};
+pub use error::{Error, Problem};
+pub use halfarrow_compiler::bond_graph::Override;
+pub use halfarrow_compiler::compile::Found;
+pub use halfarrow_compiler::equations::Form;
+pub use halfarrow_sim::fixed_step::FixedMethod;
+pub use halfarrow_sim::{Failure, Method};
+pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_whole};
+pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StorageReport};
+pub use model::{Model, format_text};
+pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
+pub use stage::Stage;

@@ -70,6 +70,11 @@ impl Signal {
         Ok(Signal { times, values })
     }
 
+    /// Values of the samples.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
     /// Times of the samples in s, ascending.
     pub fn times(&self) -> &[f64] {
         &self.times

@@ -96,6 +96,8 @@ codes! {
     L010 "a signal block that cannot be";
     I001 "a start value of the wrong kind";
     I002 "a start value given twice";
+    I003 "start values that contradict each other or a constraint";
+    I004 "start values that no iteration brings together";
 }
 
 #[cfg(test)]

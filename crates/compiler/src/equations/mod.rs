@@ -176,6 +176,16 @@ pub enum Unavailable {
     Unsolvable,
 }
 
+impl std::fmt::Display for Unavailable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Unavailable::Undetermined => f.write_str("the junction structure does not determine it"),
+            Unavailable::NeedsRateOf(input) => write!(f, "it needs the time derivative of the input {input}"),
+            Unavailable::Unsolvable => f.write_str("it needs a rate that is only defined through itself"),
+        }
+    }
+}
+
 /// A start value: `residual = 0` at the start.
 #[derive(Debug, Clone)]
 pub struct Condition {

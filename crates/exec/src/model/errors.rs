@@ -1,6 +1,5 @@
 //! What can be wrong with what a model is given.
 
-use super::reason;
 use halfarrow_compiler::program::Unavailable;
 use halfarrow_compiler::span::Span;
 use halfarrow_sim::Failure;
@@ -67,7 +66,7 @@ impl fmt::Display for RecordError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RecordError::Unknown(name) => write!(f, "there is no variable `{name}` to record"),
-            RecordError::Unavailable(name, why) => write!(f, "`{name}` cannot be recorded: {}", reason(why)),
+            RecordError::Unavailable(name, why) => write!(f, "`{name}` cannot be recorded: {why}"),
         }
     }
 }

@@ -15,7 +15,7 @@ pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, Star
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Layout, Program, Routine, Unavailable, Value};
+use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Layout, Program, Routine, Value};
 use halfarrow_sim::{Failure, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
@@ -276,13 +276,4 @@ fn sparsity_of(program: &Program) -> Sparsity {
         reads.iter().for_each(|&column| columns[column as usize].push(row));
     }
     Sparsity::from_columns(columns)
-}
-
-/// Why a variable has no value, in words.
-fn reason(why: &Unavailable) -> String {
-    match why {
-        Unavailable::Undetermined => "the junction structure does not determine it".to_string(),
-        Unavailable::NeedsRateOf(input) => format!("it needs the time derivative of the input {input}"),
-        Unavailable::Unsolvable => "it needs a rate that is only defined through itself".to_string(),
-    }
 }

@@ -1,0 +1,114 @@
+//! The chain of stages.
+
+use crate::ast::parse;
+use crate::bond_graph::{BondGraph, Files, Override, elaborate};
+use crate::causal_graph::{self, CausalGraph, assign_causality};
+use crate::diagnostic::{Diagnostics, Sources, render};
+use crate::equations::{Equations, Form, derive_equations};
+use crate::program::{Program, schedule};
+
+/// The text of a model, and where the rest of it comes from.
+#[derive(Clone, Copy)]
+pub struct Text<'a> {
+    /// Name under which places in it are reported; what it imports is looked for beside it.
+    pub name: &'a str,
+    /// The text.
+    pub text: &'a str,
+    /// Imported models and tables.
+    pub files: &'a dyn Files,
+    /// Values that replace those of parameters.
+    pub overrides: &'a [Override],
+}
+
+/// A stage's result, with what was noticed on the way to it.
+#[derive(Debug, Clone)]
+pub struct Reached<T> {
+    /// The result.
+    pub ir: T,
+    /// Warnings of this stage and those before it.
+    pub found: Found,
+}
+
+/// What was found out about a model, and the texts it is about.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Errors and warnings, stage by stage, each in the order of the text.
+    pub diagnostics: Diagnostics,
+    /// The files of the model.
+    pub sources: Sources,
+}
+
+/// From model text to what is evaluated.
+///
+/// ```
+/// use halfarrow_compiler::{bond_graph::NoFiles, compile::{Text, compile}, equations::Form};
+/// let text = "model Drop\nSe:weight(9.81 N) -> I:mass(1 kg)\n";
+/// let text = Text { name: "drop.bond", text, files: &NoFiles, overrides: &[] };
+/// assert_eq!(compile(text, Form::Minimal).unwrap().ir.states.len(), 1);
+/// ```
+///
+/// # Errors
+/// All faults of the first stage that fails, and the warnings before it.
+pub fn compile(text: Text<'_>, form: Form) -> Result<Reached<Program>, Found> {
+    Ok(to_equations(text, form)?.then(|equations| schedule(&equations)))
+}
+
+/// Names, units and parts: the bond graph.
+///
+/// # Errors
+/// All faults of the text and of the names, units and bonds in it.
+pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
+    let mut sources = Sources::new();
+    let file = sources.add(text.name, text.text);
+    let parsed = parse(text.text, file);
+    let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
+    let mut diagnostics = Diagnostics(parsed.diagnostics);
+    diagnostics.0.extend(elaborated.diagnostics.0);
+    let found = Found { diagnostics, sources: elaborated.sources };
+    match elaborated.graph {
+        Some(ir) if !found.diagnostics.has_errors() => Ok(Reached { ir, found }),
+        _ => Err(found),
+    }
+}
+
+/// Causality.
+///
+/// # Errors
+/// As [`to_bond_graph`], and sources, constraints or forced strokes that cannot hold together.
+pub fn to_causal_graph(text: Text<'_>) -> Result<Reached<CausalGraph>, Found> {
+    let mut causal = to_bond_graph(text)?.and_then(|bonds| assign_causality(&bonds))?;
+    causal.found.diagnostics.0.extend(causal_graph::warnings(&causal.ir));
+    Ok(causal)
+}
+
+/// The equations in one form.
+///
+/// # Errors
+/// As [`to_causal_graph`], and equations that have no solution.
+pub fn to_equations(text: Text<'_>, form: Form) -> Result<Reached<Equations>, Found> {
+    to_causal_graph(text)?.and_then(|causal| derive_equations(&causal, form))
+}
+
+impl Found {
+    /// For people, under the lines of the model; `color` adds terminal colours.
+    pub fn render(&self, color: bool) -> String {
+        render(&self.diagnostics, &self.sources, color)
+    }
+}
+
+impl<T> Reached<T> {
+    fn then<U>(self, stage: impl FnOnce(T) -> U) -> Reached<U> {
+        Reached { ir: stage(self.ir), found: self.found }
+    }
+
+    fn and_then<U>(self, stage: impl FnOnce(T) -> Result<U, Diagnostics>) -> Result<Reached<U>, Found> {
+        let Reached { ir, mut found } = self;
+        match stage(ir) {
+            Ok(ir) => Ok(Reached { ir, found }),
+            Err(errors) => {
+                found.diagnostics.0.extend(errors.0);
+                Err(found)
+            }
+        }
+    }
+}

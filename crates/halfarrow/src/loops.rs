@@ -1,0 +1,279 @@
+//! Zero-order causal paths and what becomes of them, as plain data.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use halfarrow_compiler::algebra::{Exprs, PlainNames, Symbol, ascii};
+use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
+use halfarrow_compiler::causal_graph::{CausalGraph, PortState, Role, Stroke};
+use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
+use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr};
+use halfarrow_compiler::ids::Id;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::model::Model;
+
+/// What `halfarrow loops` tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopsReport {
+    /// Name of the model.
+    pub model: String,
+    /// Zero-order causal paths, by class.
+    pub paths: Vec<LoopReport>,
+    /// Whether `paths` holds every simple path; if not, one for every break variable.
+    pub complete: bool,
+    /// The strongly connected parts of the algebraic variables.
+    pub components: Vec<ComponentReport>,
+    /// Every port of a storage.
+    pub storages: Vec<StorageReport>,
+    /// Combinations of stored quantities that no motion changes.
+    pub conserved: Vec<ConservedReport>,
+    /// How many equations each form has; integrated signals are not counted.
+    pub counts: Counts,
+    /// Number of independent storages.
+    pub dof: usize,
+}
+
+/// One zero-order causal path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopReport {
+    /// 1 storage to storage, 2 resistor to resistor, 3 resistor to itself, 4 inside the junction structure.
+    pub class: u8,
+    /// What it runs between.
+    pub elements: Vec<String>,
+    /// All elements that it meets, in order.
+    pub route: Vec<String>,
+    /// The bonds it runs along, in order, numbered from 1 as in the drawing.
+    pub bonds: Vec<u32>,
+    /// Its gain, in the model language.
+    pub gain: String,
+    /// The gain at the given parameters and, where it depends on the state, at the start; `None` if it has no value.
+    pub gain_value: Option<f64>,
+    /// Break variables that lie on it.
+    pub breaks: Vec<String>,
+    /// What becomes of it in minimal form.
+    pub resolution: String,
+}
+
+/// A strongly connected part of the algebraic variables.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComponentReport {
+    /// Number of variables in it.
+    pub size: usize,
+    /// A smallest set of break variables.
+    pub breaks: Vec<String>,
+    /// Whether `breaks` is proven to be smallest.
+    pub exact: bool,
+    /// Proven lower bound on the number of break variables.
+    pub lower_bound: usize,
+    /// Determinant (Mason), in the model language; `None` if it was not worked out.
+    pub determinant: Option<String>,
+    /// Whether it vanishes: the part alone has no unique solution.
+    pub singular: bool,
+}
+
+/// One port of a storage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StorageReport {
+    /// Name of the element, for fields with `.port`.
+    pub name: String,
+    /// `integral` or `derivative`, as drawn.
+    pub causality: &'static str,
+    /// Whether its variable is independent.
+    pub independent: bool,
+    /// The independent variables from which the dependent one follows, in the model language.
+    pub follows: Option<String>,
+}
+
+/// A conserved quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConservedReport {
+    /// Its name among the variables.
+    pub name: String,
+    /// What is conserved, in the model language.
+    pub value: String,
+}
+
+/// Numbers of equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Count {
+    /// Differential ones.
+    pub differential: usize,
+    /// Algebraic ones.
+    pub algebraic: usize,
+}
+
+/// Numbers of equations of the forms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Break variables and multipliers beside all storages.
+    #[serde(rename = "break")]
+    pub break_form: Count,
+    /// The paper's inversion.
+    pub inverted: Count,
+    /// The smallest.
+    pub minimal: Count,
+}
+
+impl From<causal_paths::Count> for Count {
+    fn from(count: causal_paths::Count) -> Count {
+        Count { differential: count.differential, algebraic: count.algebraic }
+    }
+}
+
+impl Model {
+    /// The zero-order causal paths and their fate, storages, conserved quantities and counts.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn loops(&self) -> Result<LoopsReport, Error> {
+        let causal = self.causal_graph()?;
+        let paths = find_paths(&causal);
+        let equations = derive_equations(&causal, Form::Minimal).map_err(|errors| self.fault(errors))?;
+        let start = self.values_at_start(&equations);
+        let counted = counts(&causal, &paths);
+        let report = |path| loop_report(&causal.graph, &paths, path, &equations, &start);
+        Ok(LoopsReport {
+            model: self.graph.name.clone(),
+            paths: paths.paths.iter().map(report).collect(),
+            complete: paths.complete,
+            components: components(&paths),
+            storages: storages(&causal),
+            conserved: conserved(&equations),
+            counts: Counts {
+                break_form: counted.break_form.into(),
+                inverted: counted.inverted.into(),
+                minimal: minimal_count(&equations),
+            },
+            dof: equations.dof,
+        })
+    }
+}
+
+/// Storage states and what stays implicit.
+pub(crate) fn minimal_count(equations: &Equations) -> Count {
+    let storages = equations.states.iter().filter(|s| s.kind != StateKind::Signal).count();
+    Count { differential: storages, algebraic: equations.implicit.len() }
+}
+
+fn loop_report(
+    graph: &BondGraph,
+    paths: &CausalPaths,
+    path: &Path,
+    equations: &Equations,
+    start: &BTreeMap<String, f64>,
+) -> LoopReport {
+    let x = &paths.exprs;
+    let names = |list: &[ElementId]| list.iter().map(|&e| graph.elements[e].name.clone()).collect();
+    let value = x.eval(path.gain, &mut |symbol| value_of(x, symbol, start));
+    LoopReport {
+        class: path.class,
+        elements: names(&path.elements),
+        route: names(&path.route),
+        bonds: path.signals.iter().map(|(bond, _)| bond.index() as u32 + 1).collect(),
+        gain: ascii(x, path.gain, &PlainNames(x)),
+        gain_value: value.is_finite().then_some(value),
+        breaks: path.breaks.iter().map(|&s| x.name(s).to_string()).collect(),
+        resolution: resolution(graph, path, equations),
+    }
+}
+
+/// The value of a symbol: of a parameter as given, of anything else at the start; NaN if unknown.
+fn value_of(x: &Exprs, symbol: Symbol, start: &BTreeMap<String, f64>) -> f64 {
+    match x.facts(symbol).given {
+        Some(given) => x.eval(given, &mut |inner| value_of(x, inner, start)),
+        None => start.get(x.name(symbol)).copied().unwrap_or(f64::NAN),
+    }
+}
+
+fn resolution(graph: &BondGraph, path: &Path, equations: &Equations) -> String {
+    if path.class == 1 {
+        let dependent: Vec<&str> = path.breaks.iter().map(|&s| equations.graph.exprs.name(s)).collect();
+        return format!("velocity transformation: {} is eliminated with its storage", dependent.join(", "));
+    }
+    let met: BTreeSet<ElementId> = path.route.iter().chain(&path.elements).copied().collect();
+    let meets =
+        |elements: &[ElementId]| elements.iter().any(|e| met.contains(e) && !graph.elements[*e].kind.is_inner());
+    let mut linear = None;
+    for step in &equations.steps {
+        match step {
+            Step::Newton { unknowns, elements, .. } if meets(elements) => {
+                return format!("Newton iteration for {} unknown{}", unknowns.len(), plural(unknowns.len()));
+            }
+            Step::Linear { unknowns, elements, .. } if meets(elements) => linear = linear.or(Some(unknowns.len())),
+            _ => {}
+        }
+    }
+    match linear {
+        Some(size) => format!("solved in a block of {size} linear equation{}", plural(size)),
+        None => "solved in closed form".to_string(),
+    }
+}
+
+fn plural(n: usize) -> &'static str {
+    if n == 1 { "" } else { "s" }
+}
+
+fn components(paths: &CausalPaths) -> Vec<ComponentReport> {
+    let x = &paths.exprs;
+    let report = |c: &causal_paths::Component| ComponentReport {
+        size: c.signals.len(),
+        breaks: c.breaks.iter().map(|&s| x.name(s).to_string()).collect(),
+        exact: c.exact,
+        lower_bound: c.lower_bound,
+        determinant: c.determinant.map(|d| ascii(x, d, &PlainNames(x))),
+        singular: c.singular,
+    };
+    paths.components.iter().map(report).collect()
+}
+
+fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
+    let graph = &causal.graph;
+    let mut x = graph.exprs.clone();
+    let mut known = BTreeMap::new();
+    let of_storages = causal.ports.ports.iter().filter(|s| graph.storage_symbols(s.port).is_some());
+    let mut report = |state: &PortState| {
+        let (co_energy, _) = graph.storage_symbols(state.port).expect("a storage");
+        let follows = (state.role == Role::Dependent).then(|| {
+            let combination = causal.ports.resolve(&mut x, co_energy, &mut known);
+            let value = combination.expr(&mut x);
+            format!("{} = {}", x.name(co_energy).to_string(), ascii(&x, value, &PlainNames(&x)))
+        });
+        StorageReport {
+            name: port_name(graph, state.port),
+            causality: if integral(causal, state) { "integral" } else { "derivative" },
+            independent: state.role == Role::Independent,
+            follows,
+        }
+    };
+    of_storages.map(&mut report).collect()
+}
+
+/// Whether a storage is drawn in integral causality: an `I` is given the effort, a `C` the flow.
+fn integral(causal: &CausalGraph, state: &PortState) -> bool {
+    let graph = &causal.graph;
+    let bond = graph.bond_of(state.port);
+    let at_storage = match causal.strokes[bond] {
+        Stroke::Undetermined => return state.role == Role::Independent,
+        Stroke::To => graph.bonds[bond].to == state.port,
+        Stroke::From => graph.bonds[bond].from == state.port,
+    };
+    at_storage == matches!(graph.elements[state.port.element].kind, Kind::Inertance(_))
+}
+
+/// `body`, or `gap.el` for a port of a field.
+fn port_name(graph: &BondGraph, port: PortRef) -> String {
+    let element = &graph.elements[port.element];
+    match element.ports[port.port as usize].name.as_str() {
+        "" => element.name.clone(),
+        name => format!("{}.{name}", element.name),
+    }
+}
+
+fn conserved(equations: &Equations) -> Vec<ConservedReport> {
+    let report = |c: &halfarrow_compiler::equations::Conserved| ConservedReport {
+        name: c.name.clone(),
+        value: print_expr(equations, c.value, Style::Ascii),
+    };
+    equations.conserved.iter().map(report).collect()
+}

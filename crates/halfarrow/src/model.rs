@@ -1,0 +1,104 @@
+//! A model that can be asked.
+
+use std::path::Path;
+
+use halfarrow_compiler::ast;
+use halfarrow_compiler::bond_graph::{BondGraph, Files, Override};
+use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
+use halfarrow_compiler::compile::{Found, Reached, Text, to_bond_graph};
+use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
+use halfarrow_compiler::equations::{Equations, Form, derive_equations};
+
+use crate::disk::Disk;
+use crate::error::{Error, Problem};
+
+/// A model without errors in its text, its names, its units and its bonds, and what was noticed in it.
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub(crate) graph: BondGraph,
+    pub(crate) found: Found,
+}
+
+impl Model {
+    /// Reads a model from disk; `set` replaces values of parameters.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the model has errors.
+    pub fn load(path: &Path, set: &[Override]) -> Result<Model, Error> {
+        let text = read(path)?;
+        Model::read(&path.to_string_lossy(), &text, &Disk, set)
+    }
+
+    /// A model from its text; it may import files from disk, beside `name`.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn from_text(name: &str, text: &str, set: &[Override]) -> Result<Model, Error> {
+        Model::read(name, text, &Disk, set)
+    }
+
+    fn read(name: &str, text: &str, files: &dyn Files, overrides: &[Override]) -> Result<Model, Error> {
+        let Reached { ir: graph, found } = to_bond_graph(Text { name, text, files, overrides })?;
+        Ok(Model { graph, found })
+    }
+
+    /// Its name, as the text says.
+    pub fn name(&self) -> &str {
+        &self.graph.name
+    }
+
+    /// Everything that is odd about it: warnings of all stages.
+    ///
+    /// # Errors
+    /// The model has errors that only later stages find.
+    pub fn check(&self) -> Result<Found, Error> {
+        let causal = self.causal_graph()?;
+        let mut found = self.found.clone();
+        found.diagnostics.0.extend(causal_graph::warnings(&causal));
+        let equations = derive_equations(&causal, Form::Minimal);
+        let equations = equations.map_err(|errors| {
+            let mut all = found.clone();
+            all.diagnostics.0.extend(errors.0);
+            Error::Model(all)
+        })?;
+        self.check_start(&equations)?;
+        Ok(found)
+    }
+
+    /// What was noticed in its text, names, units and bonds.
+    pub fn warnings(&self) -> &Found {
+        &self.found
+    }
+
+    pub(crate) fn causal_graph(&self) -> Result<CausalGraph, Error> {
+        assign_causality(&self.graph).map_err(|errors| self.fault(errors))
+    }
+
+    pub(crate) fn equations_in(&self, form: Form) -> Result<Equations, Error> {
+        derive_equations(&self.causal_graph()?, form).map_err(|errors| self.fault(errors))
+    }
+
+    /// Errors of a later stage, with the warnings before them.
+    pub(crate) fn fault(&self, errors: Diagnostics) -> Error {
+        let mut found = self.found.clone();
+        found.diagnostics.0.extend(errors.0);
+        Error::Model(found)
+    }
+}
+
+/// The text of a model in canonical layout. `name` is for messages.
+///
+/// # Errors
+/// The text has errors.
+pub fn format_text(name: &str, text: &str) -> Result<String, Error> {
+    ast::format(text).map_err(|errors| {
+        let mut sources = Sources::new();
+        sources.add(name, text);
+        Error::Model(Found { diagnostics: Diagnostics(errors), sources })
+    })
+}
+
+/// The text of a file.
+pub(crate) fn read(path: &Path) -> Result<String, Problem> {
+    std::fs::read_to_string(path).map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })
+}

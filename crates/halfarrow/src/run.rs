@@ -1,0 +1,348 @@
+//! A run: what is asked of it, and what comes of it.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
+use halfarrow_compiler::equations::{Equations, Form};
+use halfarrow_compiler::program::schedule;
+use halfarrow_exec::{self as exec, EquilibriumError, StartError};
+use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate};
+use halfarrow_trace::{Trace, read_inputs};
+use serde::Serialize;
+
+use crate::audited::{AuditReport, Audited};
+use crate::error::{Error, Problem};
+use crate::model::Model;
+
+/// What to run and how exactly. Times in s, values in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// End of the run; it begins at 0. Above 0.
+    pub to: f64,
+    /// Time between recorded points; `None`: every step. Start and end are always recorded.
+    pub every: Option<f64>,
+    /// The formulation.
+    pub form: Form,
+    /// The method.
+    pub method: Method,
+    /// Step of a method with fixed step, longest step of the others.
+    pub step: Option<f64>,
+    /// Relative error allowed in a step.
+    pub rtol: f64,
+    /// Absolute error allowed in a step, in the unit of each state; `None`: scaled to each state.
+    pub atol: Option<f64>,
+    /// Inputs given by CSV files: their names and the files.
+    pub inputs: Vec<(String, PathBuf)>,
+    /// Where to start.
+    pub start: Start,
+    /// What to record.
+    pub record: Record,
+}
+
+/// Where a run starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// As the model says.
+    Given,
+    /// At rest, as near as possible to what the model says.
+    Equilibrium,
+}
+
+/// What is recorded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Record {
+    /// States and outputs.
+    Default,
+    /// Everything that has a value.
+    All,
+    /// These variables, in this order.
+    Names(Vec<String>),
+}
+
+impl Default for Run {
+    /// To 1 s with the default method at `rtol` 1e-6, every step, states and outputs.
+    fn default() -> Run {
+        Run {
+            to: 1.0,
+            every: None,
+            form: Form::Minimal,
+            method: Method::Auto,
+            step: None,
+            rtol: 1e-6,
+            atol: None,
+            inputs: Vec::new(),
+            start: Start::Given,
+            record: Record::Default,
+        }
+    }
+}
+
+/// What came of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// What was recorded.
+    pub trace: Trace,
+    /// What it took, and how well it did.
+    pub report: RunReport,
+}
+
+/// What a run took, and how well it did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunReport {
+    /// Name of the model.
+    pub model: String,
+    /// The time reached, in s.
+    pub reached: f64,
+    /// Accepted steps.
+    pub steps: usize,
+    /// Steps tried in vain.
+    pub rejected: usize,
+    /// Evaluations of the rates.
+    pub evaluations: usize,
+    /// Directional derivatives of the rates.
+    pub tangents: usize,
+    /// Jumps of sources and inputs that were met.
+    pub jumps: usize,
+    /// Switching conditions that changed their side.
+    pub switches: usize,
+    /// Whether the stiff method took over.
+    pub stiff: bool,
+    /// The audit.
+    pub audit: AuditReport,
+    /// What was left out or is to be known.
+    pub notes: Vec<String>,
+}
+
+/// A run that stopped before its end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stopped {
+    /// Why.
+    pub failure: Failure,
+    /// What was recorded before.
+    pub trace: Trace,
+    /// What it took so far.
+    pub report: RunReport,
+}
+
+impl fmt::Display for Stopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.failure.fmt(f)
+    }
+}
+
+impl Model {
+    /// Computes a trajectory. `progress` is told the time reached after every step and says whether to go on.
+    ///
+    /// # Errors
+    /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
+    pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(f64) -> bool) -> Result<Simulated, Error> {
+        let equations = self.equations_in(run.form)?;
+        let mut system = self.system(&equations)?;
+        connect(&mut system, run)?;
+        let notes = choose(&mut system, &run.record)?;
+        let start = self.start(&mut system, run.start)?;
+        let options = options(run)?;
+        self.integrate(&mut system, start, &options, notes, progress)
+    }
+
+    fn integrate(
+        &self,
+        system: &mut exec::Model,
+        mut x: Vec<f64>,
+        options: &Options,
+        notes: Vec<String>,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Simulated, Error> {
+        let mut sink = Recorder { trace: empty_trace(system), progress };
+        let mut audited = Audited::new(system, &self.graph);
+        let outcome = simulate(&mut audited, options, &mut x, &mut sink);
+        let (trace, audit) = (sink.trace, audited.finish());
+        match outcome {
+            Ok(summary) => Ok(Simulated { trace, report: self.report(&summary, options.to, audit, notes) }),
+            Err(stopped) if matches!(stopped.failure, Failure::BadOption { .. }) => {
+                Err(Problem::BadOption { reason: stopped.failure.to_string() }.into())
+            }
+            Err(stopped) => {
+                let report = self.report(&stopped.summary, stopped.time, audit, notes);
+                Err(Error::Run(Box::new(Stopped { failure: stopped.failure, trace, report })))
+            }
+        }
+    }
+
+    fn report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
+        RunReport {
+            model: self.graph.name.clone(),
+            reached,
+            steps: summary.steps,
+            rejected: summary.rejected,
+            evaluations: summary.rates,
+            tangents: summary.tangents,
+            jumps: summary.jumps,
+            switches: summary.switches,
+            stiff: summary.stiff,
+            audit,
+            notes,
+        }
+    }
+
+    fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
+        exec::Model::new(schedule(equations)).map_err(|failure| self.stopped(failure))
+    }
+
+    /// A run that never began.
+    fn stopped(&self, failure: Failure) -> Error {
+        let report = self.report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
+        Error::Run(Box::new(Stopped { failure, trace: Trace::default(), report }))
+    }
+
+    fn start(&self, system: &mut exec::Model, start: Start) -> Result<Vec<f64>, Error> {
+        let x = system.initialise(0.0).map_err(|error| self.no_start(error))?;
+        match start {
+            Start::Given => Ok(x),
+            Start::Equilibrium => match system.equilibrium(0.0, &x) {
+                Ok(equilibrium) => Ok(equilibrium.x),
+                Err(EquilibriumError::Failure(failure)) => Err(self.stopped(failure)),
+                Err(error) => Err(Problem::NoEquilibrium { reason: error.to_string() }.into()),
+            },
+        }
+    }
+
+    fn no_start(&self, error: StartError) -> Error {
+        match error {
+            StartError::Failure(failure) => self.stopped(failure),
+            StartError::Conflict(conflict) => self.fault(conflict_diagnostic(&conflict).into()),
+            StartError::NotFound(_) => {
+                let span = halfarrow_compiler::span::Span::default();
+                let d = Diagnostic::error(codes::I004, error.to_string(), span, "in this model");
+                self.fault(d.hint("give start values nearer to ones that fit").into())
+            }
+        }
+    }
+
+    /// That there is a start.
+    pub(crate) fn check_start(&self, equations: &Equations) -> Result<(), Error> {
+        let mut system = self.system(equations)?;
+        self.start(&mut system, Start::Given).map(|_| ())
+    }
+
+    /// The values of all variables at the start; none where there is no start.
+    pub(crate) fn values_at_start(&self, equations: &Equations) -> BTreeMap<String, f64> {
+        let found = self.system(equations).and_then(|mut system| {
+            system.record_all();
+            let mut x = self.start(&mut system, Start::Given)?;
+            let mut trace = empty_trace(&system);
+            let mut values = vec![0.0; trace.columns.len()];
+            use halfarrow_sim::System;
+            let observed = system.cross_jump(0.0, &mut x).and_then(|()| system.observe(0.0, &x, &mut values));
+            observed.map_err(|failure| self.stopped(failure))?;
+            trace.sample(0.0, &values);
+            Ok(trace)
+        });
+        let columns = found.map(|trace| trace.columns).unwrap_or_default();
+        columns.into_iter().map(|c| (c.name, c.values[0])).collect()
+    }
+}
+
+/// Start values that contradict each other, at their places, with what would fit.
+fn conflict_diagnostic(conflict: &exec::StartConflict) -> Diagnostic {
+    let say = |v: &exec::StartValue| format!("{} = {} asked, {} would fit", v.name, v.asked, v.fitting);
+    let mut values = conflict.values.iter();
+    let first = values.next().map_or((Default::default(), String::new()), |v| (v.span, say(v)));
+    let title = "start values contradict each other or a constraint";
+    let d = Diagnostic::error(codes::I003, title, first.0, first.1);
+    let d = values.fold(d, |d, v| d.also(v.span, say(v)));
+    d.hint("take the values that would fit, or leave out all but one of them")
+}
+
+/// Gives the samples to a trace, and tells how far the run has come.
+struct Recorder<'p> {
+    trace: Trace,
+    progress: &'p mut dyn FnMut(f64) -> bool,
+}
+
+impl Sink for Recorder<'_> {
+    fn sample(&mut self, t: f64, values: &[f64]) {
+        self.trace.sample(t, values);
+    }
+    fn progress(&mut self, t: f64) -> ControlFlow<()> {
+        if (self.progress)(t) { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+}
+
+fn empty_trace(system: &exec::Model) -> Trace {
+    let observed = &system.program().observed;
+    let column = |&i: &usize| {
+        let unit = observed[i].unit.as_ref().map(ToString::to_string).unwrap_or_default();
+        (observed[i].name.clone(), unit)
+    };
+    Trace::new(system.recorded().iter().map(column))
+}
+
+fn options(run: &Run) -> Result<Options, Problem> {
+    if matches!(run.method, Method::Fixed(_)) && run.step.is_none() {
+        return Err(Problem::NoStep);
+    }
+    Ok(Options {
+        method: run.method,
+        from: 0.0,
+        to: run.to,
+        every: run.every,
+        step: run.step,
+        rtol: run.rtol,
+        atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),
+    })
+}
+
+/// Connects the files of a run to the inputs.
+fn connect(system: &mut exec::Model, run: &Run) -> Result<(), Problem> {
+    for (name, path) in &run.inputs {
+        let known: Vec<String> = system.program().inputs.iter().map(|i| i.name.clone()).collect();
+        if !known.contains(name) {
+            return Err(Problem::UnknownInput { name: name.clone(), known });
+        }
+        let bad = |faults| Problem::BadInput { path: path.clone(), faults };
+        let mut signals = read_inputs(path).map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
+        let columns: Vec<String> = signals.keys().cloned().collect();
+        let only =
+            if columns.len() == 1 { signals.pop_first().map(|(_, signal)| signal) } else { signals.remove(name) };
+        let missing = || bad(vec![format!("no column is called `{name}`: there are {}", columns.join(", "))]);
+        let signal = only.ok_or_else(missing)?;
+        system.connect(name, signal.times(), signal.values()).map_err(|e| bad(vec![e.to_string()]))?;
+    }
+    Ok(())
+}
+
+/// Chooses what is recorded; tells what was left out.
+fn choose(system: &mut exec::Model, record: &Record) -> Result<Vec<String>, Problem> {
+    match record {
+        Record::Default => Ok(left_out(system, true)),
+        Record::All => {
+            system.record_all();
+            Ok(left_out(system, false))
+        }
+        Record::Names(names) => {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            system.record(&names).map_err(|error| refused(system, error)).map(|()| Vec::new())
+        }
+    }
+}
+
+/// What has no value among what would be recorded.
+fn left_out(system: &exec::Model, only_default: bool) -> Vec<String> {
+    let observed = system.program().observed.iter().filter(|o| o.default || !only_default);
+    let without = observed.filter_map(|o| o.value.as_ref().err().map(|why| format!("`{}` is left out: {why}", o.name)));
+    without.collect()
+}
+
+fn refused(system: &exec::Model, error: exec::RecordError) -> Problem {
+    match error {
+        exec::RecordError::Unknown(name) => {
+            let known = system.program().observed.iter().map(|o| o.name.as_str());
+            Problem::UnknownVariable { nearest: nearest(&name, known).map(str::to_string), name }
+        }
+        exec::RecordError::Unavailable(name, why) => Problem::Unavailable { name, reason: why.to_string() },
+    }
+}

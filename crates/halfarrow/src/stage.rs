@@ -1,0 +1,92 @@
+//! The stages as text.
+
+use std::path::Path;
+
+use halfarrow_compiler::ast;
+use halfarrow_compiler::causal_paths::find_paths;
+use halfarrow_compiler::compile::Found;
+use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
+use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::program::schedule;
+
+use crate::Override;
+use crate::error::Error;
+use crate::model::{Model, read};
+
+/// A stage of the compiler whose result can be shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The syntax tree.
+    Ast,
+    /// Elements, bonds and laws, flattened, in SI.
+    BondGraph,
+    /// The same with causality.
+    CausalGraph,
+    /// Zero-order causal paths.
+    CausalPaths,
+    /// Equations in evaluation order, minimal form.
+    Equations,
+    /// What is evaluated while running.
+    Program,
+}
+
+impl Stage {
+    /// All of them, in order.
+    pub const ALL: [Stage; 6] =
+        [Stage::Ast, Stage::BondGraph, Stage::CausalGraph, Stage::CausalPaths, Stage::Equations, Stage::Program];
+
+    /// Its name: that of its folder, of its golden text and of `halfarrow show`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Ast => "ast",
+            Stage::BondGraph => "bond_graph",
+            Stage::CausalGraph => "causal_graph",
+            Stage::CausalPaths => "causal_paths",
+            Stage::Equations => "equations",
+            Stage::Program => "program",
+        }
+    }
+
+    /// What it makes of a file, as text.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the model has errors; the syntax tree is shown only of a text without errors.
+    pub fn show(self, path: &Path, set: &[Override]) -> Result<String, Error> {
+        match self {
+            Stage::Ast => {
+                let name = path.to_string_lossy();
+                let text = read(path)?;
+                let mut sources = Sources::new();
+                let file = sources.add(name, text);
+                let parsed = ast::parse(sources.text(file), file);
+                let diagnostics = Diagnostics(parsed.diagnostics);
+                match diagnostics.has_errors() {
+                    true => Err(Error::Model(Found { diagnostics, sources })),
+                    false => Ok(parsed.ast.to_string()),
+                }
+            }
+            _ => self.show_model(&Model::load(path, set)?),
+        }
+    }
+
+    /// What it makes of a model, as text. The syntax tree of a model is that of its main file.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn show_model(self, model: &Model) -> Result<String, Error> {
+        Ok(match self {
+            Stage::Ast => {
+                let text = model.found.sources.text(Default::default());
+                ast::parse(text, Default::default()).ast.to_string()
+            }
+            Stage::BondGraph => model.graph.to_string(),
+            Stage::CausalGraph => model.causal_graph()?.to_string(),
+            Stage::CausalPaths => {
+                let causal = model.causal_graph()?;
+                find_paths(&causal).text(&causal)
+            }
+            Stage::Equations => model.equations_in(Form::Minimal)?.to_string(),
+            Stage::Program => schedule(&model.equations_in(Form::Minimal)?).to_string(),
+        })
+    }
+}
