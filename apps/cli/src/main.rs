@@ -1,2 +1,25 @@
-//! The command line.
-fn main() {}
+//! The command line: arguments, files and screens; no modelling.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod commands;
+mod screen;
+
+use std::process::ExitCode;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::New(a) => commands::new(&a),
+        Command::Check(a) => commands::check(&a),
+        Command::Fmt(a) => commands::fmt(&a),
+        Command::Show(a) => commands::show(&a),
+        Command::Loops(a) => commands::loops(&a),
+        Command::Equations(a) => commands::equations(&a),
+        Command::Simulate(a) => commands::simulate(&a),
+        Command::Draw(a) => commands::draw(&a),
+    };
+    ExitCode::from(outcome)
+}

@@ -1,0 +1,263 @@
+//! What can stand on the command line.
+
+use std::path::PathBuf;
+
+use clap::builder::Styles;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Bond graphs: causality, zero-order causal paths, the smallest equations, and what they do.
+#[derive(Debug, Parser)]
+#[command(name = "halfarrow", version, styles = Styles::plain(), arg_required_else_help = true)]
+#[command(after_help = "\
+Exit status: 0 fine, 1 the model is at fault, 2 wrong usage, 3 the run failed.
+Example:
+  halfarrow new car && halfarrow simulate car.bond --to 10 --plot car.svg")]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write a commented starter model that runs at once
+    #[command(after_help = "Example:\n  halfarrow new car          writes car.bond")]
+    New(New),
+    /// Report everything that is wrong with a model, and what is odd
+    #[command(after_help = "Example:\n  halfarrow check car.bond")]
+    Check(FileArguments),
+    /// Print a model in the canonical layout
+    #[command(after_help = "\
+Examples:
+  halfarrow fmt car.bond             prints it
+  halfarrow fmt --write car.bond     rewrites the file
+  halfarrow fmt --check car.bond     exit status 1 if the layout differs")]
+    Fmt(Fmt),
+    /// Print what a stage of the compiler makes of a model
+    #[command(after_help = "Example:\n  halfarrow show causal_graph car.bond")]
+    Show(Show),
+    /// List zero-order causal paths, dependent storages and conserved quantities
+    #[command(after_help = "Example:\n  halfarrow loops car.bond --set b=900")]
+    Loops(Loops),
+    /// Print the equations
+    #[command(after_help = "\
+Examples:
+  halfarrow equations car.bond
+  halfarrow equations car.bond --form minimal --format latex > car.tex")]
+    Equations(Equations),
+    /// Compute a trajectory
+    #[command(after_help = "\
+Examples:
+  halfarrow simulate car.bond --to 10
+  halfarrow simulate car.bond --to 10 --every 0.01 --out car.csv --plot car.svg
+  halfarrow simulate car.bond --to 10 --set k=20e3 --input road=road.csv --record body.f,damper.e
+  halfarrow simulate car.bond --to 10 --solver rk4 --step 1e-3 --out -")]
+    Simulate(Box<Simulate>),
+    /// Draw the bond graph with its causal strokes and paths
+    #[command(after_help = "Example:\n  halfarrow draw car.bond --out car.svg")]
+    Draw(Draw),
+}
+
+/// A model and how to answer.
+#[derive(Debug, Args)]
+pub struct FileArguments {
+    /// The model
+    pub file: PathBuf,
+    /// Print one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A model, perhaps with other parameters.
+#[derive(Debug, Args)]
+pub struct ModelArguments {
+    #[command(flatten)]
+    pub model: FileArguments,
+    /// Set a parameter, as in `k=3` or `k=18 kN/m`; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = pair)]
+    pub set: Vec<(String, String)>,
+}
+
+/// `new`.
+#[derive(Debug, Args)]
+pub struct New {
+    /// Name of the model; the file is NAME.bond
+    pub name: String,
+    /// Print one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `fmt`.
+#[derive(Debug, Args)]
+pub struct Fmt {
+    #[command(flatten)]
+    pub model: FileArguments,
+    /// Rewrite the file instead of printing
+    #[arg(long, conflicts_with = "check")]
+    pub write: bool,
+    /// Print nothing; exit status 1 if the layout differs
+    #[arg(long)]
+    pub check: bool,
+}
+
+/// `show`.
+#[derive(Debug, Args)]
+pub struct Show {
+    /// The stage
+    pub stage: Stage,
+    #[command(flatten)]
+    pub model: ModelArguments,
+}
+
+/// Stages that can be shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Stage {
+    /// The syntax tree
+    Ast,
+    /// Elements, bonds and laws, flattened, in SI
+    BondGraph,
+    /// The same with causal strokes and the causality of every port
+    CausalGraph,
+    /// Zero-order causal paths
+    CausalPaths,
+    /// Equations in evaluation order
+    Equations,
+    /// What is evaluated while running
+    Program,
+}
+
+/// `loops`.
+#[derive(Debug, Args)]
+pub struct Loops {
+    #[command(flatten)]
+    pub model: ModelArguments,
+}
+
+/// Forms of the equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Form {
+    /// One explicit equation for each independent variable, nothing else
+    Minimal,
+}
+
+/// Ways of writing equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Unicode, as in a textbook
+    Text,
+    /// LaTeX
+    Latex,
+    /// One JSON object
+    Json,
+}
+
+/// `equations`.
+#[derive(Debug, Args)]
+pub struct Equations {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// The formulation
+    #[arg(long, default_value = "minimal")]
+    pub form: Form,
+    /// How to write them
+    #[arg(long, default_value = "text")]
+    pub format: Format,
+}
+
+/// Methods of integration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Solver {
+    /// Explicit with variable step, and BDF when the model proves stiff
+    Auto,
+    /// Runge-Kutta of order 5(4), variable step
+    Explicit,
+    /// Backward differentiation formulas, variable step, for stiff models
+    Bdf,
+    /// Order 1, fixed step
+    Euler,
+    /// Order 2, fixed step
+    Heun,
+    /// Order 4, fixed step
+    Rk4,
+    /// Order 2, implicit, fixed step
+    ImplicitMidpoint,
+}
+
+/// How to find the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Start {
+    /// As the model says
+    Given,
+    /// At rest: all rates are zero
+    Equilibrium,
+}
+
+/// `simulate`.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// End of the run, in s; it begins at 0
+    #[arg(long, value_name = "TIME")]
+    pub to: f64,
+    /// Time between recorded points, in s; without it every step is recorded
+    #[arg(long, value_name = "TIME")]
+    pub every: Option<f64>,
+    /// The formulation
+    #[arg(long, default_value = "minimal")]
+    pub form: Form,
+    /// The method
+    #[arg(long, default_value = "auto")]
+    pub solver: Solver,
+    /// Step of a method with fixed step, longest step of the others, in s
+    #[arg(long, value_name = "TIME")]
+    pub step: Option<f64>,
+    /// Relative error allowed in a step
+    #[arg(long, default_value_t = 1e-6)]
+    pub rtol: f64,
+    /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
+    #[arg(long)]
+    pub atol: Option<f64>,
+    /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Where to start
+    #[arg(long, default_value = "given")]
+    pub start: Start,
+    /// What to record instead of states and outputs: names with commas between them, or `all`
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub record: Vec<String>,
+    /// Where to write the trajectory: a .csv file, or `-` for CSV on stdout; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub out: Vec<PathBuf>,
+    /// Where to plot it: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub plot: Vec<PathBuf>,
+    /// Where to draw the bond graph: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub draw: Vec<PathBuf>,
+}
+
+/// `draw`.
+#[derive(Debug, Args)]
+pub struct Draw {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Where to draw it: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE", required = true)]
+    pub out: Vec<PathBuf>,
+}
+
+/// Reads `name=value`.
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_string(), value.trim().to_string()))
+        }
+        _ => Err(format!("`{text}` is not of the form name=value")),
+    }
+}

@@ -1,0 +1,33 @@
+//! The commands: each gives its exit status.
+
+mod analyse;
+mod files;
+mod picture;
+mod run;
+
+pub use analyse::{check, equations, loops, show};
+pub use files::{fmt, new};
+pub use picture::draw;
+pub use run::simulate;
+
+use halfarrow::{Error, Model, Override};
+
+use crate::arguments::ModelArguments;
+use crate::screen;
+
+/// Loads a model, shows what was noticed, and goes on; on an error gives its exit status.
+fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u8, Error>) -> u8 {
+    let set = overrides(arguments);
+    let loaded = Model::load(&arguments.model.file, &set);
+    let outcome = loaded.and_then(|model| {
+        screen::warn(model.warnings());
+        go_on(&model)
+    });
+    outcome.unwrap_or_else(|error| screen::fail(&error, arguments.model.json))
+}
+
+/// What `--set` gives.
+fn overrides(arguments: &ModelArguments) -> Vec<Override> {
+    let given = arguments.set.iter();
+    given.map(|(name, value)| Override { name: name.clone(), value: value.clone() }).collect()
+}

@@ -1,0 +1,155 @@
+//! `check`, `show`, `loops`, `equations`.
+
+use std::path::Path;
+
+use halfarrow::{CheckReport, EquationsReport, Error, Form, LoopsReport, Model, Stage};
+use serde_json::json;
+
+use super::{overrides, with_model};
+use crate::arguments::{self, FileArguments, Format};
+use crate::screen;
+
+/// All diagnostics.
+pub fn check(arguments: &FileArguments) -> u8 {
+    let report = match CheckReport::of(&arguments.file) {
+        Ok(report) => report,
+        Err(error) => return screen::fail(&error, arguments.json),
+    };
+    screen::warn(&report.found);
+    if arguments.json {
+        screen::print_json(&report.to_json());
+    } else if report.errors == 0 {
+        let odd = if report.warnings == 0 { "nothing to say".to_string() } else { counted(report.warnings, "warning") };
+        screen::print(&format!("{}: {odd}\n", arguments.file.display()));
+    } else {
+        let errors = counted(report.errors, "error");
+        let warnings = counted(report.warnings, "warning");
+        screen::note(&format!("{}: {errors}, {warnings}", arguments.file.display()));
+    }
+    u8::from(report.errors > 0)
+}
+
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A stage as text.
+pub fn show(arguments: &arguments::Show) -> u8 {
+    let stage = match arguments.stage {
+        arguments::Stage::Ast => Stage::Ast,
+        arguments::Stage::BondGraph => Stage::BondGraph,
+        arguments::Stage::CausalGraph => Stage::CausalGraph,
+        arguments::Stage::CausalPaths => Stage::CausalPaths,
+        arguments::Stage::Equations => Stage::Equations,
+        arguments::Stage::Program => Stage::Program,
+    };
+    let file: &Path = &arguments.model.model.file;
+    match stage.show(file, &overrides(&arguments.model)) {
+        Ok(text) if arguments.model.model.json => screen::print_json(&json!({"stage": stage.name(), "text": text})),
+        Ok(text) => screen::print(&text),
+        Err(error) => return screen::fail(&error, arguments.model.model.json),
+    }
+    0
+}
+
+/// Zero-order causal paths and their fate.
+pub fn loops(arguments: &arguments::Loops) -> u8 {
+    with_model(&arguments.model, |model| {
+        let report = model.loops()?;
+        match arguments.model.model.json {
+            true => screen::print_json(&json!(report)),
+            false => screen::print(&loops_text(&report)),
+        }
+        Ok(0)
+    })
+}
+
+fn loops_text(report: &LoopsReport) -> String {
+    let mut text = match report.paths.len() {
+        0 => format!("{}: no zero-order causal path\n", report.model),
+        n => format!("{}: {}\n", report.model, counted(n, "zero-order causal path")),
+    };
+    if !report.paths.is_empty() {
+        let value = |v: Option<f64>| v.map_or("-".to_string(), screen::short);
+        let rows = report.paths.iter().map(|p| {
+            let between = p.elements.join(" - ");
+            [
+                p.class.to_string(),
+                between,
+                p.gain.clone(),
+                value(p.gain_value),
+                p.breaks.join(", "),
+                p.resolution.clone(),
+            ]
+        });
+        text += &screen::table(["class", "between", "gain", "value", "break variables", "in minimal form"], rows);
+    }
+    if !report.complete {
+        text += "There are more paths: shown is one for every break variable.\n";
+    }
+    for component in report.components.iter().filter(|c| c.singular) {
+        let breaks = component.breaks.join(", ");
+        text +=
+            &format!("The determinant of the paths through {breaks} vanishes: alone they have no unique solution.\n");
+    }
+    text + &storages_text(report) + &counts_text(report)
+}
+
+fn storages_text(report: &LoopsReport) -> String {
+    if report.storages.is_empty() {
+        return String::new();
+    }
+    let rows = report.storages.iter().map(|s| {
+        let independent = if s.independent { "independent" } else { "dependent" };
+        [s.name.clone(), s.causality.to_string(), independent.to_string(), s.follows.clone().unwrap_or_default()]
+    });
+    let mut text = "\nStorages\n".to_string();
+    text += &screen::table(["name", "causality", "", "follows from"], rows);
+    for c in &report.conserved {
+        text += &format!("Conserved: {} = {}\n", c.name, c.value);
+    }
+    text
+}
+
+fn counts_text(report: &LoopsReport) -> String {
+    let c = &report.counts;
+    let forms = [("break variables", c.break_form), ("inverted", c.inverted), ("minimal", c.minimal)];
+    let rows = forms.map(|(name, n)| [name.to_string(), n.differential.to_string(), n.algebraic.to_string()]);
+    let mut text = "\nEquations in each form\n".to_string();
+    text += &screen::table(["form", "differential", "algebraic"], rows);
+    text + &format!("Independent storages: {}\n", report.dof)
+}
+
+/// The equations.
+pub fn equations(arguments: &arguments::Equations) -> u8 {
+    with_model(&arguments.model, |model: &Model| -> Result<u8, Error> {
+        let report = model.equations(form(arguments.form))?;
+        match (arguments.model.model.json, arguments.format) {
+            (true, _) | (_, Format::Json) => screen::print_json(&json!(report)),
+            (_, Format::Text) => screen::print(&equations_text(&report)),
+            (_, Format::Latex) => screen::print(&latex_text(&report)),
+        }
+        Ok(0)
+    })
+}
+
+/// The formulation that is meant.
+pub fn form(form: arguments::Form) -> Form {
+    match form {
+        arguments::Form::Minimal => Form::Minimal,
+    }
+}
+
+fn equations_text(report: &EquationsReport) -> String {
+    let mut text = report.text.join("\n") + "\n";
+    if !report.legend.is_empty() {
+        text += "\nwhere\n";
+    }
+    report.legend.iter().for_each(|line| text += &format!("    {line}\n"));
+    text
+}
+
+fn latex_text(report: &EquationsReport) -> String {
+    let lines: Vec<String> = report.latex.iter().map(|line| format!("  {}", line.replacen(" = ", " &= ", 1))).collect();
+    format!("\\begin{{align}}\n{}\n\\end{{align}}\n", lines.join(" \\\\\n"))
+}

@@ -1,0 +1,172 @@
+//! `simulate`.
+
+use std::path::Path;
+
+use halfarrow::{
+    Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start, Trace, csv_text,
+    write_csv,
+};
+use serde_json::{Value, json};
+
+use super::analyse::form;
+use super::picture::{check_names, write_picture};
+use super::with_model;
+use crate::arguments::{self, Simulate, Solver};
+use crate::screen::{self, Progress};
+
+/// A trajectory.
+pub fn simulate(arguments: &Simulate) -> u8 {
+    with_model(&arguments.model, |model| {
+        check_files(arguments)?;
+        for path in &arguments.draw {
+            write_picture(&model.draw()?, path)?;
+        }
+        let mut progress = Progress::new(arguments.to);
+        let outcome = model.simulate(&run(arguments), &mut |t| {
+            progress.reach(t);
+            true
+        });
+        progress.finish();
+        match outcome {
+            Ok(done) => {
+                finish(arguments, model, &done)?;
+                Ok(0)
+            }
+            Err(Error::Run(stopped)) => {
+                let done = Simulated { trace: stopped.trace.clone(), report: stopped.report.clone() };
+                screen::note(Error::Run(stopped.clone()).render(false).trim_end());
+                if done.trace.samples() > 0 {
+                    finish(arguments, model, &done)?;
+                } else if arguments.model.model.json {
+                    screen::print_json(&Error::Run(stopped).to_json());
+                }
+                Ok(3)
+            }
+            Err(error) => Err(error),
+        }
+    })
+}
+
+fn run(arguments: &Simulate) -> Run {
+    Run {
+        to: arguments.to,
+        every: arguments.every,
+        form: form(arguments.form),
+        method: match arguments.solver {
+            Solver::Auto => Method::Auto,
+            Solver::Explicit => Method::Explicit,
+            Solver::Bdf => Method::Bdf,
+            Solver::Euler => Method::Fixed(FixedMethod::Euler),
+            Solver::Heun => Method::Fixed(FixedMethod::Heun),
+            Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),
+            Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
+        },
+        step: arguments.step,
+        rtol: arguments.rtol,
+        atol: arguments.atol,
+        inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
+        start: match arguments.start {
+            arguments::Start::Given => Start::Given,
+            arguments::Start::Equilibrium => Start::Equilibrium,
+        },
+        record: match &arguments.record[..] {
+            [] => Record::Default,
+            [all] if all == "all" => Record::All,
+            names => Record::Names(names.iter().map(|name| name.trim().to_string()).collect()),
+        },
+    }
+}
+
+/// That everything can be written, before anything is computed.
+fn check_files(arguments: &Simulate) -> Result<(), Problem> {
+    for path in &arguments.out {
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        if !is_stdout(path) && extension.as_deref() != Some("csv") {
+            return Err(Problem::UnknownKind { path: path.clone(), known: vec!["csv"] });
+        }
+    }
+    check_names(&arguments.plot)?;
+    check_names(&arguments.draw)
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+fn finish(arguments: &Simulate, model: &Model, done: &Simulated) -> Result<(), Error> {
+    for path in &arguments.out {
+        if is_stdout(path) {
+            screen::print(&csv_text(&done.trace));
+        } else {
+            write_csv(&done.trace, path)
+                .map_err(|why| Problem::Unwritable { path: path.clone(), why: why.source.to_string() })?;
+        }
+    }
+    for path in &arguments.plot {
+        write_picture(&model.plot(&done.trace), path)?;
+    }
+    let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
+    done.report.notes.iter().for_each(|note| screen::note(&format!("warning: {note}")));
+    if arguments.model.model.json {
+        if !to_stdout {
+            screen::print_json(&json_of(arguments, done));
+        }
+    } else if to_stdout {
+        screen::note(summary(&done.report).trim_end());
+    } else {
+        screen::print(&(values(&done.trace) + &summary(&done.report)));
+    }
+    Ok(())
+}
+
+/// The report, the columns and, if they are written nowhere else, the values.
+fn json_of(arguments: &Simulate, done: &Simulated) -> Value {
+    let mut object = json!(done.report);
+    let columns = done.trace.columns.iter();
+    object["columns"] = columns.clone().map(|c| json!({"name": c.name, "unit": c.unit})).collect();
+    object["samples"] = json!(done.trace.samples());
+    if arguments.out.is_empty() {
+        object["t"] = json!(done.trace.times);
+        object["values"] = columns.map(|c| (c.name.clone(), json!(c.values))).collect::<serde_json::Map<_, _>>().into();
+    }
+    object["complete"] = json!(done.report.reached >= arguments.to);
+    object
+}
+
+/// Start, end, least and greatest value of every column.
+fn values(trace: &Trace) -> String {
+    let rows = trace.columns.iter().map(|c| {
+        let first = c.values.first().copied().unwrap_or(f64::NAN);
+        let last = c.values.last().copied().unwrap_or(f64::NAN);
+        let least = c.values.iter().copied().fold(f64::INFINITY, f64::min);
+        let greatest = c.values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [first, last, least, greatest] = [first, last, least, greatest].map(screen::short);
+        [c.name.clone(), c.unit.clone(), first, last, least, greatest]
+    });
+    screen::table(["variable", "unit", "start", "end", "least", "greatest"], rows)
+}
+
+fn summary(report: &RunReport) -> String {
+    let mut text = format!("{} to t = {} s: {} steps", report.model, screen::short(report.reached), report.steps);
+    if report.rejected > 0 {
+        text += &format!(" ({} more rejected)", report.rejected);
+    }
+    text += &format!(", {} evaluations", report.evaluations);
+    if report.stiff {
+        text += ", the stiff method took over";
+    }
+    if report.jumps + report.switches > 0 {
+        text += &format!(", {} jumps and {} switches met", report.jumps, report.switches);
+    }
+    text += "\n";
+    let audit = &report.audit;
+    let parts =
+        [("power", &audit.power), ("energy", &audit.energy), ("residual", &audit.residual), ("rates", &audit.rates)];
+    let misses = parts.iter().filter_map(|(name, miss)| miss.as_ref().map(|m| format!("{name} {}", missed(m))));
+    text + &format!("audit: {}\n", misses.collect::<Vec<_>>().join(", "))
+}
+
+/// A miss; one that the samples cannot resolve is said to be below that.
+fn missed(miss: &Miss) -> String {
+    if miss.value < miss.resolution { format!("below {:.0e}", miss.resolution) } else { format!("{:.0e}", miss.value) }
+}

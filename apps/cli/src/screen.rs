@@ -1,0 +1,132 @@
+//! What the terminal shows: text, JSON, errors, tables, a progress bar.
+
+use std::env;
+use std::io::{self, IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use comfy_table::{ContentArrangement, Table, presets};
+use halfarrow::{Error, Found};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::Value;
+
+/// A run shorter than this shows no progress bar.
+const PATIENCE: Duration = Duration::from_millis(700);
+
+/// Prints text to stdout; a closed pipe is no error.
+pub fn print(text: &str) {
+    let _ = io::stdout().lock().write_all(text.as_bytes());
+}
+
+/// Prints one JSON object.
+pub fn print_json(value: &Value) {
+    print(&format!("{value:#}\n"));
+}
+
+/// Says something beside the result.
+pub fn note(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Shows an error, with `json` on stdout too, and gives the exit status.
+pub fn fail(error: &Error, json: bool) -> u8 {
+    note(error.render(color(&io::stderr())).trim_end());
+    if json {
+        print_json(&error.to_json());
+    }
+    error.exit_status()
+}
+
+/// Shows warnings.
+pub fn warn(found: &Found) {
+    if !found.diagnostics.0.is_empty() {
+        note(found.render(color(&io::stderr())).trim_end());
+    }
+}
+
+/// Whether to use colours: on a terminal, unless `NO_COLOR` is set.
+fn color(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+}
+
+/// A table with a header.
+pub fn table<const N: usize>(header: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(header);
+    rows.into_iter().for_each(|row| _ = table.add_row(row));
+    format!("{table}\n")
+}
+
+/// A number with six digits.
+pub fn short(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 || (1e-4..1e6).contains(&size) {
+        let digits = if x == 0.0 { 0 } else { (5 - size.log10().floor() as i32).clamp(0, 9) as usize };
+        let text = format!("{x:.digits$}");
+        match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+            false => text,
+        }
+    } else {
+        format!("{x:.5e}")
+    }
+}
+
+/// The progress of a run, on stderr if that is a terminal.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    to: f64,
+    begun: Instant,
+}
+
+impl Progress {
+    /// Of a run to `to`, in s.
+    pub fn new(to: f64) -> Progress {
+        let bar = io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
+            let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
+            bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        });
+        Progress { bar, to, begun: Instant::now() }
+    }
+
+    /// The run has come to `t`, in s.
+    pub fn reach(&mut self, t: f64) {
+        let Some(bar) = &self.bar else { return };
+        if bar.is_hidden() {
+            if self.begun.elapsed() < PATIENCE {
+                return;
+            }
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        bar.set_position((t / self.to * 1000.0) as u64);
+        bar.set_message(format!("t = {} s of {} s", short(t), short(self.to)));
+    }
+
+    /// The run is over.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases = [
+            (0.0, "0"),
+            (1.0, "1"),
+            (-0.25, "-0.25"),
+            (123456.7, "123457"),
+            (1e6, "1.00000e6"),
+            (0.000123456789, "0.000123457"),
+            (1.0 / 3.0, "0.333333"),
+            (1e-13, "1.00000e-13"),
+        ];
+        cases.iter().for_each(|(x, text)| assert_eq!(short(*x), *text));
+    }
+}

@@ -1,0 +1,266 @@
+//! The program as its users see it: output, files, exit status.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Runs `halfarrow` in a folder.
+fn halfarrow(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
+    command.current_dir(folder).args(arguments).env_remove("NO_COLOR").output().expect("the program starts")
+}
+
+fn status(output: &Output) -> i32 {
+    output.status.code().expect("an exit status")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("UTF-8")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).expect("UTF-8")
+}
+
+/// The JSON object of a run that went well.
+fn json(output: &Output) -> Value {
+    assert_eq!(status(output), 0, "{}", stderr(output));
+    serde_json::from_slice(&output.stdout).expect("one JSON object")
+}
+
+/// The path of a model of the repository.
+fn model(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(name);
+    folder.join("model.bond").to_string_lossy().into_owned()
+}
+
+/// An empty folder of this test's own.
+fn folder(test: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    let _ = fs::remove_dir_all(&path);
+    fs::create_dir_all(&path).expect("a folder");
+    path
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> String {
+    fs::write(folder.join(name), text).expect("a file");
+    name.to_string()
+}
+
+const FAULTY: &str = "model M\nSe:battery(12 V) -> 0:n1\nSe:charger(14 V) -> n1\nn1 -> R:load(3 ohm)\n";
+
+#[test]
+fn a_new_model_runs_at_once() {
+    let here = folder("new");
+    let made = halfarrow(&here, &["new", "quarter-car"]);
+    assert_eq!(status(&made), 0, "{}", stderr(&made));
+    assert!(fs::read_to_string(here.join("quarter-car.bond")).unwrap().starts_with("model QuarterCar "));
+    let checked = halfarrow(&here, &["check", "quarter-car.bond"]);
+    assert_eq!((status(&checked), stderr(&checked).as_str()), (0, ""));
+    let laid_out = halfarrow(&here, &["fmt", "--check", "quarter-car.bond"]);
+    assert_eq!(status(&laid_out), 0, "{}", stderr(&laid_out));
+    let run = halfarrow(&here, &["simulate", "quarter-car.bond", "--to", "10"]);
+    assert_eq!(status(&run), 0, "{}", stderr(&run));
+    assert!(stdout(&run).contains("stretch") && stdout(&run).contains("audit"), "{}", stdout(&run));
+    let again = halfarrow(&here, &["new", "quarter-car"]);
+    assert_eq!(status(&again), 2);
+    assert!(stderr(&again).contains("there already"));
+}
+
+#[test]
+fn check_shows_all_faults_at_their_places() {
+    let here = folder("check");
+    let file = write(&here, "faulty.bond", FAULTY);
+    let output = halfarrow(&here, &["check", &file]);
+    assert_eq!(status(&output), 1);
+    assert!(stderr(&output).contains("faulty.bond:") && stderr(&output).contains("error["), "{}", stderr(&output));
+    assert!(!stderr(&output).contains('\u{1b}'), "no colours where there is no terminal");
+    let output = halfarrow(&here, &["check", "--json", &file]);
+    assert_eq!(status(&output), 1);
+    let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(report["errors"], 1);
+    assert_eq!(report["diagnostics"][0]["severity"], "error");
+    assert!(report["diagnostics"][0]["primary"]["line"].as_u64() >= Some(2));
+}
+
+#[test]
+fn fmt_prints_checks_and_writes() {
+    let here = folder("fmt");
+    let file = write(&here, "m.bond", "model M\nSe:a( 1 )->1:b\nb->I:c(2)\n");
+    let laid_out = "model M\nSe:a(1) -> 1:b\nb -> I:c(2)\n";
+    assert_eq!(stdout(&halfarrow(&here, &["fmt", &file])), laid_out);
+    assert_eq!(status(&halfarrow(&here, &["fmt", "--check", &file])), 1);
+    assert_eq!(json(&halfarrow(&here, &["fmt", "--json", &file]))["changed"], true);
+    assert_eq!(status(&halfarrow(&here, &["fmt", "--write", &file])), 0);
+    assert_eq!(fs::read_to_string(here.join(&file)).unwrap(), laid_out);
+    assert_eq!(status(&halfarrow(&here, &["fmt", "--check", &file])), 0);
+}
+
+#[test]
+fn show_prints_every_stage() {
+    for stage in ["ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program"] {
+        let output = halfarrow(Path::new("."), &["show", stage, &model("class2")]);
+        assert_eq!(status(&output), 0, "{stage}: {}", stderr(&output));
+        assert!(stdout(&output).lines().count() > 3, "{stage}");
+        let object = json(&halfarrow(Path::new("."), &["show", "--json", stage, &model("class2")]));
+        assert_eq!((object["stage"].as_str(), object["text"].as_str()), (Some(stage), Some(stdout(&output).as_str())));
+    }
+}
+
+#[test]
+fn loops_tell_class_gain_and_breaks() {
+    let forced = model("class2").replace("model.bond", "forced.bond");
+    let report = json(&halfarrow(Path::new("."), &["loops", "--json", &forced]));
+    let path = &report["paths"][0];
+    assert_eq!((path["class"].as_u64(), path["gain_value"].as_f64()), (Some(2), Some(-0.6)));
+    assert_eq!(path["gain"], "-R1/R2");
+    assert_eq!(path["elements"], serde_json::json!(["R1", "R2"]));
+    assert_eq!(path["breaks"], serde_json::json!(["R1.e"]));
+    assert!(path["resolution"].is_string());
+    assert_eq!(report["storages"][0]["name"], "I");
+    assert_eq!(report["storages"][0]["causality"], "integral");
+    assert_eq!(report["storages"][0]["independent"], true);
+    assert_eq!(report["counts"]["break"], serde_json::json!({"differential": 1, "algebraic": 1}));
+    assert_eq!(report["counts"]["minimal"], serde_json::json!({"differential": 1, "algebraic": 0}));
+    assert_eq!(report["dof"], 1);
+    let changed = json(&halfarrow(Path::new("."), &["loops", "--json", &forced, "--set", "R2=6"]));
+    assert_eq!(changed["paths"][0]["gain_value"], -0.5);
+    let text = stdout(&halfarrow(Path::new("."), &["loops", &forced]));
+    assert!(text.contains("-R1/R2") && text.contains("integral"), "{text}");
+}
+
+#[test]
+fn equations_read_as_in_a_textbook() {
+    let text = halfarrow(Path::new("."), &["equations", &model("pendulum")]);
+    assert_eq!(stdout(&text), "(J + M a²) ω' = -M g a cos φ\nφ' = ω\n");
+    let report = json(&halfarrow(Path::new("."), &["equations", &model("pendulum"), "--json"]));
+    assert_eq!((report["form"].as_str(), report["index"].as_u64()), (Some("minimal"), Some(0)));
+    assert_eq!(report["counts"], serde_json::json!({"differential": 1, "algebraic": 0}));
+    let kinds: Vec<&str> = report["states"].as_array().unwrap().iter().filter_map(|s| s["kind"].as_str()).collect();
+    assert_eq!(kinds, ["storage", "signal"]);
+    let latex = stdout(&halfarrow(Path::new("."), &["equations", &model("pendulum"), "--format", "latex"]));
+    assert!(latex.contains("\\cos") && latex.contains("&="), "{latex}");
+}
+
+#[test]
+fn simulate_writes_what_is_recorded() {
+    let here = folder("simulate");
+    let file = model("class2");
+    let arguments = ["simulate", &file, "--to", "10", "--every", "0.1", "--rtol", "1e-10", "--out", "x.csv"];
+    let output = halfarrow(&here, &[&arguments[..], &["--plot", "x.svg", "--draw", "graph.svg"]].concat());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let csv = fs::read_to_string(here.join("x.csv")).unwrap();
+    assert_eq!(csv.lines().next(), Some("t,I.f,v,F1"));
+    assert_eq!(csv.lines().count(), 102);
+    let last: Vec<f64> = csv.lines().last().unwrap().split(',').map(|field| field.parse().unwrap()).collect();
+    assert_eq!(last[0], 10.0);
+    assert!((last[2] - 0.386823068113934).abs() < 1e-8);
+    for picture in ["x.svg", "graph.svg"] {
+        assert!(fs::read_to_string(here.join(picture)).unwrap().contains("<svg"), "{picture}");
+    }
+    let csv = stdout(&halfarrow(&here, &["simulate", &file, "--to", "1", "--record", "R1.f,I.p", "--out", "-"]));
+    assert_eq!(csv.lines().next(), Some("t,R1.f,I.p"));
+    let report = json(&halfarrow(&here, &["simulate", &file, "--to", "1", "--json"]));
+    assert!(report["steps"].as_u64() > Some(0) && report["audit"]["power"]["value"].as_f64() < Some(1e-9), "{report}");
+    let (times, values) = (report["t"].as_array().unwrap(), report["values"]["v"].as_array().unwrap());
+    assert_eq!((times.len(), times.last().unwrap().as_f64()), (values.len(), Some(1.0)));
+}
+
+#[test]
+fn every_solver_comes_to_the_same_end() {
+    let here = folder("solvers");
+    let end = |solver: &[&str]| {
+        let arguments = ["simulate", &model("class2"), "--to", "1", "--json", "--solver"];
+        let report = json(&halfarrow(&here, &[&arguments[..], solver].concat()));
+        report["values"]["v"].as_array().unwrap().last().unwrap().as_f64().unwrap()
+    };
+    let exact = 1.99313146956953;
+    for solver in ["auto", "explicit", "bdf"] {
+        assert!((end(&[solver]) - exact).abs() < 1e-4, "{solver}");
+    }
+    for (solver, error) in [("euler", 1e-2), ("heun", 1e-5), ("rk4", 1e-9), ("implicit_midpoint", 1e-5)] {
+        assert!((end(&[solver, "--step", "1e-3"]) - exact).abs() < error, "{solver}");
+    }
+    let output = halfarrow(&here, &["simulate", &model("class2"), "--to", "1", "--solver", "rk4"]);
+    assert_eq!(status(&output), 2);
+    assert!(stderr(&output).contains("--step"));
+}
+
+#[test]
+fn inputs_come_from_csv() {
+    let here = folder("inputs");
+    write(&here, "push.csv", "t,push\n0,0\n1,2\n2,2\n");
+    write(&here, "m.bond", "model M\ninput push : N = 0\nSe:force(push) -> I:mass(2 kg)\n");
+    let run = ["simulate", "m.bond", "--to", "2", "--json", "--input"];
+    let report = json(&halfarrow(&here, &[&run[..], &["push=push.csv"]].concat()));
+    let end = report["values"]["mass.f"].as_array().unwrap().last().unwrap().as_f64().unwrap();
+    assert!((end - 1.5).abs() < 1e-6, "{end}");
+    for wrong in ["pull=push.csv", "push=none.csv", "push=m.bond"] {
+        let output = halfarrow(&here, &[&run[..], &[wrong]].concat());
+        assert_eq!(status(&output), 2, "{wrong}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_start_at_rest_stays_at_rest() {
+    let here = folder("rest");
+    halfarrow(&here, &["new", "m"]);
+    let arguments = ["simulate", "m.bond", "--to", "5", "--start", "equilibrium", "--json"];
+    let report = json(&halfarrow(&here, &arguments));
+    for value in report["values"]["spring.q"].as_array().unwrap() {
+        assert!((value.as_f64().unwrap() - 10.0 / 800.0).abs() < 1e-9, "{value}");
+    }
+}
+
+#[test]
+fn a_run_that_fails_keeps_what_it_has() {
+    let here = folder("failure");
+    write(&here, "m.bond", "model M\nstate x' = x^2 from 1\nSe:force(x) -> I:mass(1)\n");
+    let output = halfarrow(&here, &["simulate", "m.bond", "--to", "2", "--out", "x.csv"]);
+    assert_eq!(status(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("t ="), "{}", stderr(&output));
+    let csv = fs::read_to_string(here.join("x.csv")).unwrap();
+    let last: f64 = csv.lines().last().unwrap().split(',').next().unwrap().parse().unwrap();
+    assert!(last > 0.99 && last <= 1.01, "{last}");
+}
+
+#[test]
+fn wrong_usage_is_said_with_the_remedy() {
+    let here = folder("usage");
+    let file = model("class2");
+    let cases: [(&[&str], &str); 8] = [
+        (&["simulate", &file, "--to", "1", "--record", "R1.g"], "R1"),
+        (&["simulate", &file, "--to", "1", "--set", "R9=3"], "R9"),
+        (&["simulate", &file, "--to", "-1"], "to"),
+        (&["simulate", &file, "--to", "1", "--out", "x.xls"], ".csv"),
+        (&["simulate", &file, "--to", "1", "--plot", "x.gif"], ".svg"),
+        (&["draw", &file, "--out", "x"], ".svg"),
+        (&["check", "none.bond"], "none.bond"),
+        (&["loops", &file, "--set", "R1"], "name=value"),
+    ];
+    for (arguments, said) in cases {
+        let output = halfarrow(&here, arguments);
+        assert_eq!(status(&output), 2, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(said), "{arguments:?}: {}", stderr(&output));
+    }
+    assert_eq!(status(&halfarrow(&here, &["frobnicate"])), 2);
+}
+
+#[test]
+fn drawings_are_svg_or_png() {
+    let here = folder("draw");
+    let output = halfarrow(&here, &["draw", &model("pendulum"), "--out", "a.svg", "--out", "a.png"]);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    assert!(fs::read_to_string(here.join("a.svg")).unwrap().contains("MTFx"));
+    assert!(fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn help_has_an_example_for_every_command() {
+    for command in ["new", "check", "fmt", "show", "loops", "equations", "simulate", "draw"] {
+        let help = stdout(&halfarrow(Path::new("."), &[command, "--help"]));
+        assert!(help.contains("Example") && help.contains(&format!("halfarrow {command} ")), "{command}: {help}");
+    }
+}
