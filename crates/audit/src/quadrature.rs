@@ -11,11 +11,13 @@ pub(crate) struct Integral {
 pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
     let n = times.len();
     let mut integral = Integral { values: vec![0.0; n], uncertainty: vec![0.0; n] };
-    let mut start = 0;
+    let (mut start, mut end) = (0, 0);
     for k in 1..n {
         let (mut step, mut doubt) = (0.0, 0.0);
         if times[k] > times[k - 1] {
-            let end = (k..n).find(|&j| j + 1 == n || times[j + 1] <= times[j]).unwrap_or(n - 1);
+            if end < k {
+                end = (k..n).find(|&j| j + 1 == n || times[j + 1] <= times[j]).unwrap_or(n - 1);
+            }
             let fine = piece(times, rates, (start, end), k, 6);
             step = fine;
             doubt = (fine - piece(times, rates, (start, end), k, 5)).abs();
