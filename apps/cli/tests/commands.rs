@@ -114,7 +114,8 @@ fn loops_tell_class_gain_and_breaks() {
     let forced = model("class2").replace("model.bond", "forced.bond");
     let report = json(&halfarrow(Path::new("."), &["loops", "--json", &forced]));
     let path = &report["paths"][0];
-    assert_eq!((path["class"].as_u64(), path["gain_value"].as_f64()), (Some(2), Some(-0.6)));
+    assert_eq!(path["class"], 2);
+    assert!((path["gain_value"].as_f64().expect("a number") + 0.6).abs() < 1e-15);
     assert_eq!(path["gain"], "-R1/R2");
     assert_eq!(path["elements"], serde_json::json!(["R1", "R2"]));
     assert_eq!(path["breaks"], serde_json::json!(["R1.e"]));
@@ -134,7 +135,7 @@ fn loops_tell_class_gain_and_breaks() {
 #[test]
 fn equations_read_as_in_a_textbook() {
     let text = halfarrow(Path::new("."), &["equations", &model("pendulum")]);
-    assert_eq!(stdout(&text), "(J + M a²) ω' = -M g a cos φ\nφ' = ω\n");
+    assert_eq!(stdout(&text), "(J + M a²) ω' = -M a g cos φ\nφ' = ω\n");
     let report = json(&halfarrow(Path::new("."), &["equations", &model("pendulum"), "--json"]));
     assert_eq!((report["form"].as_str(), report["index"].as_u64()), (Some("minimal"), Some(0)));
     assert_eq!(report["counts"], serde_json::json!({"differential": 1, "algebraic": 0}));

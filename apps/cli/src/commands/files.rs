@@ -48,7 +48,12 @@ fn write_new(path: &Path) -> Result<(), Problem> {
 fn model_name(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
-    let name: String = words.map(|w| w[..1].to_uppercase() + &w[1..]).collect();
+    let name: String = words
+        .map(|word| {
+            let first = word.chars().next().map_or(0, char::len_utf8);
+            word[..first].to_uppercase() + &word[first..]
+        })
+        .collect();
     if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.is_ascii() { name } else { "Model".to_string() }
 }
 
