@@ -237,7 +237,7 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
         let follows = (state.role == Role::Dependent).then(|| {
             let combination = causal.ports.resolve(&mut x, co_energy, &mut known);
             let value = combination.expr(&mut x);
-            format!("{} = {}", x.name(co_energy).to_string(), ascii(&x, value, &PlainNames(&x)))
+            format!("{} = {}", x.name(co_energy), ascii(&x, value, &PlainNames(&x)))
         });
         StorageReport {
             name: port_name(graph, state.port),

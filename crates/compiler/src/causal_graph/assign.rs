@@ -6,7 +6,7 @@ use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
 use super::signals::{NodeId, signal_graph};
 use super::strokes::{Strokes, parts, sits_here};
 use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, local};
-use crate::algebra::{Expr, Exprs, Symbol};
+use crate::algebra::{Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::ids::{Id, Table};
@@ -173,7 +173,7 @@ impl Part<'_> {
     /// Assigns the part with the laws as they are wished.
     fn assign(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let (graph, members) = (self.graph, self.members);
-        let forced = contradiction::force_strokes(graph, strokes, members).map_err(|fault| vec![fault])?;
+        let forced = contradiction::force_strokes(graph, strokes, members).map_err(|fault| vec![*fault])?;
         let mark = strokes.mark();
         let drawn = self.propagate(strokes);
         let plain = drawn && !forced && !self.wanted.concerns(members) && is_plain(self.x, graph, members);
@@ -479,7 +479,7 @@ fn whole_truth(
     graph: &BondGraph,
     members: &[ElementId],
     strokes: &Strokes,
-) -> Option<(Vec<(Symbol, Combination)>, Vec<Expr>)> {
+) -> Option<local::Definitions> {
     let bonds: usize = members.iter().map(|&m| graph.elements[m].ports.len()).sum::<usize>() / 2;
     let tree = bonds + 1 == members.len();
     let sensing = members.iter().any(|&m| reads_bonds(x, graph, m));

@@ -20,7 +20,7 @@ struct Demand {
 }
 
 /// Applies `stroke` and `causality` to one part; tells whether there were any. On conflict the smallest set is reported.
-pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId]) -> Result<bool, Diagnostic> {
+pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId]) -> Result<bool, Box<Diagnostic>> {
     let demands = demands_on(graph, members);
     let mark = strokes.mark();
     if demands.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok()) {
@@ -55,9 +55,9 @@ pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[Elemen
     for other in &core[1..] {
         fault = fault.also(other.span, format!("this settles the stroke of {}", bond(other)));
     }
-    Err(fault
+    Err(Box::new(fault
         .note("one bond sets the effort of a 0-junction, one sets the flow of a 1-junction; a TF passes causality on, a GY turns it")
-        .hint("leave out one of them"))
+        .hint("leave out one of them")))
 }
 
 fn demands_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {

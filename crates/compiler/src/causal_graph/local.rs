@@ -5,15 +5,13 @@ use super::{Combination, PortState, Role};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
+/// Definitions of variables, and what they divide by that is not known to be nonzero.
+pub type Definitions = (Vec<(Symbol, Combination)>, Vec<Expr>);
+
 /// Definitions of the variables that junctions and two-ports set, one element at a time, and the moduli divided by.
 ///
 /// Triangular if no signal runs in a circle, which is so on trees.
-pub fn definitions(
-    x: &mut Exprs,
-    graph: &BondGraph,
-    members: &[ElementId],
-    strokes: &Strokes,
-) -> (Vec<(Symbol, Combination)>, Vec<Expr>) {
+pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], strokes: &Strokes) -> Definitions {
     let mut all = Vec::new();
     let mut divisors = Vec::new();
     let one = x.int(1);
@@ -42,11 +40,9 @@ pub fn definitions(
             Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
                 let transformer = matches!(graph.elements[element].kind, Kind::Transformer { .. });
                 let ((e_in, f_in), (e_out, f_out)) = (pair(0), pair(1));
-                if at(0) {
-                    if !x.nonzero(modulus) {
-                        divisors.push(modulus);
-                        x.assume_nonzero(modulus);
-                    }
+                if at(0) && !x.nonzero(modulus) {
+                    divisors.push(modulus);
+                    x.assume_nonzero(modulus);
                 }
                 let inverse = |x: &mut Exprs| x.recip(modulus);
                 let [(a, b, ab), (c, d, cd)] = match (transformer, at(0)) {

@@ -112,7 +112,8 @@ fn block(
     let Some(rows) = linear else {
         let inner = body.clone();
         ordered.steps.push(Step::Newton { unknowns: torn, body: inner, residuals, elements });
-        return Ok(ordered.assign(body));
+        ordered.assign(body);
+        return Ok(());
     };
     let x = &mut d.x;
     let matrix: Vec<Vec<Expr>> = rows.iter().map(|r| r.0.iter().map(|&e| x.simplify(e)).collect()).collect();

@@ -210,10 +210,10 @@ impl<'a> Definitions<'a> {
         while let Some(symbol) = work.pop() {
             let reason = self.missing[&symbol].clone();
             for &reader in readers.get(&symbol).into_iter().flatten() {
-                if !self.missing.contains_key(&reader) {
-                    self.missing.insert(reader, reason.clone());
+                self.missing.entry(reader).or_insert_with(|| {
                     work.push(reader);
-                }
+                    reason.clone()
+                });
             }
         }
         let missing: BTreeSet<Symbol> = self.missing.keys().copied().collect();
