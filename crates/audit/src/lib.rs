@@ -1,5 +1,5 @@
 //! Checks a run against the bond graph it came from: power, energy and every law, by code that shares nothing with the
-//! formulations but the [`BondGraph`](halfarrow_compiler::bond_graph::BondGraph). Source: `method.md`, section 7.
+//! formulations but the [`BondGraph`]. Source: `method.md`, section 7.
 //!
 //! - **Power**: at every sample the powers at the ports of a connected junction structure sum to zero.
 //! - **Residual**: at every sample every junction, two-port, source, resistor and storage law holds.

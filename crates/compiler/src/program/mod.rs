@@ -1,6 +1,6 @@
 //! The program: what is evaluated to integrate a model and to record its variables.
 //!
-//! [`schedule`] turns the steps of [`Equations`] into one list of [values](Program::values), each an operation on
+//! [`schedule`] turns the steps of [`Equations`](crate::equations::Equations) into one list of [values](Program::values), each an operation on
 //! values before it, equal ones shared. From it [`Program::routine`] makes the code that computes a chosen few of
 //! them, with everything else left out and registers reused: one routine for the rates, one for what is recorded, one
 //! for switching functions. Values that read parameters alone are computed once for each set of parameters, by the

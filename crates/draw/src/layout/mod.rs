@@ -2,8 +2,8 @@
 //!
 //! The junction structure lies on a grid, in line where it is a chain and as a rectangle where it is a ring; one-ports
 //! stand around their junction in the free compass directions; bonds are straight. A first placement in layers
-//! ([`start`]) is improved by small moves ([`improve`]), then rows and columns get the room that the labels need
-//! ([`space`]). All choices are made in integers, so the same graph gives the same picture everywhere.
+//! (`start`) is improved by small moves (`improve`), then rows and columns get the room that the labels need
+//! (`space`). All choices are made in integers, so the same graph gives the same picture everywhere.
 
 mod board;
 mod improve;
