@@ -1,11 +1,13 @@
-//! Integrates `x' = f(t, x)` and hands out samples. This crate has never heard of a bond: what it integrates is a
-//! [`System`], whose algebra, tables and units are the system's own affair.
+//! Integrates `x' = f(t, x)` or `F(t, y, y') = 0` and hands out samples. This crate has never heard of a bond: what it
+//! integrates is a
+//! [`System`] or an [`ImplicitSystem`], whose algebra, tables and units are the system's own affair.
 #![forbid(unsafe_code)]
 
 mod events;
 mod failure;
 pub mod fixed_step;
 mod grid;
+mod implicit_system;
 mod jacobian;
 mod lu;
 mod options;
@@ -17,6 +19,7 @@ mod system;
 mod variable_step;
 
 pub use failure::Failure;
+pub use implicit_system::ImplicitSystem;
 pub use options::{AbsoluteTolerance, Method, Options};
 pub use signal::{Signal, SignalError};
 pub use simulate::{Sink, Stopped, Summary, simulate};
