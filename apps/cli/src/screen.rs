@@ -61,7 +61,7 @@ pub fn table<const N: usize>(header: [&str; N], rows: impl IntoIterator<Item = [
 pub fn short(x: f64) -> String {
     let size = x.abs();
     if x == 0.0 || (1e-4..1e6).contains(&size) {
-        let digits = if x == 0.0 { 0 } else { (5 - size.log10().floor() as i32).clamp(0, 9) as usize };
+        let digits = if x == 0.0 { 0 } else { (5 - libm::log10(size).floor() as i32).clamp(0, 9) as usize };
         let text = format!("{x:.digits$}");
         match text.contains('.') {
             true => text.trim_end_matches('0').trim_end_matches('.').to_string(),

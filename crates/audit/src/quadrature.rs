@@ -56,6 +56,7 @@ pub(crate) fn gauss(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "values to compare with")]
 mod tests {
     use super::*;
 

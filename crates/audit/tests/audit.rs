@@ -1,4 +1,5 @@
 //! A true run passes; one wrong value does not.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use halfarrow_audit::{Audit, Run, audit, wanted};
 use halfarrow_compiler::ast;

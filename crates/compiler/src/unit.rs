@@ -9,6 +9,7 @@ mod table;
 
 pub use dimension::{Dimension, Domain, WHOLE};
 
+use crate::algebra::math;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 use num_bigint::BigInt;
@@ -119,14 +120,14 @@ impl Unit {
     /// The SI value of a number in this unit, to rounding.
     pub fn to_si_f64(&self, value: f64) -> f64 {
         match BigRational::from_float(value) {
-            Some(exact) => float(&self.to_si(&exact)) * std::f64::consts::PI.powi(self.pi),
+            Some(exact) => float(&self.to_si(&exact)) * math::whole_power(std::f64::consts::PI, self.pi.into()),
             None => value,
         }
     }
 
     /// The number in this unit of an SI value, to rounding.
     pub fn from_si_f64(&self, si: f64) -> f64 {
-        match BigRational::from_float(si / std::f64::consts::PI.powi(self.pi)) {
+        match BigRational::from_float(si / math::whole_power(std::f64::consts::PI, self.pi.into())) {
             Some(exact) => float(&((exact - &self.offset) / &self.rational)),
             None => si,
         }

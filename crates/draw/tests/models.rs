@@ -1,5 +1,6 @@
 //! Drawings of the models: well-formed, complete, strokes and half arrows at the right ends, and as they were.
 //! `UPDATE=1 cargo test -p halfarrow-draw --test models` rewrites `models/<name>/graph.svg`.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::path::{Path, PathBuf};
 

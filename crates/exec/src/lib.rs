@@ -5,9 +5,9 @@
 #![deny(unsafe_code)]
 
 mod bytecode;
-pub mod math;
 mod model;
 
+pub use halfarrow_compiler::algebra::math;
 pub use model::{
     Equilibrium, EquilibriumError, InputError, Model, ParameterError, RecordError, StartConflict, StartError,
     StartValue,

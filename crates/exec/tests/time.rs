@@ -1,4 +1,5 @@
 //! Jumps in time, switches of the state, inputs, delays and samples, run by the integrators.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 mod common;
 

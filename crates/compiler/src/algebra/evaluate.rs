@@ -1,6 +1,7 @@
 //! Values in floating point.
 
 use super::exprs::Exprs;
+use super::math;
 use super::node::{Expr, Function, Node, Symbol};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -103,9 +104,9 @@ fn node_value(pool: &Exprs, node: &Node, at: &dyn Fn(Expr) -> f64) -> f64 {
 
 fn power(base: f64, exact: Option<(i64, i64)>, n: f64) -> f64 {
     match exact {
-        Some((n, 1)) => i32::try_from(n).map_or_else(|_| base.powf(n as f64), |n| base.powi(n)),
+        Some((n, 1)) => math::whole_power(base, n),
         Some((1, 2)) => Function::Sqrt.value(base, 0.0),
         Some((-1, 2)) => 1.0 / base.sqrt(),
-        _ => base.powf(n),
+        _ => math::pow(base, n),
     }
 }

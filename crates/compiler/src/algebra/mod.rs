@@ -13,6 +13,7 @@ mod field;
 mod fingerprint;
 mod functions;
 mod linear;
+pub mod math;
 mod node;
 mod order;
 mod polynomial;

@@ -1,5 +1,6 @@
 //! What an expression is made of.
 
+use super::math;
 use super::rational::Rational;
 use super::table::TableId;
 use crate::ids::id;
@@ -102,29 +103,9 @@ impl Function {
 
     /// Its value. `sign(0)` is 0; outside its domain NaN.
     pub fn value(self, x: f64, y: f64) -> f64 {
-        use Function::*;
-        match self {
-            Sin => x.sin(),
-            Cos => x.cos(),
-            Tan => x.tan(),
-            Asin => x.asin(),
-            Acos => x.acos(),
-            Atan => x.atan(),
-            Atan2 => x.atan2(y),
-            Exp => x.exp(),
-            Log => x.ln(),
-            Log10 => x.log10(),
-            Sqrt => x.sqrt(),
-            Abs => x.abs(),
-            Sign if x == 0.0 => 0.0,
-            Sign => x.signum(),
-            Min => x.min(y),
-            Max => x.max(y),
-            Sinh => x.sinh(),
-            Cosh => x.cosh(),
-            Tanh => x.tanh(),
-            Floor => x.floor(),
-            Mod => x - y * (x / y).floor(),
+        match self.arity() {
+            2 => math::call2(self, x, y),
+            _ => math::call(self, x),
         }
     }
 }

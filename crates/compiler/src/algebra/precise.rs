@@ -1,6 +1,7 @@
 //! Values with a bound on their error, in floats of 53 bits and of 320: the slow half of the zero test.
 
 use super::exprs::Exprs;
+use super::math;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::rational::Rational;
 use astro_float::{BigFloat, Consts, Radix, RoundingMode, Sign};
@@ -41,13 +42,13 @@ impl Real for f64 {
         1.0 / self
     }
     fn pow(&self, n: &Self, _: &mut Consts) -> Self {
-        self.powf(*n)
+        math::pow(*self, *n)
     }
     fn call(&self, f: Function, _: &mut Consts) -> Self {
         f.value(*self, 0.0)
     }
     fn size(&self) -> f64 {
-        if self.is_finite() { self.abs().log2() } else { f64::NAN }
+        if self.is_finite() { math::log2(self.abs()) } else { f64::NAN }
     }
     fn negative(&self) -> bool {
         *self < 0.0
@@ -275,8 +276,8 @@ impl Point<'_> {
         }
         let value = base.value.pow(&n.value, constants);
         // d(b^n) = b^n (n db/b + log b dn)
-        let relative = both(n.value.size() + base.error - size, (size.abs() + 1.0).log2() + n.error);
-        let relative = both(relative, (size.abs() + 1.0).log2() + n.value.size() - R::BITS);
+        let relative = both(n.value.size() + base.error - size, math::log2(size.abs() + 1.0) + n.error);
+        let relative = both(relative, math::log2(size.abs() + 1.0) + n.value.size() - R::BITS);
         let error = value.size() + relative;
         Some(rounded(value, error))
     }

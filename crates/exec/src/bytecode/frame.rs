@@ -5,7 +5,7 @@ use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
 use crate::math;
-use halfarrow_compiler::algebra::Table1d;
+use halfarrow_compiler::algebra::{Function, Table1d};
 use halfarrow_compiler::program::{Block, ConditionId, Instruction, Layout, Program, Reads, Routine, Solve};
 
 /// Why a routine stopped.
@@ -261,6 +261,6 @@ fn along(slope: f64, rate: f64) -> f64 {
 
 fn slope_of_power(value: f64, (a, da): (f64, f64), (b, db): (f64, f64)) -> f64 {
     let base = if da == 0.0 { 0.0 } else { b * math::pow(a, b - 1.0) * da };
-    let exponent = if db == 0.0 || value == 0.0 { 0.0 } else { value * libm::log(a) * db };
+    let exponent = if db == 0.0 || value == 0.0 { 0.0 } else { value * math::call(Function::Log, a) * db };
     base + exponent
 }

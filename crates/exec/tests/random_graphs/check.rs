@@ -1,4 +1,5 @@
 //! What must hold of every graph, by numbers.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

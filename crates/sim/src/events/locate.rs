@@ -77,6 +77,7 @@ fn halve(
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "values to compare with")]
 mod tests {
     use super::*;
 

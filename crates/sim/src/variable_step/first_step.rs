@@ -26,7 +26,7 @@ pub(super) fn first_step(
             let sharpest = speed.max(bend);
             let root = 1.0 / (order as f64 + 1.0);
             let step =
-                if sharpest <= 1e-15 { (trial * 1e-3).max(1e-6 * longest) } else { (0.01 / sharpest).powf(root) };
+                if sharpest <= 1e-15 { (trial * 1e-3).max(1e-6 * longest) } else { libm::pow(0.01 / sharpest, root) };
             return Ok(step.min(100.0 * trial).min(longest));
         }
         trial /= 10.0;

@@ -186,7 +186,7 @@ fn shortest_time(entries: &[Entry], states: usize) -> f64 {
             return f64::INFINITY;
         }
         powers = next.iter().map(|value| value / most).collect();
-        growth += if 2 * iteration >= POWERS { 2.0 * most.ln() / POWERS as f64 } else { 0.0 };
+        growth += if 2 * iteration >= POWERS { 2.0 * libm::log(most) / POWERS as f64 } else { 0.0 };
     }
-    (-growth).exp()
+    libm::exp(-growth)
 }

@@ -56,8 +56,8 @@ impl Stiffness {
     fn radius(&mut self, system: &mut dyn System, tolerances: &Tolerances, t: f64, x: &[f64]) -> Option<f64> {
         system.tangent(t, x, &self.vector, &mut self.product).ok()?;
         let size = |v: &[f64]| {
-            let sum: f64 = v.iter().zip(tolerances.magnitudes()).map(|(v, magnitude)| (v / magnitude).powi(2)).sum();
-            sum.sqrt()
+            let parts = v.iter().zip(tolerances.magnitudes()).map(|(v, magnitude)| v / magnitude);
+            parts.map(|part| part * part).sum::<f64>().sqrt()
         };
         let (before, after) = (size(&self.vector), size(&self.product));
         if !(after.is_finite() && after > 0.0) {

@@ -66,7 +66,8 @@ impl Tolerances {
             Some(given) => self.relative * x[i].abs() + given[i],
             None => self.relative * x[i].abs() + self.share() * self.magnitudes[i],
         };
-        let sum: f64 = v.iter().enumerate().map(|(i, v)| (v / allowed(i)).powi(2)).sum();
+        let parts = v.iter().enumerate().map(|(i, v)| v / allowed(i));
+        let sum: f64 = parts.map(|part| part * part).sum();
         (sum / v.len().max(1) as f64).sqrt()
     }
 

@@ -1,4 +1,5 @@
 //! Systems with known solutions.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 #![allow(dead_code)]
 
 use halfarrow_sim::{Failure, Options, Sink, Sparsity, Stopped, Summary, System, simulate};

@@ -1,4 +1,5 @@
 //! What is rebuilt keeps its value: random expressions at random points.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use super::super::*;
 use proptest::prelude::*;

@@ -1,13 +1,13 @@
-//! Elementary functions: the same bits on every machine.
+//! Elementary functions: the same bits on every machine, in constants and in programs.
 
-use halfarrow_compiler::algebra::Function;
+use super::Function;
 
 /// A function of one argument; NaN outside its domain.
 ///
 /// ```
-/// use halfarrow_compiler::algebra::Function;
-/// assert_eq!(halfarrow_exec::math::call(Function::Sqrt, 9.0), 3.0);
-/// assert!(halfarrow_exec::math::call(Function::Log, -1.0).is_nan());
+/// use halfarrow_compiler::algebra::{Function, math};
+/// assert_eq!(math::call(Function::Sqrt, 9.0), 3.0);
+/// assert!(math::call(Function::Log, -1.0).is_nan());
 /// ```
 ///
 /// # Panics
@@ -59,7 +59,7 @@ pub fn pow(x: f64, y: f64) -> f64 {
 /// `x` to the power `n` by repeated squaring.
 ///
 /// ```
-/// assert_eq!(halfarrow_exec::math::powi(3.0, 5), 243.0);
+/// assert_eq!(halfarrow_compiler::algebra::math::powi(3.0, 5), 243.0);
 /// ```
 pub fn powi(x: f64, n: u32) -> f64 {
     let (mut result, mut square, mut left) = (1.0, x, n);
@@ -71,6 +71,24 @@ pub fn powi(x: f64, n: u32) -> f64 {
         left >>= 1;
     }
     result
+}
+
+/// `x` to the power `n` of any sign.
+///
+/// ```
+/// assert_eq!(halfarrow_compiler::algebra::math::whole_power(2.0, -3), 0.125);
+/// ```
+pub fn whole_power(x: f64, n: i64) -> f64 {
+    match u32::try_from(n.unsigned_abs()) {
+        Ok(size) if n < 0 => 1.0 / powi(x, size),
+        Ok(size) => powi(x, size),
+        Err(_) => pow(x, n as f64),
+    }
+}
+
+/// Logarithm of `x` to the base 2.
+pub fn log2(x: f64) -> f64 {
+    libm::log2(x)
 }
 
 /// Derivative of [`call`] by its argument; `value` is `call(f, x)`.
