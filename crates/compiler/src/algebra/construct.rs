@@ -284,8 +284,10 @@ impl Exprs {
         if n.is_one() {
             return base;
         }
-        if n.is_zero() && self.total(base) {
-            return ONE;
+        if n.is_zero() {
+            // 1 where the base is defined.
+            let nothing = self.mul(&[ZERO, base]);
+            return self.add(&[ONE, nothing]);
         }
         let exponent = self.number(n.clone());
         match self.node(base) {

@@ -28,6 +28,7 @@ law! {
     cancel_known: "(a*M + b*M)/M" => "a + b";
     zero_times_singular: "0*(1/q)" => "0*(1/q)";
     zero_times_regular: "0*(sin(q) + exp(q)/M)" => "0";
+    zeroth_power_of_singular: "(1/q)^0" => "q/q";
     difference_of_singular: "1/q - 1/q" => "0*(1/q)";
     root_squared: "sqrt(q)^2" => "sqrt(q)^2";
     root_squared_positive: "sqrt(M)^2" => "M";

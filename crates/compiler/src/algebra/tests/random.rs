@@ -99,7 +99,7 @@ fn direct(tree: &Tree, at: &dyn Fn(usize) -> f64) -> (f64, f64) {
         Tree::Power(base, n) => {
             let (b, error) = direct(base, at);
             // A power of 0 is 1 only where its base is defined.
-            let value = if b.is_nan() { b } else { b.powi(*n as i32) };
+            let value = if *n == 0 && !b.is_finite() { f64::NAN } else { b.powi(*n as i32) };
             let slope = (*n as f64 * b.powi(*n as i32 - 1)).abs();
             rounded(value, if *n == 0 { 0.0 } else { near(error, b) * slope })
         }
