@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::equations::{Equations, Form, StateKind, Style, print, print_expr};
+use halfarrow_compiler::equations::{Equations, Form, Shown, StateKind, Style, print, print_expr, print_symbol, show};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -64,40 +63,35 @@ impl Model {
         let start = self.values_at_start(&equations);
         let x = &equations.graph.exprs;
         let states = states(&equations, &start);
-        let implicit = equations.implicit.iter().map(|&s| x.name(s).to_string());
+        let implicit: Vec<String> = equations.implicit.iter().map(|&s| x.name(s).to_string()).collect();
+        let shown = show(equations);
+        let equations = &shown.equations;
         Ok(EquationsReport {
             model: equations.graph.name.clone(),
             form: form_name(form),
             unknowns: states.iter().map(|s| s.name.clone()).chain(implicit).collect(),
             states,
-            equations: print(&equations, Style::Ascii),
-            text: print(&equations, Style::Unicode),
-            latex: print(&equations, Style::Latex),
-            meanings: meanings(&equations, Style::Ascii),
-            conserved: conserved(&equations, Style::Ascii),
-            legend: [meanings(&equations, Style::Unicode), conserved(&equations, Style::Unicode)].concat(),
+            equations: print(&shown, Style::Ascii),
+            text: print(&shown, Style::Unicode),
+            latex: print(&shown, Style::Latex),
+            meanings: meanings(&shown, Style::Ascii),
+            conserved: conserved(&shown, Style::Ascii),
+            legend: [meanings(&shown, Style::Unicode), conserved(&shown, Style::Unicode)].concat(),
             index: equations.index,
-            counts: minimal_count(&equations),
+            counts: minimal_count(equations),
             dof: equations.dof,
         })
     }
 }
 
-fn meanings(equations: &Equations, style: Style) -> Vec<String> {
-    let line = |&(symbol, e)| format!("{} = {}", symbol_in(equations, symbol, style), print_expr(equations, e, style));
-    equations.meanings.iter().map(line).collect()
+fn meanings(shown: &Shown, style: Style) -> Vec<String> {
+    let line = |&(symbol, e)| format!("{} = {}", print_symbol(shown, symbol, style), print_expr(shown, e, style));
+    shown.equations.meanings.iter().map(line).collect()
 }
 
-fn conserved(equations: &Equations, style: Style) -> Vec<String> {
-    let value = |e| print_expr(equations, e, style);
-    equations.conserved.iter().map(|c| format!("{} = {}", c.name, value(c.value))).collect()
-}
-
-/// A symbol as it is written among the equations.
-fn symbol_in(equations: &Equations, symbol: Symbol, style: Style) -> String {
-    let mut with_symbol = equations.clone();
-    let e = with_symbol.graph.exprs.sym(symbol);
-    print_expr(&with_symbol, e, style)
+fn conserved(shown: &Shown, style: Style) -> Vec<String> {
+    let value = |e| print_expr(shown, e, style);
+    shown.equations.conserved.iter().map(|c| format!("{} = {}", c.name, value(c.value))).collect()
 }
 
 /// Its name on the command line.

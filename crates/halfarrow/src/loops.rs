@@ -6,7 +6,7 @@ use halfarrow_compiler::algebra::{Exprs, PlainNames, Symbol, ascii};
 use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
 use halfarrow_compiler::causal_graph::{CausalGraph, PortState, Role, Stroke};
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
-use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr};
+use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
 use halfarrow_compiler::ids::Id;
 use serde::Serialize;
 
@@ -271,9 +271,13 @@ fn port_name(graph: &BondGraph, port: PortRef) -> String {
 }
 
 fn conserved(equations: &Equations) -> Vec<ConservedReport> {
+    if equations.conserved.is_empty() {
+        return Vec::new();
+    }
+    let shown = show(equations.clone());
     let report = |c: &halfarrow_compiler::equations::Conserved| ConservedReport {
         name: c.name.clone(),
-        value: print_expr(equations, c.value, Style::Ascii),
+        value: print_expr(&shown, c.value, Style::Ascii),
     };
-    equations.conserved.iter().map(report).collect()
+    shown.equations.conserved.iter().map(report).collect()
 }

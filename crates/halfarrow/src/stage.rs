@@ -6,7 +6,7 @@ use halfarrow_compiler::ast;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::compile::Found;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
-use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::equations::{Form, show};
 use halfarrow_compiler::program::schedule;
 
 use crate::Override;
@@ -85,7 +85,7 @@ impl Stage {
                 let causal = model.causal_graph()?;
                 find_paths(&causal).text(&causal)
             }
-            Stage::Equations => model.equations_in(Form::Minimal)?.to_string(),
+            Stage::Equations => show(model.equations_in(Form::Minimal)?).to_string(),
             Stage::Program => schedule(&model.equations_in(Form::Minimal)?).to_string(),
         })
     }

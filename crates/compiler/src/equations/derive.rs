@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::blocks::{Insoluble, Ordered, order};
 use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
-use super::{Equations, Form, State, StateKind, Step, Unavailable, conserved, display, observed};
+use super::{Equations, Form, State, StateKind, Step, Unavailable, conserved, observed};
 use crate::algebra::{Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
@@ -58,25 +58,22 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         _ => Vec::new(),
     });
     let implicit = implicit.collect();
-    let follows: Vec<Symbol> =
+    let dependent: Vec<Symbol> =
         causal.ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output).collect();
-    let display::Shown { display, aliases, sources, dependent } = display::display(&mut d, &states, &ordered, &follows);
     let dof =
         causal.ports.ports.iter().filter(|p| p.role == Role::Independent).count() + causal.ports.virtual_speeds.len();
-    let graph = graph.with_exprs(d.x);
     Ok(Equations {
         form,
-        graph,
+        graph: graph.with_exprs(d.x),
         states,
         conserved,
         steps: ordered.steps,
         observed,
         conditions,
-        display,
-        meanings,
-        aliases,
-        sources,
+        definitions: d.of,
+        rows: ordered.rows,
         dependent,
+        meanings,
         index: 0,
         dof,
         implicit,

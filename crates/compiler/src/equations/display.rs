@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::blocks::{LinearRow, Ordered};
 use super::definitions::{Definition, Definitions};
-use super::{Dependent, DisplayEquation, State, Step};
+use super::{Equations, State, Step};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 
@@ -13,34 +13,62 @@ const SMALL: usize = 2_000;
 /// Linear blocks up to this size are written out.
 const CLOSED: usize = 3;
 
-/// What is shown.
+/// Equations with what a textbook would print of them.
+#[derive(Debug, Clone)]
 pub struct Shown {
-    /// One equation for each state, then the equations of what stays implicit.
+    /// The equations; their pool holds the expressions of this too.
+    pub equations: Equations,
+    /// One equation for each state, then what stays implicit.
     pub display: Vec<DisplayEquation>,
+    /// Each dependent storage with its co-energy variable as a combination of independent ones: its row of `S`.
+    pub dependent: Vec<Dependent>,
+    /// Sources that stand in `display` by name, with their values.
+    pub sources: Vec<(Symbol, Expr)>,
     /// Names that outputs or `let`s give to states.
     pub aliases: BTreeMap<Symbol, String>,
-    /// Sources that stand in the equations by name, with their values.
-    pub sources: Vec<(Symbol, Expr)>,
-    /// The rows of the dependent storages.
-    pub dependent: Vec<Dependent>,
 }
 
-/// The equations for people, with everything put in that can be.
-pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered, follows: &[Symbol]) -> Shown {
+/// An equation for people: `left = right`.
+#[derive(Debug, Clone, Copy)]
+pub struct DisplayEquation {
+    /// Left side.
+    pub left: Expr,
+    /// Right side, with sources that vary in time as symbols.
+    pub right: Expr,
+    /// Both sides with the values of these sources put in.
+    pub closed: (Expr, Expr),
+}
+
+/// A storage whose co-energy variable follows from others.
+#[derive(Debug, Clone, Copy)]
+pub struct Dependent {
+    /// Its co-energy variable.
+    pub variable: Symbol,
+    /// What it follows from, with everything put in that can be.
+    pub value: Expr,
+}
+
+/// The equations for people, with everything put in that can be. Apart from [`derive_equations`](super::derive_equations)
+/// since to run a model takes none of it.
+pub fn show(mut equations: Equations) -> Shown {
+    let mut d = Definitions::new(std::mem::take(&mut equations.graph.exprs), &equations.graph);
+    d.of = std::mem::take(&mut equations.definitions);
+    let ordered = Ordered { steps: std::mem::take(&mut equations.steps), rows: std::mem::take(&mut equations.rows) };
+    let states = &equations.states;
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
-    let named = named_sources(d);
+    let named = named_sources(&d);
     let small = ordered.steps.len() <= SMALL;
-    let known = if small { expansions(d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
-    let aliases = aliases(d, states, &known);
-    let mut display = equations(d, states, ordered, &known);
+    let known = if small { expansions(&mut d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
+    let aliases = aliases(&mut d, states, &known);
+    let mut display = self::equations(&mut d, states, &ordered, &known);
     let mut read = BTreeSet::new();
     for equation in &mut display {
         read.extend(d.x.symbols_of(equation.left));
         read.extend(d.x.symbols_of(equation.right));
         equation.closed = (d.x.substitute(equation.left, &named), d.x.substitute(equation.right, &named));
     }
-    let mut dependent = Vec::with_capacity(follows.len());
-    for &variable in follows {
+    let mut dependent = Vec::with_capacity(equations.dependent.len());
+    for &variable in &equations.dependent {
         if let Some(row) = d.of.get(&variable).map(|f| f.expr()) {
             let value = put_in(&mut d.x, row, &known);
             read.extend(d.x.symbols_of(value));
@@ -48,7 +76,11 @@ pub fn display(d: &mut Definitions, states: &[State], ordered: &Ordered, follows
         }
     }
     let sources = named.into_iter().filter(|(s, _)| read.contains(s)).collect();
-    Shown { display, aliases, sources, dependent }
+    let Definitions { x, of, .. } = d;
+    equations.graph.exprs = x;
+    equations.definitions = of;
+    Ordered { steps: equations.steps, rows: equations.rows } = ordered;
+    Shown { equations, display, dependent, sources, aliases }
 }
 
 /// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.

@@ -16,8 +16,11 @@ use crate::bond_graph::{BondGraph, ElementId};
 use crate::span::Span;
 use crate::unit::Unit;
 
+pub use blocks::LinearRow;
+pub use definitions::Definition;
 pub use derive::derive_equations;
-pub use text::{Style, print, print_dependent, print_expr, print_meanings};
+pub use display::{Dependent, DisplayEquation, Shown, show};
+pub use text::{Style, print, print_dependent, print_expr, print_meanings, print_symbol};
 
 /// A formulation, `method.md`, section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,16 +50,14 @@ pub struct Equations {
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
     pub conditions: Vec<Condition>,
-    /// The equations as a person would write them: one for each state, then what stays implicit.
-    pub display: Vec<DisplayEquation>,
-    /// Each dependent storage with its co-energy variable as a combination of independent ones: its row of `S`.
-    pub dependent: Vec<Dependent>,
-    /// Sources that stand in `display` by name, with their values.
-    pub sources: Vec<(Symbol, Expr)>,
+    /// What defines each variable, before loops were opened.
+    pub definitions: BTreeMap<Symbol, Definition>,
+    /// The rows of all linear loops.
+    pub rows: Vec<LinearRow>,
+    /// Co-energy variables of the storages that depend on others.
+    pub dependent: Vec<Symbol>,
     /// What a state is that is no variable of its own (`pi = X + S^T X_d`), in stored quantities.
     pub meanings: Vec<(Symbol, Expr)>,
-    /// Names that outputs or `let`s give to states.
-    pub aliases: BTreeMap<Symbol, String>,
     /// Differentiation index of what is left, 0 for an explicit ODE.
     pub index: u8,
     /// Number of independent storages.
@@ -89,15 +90,6 @@ pub enum StateKind {
     Storage(Option<ElementId>),
     /// An integrated signal.
     Signal,
-}
-
-/// A storage whose co-energy variable follows from others.
-#[derive(Debug, Clone, Copy)]
-pub struct Dependent {
-    /// Its co-energy variable.
-    pub variable: Symbol,
-    /// What it follows from, with everything put in that can be.
-    pub value: Expr,
 }
 
 /// A combination of stored quantities that no motion changes.
@@ -197,15 +189,4 @@ pub struct Condition {
     pub value: Expr,
     /// Where it stands.
     pub span: Span,
-}
-
-/// An equation for people: `left = right`.
-#[derive(Debug, Clone, Copy)]
-pub struct DisplayEquation {
-    /// Left side.
-    pub left: Expr,
-    /// Right side, with sources that vary in time as symbols.
-    pub right: Expr,
-    /// Both sides with the values of these sources put in.
-    pub closed: (Expr, Expr),
 }

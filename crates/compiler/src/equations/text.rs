@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Dependent, DisplayEquation, Equations, Step};
+use super::{Dependent, DisplayEquation, Shown, Step};
 use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
 use crate::bond_graph::{BondGraph, Element, Kind, Meaning};
 
@@ -19,52 +19,57 @@ pub enum Style {
 }
 
 /// The equations, one a line. For people, sources that vary in time stand by name; [`print_meanings`] has their values.
-pub fn print(equations: &Equations, style: Style) -> Vec<String> {
-    let names = Written::of(equations);
-    let side = |e: Expr| expression(&equations.graph.exprs, e, &names, style);
+pub fn print(shown: &Shown, style: Style) -> Vec<String> {
+    let names = Written::of(shown);
+    let side = |e: Expr| expression(e, &names, style);
     let sides = |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
     let line = |(left, right)| format!("{} = {}", side(left), side(right));
-    equations.display.iter().map(sides).map(line).collect()
+    shown.display.iter().map(sides).map(line).collect()
 }
 
 /// What stands behind the names in the equations: sources that vary in time, states that are sums of stored quantities,
 /// conserved quantities.
-pub fn print_meanings(equations: &Equations, style: Style) -> Vec<String> {
-    let names = Written::of(equations);
-    let text = |e: Expr| expression(&equations.graph.exprs, e, &names, style);
-    let name = |s: Symbol| match style {
-        Style::Ascii => names.ascii(s),
-        Style::Unicode => names.unicode(s),
-        Style::Latex => names.latex(s),
-    };
-    let conserved = equations.conserved.iter().map(|c| (c.symbol, c.value));
-    let all = equations.sources.iter().copied().chain(equations.meanings.iter().copied()).chain(conserved);
-    all.map(|(symbol, value)| format!("{} = {}", name(symbol), text(value))).collect()
+pub fn print_meanings(shown: &Shown, style: Style) -> Vec<String> {
+    let names = Written::of(shown);
+    let conserved = shown.equations.conserved.iter().map(|c| (c.symbol, c.value));
+    let all = shown.sources.iter().copied().chain(shown.equations.meanings.iter().copied()).chain(conserved);
+    all.map(|(symbol, value)| definition(symbol, value, &names, style)).collect()
 }
 
 /// The dependent storages, each with its row of `S`, one a line.
-pub fn print_dependent(equations: &Equations, style: Style) -> Vec<String> {
-    let names = Written::of(equations);
-    let x = &equations.graph.exprs;
-    let name = |s: Symbol| match style {
-        Style::Ascii => names.ascii(s),
-        Style::Unicode => names.unicode(s),
-        Style::Latex => names.latex(s),
-    };
-    let line = |d: &Dependent| format!("{} = {}", name(d.variable), expression(x, d.value, &names, style));
-    equations.dependent.iter().map(line).collect()
+pub fn print_dependent(shown: &Shown, style: Style) -> Vec<String> {
+    let names = Written::of(shown);
+    let line = |d: &Dependent| definition(d.variable, d.value, &names, style);
+    shown.dependent.iter().map(line).collect()
 }
 
 /// One expression in the names of these equations.
-pub fn print_expr(equations: &Equations, e: Expr, style: Style) -> String {
-    expression(&equations.graph.exprs, e, &Written::of(equations), style)
+pub fn print_expr(shown: &Shown, e: Expr, style: Style) -> String {
+    expression(e, &Written::of(shown), style)
 }
 
-fn expression(x: &Exprs, e: Expr, names: &Written, style: Style) -> String {
+/// One symbol in the names of these equations.
+pub fn print_symbol(shown: &Shown, symbol: Symbol, style: Style) -> String {
+    name(symbol, &Written::of(shown), style)
+}
+
+fn definition(symbol: Symbol, value: Expr, names: &Written, style: Style) -> String {
+    format!("{} = {}", name(symbol, names, style), expression(value, names, style))
+}
+
+fn name(symbol: Symbol, names: &Written, style: Style) -> String {
     match style {
-        Style::Ascii => ascii(x, e, names),
-        Style::Unicode => unicode(x, e, names),
-        Style::Latex => latex(x, e, names),
+        Style::Ascii => names.ascii(symbol),
+        Style::Unicode => names.unicode(symbol),
+        Style::Latex => names.latex(symbol),
+    }
+}
+
+fn expression(e: Expr, names: &Written, style: Style) -> String {
+    match style {
+        Style::Ascii => ascii(names.x, e, names),
+        Style::Unicode => unicode(names.x, e, names),
+        Style::Latex => latex(names.x, e, names),
     }
 }
 
@@ -78,7 +83,8 @@ struct Written<'a> {
 }
 
 impl<'a> Written<'a> {
-    fn of(equations: &'a Equations) -> Self {
+    fn of(shown: &'a Shown) -> Self {
+        let equations = &shown.equations;
         let mut states = BTreeMap::new();
         for state in &equations.states {
             states.insert(state.symbol, (state.name.as_str(), false));
@@ -90,8 +96,8 @@ impl<'a> Written<'a> {
             _ => 2,
         };
         let place = equations.graph.variables.iter().map(|(&s, v)| (s, class(v.meaning))).collect();
-        let sources = equations.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
-        Written { x: &equations.graph.exprs, aliases: &equations.aliases, states, sources, place }
+        let sources = shown.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
+        Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, sources, place }
     }
 
     /// The name for people, and whether it is the rate of what has the name.
@@ -166,13 +172,14 @@ fn subscripted(name: &str) -> Option<(&str, &str)> {
     matches!(variable, "e" | "f" | "q" | "p" | "pi").then_some((variable, element))
 }
 
-impl Display for Equations {
+impl Display for Shown {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let equations = &self.equations;
         let names = Written::of(self);
-        let text = |e: Expr| ascii(&self.graph.exprs, e, &names);
-        writeln!(f, "equations {} {:?}", self.graph.name, self.form)?;
+        let text = |e: Expr| ascii(names.x, e, &names);
+        writeln!(f, "equations {} {:?}", equations.graph.name, equations.form)?;
         writeln!(f, "\nstates")?;
-        for state in &self.states {
+        for state in &equations.states {
             writeln!(f, "  {}", state.name)?;
         }
         writeln!(f, "\nequations")?;
@@ -186,7 +193,7 @@ impl Display for Equations {
             writeln!(f, "  dependent {line}")?;
         }
         writeln!(f, "\nsteps")?;
-        for step in &self.steps {
+        for step in &equations.steps {
             match step {
                 Step::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
                 Step::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,

@@ -146,11 +146,10 @@ impl Sketch {
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,
-            display: Vec::new(),
+            definitions: BTreeMap::new(),
+            rows: Vec::new(),
             dependent: Vec::new(),
-            sources: Vec::new(),
             meanings: Vec::new(),
-            aliases: BTreeMap::new(),
             index: 0,
             implicit: Vec::new(),
         }
