@@ -62,6 +62,11 @@ pub enum Failure {
         /// What it has to be.
         expected: &'static str,
     },
+    /// The method of the run does not fit the system.
+    BadMethod {
+        /// What it has to be.
+        expected: &'static str,
+    },
     /// The receiver of the samples asked to stop.
     Interrupted {
         /// When, in s.
@@ -80,7 +85,7 @@ impl Failure {
             | Failure::StepTooSmall { time, .. }
             | Failure::Chattering { time, .. }
             | Failure::Interrupted { time } => Some(*time),
-            Failure::BadOption { .. } => None,
+            Failure::BadOption { .. } | Failure::BadMethod { .. } => None,
         }
     }
 }
@@ -115,6 +120,7 @@ impl fmt::Display for Failure {
             Failure::BadOption { option, value, expected } => {
                 write!(f, "{option} is {value}, but it must be {expected}")
             }
+            Failure::BadMethod { expected } => write!(f, "this method does not fit the equations: use {expected}"),
             Failure::Interrupted { time } => write!(f, "stopped at t = {time} s as asked"),
         }
     }

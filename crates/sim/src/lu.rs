@@ -32,6 +32,11 @@ impl Lu {
         (0..self.size).for_each(|i| self.entries[i * self.size + i] = 1.0);
     }
 
+    /// Makes all entries 0.
+    pub(crate) fn clear(&mut self) {
+        self.entries.fill(0.0);
+    }
+
     /// Adds to one entry.
     pub(crate) fn add(&mut self, row: usize, column: usize, value: f64) {
         self.entries[row * self.size + column] += value;

@@ -12,6 +12,9 @@ pub enum Method {
     Explicit,
     /// Backward differentiation formulas of order 1 to 5 with variable step, for stiff systems.
     Bdf,
+    /// The implicit Runge-Kutta method Radau IIA of order 5 with variable step, for stiff systems and the only one for
+    /// systems of index 2 and 3.
+    Radau,
     /// Explicit until the system proves stiff, then backward differentiation formulas to the end. Stiff is a system
     /// whose steps times the spectral radius of its Jacobian stay above what accuracy allows, look after look, while many
     /// steps are still to come, or one in which no explicit step is short enough.

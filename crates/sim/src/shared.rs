@@ -2,6 +2,7 @@
 
 use std::cell::{RefCell, RefMut};
 
+use crate::scene::Scene;
 use crate::{Failure, Sparsity, System};
 
 /// A system that the run and the integrator's library both call, and the failure that the library cannot pass on.
@@ -18,6 +19,14 @@ impl<'a> Shared<'a> {
     /// The system, to be given back before anybody else asks for it.
     pub(crate) fn system(&self) -> RefMut<'_, Counted<'a>> {
         self.system.borrow_mut()
+    }
+
+    /// The system as a run sees it.
+    pub(crate) fn scene<'r>(&'r self) -> &'r RefCell<dyn Scene + 'r>
+    where
+        'a: 'r,
+    {
+        &self.system
     }
 
     /// Keeps a failure until somebody can return it.

@@ -1,11 +1,13 @@
 //! A whole run: from an initial state through jumps and switches to the end, samples on the way.
 
+use std::cell::{RefCell, RefMut};
 use std::fmt;
 use std::ops::ControlFlow;
 
 use crate::events::Sides;
 use crate::fixed_step::{FixedMethod, FixedStep};
 use crate::grid::Grid;
+use crate::scene::Scene;
 use crate::shared::Shared;
 use crate::{Failure, Method, Options, System};
 
@@ -29,10 +31,16 @@ pub struct Summary {
     pub steps: usize,
     /// Steps tried in vain: error too large, Newton without convergence, or a failure of the system.
     pub rejected: usize,
-    /// Evaluations of the rates.
+    /// Evaluations of the rates, or of the residuals of a system in implicit form.
     pub rates: usize,
     /// Directional derivatives of the rates.
     pub tangents: usize,
+    /// Jacobians of a system in implicit form, or by [`Method::Radau`].
+    pub jacobians: usize,
+    /// Factorisations of matrices; for [`Method::Radau`] a real and a complex one count as one.
+    pub factorisations: usize,
+    /// Newton iterations of [`Method::Radau`], each the solution of a real and a complex system.
+    pub iterations: usize,
     /// Jumps crossed that were known in advance, the start not counted.
     pub jumps: usize,
     /// Crossings of switching functions.
@@ -71,21 +79,22 @@ pub fn simulate(
     sink: &mut dyn Sink,
 ) -> Result<Summary, Stopped> {
     let shared = Shared::new(system);
-    let mut run = Run::new(&shared, options, sink);
+    let mut run = Run::new(shared.scene(), options, sink);
     let end = match options.check(x.len()) {
         Err(failure) => Err(failure),
         Ok(()) => match (options.method, options.step) {
-            (Method::Fixed(method), Some(step)) => run.fixed(method, step, x),
-            _ => crate::variable_step::run(&mut run, x),
+            (Method::Fixed(method), Some(step)) => run.fixed(&shared, method, step, x),
+            _ => crate::variable_step::run(&mut run, &shared, x),
         },
     };
-    let summary = run.summary();
-    end.map(|()| summary).map_err(|failure| Stopped { failure, time: run.time, summary })
+    let (system, time) = (shared.system(), run.time);
+    let summary = Summary { rates: system.rates, tangents: system.tangents, ..run.counts };
+    end.map(|()| summary).map_err(|failure| Stopped { failure, time, summary })
 }
 
 /// The parts of a run that all methods share.
 pub(crate) struct Run<'a> {
-    pub(crate) shared: &'a Shared<'a>,
+    scene: &'a RefCell<dyn Scene + 'a>,
     pub(crate) options: &'a Options,
     pub(crate) sides: Sides,
     /// How far the run has come: `x` belongs to this time.
@@ -97,13 +106,12 @@ pub(crate) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(shared: &'a Shared<'a>, options: &'a Options, sink: &'a mut dyn Sink) -> Run<'a> {
-        let observed = shared.system().observed();
-        let switches = shared.system().switches();
+    pub(crate) fn new(scene: &'a RefCell<dyn Scene + 'a>, options: &'a Options, sink: &'a mut dyn Sink) -> Run<'a> {
+        let (observed, switches) = (scene.borrow().observed(), scene.borrow().switches());
         Run {
             values: vec![0.0; observed],
             sides: Sides::new(switches),
-            shared,
+            scene,
             options,
             time: options.from,
             counts: Summary::default(),
@@ -112,25 +120,25 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn summary(&self) -> Summary {
-        let system = self.shared.system();
-        Summary { rates: system.rates, tangents: system.tangents, ..self.counts }
+    /// The system, to be given back before anybody else asks for it.
+    pub(crate) fn scene(&self) -> RefMut<'_, dyn Scene + 'a> {
+        self.scene.borrow_mut()
     }
 
     /// The start counts as a jump.
     pub(crate) fn start(&mut self, x: &mut [f64]) -> Result<(), Failure> {
         if let Some(state) = x.iter().position(|value| !value.is_finite()) {
-            return Err(Failure::NotFinite { time: self.time, what: self.shared.system().state_name(state) });
+            return Err(Failure::NotFinite { time: self.time, what: self.scene().name(state) });
         }
         self.cross(self.time, x)?;
-        self.shared.system().accept(self.time, x)?;
+        self.scene().accept(self.time, x)?;
         self.record(self.time, self.time, x)
     }
 
     /// A step to `(t, x)` is accepted.
     pub(crate) fn reach(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.time = t;
-        self.shared.system().accept(t, x)?;
+        self.scene().accept(t, x)?;
         match self.sink.progress(t) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Failure::Interrupted { time: t }),
@@ -155,9 +163,9 @@ impl<'a> Run<'a> {
     }
 
     fn cross(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        let system = &mut *self.shared.system();
-        system.cross_jump(t, x)?;
-        self.sides.take(system, t, x)
+        let scene = &mut *self.scene.borrow_mut();
+        scene.cross_jump(t, x)?;
+        self.sides.take(scene, t, x)
     }
 
     /// The next time of the grid that is clearly before `end`.
@@ -171,9 +179,9 @@ impl<'a> Run<'a> {
 
     /// Hands over the values at `(t, x)` as the sample of time `label`.
     pub(crate) fn record(&mut self, label: f64, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.shared.system().observe(t, x, &mut self.values)?;
+        self.scene.borrow_mut().observe(t, x, &mut self.values)?;
         if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: self.shared.system().observed_name(value) });
+            return Err(Failure::NotFinite { time: t, what: self.scene().observed_name(value) });
         }
         self.sink.sample(label, &self.values);
         if let Some(grid) = &mut self.grid {
@@ -182,17 +190,17 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn fixed(&mut self, method: FixedMethod, step: f64, x: &mut [f64]) -> Result<(), Failure> {
-        let mut stepper = FixedStep::new(method, self.shared.system().sparsity());
+    fn fixed(&mut self, shared: &Shared<'_>, method: FixedMethod, step: f64, x: &mut [f64]) -> Result<(), Failure> {
+        let mut stepper = FixedStep::new(method, shared.system().sparsity());
         let mut ticks = Grid::new(self.options.from, step);
         self.start(x)?;
         while self.time < self.options.to {
             ticks.pass(self.time);
-            let jump = self.shared.system().next_jump(self.time);
+            let jump = self.scene().next_jump(self.time);
             let target = self.target(ticks.next(), jump, ticks.slack());
-            stepper.step(&mut *self.shared.system(), self.time, target - self.time, x)?;
+            stepper.step(&mut *shared.system(), self.time, target - self.time, x)?;
             self.counts.steps += 1;
-            let switched = self.sides.crossed(&mut *self.shared.system(), target, x)?.is_some();
+            let switched = self.sides.crossed(&mut *self.scene.borrow_mut(), target, x)?.is_some();
             self.counts.switches += usize::from(switched);
             self.counts.jumps += usize::from(jump == Some(target));
             self.reach(target, x)?;

@@ -5,7 +5,7 @@ mod systems;
 
 use std::ops::ControlFlow;
 
-use halfarrow_sim::Method::{Auto, Bdf, Explicit};
+use halfarrow_sim::Method::{Auto, Bdf, Explicit, Radau};
 use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, simulate};
 use systems::*;
 
@@ -21,9 +21,9 @@ macro_rules! work {
             let mut system: Known = $system;
             let (samples, end) = system.run(&options($method, $rtol, 10.0));
             let summary = end.unwrap();
-            assert!(summary.steps <= $steps && summary.rates <= $rates, "{summary:?}");
             assert_eq!(samples.times.len(), 1001);
             let error = system.error(&samples);
+            assert!(summary.steps <= $steps && summary.rates <= $rates, "error {error:e}, {summary:?}");
             assert!(error < $error, "error {error:e}, {summary:?}");
         }
     };
@@ -48,6 +48,17 @@ work!(bdf_lopsided_12: Bdf, lopsided(), rtol = 1e-12 => steps <= 3000, rates <= 
 work!(bdf_prothero_robinson_12: Bdf, prothero_robinson(), rtol = 1e-12 => steps <= 1500, rates <= 2000, error < 1e-12);
 work!(bdf_rod_6: Bdf, rod(), rtol = 1e-6 => steps <= 300, rates <= 330, error < 1e-6);
 work!(bdf_rod_12: Bdf, rod(), rtol = 1e-12 => steps <= 1200, rates <= 1300, error < 1e-11);
+work!(radau_decay_6: Radau, decay(), rtol = 1e-6 => steps <= 55, rates <= 3500, error < 1e-7);
+work!(radau_decay_12: Radau, decay(), rtol = 1e-12 => steps <= 225, rates <= 4400, error < 5e-12);
+work!(radau_oscillator_6: Radau, oscillator(), rtol = 1e-6 => steps <= 70, rates <= 3400, error < 1e-6);
+work!(radau_oscillator_12: Radau, oscillator(), rtol = 1e-12 => steps <= 470, rates <= 5600, error < 2e-11);
+work!(radau_hyperbola_12: Radau, hyperbola(), rtol = 1e-12 => steps <= 250, rates <= 8200, error < 1e-12);
+work!(radau_stepped_12: Radau, stepped(), rtol = 1e-12 => steps <= 280, rates <= 4700, error < 5e-12);
+work!(radau_scales_12: Radau, scales_apart(), rtol = 1e-12 => steps <= 530, rates <= 6000, error < 2e-11);
+work!(radau_lopsided_12: Radau, lopsided(), rtol = 1e-12 => steps <= 640, rates <= 6600, error < 3e-11);
+work!(radau_prothero_robinson_12: Radau, prothero_robinson(), rtol = 1e-12 => steps <= 35, rates <= 3800, error < 5e-9);
+work!(radau_rod_6: Radau, rod(), rtol = 1e-6 => steps <= 70, rates <= 1050, error < 5e-8);
+work!(radau_rod_12: Radau, rod(), rtol = 1e-12 => steps <= 250, rates <= 3600, error < 2e-11);
 work!(auto_stays_explicit: Auto, oscillator(), rtol = 1e-6 => steps <= 60, rates <= 450, error < 1e-6);
 work!(auto_turns_stiff: Auto, prothero_robinson(), rtol = 1e-9 => steps <= 700, rates <= 1200, error < 1e-9);
 work!(auto_turns_stiff_on_a_large_system: Auto, rod(), rtol = 1e-9 => steps <= 850, rates <= 1200, error < 2e-9);
@@ -70,9 +81,15 @@ fn error_at_rest<const SECTIONS: usize>(method: Method, rtol: f64, to: f64) -> f
 
 #[test]
 fn a_ladder_at_rest_starts_and_comes_to_rest() {
-    for (method, rtol, bound) in
-        [(Auto, 1e-6, 5e-5), (Explicit, 1e-6, 5e-5), (Bdf, 1e-6, 1e-5), (Auto, 1e-12, 1e-10), (Bdf, 1e-12, 1e-10)]
-    {
+    for (method, rtol, bound) in [
+        (Auto, 1e-6, 5e-5),
+        (Explicit, 1e-6, 5e-5),
+        (Bdf, 1e-6, 1e-5),
+        (Auto, 1e-12, 1e-10),
+        (Bdf, 1e-12, 1e-10),
+        (Radau, 1e-6, 1e-5),
+        (Radau, 1e-12, 1e-10),
+    ] {
         let error = error_at_rest::<10>(method, rtol, 0.02);
         assert!(error < bound, "{method:?} {rtol:e}: {error:e}");
     }
@@ -81,7 +98,8 @@ fn a_ladder_at_rest_starts_and_comes_to_rest() {
 #[test]
 fn long_ladders_start_from_rest() {
     // What runs down the ladder does not depend on how many sections follow that it has not reached.
-    for (method, rtol, bound) in [(Auto, 1e-6, 1e-5), (Explicit, 1e-12, 1e-10), (Bdf, 1e-6, 5e-5)] {
+    for (method, rtol, bound) in [(Auto, 1e-6, 1e-5), (Explicit, 1e-12, 1e-10), (Bdf, 1e-6, 5e-5), (Radau, 1e-6, 5e-5)]
+    {
         let last = |system: &mut Known| {
             let (samples, end) = system.run(&Options { every: None, ..options(method, rtol, 5e-4) });
             assert!(end.is_ok(), "{method:?} {rtol:e}: {end:?}");
@@ -98,7 +116,7 @@ fn long_ladders_start_from_rest() {
 #[test]
 fn what_nothing_moves_does_no_harm() {
     // The second state stands still, the third moves only once the first has, the fourth follows the third.
-    for method in [Explicit, Bdf, Auto] {
+    for method in [Explicit, Bdf, Radau, Auto] {
         let mut system = Known::new(
             &[0.0; 4],
             |_, x, _, dx| dx.copy_from_slice(&[1.0, 0.0, 1e-9 * x[0].powi(8), 1e6 * x[2]]),
@@ -112,8 +130,10 @@ fn what_nothing_moves_does_no_harm() {
 }
 
 #[test]
-fn bdf_meets_the_published_values_of_robertson() {
-    for (method, rtol, bound) in [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7)] {
+fn stiff_methods_meet_the_published_values_of_robertson() {
+    for (method, rtol, bound) in
+        [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7), (Radau, 1e-6, 3e-5), (Radau, 1e-10, 1e-9)]
+    {
         let mut system = robertson();
         let atol = AbsoluteTolerance::Each([1e-4, 1e-10, 1e-2].map(|share| share * rtol).to_vec());
         let options = Options { method, rtol, atol, to: 1e11, every: Some(1e11), ..Options::default() };
@@ -135,7 +155,7 @@ fn scaled_tolerances_carry_robertson_through() {
 
 #[test]
 fn jumps_are_met_to_the_last_bit() {
-    for method in [Explicit, Bdf] {
+    for method in [Explicit, Bdf, Radau] {
         let mut system = stepped();
         let (samples, end) = system.run(&Options { every: None, ..options(method, 1e-9, 1.0) });
         assert_eq!(end.unwrap().jumps, 2);
@@ -162,7 +182,9 @@ fn a_thousand_jumps() {
 #[test]
 fn corners_do_not_start_anew() {
     // 1000 rows in 10 s: an explicit step a row, 6 evaluations and one beyond the corner.
-    for (method, steps, rates) in [(Explicit, 1000, 7002), (Auto, 1000, 7002), (Bdf, 25_000, 40_000)] {
+    for (method, steps, rates) in
+        [(Explicit, 1000, 7002), (Auto, 1000, 7002), (Bdf, 25_000, 40_000), (Radau, 25_000, 40_000)]
+    {
         let mut system = zigzag();
         let (samples, end) = system.run(&options(method, 1e-6, 10.0));
         let summary = end.unwrap();
@@ -174,7 +196,7 @@ fn corners_do_not_start_anew() {
 
 #[test]
 fn fine_tables_cost_few_steps_a_row() {
-    for (method, steps, rates) in [(Explicit, 1000, 7002), (Auto, 1000, 7002), (Bdf, 6500, 8500)] {
+    for (method, steps, rates) in [(Explicit, 1000, 7002), (Auto, 1000, 7002), (Bdf, 6500, 8500), (Radau, 6500, 8500)] {
         let mut system = table_of_a_sine();
         let (samples, end) = system.run(&options(method, 1e-6, 1.0));
         let summary = end.unwrap();
@@ -187,7 +209,8 @@ fn fine_tables_cost_few_steps_a_row() {
 #[test]
 fn rounding_is_not_taken_for_a_magnitude() {
     // In equilibrium the velocity is 0 and its rate what rounding leaves; a system may take that for its scale.
-    for (method, scale, steps) in [(Explicit, 0.0, 100), (Explicit, 1e-17, 100), (Auto, 1e-17, 100), (Bdf, 1e-17, 600)]
+    for (method, scale, steps) in
+        [(Explicit, 0.0, 100), (Explicit, 1e-17, 100), (Auto, 1e-17, 100), (Bdf, 1e-17, 600), (Radau, 1e-17, 600)]
     {
         let mut system = hanging();
         system.scales[0] = scale;
@@ -204,7 +227,7 @@ fn every_bounce_is_found() {
     // Half the speed is kept: each flight takes half the time of the one before.
     let first = (2.0_f64 / 9.81).sqrt();
     let bounces: Vec<f64> = (0..8).map(|n| first * (1.0 + 2.0 * (1.0 - 0.5_f64.powi(n)))).collect();
-    for method in [Explicit, Bdf] {
+    for method in [Explicit, Bdf, Radau] {
         let (samples, end) = ball().run(&Options { every: None, ..options(method, 1e-9, 1.3485) });
         assert_eq!(end.unwrap().switches, 8);
         let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
@@ -224,7 +247,7 @@ fn bounces_without_end_are_reported() {
 
 #[test]
 fn two_crossings_in_one_step_are_both_found() {
-    for (method, rtol) in [(Explicit, 1e-3), (Explicit, 1e-6), (Bdf, 1e-4)] {
+    for (method, rtol) in [(Explicit, 1e-3), (Explicit, 1e-6), (Bdf, 1e-4), (Radau, 1e-4)] {
         let (_, end) = grazing().run(&options(method, rtol, 10.0));
         assert_eq!(end.unwrap().switches, 2, "{method:?} {rtol:e}");
     }
@@ -232,7 +255,7 @@ fn two_crossings_in_one_step_are_both_found() {
 
 #[test]
 fn trial_steps_out_of_the_domain_are_taken_back() {
-    for method in [Explicit, Bdf, Auto] {
+    for method in [Explicit, Bdf, Radau, Auto] {
         let mut system = draining();
         let (samples, end) = system.run(&options(method, 1e-9, 0.999));
         end.unwrap();
@@ -242,7 +265,7 @@ fn trial_steps_out_of_the_domain_are_taken_back() {
 
 #[test]
 fn a_failure_of_the_system_is_handed_on_with_what_was_computed() {
-    for method in [Explicit, Bdf, Auto] {
+    for method in [Explicit, Bdf, Radau, Auto] {
         let mut system = draining();
         system.rates = |_, x, _, dx| dx[0] = -1.0 - x[0].sqrt();
         let (samples, end) = system.run(&options(method, 1e-6, 10.0));
@@ -255,7 +278,7 @@ fn a_failure_of_the_system_is_handed_on_with_what_was_computed() {
 
 #[test]
 fn a_solution_that_escapes_is_reported() {
-    for method in [Explicit, Bdf, Auto] {
+    for method in [Explicit, Bdf, Radau, Auto] {
         let mut system = hyperbola();
         system.rates = |_, x, _, dx| dx[0] = x[0] * x[0];
         system.tangent = |_, x, v, _, jv| jv[0] = 2.0 * x[0] * v[0];
@@ -303,7 +326,7 @@ fn the_sink_may_stop_the_run() {
 #[test]
 fn no_state_at_all() {
     let mut system = Known::new(&[], |_, _, _, _| {}, |_, _, _, _, _| {}, |_| vec![]);
-    for method in [Explicit, Bdf, Auto] {
+    for method in [Explicit, Bdf, Radau, Auto] {
         system.accepted.clear();
         let (samples, end) = system.run(&options(method, 1e-6, 1.0));
         end.unwrap();
@@ -313,7 +336,7 @@ fn no_state_at_all() {
 
 #[test]
 fn the_longest_step_is_kept() {
-    for method in [Explicit, Bdf] {
+    for method in [Explicit, Bdf, Radau] {
         let (samples, end) = decay().run(&Options { every: None, step: Some(0.05), ..options(method, 1e-3, 10.0) });
         assert!(samples.times.windows(2).all(|pair| pair[1] - pair[0] <= 0.05 + 1e-12));
         assert!(end.unwrap().steps >= 200);

@@ -6,7 +6,8 @@ mod locate;
 pub(crate) use chatter::Chatter;
 pub(crate) use locate::first_crossing;
 
-use crate::{Failure, System};
+use crate::Failure;
+use crate::scene::Scene;
 
 /// The side of each switching function during the present mode.
 pub(crate) struct Sides {
@@ -30,23 +31,23 @@ impl Sides {
     }
 
     /// Takes the sides at `(t, x)`, as the system does in `cross_jump`.
-    pub(crate) fn take(&mut self, system: &mut dyn System, t: f64, x: &[f64]) -> Result<(), Failure> {
+    pub(crate) fn take(&mut self, scene: &mut dyn Scene, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.is_empty() {
             return Ok(());
         }
-        system.switch_values(t, x, &mut self.values)?;
+        scene.switch_values(t, x, &mut self.values)?;
         self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
         Ok(())
     }
 
     /// The first switching function that at `(t, x)` is on another side than that held; `None` if all keep theirs.
-    pub(crate) fn crossed(&mut self, system: &mut dyn System, t: f64, x: &[f64]) -> Result<Option<usize>, Failure> {
+    pub(crate) fn crossed(&mut self, scene: &mut dyn Scene, t: f64, x: &[f64]) -> Result<Option<usize>, Failure> {
         if self.is_empty() {
             return Ok(None);
         }
-        system.switch_values(t, x, &mut self.values)?;
+        scene.switch_values(t, x, &mut self.values)?;
         if let Some(switch) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: system.switch_name(switch) });
+            return Err(Failure::NotFinite { time: t, what: scene.switch_name(switch) });
         }
         Ok(self.held.iter().zip(&self.values).position(|(&held, &value)| held != (value > 0.0)))
     }

@@ -3,15 +3,20 @@
 mod first_step;
 mod library;
 mod magnitudes;
+mod radau;
 mod stiffness;
 mod tolerances;
 
 use crate::events::{Chatter, first_crossing};
+use crate::shared::Shared;
 use crate::simulate::Run;
-use crate::{Failure, Method, System};
+use crate::{Failure, Method, Summary, System};
 use first_step::first_step;
 use stiffness::Stiffness;
 use tolerances::Tolerances;
+
+/// Parts of a step by which it is made to go beyond a crossing.
+pub(crate) const MARGINS: [f64; 2] = [1e-3, 1e-6];
 
 /// A method of variable step between two restarts.
 trait Integrator {
@@ -46,8 +51,20 @@ trait Integrator {
     /// The state at a time inside the last step, to the accuracy of the step.
     fn between(&mut self, t: f64, x: &mut [f64]);
 
-    /// Steps tried in vain so far.
-    fn rejected(&self) -> usize;
+    /// The state at a time inside the last step, to the accuracy of its end.
+    fn inside(&mut self, t: f64, x: &mut [f64]) {
+        self.between(t, x);
+    }
+
+    /// Makes the last step again so that it ends at a time inside it, if [`between`](Integrator::between) is less exact
+    /// than its end. `false` if that is not so, or cannot be done.
+    fn shorten(&mut self, t: f64) -> bool {
+        let _ = t;
+        false
+    }
+
+    /// Adds what it took so far, beside accepted steps and what the system counts.
+    fn add_work(&self, counts: &mut Summary);
 }
 
 /// Why an integrator hands over.
@@ -61,29 +78,31 @@ enum End {
 }
 
 /// Integrates to the end.
-pub(crate) fn run(run: &mut Run<'_>, x: &mut [f64]) -> Result<(), Failure> {
+pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) -> Result<(), Failure> {
     run.start(x)?;
-    let shared = run.shared;
     let mut tolerances = Tolerances::new(run.options, &*shared.system(), x);
     let mut chatter = Chatter::new(run.options.to - run.options.from);
     let mut stiff = run.options.method == Method::Bdf && !x.is_empty();
     loop {
         let atol = tolerances.clone();
-        let end = if stiff {
+        let end = if run.options.method == Method::Radau {
+            let mut method = radau::OnStates::new(shared, &atol);
+            Drive::new(run, shared, &mut method, &mut tolerances, &mut chatter, None).run(x)
+        } else if stiff {
             library::with_bdf(shared, &atol, |method| {
-                Drive::new(run, method, &mut tolerances, &mut chatter, None).run(x)
+                Drive::new(run, shared, method, &mut tolerances, &mut chatter, None).run(x)
             })
         } else {
             let watch = (run.options.method == Method::Auto).then(|| Stiffness::new(&atol));
             library::with_explicit(shared, &atol, |method| {
-                Drive::new(run, method, &mut tolerances, &mut chatter, watch).run(x)
+                Drive::new(run, shared, method, &mut tolerances, &mut chatter, watch).run(x)
             })
         };
         match end {
             Ok(End::Done) => return Ok(()),
             Ok(End::Grown) => tolerances.grow(),
             Ok(End::Stiff) => stiff = true,
-            Err(Failure::StepTooSmall { .. }) if becomes_known(run, &mut tolerances, x) => {}
+            Err(Failure::StepTooSmall { .. }) if becomes_known(run, shared, &mut tolerances, x) => {}
             Err(Failure::StepTooSmall { .. }) if run.options.method == Method::Auto && !stiff => stiff = true,
             Err(failure) => return Err(failure),
         }
@@ -92,16 +111,17 @@ pub(crate) fn run(run: &mut Run<'_>, x: &mut [f64]) -> Result<(), Failure> {
 }
 
 /// A state of unknown magnitude that leaves 0 fails every test. `true` if its magnitude can be guessed a little later.
-fn becomes_known(run: &Run<'_>, tolerances: &mut Tolerances, x: &[f64]) -> bool {
-    let system = &mut *run.shared.system();
+fn becomes_known(run: &Run<'_>, shared: &Shared<'_>, tolerances: &mut Tolerances, x: &[f64]) -> bool {
+    let system = &mut *shared.system();
     let end = system.next_jump(run.time).map_or(run.options.to, |jump| jump.min(run.options.to));
     let later = 1e-3 * (end - run.time);
     tolerances.guess(system, run.time + later, x, later).unwrap_or(false)
 }
 
 /// One integrator at work on a run.
-struct Drive<'r, 'a, 'i> {
+struct Drive<'r, 'a, 'i, 's> {
     run: &'r mut Run<'a>,
+    shared: &'s Shared<'s>,
     method: &'i mut dyn Integrator,
     tolerances: &'r mut Tolerances,
     chatter: &'r mut Chatter,
@@ -115,9 +135,10 @@ struct Drive<'r, 'a, 'i> {
     corner: bool,
 }
 
-impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
+impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
     fn new(
         run: &'r mut Run<'a>,
+        shared: &'s Shared<'s>,
         method: &'i mut dyn Integrator,
         tolerances: &'r mut Tolerances,
         chatter: &'r mut Chatter,
@@ -125,13 +146,23 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     ) -> Self {
         let interpolated = vec![0.0; method.state().len()];
         let end_rates = interpolated.clone();
-        Drive { run, method, tolerances, chatter, stiffness, interpolated, end_rates, resume: None, corner: false }
+        Drive {
+            run,
+            shared,
+            method,
+            tolerances,
+            chatter,
+            stiffness,
+            interpolated,
+            end_rates,
+            resume: None,
+            corner: false,
+        }
     }
 
     fn run(mut self, x: &mut [f64]) -> Result<End, Failure> {
-        let rejected = self.run.counts.rejected;
         let end = self.pieces(x);
-        self.run.counts.rejected = rejected + self.method.rejected();
+        self.method.add_work(&mut self.run.counts);
         end
     }
 
@@ -139,7 +170,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     fn pieces(&mut self, x: &mut [f64]) -> Result<End, Failure> {
         while self.run.time < self.run.options.to {
             let to = self.run.options.to;
-            let jump = self.run.shared.system().next_jump(self.run.time).filter(|&jump| jump <= to);
+            let jump = self.shared.system().next_jump(self.run.time).filter(|&jump| jump <= to);
             if let Some(end) = self.piece(jump.unwrap_or(to), jump.is_some(), x)? {
                 return Ok(end);
             }
@@ -155,7 +186,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
             return if jump { self.run.settle_at_jump(x) } else { self.run.settle(x) }.map(|()| None);
         }
         let interval = stop - self.run.time;
-        if self.tolerances.guess(&mut *self.run.shared.system(), self.run.time, x, interval)? {
+        if self.tolerances.guess(&mut *self.shared.system(), self.run.time, x, interval)? {
             return Ok(Some(End::Grown));
         }
         self.set_off(stop, x)?;
@@ -165,7 +196,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
             self.method.step(stop_now)?;
             self.run.counts.steps += 1;
             let end = if is_at(self.method.time(), stop, self.method.start()) { stop } else { self.method.time() };
-            let crossing = self.crossing(end)?;
+            let (end, crossing) = self.exact_crossing(end)?;
             if let Some((time, switch)) = crossing {
                 self.cross(time, switch, x)?;
                 return Ok(None);
@@ -197,7 +228,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         let longest = (stop - time).min(self.run.options.step.unwrap_or(f64::INFINITY));
         let resume = self.resume.take();
         if let Some(step) = resume {
-            self.run.shared.system().rates(time, x, &mut rates)?;
+            self.shared.system().rates(time, x, &mut rates)?;
             self.corner = self.is_corner(&rates, x);
             if self.corner {
                 return self.method.resume(time, x, &rates, step.min(longest));
@@ -205,7 +236,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         }
         let order = self.method.first_order();
         let step = {
-            let system = &mut *self.run.shared.system();
+            let system = &mut *self.shared.system();
             first_step(system, self.tolerances, order, time, x, longest, &mut rates)?
         };
         self.method.restart(time, x, &rates, step)
@@ -218,9 +249,25 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         self.tolerances.norm(&jump, x) * length <= 1.0
     }
 
+    /// The first crossing of a switching function in the step that ends at `end`, which it is, and where the step ends now:
+    /// where its end is more exact than its inside, it is made again to just beyond the crossing.
+    fn exact_crossing(&mut self, mut end: f64) -> Result<(f64, Option<(f64, usize)>), Failure> {
+        let mut crossing = self.crossing(end)?;
+        for margin in MARGINS {
+            let Some((time, _)) = crossing else { break };
+            let beyond = time + margin * (time - self.run.time);
+            if beyond >= end || !self.method.shorten(beyond) {
+                break;
+            }
+            end = beyond;
+            crossing = self.crossing(end)?;
+        }
+        Ok((end, crossing))
+    }
+
     /// The first crossing of a switching function in the step that ends at `end`, and which it is.
     fn crossing(&mut self, end: f64) -> Result<Option<(f64, usize)>, Failure> {
-        let (shared, method, x) = (self.run.shared, &mut *self.method, &mut self.interpolated);
+        let (shared, method, x) = (self.shared, &mut *self.method, &mut self.interpolated);
         first_crossing(&mut self.run.sides, self.run.time, end, |sides, t| {
             method.between(t, x);
             sides.crossed(&mut *shared.system(), t, x)
@@ -230,7 +277,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     /// Goes back to a crossing inside the last step and over it.
     fn cross(&mut self, time: f64, switch: usize, x: &mut [f64]) -> Result<(), Failure> {
         if self.chatter.is_one(time) {
-            return Err(Failure::Chattering { time, what: self.run.shared.system().switch_name(switch) });
+            return Err(Failure::Chattering { time, what: self.run.scene().switch_name(switch) });
         }
         self.method.between(time, x);
         self.run.reach(time, x)?;
@@ -242,7 +289,7 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
     /// Samples of the grid inside the last step, before `end`.
     fn samples_before(&mut self, end: f64) -> Result<(), Failure> {
         while let Some(t) = self.run.sample_before(end) {
-            self.method.between(t, &mut self.interpolated);
+            self.method.inside(t, &mut self.interpolated);
             self.run.record(t, t, &self.interpolated)?;
         }
         Ok(())
@@ -255,13 +302,13 @@ impl<'r, 'a, 'i> Drive<'r, 'a, 'i> {
         if self.tolerances.watch(x) {
             return Some(End::Grown);
         }
-        let system = &mut *self.run.shared.system();
+        let system = &mut *self.shared.system();
         let stiffness = self.stiffness.as_mut()?;
         stiffness.watch(system, self.tolerances, (time, x), step, remaining).then_some(End::Stiff)
     }
 }
 
 /// Whether `time` is `stop` to rounding, after a step from `start`.
-fn is_at(time: f64, stop: f64, start: f64) -> bool {
+pub(crate) fn is_at(time: f64, stop: f64, start: f64) -> bool {
     (stop - time).abs() <= 4000.0 * f64::EPSILON * (time - start) + 200.0 * f64::EPSILON * time.abs()
 }

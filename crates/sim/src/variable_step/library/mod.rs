@@ -13,7 +13,7 @@ use diffsol::{
 use super::Integrator;
 use super::tolerances::Tolerances;
 use crate::shared::Shared;
-use crate::{Failure, System};
+use crate::{Failure, Summary, System};
 use equations::Equations;
 use sparse_lu::SparseLu;
 
@@ -107,6 +107,8 @@ struct Driven<'p, 's, M: Matrix<T = f64>, S, F> {
     rates: Vec<f64>,
     /// Steps rejected by solvers that are gone, and in retreats.
     rejected: usize,
+    /// Factorisations by solvers that are gone.
+    factorisations: usize,
 }
 
 impl<'p, 's, M, S, F> Driven<'p, 's, M, S, F>
@@ -128,6 +130,7 @@ where
             x: vec![0.0; states],
             between: M::V::zeros(states, M::C::default()),
             rejected: 0,
+            factorisations: 0,
         }
     }
 
@@ -140,6 +143,10 @@ where
             let statistics = solver.get_statistics();
             statistics.number_of_error_test_failures + statistics.number_of_nonlinear_solver_fails
         })
+    }
+
+    fn factorisations_by_solver(&self) -> usize {
+        self.solver.as_ref().map_or(0, |solver| solver.get_statistics().number_of_linear_solver_setups)
     }
 
     fn shared(&self) -> &'s Shared<'s> {
@@ -200,6 +207,7 @@ where
             h,
         };
         self.rejected += self.rejected_by_solver();
+        self.factorisations += self.factorisations_by_solver();
         self.x.copy_from_slice(x);
         self.start = t;
         self.solver = (self.make)(S::State::new_from_common(state)).ok();
@@ -267,8 +275,9 @@ where
         }
     }
 
-    fn rejected(&self) -> usize {
-        self.rejected + self.rejected_by_solver()
+    fn add_work(&self, counts: &mut Summary) {
+        counts.rejected += self.rejected + self.rejected_by_solver();
+        counts.factorisations += self.factorisations + self.factorisations_by_solver();
     }
 }
 

@@ -1,0 +1,154 @@
+//! How exact each unknown of a system in implicit form has to be.
+
+use crate::{AbsoluteTolerance, Failure, ImplicitSystem, Options};
+
+/// Absolute tolerance relative to the magnitude of an unknown, as a part of the relative one.
+const SHARE: f64 = 1e-3;
+
+/// Absolute tolerance relative to the magnitude of an unknown below which rounding would be mistaken for error.
+const ROUNDING: f64 = 1e-12;
+
+/// Part of what its equations balance below which an unknown does not count.
+const NOISE: f64 = 1e-12;
+
+/// Part of what its equations balance that an unknown of which nothing else is known is taken to have.
+const GUESS: f64 = 1e-3;
+
+/// Part of the time in which known unknowns would change altogether over which unknown ones are let grow.
+const SHORT: f64 = 0.01;
+
+/// Part of the way to the next stop over which they are let grow at most.
+const PART: f64 = 1e-3;
+
+/// Relative and absolute tolerances.
+pub(super) struct Tolerances {
+    relative: f64,
+    /// Given by the user; `None` if they are scaled.
+    given: Option<Vec<f64>>,
+    /// Magnitude of each unknown, which grows with it; 0 where it is not known yet.
+    magnitudes: Vec<f64>,
+    absolute: Vec<f64>,
+    /// Whether magnitudes were looked at for rounding.
+    looked: bool,
+}
+
+impl Tolerances {
+    pub(super) fn new(options: &Options, system: &dyn ImplicitSystem) -> Tolerances {
+        let size = system.unknowns();
+        let given = match &options.atol {
+            AbsoluteTolerance::Scaled => None,
+            AbsoluteTolerance::Same(atol) => Some(vec![*atol; size]),
+            AbsoluteTolerance::Each(atol) => Some(atol.clone()),
+        };
+        let absolute = given.clone().unwrap_or(vec![0.0; size]);
+        Tolerances { relative: options.rtol, given, magnitudes: system.scales().to_vec(), absolute, looked: false }
+    }
+
+    /// The relative one.
+    pub(super) fn relative(&self) -> f64 {
+        self.relative
+    }
+
+    /// One for each unknown.
+    pub(super) fn absolute(&self) -> &[f64] {
+        &self.absolute
+    }
+
+    /// Takes notice of values reached.
+    pub(super) fn watch(&mut self, y: &[f64]) {
+        if self.given.is_some() {
+            return;
+        }
+        let share = (SHARE * self.relative).max(ROUNDING).min(self.relative);
+        for ((magnitude, absolute), y) in self.magnitudes.iter_mut().zip(&mut self.absolute).zip(y) {
+            *magnitude = magnitude.max(y.abs());
+            *absolute = (share * *magnitude).max(f64::MIN_POSITIVE);
+        }
+    }
+
+    /// Root of the mean square of `v`, each component relative to what is allowed at `y`.
+    pub(super) fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
+        let allowed = |i: usize| self.relative * y[i].abs() + self.absolute[i];
+        let sum: f64 = v.iter().enumerate().map(|(i, v)| (v / allowed(i)).powi(2)).sum();
+        (sum / v.len().max(1) as f64).sqrt()
+    }
+
+    /// Guesses the magnitudes that are not known where the system stands at `(t, y, y')`, `interval` s before the next stop:
+    /// as what a short step of the implicit rule of Euler makes of them. A low guess costs steps, a high one accuracy.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub(super) fn guess(
+        &mut self,
+        system: &mut dyn ImplicitSystem,
+        t: f64,
+        (y, yp): (&[f64], &[f64]),
+        interval: f64,
+    ) -> Result<(), Failure> {
+        self.watch(y);
+        let looked = std::mem::replace(&mut self.looked, true);
+        if self.given.is_some() || (looked && self.magnitudes.iter().all(|&magnitude| magnitude > 0.0)) {
+            return Ok(());
+        }
+        let entries = system.sparsity().nonzeros();
+        let (mut dy, mut dyp) = (vec![0.0; entries], vec![0.0; entries]);
+        system.jacobian(t, y, yp, &mut dy, &mut dyp)?;
+        let time = self.short_time(yp, interval);
+        let matrix: Vec<f64> = dy.iter().zip(&dyp).map(|(dy, dyp)| dyp / time + dy).collect();
+        self.silence(system, &matrix);
+        if self.magnitudes.iter().all(|&magnitude| magnitude > 0.0) {
+            return Ok(());
+        }
+        let grown = grown(system, t + time, y, &matrix);
+        let balanced = self.balanced(system, &matrix);
+        for (i, magnitude) in self.magnitudes.iter_mut().enumerate().filter(|(_, magnitude)| **magnitude == 0.0) {
+            *magnitude = grown[i].max(GUESS * balanced[i]);
+        }
+        self.watch(y);
+        Ok(())
+    }
+
+    /// A time in which what is known changes little.
+    fn short_time(&self, yp: &[f64], interval: f64) -> f64 {
+        let times = self.magnitudes.iter().zip(yp).map(|(magnitude, rate)| magnitude / rate.abs());
+        let shortest = times.filter(|time| *time > 0.0 && time.is_finite()).fold(f64::INFINITY, f64::min);
+        (SHORT * shortest).min(PART * interval)
+    }
+
+    /// Forgets magnitudes that are mere rounding of what their equations balance.
+    fn silence(&mut self, system: &dyn ImplicitSystem, matrix: &[f64]) {
+        let balanced = self.balanced(system, matrix);
+        let noise = |(magnitude, balanced): (&mut f64, f64)| {
+            if *magnitude < NOISE * balanced {
+                *magnitude = 0.0;
+            }
+        };
+        self.magnitudes.iter_mut().zip(balanced).for_each(noise);
+    }
+
+    /// The value of each unknown at which it would balance the other terms of one of its equations: the least of them.
+    fn balanced(&self, system: &dyn ImplicitSystem, matrix: &[f64]) -> Vec<f64> {
+        let mut sizes = vec![0.0_f64; self.magnitudes.len()];
+        for ((row, column), entry) in system.sparsity().entries().zip(matrix) {
+            sizes[row] = sizes[row].max(entry.abs() * self.magnitudes[column]);
+        }
+        let mut balanced = vec![f64::INFINITY; sizes.len()];
+        for ((row, column), entry) in system.sparsity().entries().zip(matrix).filter(|(_, entry)| **entry != 0.0) {
+            balanced[column] = balanced[column].min(sizes[row] / entry.abs());
+        }
+        balanced.iter_mut().filter(|value| value.is_infinite()).for_each(|value| *value = 0.0);
+        balanced
+    }
+}
+
+/// How far a step of the implicit rule of Euler moves each unknown; 0 where that cannot be had.
+fn grown(system: &mut dyn ImplicitSystem, t: f64, y: &[f64], matrix: &[f64]) -> Vec<f64> {
+    let mut change = vec![0.0; y.len()];
+    if system.residual(t, y, &vec![0.0; y.len()], &mut change).is_err() {
+        return vec![0.0; y.len()];
+    }
+    if !crate::radau::solve(system.sparsity(), matrix, &mut change) {
+        return vec![0.0; y.len()];
+    }
+    change.iter().map(|change| if change.is_finite() { change.abs() } else { 0.0 }).collect()
+}

@@ -1,0 +1,108 @@
+//! An explicit system in implicit form.
+
+use crate::jacobian::Jacobian;
+use crate::shared::Shared;
+use crate::{Failure, ImplicitSystem, Sparsity, System};
+
+/// `F = y' - f(t, y)`.
+pub(crate) struct Explicit<'s> {
+    shared: &'s Shared<'s>,
+    jacobian: Jacobian,
+    /// That of the system, and the diagonal.
+    sparsity: Sparsity,
+    /// Place of each nonzero of the system in that pattern.
+    places: Vec<usize>,
+    /// Place of each entry of the diagonal.
+    diagonal: Vec<usize>,
+    scales: Vec<f64>,
+    /// All of them.
+    differential: Vec<bool>,
+}
+
+impl<'s> Explicit<'s> {
+    pub(crate) fn new(shared: &'s Shared<'s>) -> Explicit<'s> {
+        let system = shared.system();
+        let own = system.sparsity();
+        let with_diagonal = |column: usize| own.column(column).iter().copied().chain([column]).collect();
+        let sparsity = Sparsity::from_columns((0..system.states()).map(with_diagonal));
+        let place = |(row, column): (usize, usize)| {
+            let rows = sparsity.column(column);
+            sparsity.places(column).start + rows.partition_point(|&other| other < row)
+        };
+        Explicit {
+            jacobian: Jacobian::new(own),
+            places: own.entries().map(place).collect(),
+            diagonal: (0..system.states()).map(|i| place((i, i))).collect(),
+            scales: system.scales().to_vec(),
+            differential: vec![true; system.states()],
+            sparsity,
+            shared,
+        }
+    }
+}
+
+impl ImplicitSystem for Explicit<'_> {
+    fn unknowns(&self) -> usize {
+        self.diagonal.len()
+    }
+    fn unknown_name(&self, unknown: usize) -> String {
+        self.shared.system().state_name(unknown)
+    }
+    fn equation_name(&self, equation: usize) -> String {
+        format!("the rate of {}", self.unknown_name(equation))
+    }
+    fn switch_name(&self, switch: usize) -> String {
+        self.shared.system().switch_name(switch)
+    }
+    fn observed_name(&self, value: usize) -> String {
+        self.shared.system().observed_name(value)
+    }
+    fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+    fn index(&self, _: usize) -> u8 {
+        1
+    }
+    fn residual(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.shared.system().rates(t, y, out)?;
+        out.iter_mut().zip(yp).for_each(|(out, yp)| *out = yp - *out);
+        Ok(())
+    }
+    fn sparsity(&self) -> &Sparsity {
+        &self.sparsity
+    }
+    fn jacobian(&mut self, t: f64, y: &[f64], _: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
+        dy.fill(0.0);
+        dyp.fill(0.0);
+        self.diagonal.iter().for_each(|&place| dyp[place] = 1.0);
+        let places = &self.places;
+        let system = &mut *self.shared.system();
+        self.jacobian.visit(system, t, y, |_, _, place, value| dy[places[place]] = -value)
+    }
+    fn semi_explicit(&self) -> Option<&[bool]> {
+        Some(&self.differential)
+    }
+    fn observe(&mut self, t: f64, y: &[f64], _: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.shared.system().observe(t, y, out)
+    }
+    fn observed(&self) -> usize {
+        self.shared.system().observed()
+    }
+    fn next_jump(&mut self, t: f64) -> Option<f64> {
+        self.shared.system().next_jump(t)
+    }
+    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        let mut system = self.shared.system();
+        system.cross_jump(t, y)?;
+        system.rates(t, y, yp)
+    }
+    fn accept(&mut self, t: f64, y: &[f64], _: &[f64]) -> Result<(), Failure> {
+        self.shared.system().accept(t, y)
+    }
+    fn switches(&self) -> usize {
+        self.shared.system().switches()
+    }
+    fn switch_values(&mut self, t: f64, y: &[f64], _: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.shared.system().switch_values(t, y, g)
+    }
+}

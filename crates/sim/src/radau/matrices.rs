@@ -1,0 +1,192 @@
+//! The linear equations of a step: one real and one complex matrix of the size of the system.
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::prelude::Reborrow as _;
+use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, c64};
+
+use super::complex_lu::ComplexLu;
+use crate::Sparsity;
+use crate::lu::Lu;
+
+/// Unknowns up to which dense matrices are faster, whatever the pattern.
+const LARGEST_DENSE: usize = 24;
+
+/// `factor · ∂F/∂y' + ∂F/∂y` for a real and a complex factor, and their triangular factors. Rows are measured by what
+/// their equation adds up when each unknown has its scale, columns by their greatest entry then, so that pivots are chosen
+/// alike whatever the units.
+pub(super) struct Matrices {
+    pattern: Sparsity,
+    /// Factor of each column.
+    columns: Vec<f64>,
+    /// Factor of each row.
+    rows: Vec<f64>,
+    factors: Factors,
+}
+
+enum Factors {
+    Dense { real: Lu, complex: ComplexLu },
+    Sparse(Box<Sparse>),
+}
+
+/// Why there is no factorisation.
+pub(super) struct NoPivot {
+    /// The unknown for which no pivot is left, where that is known.
+    pub(super) unknown: Option<usize>,
+}
+
+impl Matrices {
+    pub(super) fn new(pattern: &Sparsity) -> Matrices {
+        let size = pattern.states();
+        let sparse = (size > LARGEST_DENSE).then(|| Sparse::new(pattern)).flatten();
+        let dense = || Factors::Dense { real: Lu::new(size), complex: ComplexLu::new(size) };
+        Matrices {
+            pattern: pattern.clone(),
+            columns: vec![1.0; size],
+            rows: vec![1.0; size],
+            factors: sparse.map_or_else(dense, |sparse| Factors::Sparse(Box::new(sparse))),
+        }
+    }
+
+    /// Factors both matrices, for unknowns of these scales.
+    pub(super) fn factor(
+        &mut self,
+        (dy, dyp): (&[f64], &[f64]),
+        real: f64,
+        complex: c64,
+        scales: &[f64],
+    ) -> Result<(), NoPivot> {
+        self.measure(dy, dyp, real, scales);
+        let entries = self.pattern.entries().enumerate().map(|(place, (row, column))| {
+            let scale = self.rows[row] * self.columns[column];
+            (place, row, column, scale * dy[place], scale * dyp[place])
+        });
+        match &mut self.factors {
+            Factors::Dense { real: matrix, complex: complex_matrix } => {
+                matrix.clear();
+                complex_matrix.clear();
+                for (_, row, column, dy, dyp) in entries {
+                    matrix.add(row, column, real * dyp + dy);
+                    complex_matrix.set(row, column, complex * dyp + dy);
+                }
+                let factored = matrix.factor().and_then(|()| complex_matrix.factor());
+                factored.map_err(|unknown| NoPivot { unknown: Some(unknown) })
+            }
+            Factors::Sparse(sparse) => {
+                let (values, complex_values) = (sparse.real.val_mut(), sparse.complex.val_mut());
+                for (place, _, _, dy, dyp) in entries {
+                    values[place] = real * dyp + dy;
+                    complex_values[place] = complex * dyp + dy;
+                }
+                sparse.factor().ok_or(NoPivot { unknown: None })
+            }
+        }
+    }
+
+    /// Replaces `b` by the solution of the real equations.
+    pub(super) fn solve_real(&mut self, b: &mut [f64]) {
+        b.iter_mut().zip(&self.rows).for_each(|(b, row)| *b *= row);
+        match &mut self.factors {
+            Factors::Dense { real, .. } => real.solve(b),
+            Factors::Sparse(sparse) => sparse.solve_real(b),
+        }
+        b.iter_mut().zip(&self.columns).for_each(|(b, column)| *b *= column);
+    }
+
+    /// Replaces `re + i im` by the solution of the complex equations.
+    pub(super) fn solve_complex(&mut self, re: &mut [f64], im: &mut [f64]) {
+        let scale = |b: &mut [f64], by: &[f64]| b.iter_mut().zip(by).for_each(|(b, by)| *b *= by);
+        scale(re, &self.rows);
+        scale(im, &self.rows);
+        match &mut self.factors {
+            Factors::Dense { complex, .. } => complex.solve(re, im),
+            Factors::Sparse(sparse) => sparse.solve_complex(re, im),
+        }
+        scale(re, &self.columns);
+        scale(im, &self.columns);
+    }
+
+    /// Takes the factors of rows and columns. A row or column of zeros keeps 1, and leaves no pivot.
+    fn measure(&mut self, dy: &[f64], dyp: &[f64], real: f64, scales: &[f64]) {
+        let size = |place: usize| (real * dyp[place] + dy[place]).abs();
+        let reciprocal = |most: &mut f64| *most = if *most > 0.0 { most.recip() } else { 1.0 };
+        self.rows.fill(0.0);
+        for (place, (row, column)) in self.pattern.entries().enumerate() {
+            self.rows[row] = self.rows[row].max(size(place) * scales[column]);
+        }
+        self.rows.iter_mut().for_each(reciprocal);
+        self.columns.fill(0.0);
+        for (place, (row, column)) in self.pattern.entries().enumerate() {
+            self.columns[column] = self.columns[column].max(size(place) * self.rows[row]);
+        }
+        self.columns.iter_mut().for_each(reciprocal);
+    }
+}
+
+/// Sparse matrices and their factors; the choice of an order is made once.
+struct Sparse {
+    symbolic: SymbolicLu<usize>,
+    real: SparseColMat<usize, f64>,
+    complex: SparseColMat<usize, c64>,
+    real_factors: NumericLu<usize, f64>,
+    complex_factors: NumericLu<usize, c64>,
+    work: Vec<c64>,
+    memory: MemBuffer,
+}
+
+impl Sparse {
+    /// `None` if there is no memory for it.
+    fn new(pattern: &Sparsity) -> Option<Sparse> {
+        let size = pattern.states();
+        let (mut starts, mut rows) = (vec![0], vec![]);
+        for column in 0..size {
+            rows.extend_from_slice(pattern.column(column));
+            starts.push(rows.len());
+        }
+        let structure = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
+        let symbolic = factorize_symbolic_lu(structure.rb(), Default::default()).ok()?;
+        let need = StackReq::any_of(&[
+            symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default()),
+            symbolic.factorize_numeric_lu_scratch::<c64>(Par::Seq, Default::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+            symbolic.solve_in_place_scratch::<c64>(1, Par::Seq),
+        ]);
+        Some(Sparse {
+            symbolic,
+            real: SparseColMat::new(structure.clone(), vec![0.0; pattern.nonzeros()]),
+            complex: SparseColMat::new(structure, vec![c64::new(0.0, 0.0); pattern.nonzeros()]),
+            real_factors: NumericLu::new(),
+            complex_factors: NumericLu::new(),
+            work: vec![c64::new(0.0, 0.0); size],
+            memory: MemBuffer::try_new(need).ok()?,
+        })
+    }
+
+    /// `None` if a matrix is singular.
+    fn factor(&mut self) -> Option<()> {
+        let stack = MemStack::new(&mut self.memory);
+        let parameters = Default::default();
+        self.symbolic.factorize_numeric_lu(&mut self.real_factors, self.real.rb(), Par::Seq, stack, parameters).ok()?;
+        let parameters = Default::default();
+        self.symbolic
+            .factorize_numeric_lu(&mut self.complex_factors, self.complex.rb(), Par::Seq, stack, parameters)
+            .ok()?;
+        Some(())
+    }
+
+    fn solve_real(&mut self, b: &mut [f64]) {
+        let factors = LuRef::new_unchecked(&self.symbolic, &self.real_factors);
+        let rows = b.len();
+        let b = MatMut::from_column_major_slice_mut(b, rows, 1);
+        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.memory));
+    }
+
+    fn solve_complex(&mut self, re: &mut [f64], im: &mut [f64]) {
+        self.work.iter_mut().zip(re.iter().zip(im.iter())).for_each(|(b, (re, im))| *b = c64::new(*re, *im));
+        let factors = LuRef::new_unchecked(&self.symbolic, &self.complex_factors);
+        let b = MatMut::from_column_major_slice_mut(&mut self.work, re.len(), 1);
+        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.memory));
+        self.work.iter().zip(re.iter_mut().zip(im)).for_each(|(b, (re, im))| (*re, *im) = (b.re, b.im));
+    }
+}

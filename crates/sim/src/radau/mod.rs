@@ -1,0 +1,417 @@
+//! Radau IIA of order 5: implicit, stiffly accurate, for stiff and implicit systems up to index 3. Source: [HW], IV.8.
+//!
+//! Unknown are the increments `z_i` of the three stages: `F(t + c_i h, y + z_i, (1/h) Σ_j w_ij z_j) = 0` with `w` the
+//! inverse of the matrix of the method. Simplified Newton multiplies these equations by the transformation that makes `w`
+//! block diagonal, so that a step needs one real and one complex factorisation of `factor · ∂F/∂y' + ∂F/∂y`, not one
+//! three times as large. One formulation serves explicit, semi-explicit and fully implicit systems.
+
+mod collocation;
+mod complex_lu;
+mod control;
+mod explicit;
+mod matrices;
+mod newton;
+mod tableau;
+#[cfg(test)]
+mod tests;
+mod within;
+
+use faer::c64;
+
+use crate::{Failure, ImplicitSystem, Sparsity, Summary};
+use collocation::Collocation;
+use control::Control;
+pub(crate) use explicit::Explicit;
+use matrices::Matrices;
+use tableau::{ALPHA, BETA, ERROR, REAL, STAGES};
+
+/// The increments of all unknowns at each stage, or anything else of that shape.
+type Stages = [Vec<f64>; STAGES];
+
+/// Singular matrices in one step after which there is no hope.
+const MOST_SINGULAR: usize = 5;
+
+/// Relative change of the step up to which the factors are kept, where Newton converges fast.
+const KEPT_CHANGE: f64 = 1.2;
+
+/// Rate of convergence below which the Jacobian is kept for the next step.
+const FAST: f64 = 1e-3;
+
+/// A step this little longer than planned is made rather than one more.
+const STRETCH: f64 = 1.0001;
+
+/// What the method did, beside steps and residuals.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Work {
+    /// Accepted steps.
+    pub(crate) accepted: usize,
+    /// Steps whose error was too large.
+    pub(crate) rejected: usize,
+    /// Steps given up because Newton did not converge or the system failed.
+    pub(crate) given_up: usize,
+    /// Jacobians.
+    pub(crate) jacobians: usize,
+    /// Factorisations, a real and a complex one counted together.
+    pub(crate) factorisations: usize,
+    /// Newton iterations.
+    pub(crate) iterations: usize,
+    /// Residuals.
+    pub(crate) residuals: usize,
+}
+
+impl Work {
+    /// Adds it to the work of a run, but for steps and residuals.
+    pub(crate) fn add_to(&self, counts: &mut Summary) {
+        counts.rejected += self.rejected + self.given_up;
+        counts.jacobians += self.jacobians;
+        counts.factorisations += self.factorisations;
+        counts.iterations += self.iterations;
+    }
+}
+
+/// The method at work on one system. All memory is taken in [`new`](Radau::new).
+pub(crate) struct Radau {
+    /// The inverse of the matrix of the method.
+    inverse: [[f64; STAGES]; STAGES],
+    relative: f64,
+    absolute: Vec<f64>,
+    /// How much tighter these are than what the user gave.
+    tightened: f64,
+    index: Vec<u8>,
+    /// Error that Newton may leave, relative to the tolerance.
+    newton_tolerance: f64,
+    t: f64,
+    y: Vec<f64>,
+    yp: Vec<f64>,
+    /// Length of the step to try next, in s.
+    h: f64,
+    last: Collocation,
+    /// Increments of the step that is tried.
+    z: Stages,
+    /// Newton's right side, then its correction.
+    correction: Stages,
+    trial: Vec<f64>,
+    trial_rates: Vec<f64>,
+    error: Vec<f64>,
+    /// What is allowed of each unknown.
+    allowed: Vec<f64>,
+    dy: Vec<f64>,
+    dyp: Vec<f64>,
+    /// Whether rates are known to enter linearly.
+    linear_in_rates: bool,
+    /// Whether the first step goes along the rates at its start.
+    straight: bool,
+    /// Columns of `∂F/∂y'` that hold anything.
+    has_rate: Vec<bool>,
+    matrices: Matrices,
+    jacobian: Age,
+    /// Step that the factors are made for.
+    factored: Option<f64>,
+    newton: newton::Convergence,
+    control: Control,
+    work: Work,
+}
+
+/// Where the Jacobian was taken.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Age {
+    /// It has to be taken anew.
+    Stale,
+    /// At the start of an earlier step.
+    Old,
+    /// At the start of this step.
+    Fresh,
+}
+
+impl Radau {
+    /// Tolerances are those that the user gives; the method tightens them as is its custom.
+    pub(crate) fn new(system: &dyn ImplicitSystem, relative: f64, absolute: &[f64]) -> Radau {
+        let size = system.unknowns();
+        let nonzeros = system.sparsity().nonzeros();
+        let vector = || vec![0.0; size];
+        let stages = || [vector(), vector(), vector()];
+        let mut radau = Radau {
+            inverse: tableau::NODES.map(tableau::rate_weights),
+            relative: 0.0,
+            absolute: vector(),
+            tightened: 1.0,
+            index: (0..size).map(|unknown| system.index(unknown)).collect(),
+            newton_tolerance: 0.0,
+            t: 0.0,
+            y: vector(),
+            yp: vector(),
+            h: 0.0,
+            last: Collocation::new(size),
+            z: stages(),
+            correction: stages(),
+            trial: vector(),
+            trial_rates: vector(),
+            error: vector(),
+            allowed: vector(),
+            dy: vec![0.0; nonzeros],
+            dyp: vec![0.0; nonzeros],
+            linear_in_rates: system.semi_explicit().is_some(),
+            straight: false,
+            has_rate: vec![false; size],
+            matrices: Matrices::new(system.sparsity()),
+            jacobian: Age::Stale,
+            factored: None,
+            newton: newton::Convergence::default(),
+            control: Control::default(),
+            work: Work::default(),
+        };
+        radau.set_tolerances(relative, absolute);
+        radau
+    }
+
+    /// Changes the tolerances. The error of a step is that of a formula of order 3, much larger than that of the
+    /// solution: so they are taken to the power 2/3.
+    pub(crate) fn set_tolerances(&mut self, relative: f64, absolute: &[f64]) {
+        let tightened = 0.1 * relative.powf(2.0 / 3.0);
+        self.relative = tightened;
+        self.tightened = tightened / relative;
+        self.absolute.iter_mut().zip(absolute).for_each(|(own, given)| *own = tightened * (given / relative));
+        self.newton_tolerance = tightened.sqrt().min(0.03).max(10.0 * f64::EPSILON / tightened);
+    }
+
+    /// Starts anew at `(t, y, y')` with a first step of about `h`.
+    pub(crate) fn restart(&mut self, t: f64, y: &[f64], yp: &[f64], h: f64) {
+        self.stand(t, y, yp, h);
+        self.last.forget();
+        self.control = Control::default();
+        self.straight = !self.linear_in_rates;
+        self.newton = newton::Convergence::default();
+    }
+
+    /// Goes on at `(t, y, y')`, where the last step ended, with a step of at most `h`; `F` may change otherwise than before.
+    pub(crate) fn resume(&mut self, t: f64, y: &[f64], yp: &[f64], h: f64) {
+        self.stand(t, y, yp, h);
+    }
+
+    fn stand(&mut self, t: f64, y: &[f64], yp: &[f64], h: f64) {
+        self.t = t;
+        self.y.copy_from_slice(y);
+        self.yp.copy_from_slice(yp);
+        self.h = h;
+        self.jacobian = Age::Stale;
+    }
+
+    pub(crate) fn time(&self) -> f64 {
+        self.t
+    }
+
+    /// Where the last step started.
+    pub(crate) fn start(&self) -> f64 {
+        self.last.start()
+    }
+
+    /// Length of the step to come, as far as is known.
+    pub(crate) fn next_step(&self) -> f64 {
+        self.h
+    }
+
+    pub(crate) fn state(&self) -> &[f64] {
+        &self.y
+    }
+
+    /// Rates at the end of the last step, from its polynomial.
+    pub(crate) fn rates(&self) -> &[f64] {
+        &self.yp
+    }
+
+    pub(crate) fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Takes one step that meets the tolerances and ends at `stop` at the latest.
+    ///
+    /// # Errors
+    /// No step is short enough: what the system reported last, or what Newton was left with.
+    pub(crate) fn step(&mut self, system: &mut dyn ImplicitSystem, stop: f64) -> Result<(), Failure> {
+        let (mut singular, mut failure) = (0, None);
+        loop {
+            let reaches = self.t + STRETCH * self.h >= stop;
+            let h = if reaches { stop - self.t } else { self.h };
+            if 0.1 * h <= self.t.abs() * f64::EPSILON || h.is_nan() || h < f64::MIN_POSITIVE {
+                return Err(failure.unwrap_or(Failure::StepTooSmall { time: self.t, step: h }));
+            }
+            match self.attempt(system, h) {
+                Ok(newton_iterations) => {
+                    let error = self.estimate(system, h);
+                    let next = self.control.judge(h, error, newton_iterations);
+                    if error < 1.0 {
+                        self.accept(if reaches { stop } else { self.t + h }, h, next);
+                        return Ok(());
+                    }
+                    failure = None;
+                    self.work.rejected += usize::from(self.work.accepted > 0);
+                    self.h = next;
+                    self.renew_jacobian();
+                }
+                Err(Trouble::Slow { shorten }) => {
+                    self.start_otherwise();
+                    self.h = shorten * h;
+                    failure = None;
+                }
+                Err(Trouble::Failed(reason)) => {
+                    self.start_otherwise();
+                    singular += usize::from(matches!(reason, Failure::Singular { .. }));
+                    if singular >= MOST_SINGULAR {
+                        return Err(reason);
+                    }
+                    self.h = 0.5 * h;
+                    failure = Some(reason);
+                }
+            }
+        }
+    }
+
+    /// Newton was in vain with what it started from.
+    fn start_otherwise(&mut self) {
+        self.straight = !self.straight;
+        self.control.rejected();
+        self.work.given_up += 1;
+        self.renew_jacobian();
+    }
+
+    /// A Jacobian of an earlier step may be the cause of the trouble.
+    fn renew_jacobian(&mut self) {
+        if self.jacobian == Age::Old {
+            self.jacobian = Age::Stale;
+        }
+    }
+
+    /// Solves the equations of a step; the number of iterations that took.
+    fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+        self.allow(h);
+        self.linearise(system, h)?;
+        match self.last.ends_at(self.t) {
+            true => self.last.extrapolate(h, &mut self.z),
+            false => self.set_off(h),
+        }
+        self.iterate(system, h)
+    }
+
+    /// What is allowed of each unknown in a step of `h`; those of higher index are allowed more.
+    fn allow(&mut self, h: f64) {
+        let shorter = h.min(1.0);
+        for (i, allowed) in self.allowed.iter_mut().enumerate() {
+            *allowed =
+                (self.absolute[i] + self.relative * self.y[i].abs()) / shorter.powi(i32::from(self.index[i]) - 1);
+        }
+    }
+
+    /// Takes the Jacobian and factors, as far as needed.
+    fn linearise(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+        if self.jacobian == Age::Stale {
+            system.jacobian(self.t, &self.y, &self.yp, &mut self.dy, &mut self.dyp).map_err(Trouble::Failed)?;
+            self.work.jacobians += 1;
+            let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+            if !(finite(&self.dy) && finite(&self.dyp)) {
+                let what = "a derivative of the equations".into();
+                return Err(Trouble::Failed(Failure::NotFinite { time: self.t, what }));
+            }
+            self.has_rate.fill(false);
+            for (place, (_, column)) in system.sparsity().entries().enumerate() {
+                self.has_rate[column] |= self.dyp[place] != 0.0;
+            }
+            self.jacobian = Age::Fresh;
+            self.factored = None;
+        }
+        self.refactor(system, h)
+    }
+
+    /// Factors for a step of `h`, unless that is done.
+    fn refactor(&mut self, system: &dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+        if self.factored != Some(h) {
+            self.factored = None;
+            let complex = c64::new(ALPHA / h, BETA / h);
+            self.work.factorisations += 1;
+            let factored = self.matrices.factor((&self.dy, &self.dyp), REAL / h, complex, &self.allowed);
+            factored.map_err(|no_pivot| {
+                let name = |unknown| format!("the step of {}", system.unknown_name(unknown));
+                let what = no_pivot.unknown.map_or("the equations of the step".into(), name);
+                Trouble::Failed(Failure::Singular { time: self.t, what })
+            })?;
+            self.factored = Some(h);
+        }
+        Ok(())
+    }
+
+    /// Increments in the first step: 0 where rates enter linearly, so that what is stiff may be off its slow motion; else
+    /// along the rates at its start, as a law may have several solutions. The other way round after a failure.
+    fn set_off(&mut self, h: f64) {
+        for (z, node) in self.z.iter_mut().zip(tableau::NODES) {
+            for (i, z) in z.iter_mut().enumerate() {
+                *z = if self.straight && self.has_rate[i] { node * h * self.yp[i] } else { 0.0 };
+            }
+        }
+    }
+
+    /// The error of the step relative to what is allowed: the embedded formula of order 3, filtered by the real matrix.
+    fn estimate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> f64 {
+        for (i, rate) in self.trial_rates.iter_mut().enumerate() {
+            *rate = -(0..STAGES).map(|stage| ERROR[stage] * self.z[stage][i]).sum::<f64>() / h;
+        }
+        self.trial.copy_from_slice(&self.y);
+        let first = self.filtered(system);
+        if first < 1.0 || !self.control.is_doubtful() {
+            return first;
+        }
+        // What is stiff but smooth is told from what is not by the same formula at the end of its own correction.
+        self.trial.iter_mut().zip(&self.y).zip(&self.error).for_each(|((trial, y), error)| *trial = y + error);
+        self.filtered(system).min(first)
+    }
+
+    /// The norm of what the real matrix makes of the residual at the trial values, which is left in `error`.
+    fn filtered(&mut self, system: &mut dyn ImplicitSystem) -> f64 {
+        self.work.residuals += 1;
+        if system.residual(self.t, &self.trial, &self.trial_rates, &mut self.error).is_err() {
+            return f64::INFINITY;
+        }
+        self.error.iter_mut().for_each(|error| *error = -*error);
+        self.matrices.solve_real(&mut self.error);
+        let norm = norm(&[&self.error], &self.allowed);
+        if norm.is_nan() { f64::INFINITY } else { norm.max(1e-10) }
+    }
+
+    /// Moves to the end of the step, with `next` for the next one.
+    fn accept(&mut self, end: f64, h: f64, next: f64) {
+        self.last.take(self.t, end, &self.y, &mut self.z);
+        self.t = end;
+        self.last.end(&mut self.y, &mut self.yp);
+        self.work.accepted += 1;
+        let fast = self.newton.rate() <= FAST;
+        let kept = fast && (1.0..=KEPT_CHANGE).contains(&(next / h));
+        self.h = if kept { h } else { next };
+        self.jacobian = if fast { Age::Old } else { Age::Stale };
+    }
+}
+
+/// Replaces `b` by the solution of sparse linear equations. `false` if they have none.
+pub(crate) fn solve(pattern: &Sparsity, matrix: &[f64], b: &mut [f64]) -> bool {
+    let (mut matrices, none) = (Matrices::new(pattern), vec![0.0; matrix.len()]);
+    let factored = matrices.factor((matrix, &none), 0.0, c64::new(0.0, 0.0), &vec![1.0; b.len()]);
+    factored.is_ok() && {
+        matrices.solve_real(b);
+        true
+    }
+}
+
+/// Why a step cannot be made as it is.
+enum Trouble {
+    /// Newton converges too slowly or not at all.
+    Slow {
+        /// By how much the step has to be shortened.
+        shorten: f64,
+    },
+    /// The system failed, or a matrix is singular.
+    Failed(Failure),
+}
+
+/// Root of the mean square of all values, each relative to what is allowed of it.
+fn norm(values: &[&[f64]], allowed: &[f64]) -> f64 {
+    let part =
+        |values: &&[f64]| values.iter().zip(allowed).map(|(value, allowed)| (value / allowed).powi(2)).sum::<f64>();
+    (values.iter().map(part).sum::<f64>() / (values.len() * allowed.len()).max(1) as f64).sqrt()
+}

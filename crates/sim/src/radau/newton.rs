@@ -1,0 +1,122 @@
+//! Simplified Newton for the increments of a step. Source: [HW], IV.8.
+
+use super::tableau::{BACK, NODES, STAGES, TRANSFORM};
+use super::{Radau, Trouble, norm};
+use crate::{Failure, ImplicitSystem};
+
+/// Iterations at most.
+pub(super) const MOST_ITERATIONS: usize = 7;
+
+/// Rate of convergence beyond which there is none.
+const DIVERGENT: f64 = 0.99;
+
+/// How Newton converges: what was seen in one step is believed in the next.
+#[derive(Clone, Copy)]
+pub(super) struct Convergence {
+    /// Factor from one correction to the next.
+    rate: f64,
+    /// What is left after a correction, relative to it.
+    left: f64,
+}
+
+impl Default for Convergence {
+    fn default() -> Convergence {
+        Convergence { rate: super::FAST, left: 1.0 }
+    }
+}
+
+impl Convergence {
+    /// Factor from one correction to the next.
+    pub(super) fn rate(&self) -> f64 {
+        self.rate
+    }
+}
+
+impl Radau {
+    /// Iterates from the increments in `z`; the number of iterations.
+    pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+        self.newton = Convergence { rate: super::FAST, left: self.newton.left.max(f64::EPSILON).powf(0.8) };
+        let (mut before, mut growth_before) = (0.0_f64, 0.0);
+        for iteration in 1..=MOST_ITERATIONS {
+            self.correct(system, h)?;
+            self.work.iterations += 1;
+            let [a, b, c] = &self.correction;
+            let size = norm(&[a, b, c], &self.allowed);
+            if iteration > 1 && iteration < MOST_ITERATIONS {
+                let growth = size / before;
+                self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
+                growth_before = growth;
+                self.foresee(size, MOST_ITERATIONS - 1 - iteration)?;
+            }
+            if !size.is_finite() {
+                return Err(Trouble::Slow { shorten: 0.5 });
+            }
+            before = size.max(f64::EPSILON);
+            self.apply();
+            if self.newton.left * size <= self.newton_tolerance {
+                return Ok(iteration);
+            }
+        }
+        Err(Trouble::Slow { shorten: 0.5 })
+    }
+
+    /// Whether `remaining` more iterations will do after a correction of this size.
+    fn foresee(&mut self, size: f64, remaining: usize) -> Result<(), Trouble> {
+        let rate = self.newton.rate;
+        if rate.is_nan() || rate >= DIVERGENT {
+            return Err(Trouble::Slow { shorten: 0.5 });
+        }
+        self.newton.left = rate / (1.0 - rate);
+        let expected = self.newton.left * size * rate.powi(remaining as i32) / self.newton_tolerance;
+        if expected >= 1.0 {
+            let shorten = 0.8 * expected.clamp(1e-4, 20.0).powf(-1.0 / (4.0 + remaining as f64));
+            return Err(Trouble::Slow { shorten });
+        }
+        Ok(())
+    }
+
+    /// Computes the transformed correction of the increments.
+    fn correct(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+        for stage in 0..STAGES {
+            self.stage_residual(system, h, stage)?;
+        }
+        let [first, second, third] = &mut self.correction;
+        for ((a, b), c) in first.iter_mut().zip(second.iter_mut()).zip(third.iter_mut()) {
+            let residual = [*a, *b, *c];
+            [*a, *b, *c] = BACK.map(|row| -(row[0] * residual[0] + row[1] * residual[1] + row[2] * residual[2]));
+        }
+        self.matrices.solve_real(first);
+        self.matrices.solve_complex(second, third);
+        Ok(())
+    }
+
+    /// Writes the residual of a stage.
+    fn stage_residual(&mut self, system: &mut dyn ImplicitSystem, h: f64, stage: usize) -> Result<(), Trouble> {
+        let weights = self.inverse[stage];
+        let [a, b, c] = &self.z;
+        for i in 0..self.y.len() {
+            self.trial[i] = self.y[i] + self.z[stage][i];
+            self.trial_rates[i] = (weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i]) / h;
+        }
+        let (t, out) = (self.t + NODES[stage] * h, &mut self.correction[stage]);
+        if let Some(unknown) = self.trial.iter().position(|value| !value.is_finite()) {
+            return Err(Trouble::Failed(Failure::NotFinite { time: t, what: system.unknown_name(unknown) }));
+        }
+        self.work.residuals += 1;
+        system.residual(t, &self.trial, &self.trial_rates, out).map_err(Trouble::Failed)?;
+        match out.iter().position(|value| !value.is_finite()) {
+            Some(row) => Err(Trouble::Failed(Failure::NotFinite { time: t, what: system.equation_name(row) })),
+            None => Ok(()),
+        }
+    }
+
+    /// Applies the correction.
+    fn apply(&mut self) {
+        for i in 0..self.y.len() {
+            let correction = [self.correction[0][i], self.correction[1][i], self.correction[2][i]];
+            for (z, row) in self.z.iter_mut().zip(TRANSFORM) {
+                z[i] += row[0] * correction[0] + row[1] * correction[1] + row[2] * correction[2];
+            }
+        }
+    }
+}
