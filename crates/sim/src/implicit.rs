@@ -18,6 +18,7 @@ use crate::{Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary};
 ///
 /// # Errors
 /// The run stopped; what was computed so far is with the sink, and `y` and `yp` belong to `Stopped::time`.
+#[allow(clippy::result_large_err, reason = "a run fails once")]
 pub fn simulate_implicit(
     system: &mut dyn ImplicitSystem,
     options: &Options,

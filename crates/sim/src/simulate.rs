@@ -72,6 +72,7 @@ impl std::error::Error for Stopped {}
 ///
 /// # Errors
 /// The run stopped; what was computed so far is with the sink, and `x` holds the state at `Stopped::time`.
+#[allow(clippy::result_large_err, reason = "a run fails once")]
 pub fn simulate(
     system: &mut dyn System,
     options: &Options,

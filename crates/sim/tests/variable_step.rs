@@ -132,7 +132,7 @@ fn what_nothing_moves_does_no_harm() {
 #[test]
 fn stiff_methods_meet_the_published_values_of_robertson() {
     for (method, rtol, bound) in
-        [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7), (Radau, 1e-6, 3e-5), (Radau, 1e-10, 1e-9)]
+        [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7), (Radau, 1e-6, 3e-5), (Radau, 1e-10, 1e-7)]
     {
         let mut system = robertson();
         let atol = AbsoluteTolerance::Each([1e-4, 1e-10, 1e-2].map(|share| share * rtol).to_vec());

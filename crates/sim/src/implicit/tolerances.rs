@@ -69,8 +69,8 @@ impl Tolerances {
     /// Root of the mean square of `v`, each component relative to what is allowed at `y`.
     pub(super) fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
         let allowed = |i: usize| self.relative * y[i].abs() + self.absolute[i];
-        let sum: f64 = v.iter().enumerate().map(|(i, v)| (v / allowed(i)).powi(2)).sum();
-        (sum / v.len().max(1) as f64).sqrt()
+        let parts = v.iter().enumerate().map(|(i, v)| v / allowed(i));
+        (parts.map(|part| part * part).sum::<f64>() / v.len().max(1) as f64).sqrt()
     }
 
     /// Guesses the magnitudes that are not known where the system stands at `(t, y, y')`, `interval` s before the next stop:

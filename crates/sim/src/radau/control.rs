@@ -36,14 +36,15 @@ impl Control {
         let most = MOST_ITERATIONS as f64;
         let safety = SAFETY.min(SAFETY * (1.0 + 2.0 * most) / (iterations as f64 + 2.0 * most));
         let shrink = |shrink: f64| shrink.clamp(1.0 / LONGEST, 1.0 / SHORTEST);
-        let plain = shrink(error.powf(0.25) / safety);
+        let plain = shrink(error.sqrt().sqrt() / safety);
         if error >= 1.0 {
             self.rejected = true;
             return if self.last.is_none() { 0.1 * h } else { h / plain };
         }
         // The controller of Gustafsson: errors that grow from step to step are foreseen.
-        let foreseen =
-            self.last.map_or(0.0, |(length, before)| shrink(length / h * (error * error / before).powf(0.25) / SAFETY));
+        let foreseen = self
+            .last
+            .map_or(0.0, |(length, before)| shrink(length / h * (error * error / before).sqrt().sqrt() / SAFETY));
         let next = h / plain.max(foreseen);
         self.last = Some((h, error.max(1e-2)));
         if std::mem::take(&mut self.rejected) { next.min(h) } else { next }

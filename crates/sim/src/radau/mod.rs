@@ -167,7 +167,7 @@ impl Radau {
     /// Changes the tolerances. The error of a step is that of a formula of order 3, much larger than that of the
     /// solution: so they are taken to the power 2/3.
     pub(crate) fn set_tolerances(&mut self, relative: f64, absolute: &[f64]) {
-        let tightened = 0.1 * relative.powf(2.0 / 3.0);
+        let tightened = 0.1 * libm::pow(relative, 2.0 / 3.0);
         self.relative = tightened;
         self.tightened = tightened / relative;
         self.absolute.iter_mut().zip(absolute).for_each(|(own, given)| *own = tightened * (given / relative));
@@ -295,9 +295,10 @@ impl Radau {
     /// What is allowed of each unknown in a step of `h`; those of higher index are allowed more.
     fn allow(&mut self, h: f64) {
         let shorter = h.min(1.0);
+        let more = [1.0, shorter.recip(), (shorter * shorter).recip()];
         for (i, allowed) in self.allowed.iter_mut().enumerate() {
-            *allowed =
-                (self.absolute[i] + self.relative * self.y[i].abs()) / shorter.powi(i32::from(self.index[i]) - 1);
+            let index = usize::from(self.index[i]).clamp(1, more.len());
+            *allowed = (self.absolute[i] + self.relative * self.y[i].abs()) * more[index - 1];
         }
     }
 
@@ -411,7 +412,7 @@ enum Trouble {
 
 /// Root of the mean square of all values, each relative to what is allowed of it.
 fn norm(values: &[&[f64]], allowed: &[f64]) -> f64 {
-    let part =
-        |values: &&[f64]| values.iter().zip(allowed).map(|(value, allowed)| (value / allowed).powi(2)).sum::<f64>();
-    (values.iter().map(part).sum::<f64>() / (values.len() * allowed.len()).max(1) as f64).sqrt()
+    let square = |(value, allowed): (&f64, &f64)| (value / allowed) * (value / allowed);
+    let sum = |values: &&[f64]| values.iter().zip(allowed).map(square).sum::<f64>();
+    (values.iter().map(sum).sum::<f64>() / (values.len() * allowed.len()).max(1) as f64).sqrt()
 }

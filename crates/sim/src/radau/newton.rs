@@ -35,7 +35,7 @@ impl Convergence {
 impl Radau {
     /// Iterates from the increments in `z`; the number of iterations.
     pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
-        self.newton = Convergence { rate: super::FAST, left: self.newton.left.max(f64::EPSILON).powf(0.8) };
+        self.newton = Convergence { rate: super::FAST, left: libm::pow(self.newton.left.max(f64::EPSILON), 0.8) };
         let (mut before, mut growth_before) = (0.0_f64, 0.0);
         for iteration in 1..=MOST_ITERATIONS {
             self.correct(system, h)?;
@@ -67,9 +67,9 @@ impl Radau {
             return Err(Trouble::Slow { shorten: 0.5 });
         }
         self.newton.left = rate / (1.0 - rate);
-        let expected = self.newton.left * size * rate.powi(remaining as i32) / self.newton_tolerance;
+        let expected = self.newton.left * size * libm::pow(rate, remaining as f64) / self.newton_tolerance;
         if expected >= 1.0 {
-            let shorten = 0.8 * expected.clamp(1e-4, 20.0).powf(-1.0 / (4.0 + remaining as f64));
+            let shorten = 0.8 * libm::pow(expected.clamp(1e-4, 20.0), -1.0 / (4.0 + remaining as f64));
             return Err(Trouble::Slow { shorten });
         }
         Ok(())

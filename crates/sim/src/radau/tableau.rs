@@ -55,6 +55,7 @@ pub(super) fn rate_weights(at: f64) -> [f64; STAGES] {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "values to compare with")]
 mod tests {
     use super::*;
 
