@@ -177,6 +177,8 @@ pub enum Solver {
     Explicit,
     /// Backward differentiation formulas, variable step, for stiff models
     Bdf,
+    /// Radau IIA of order 5, implicit, variable step, for stiff models
+    Radau,
     /// Order 1, fixed step
     Euler,
     /// Order 2, fixed step

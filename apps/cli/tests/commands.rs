@@ -178,7 +178,7 @@ fn every_solver_comes_to_the_same_end() {
         report["values"]["v"].as_array().unwrap().last().unwrap().as_f64().unwrap()
     };
     let exact = 1.99313146956953;
-    for solver in ["auto", "explicit", "bdf"] {
+    for solver in ["auto", "explicit", "bdf", "radau"] {
         assert!((end(&[solver]) - exact).abs() < 1e-4, "{solver}");
     }
     for (solver, error) in [("euler", 1e-2), ("heun", 1e-5), ("rk4", 1e-9), ("implicit_midpoint", 1e-5)] {

@@ -56,6 +56,7 @@ fn run(arguments: &Simulate) -> Run {
             Solver::Auto => Method::Auto,
             Solver::Explicit => Method::Explicit,
             Solver::Bdf => Method::Bdf,
+            Solver::Radau => Method::Radau,
             Solver::Euler => Method::Fixed(FixedMethod::Euler),
             Solver::Heun => Method::Fixed(FixedMethod::Heun),
             Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),

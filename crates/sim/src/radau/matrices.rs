@@ -84,6 +84,11 @@ impl Matrices {
         }
     }
 
+    /// Reciprocal of what an equation adds up.
+    pub(super) fn row_factor(&self, row: usize) -> f64 {
+        self.rows[row]
+    }
+
     /// Replaces `b` by the solution of the real equations.
     pub(super) fn solve_real(&mut self, b: &mut [f64]) {
         b.iter_mut().zip(&self.rows).for_each(|(b, row)| *b *= row);

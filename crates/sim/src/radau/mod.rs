@@ -95,6 +95,9 @@ pub(crate) struct Radau {
     error: Vec<f64>,
     /// What is allowed of each unknown.
     allowed: Vec<f64>,
+    /// What Newton should reach of it, where that is less: errors of rates in a constraint add up from step to step, though
+    /// the constraint holds.
+    wanted: Option<Vec<f64>>,
     dy: Vec<f64>,
     dyp: Vec<f64>,
     /// Whether rates are known to enter linearly.
@@ -148,6 +151,7 @@ impl Radau {
             trial_rates: vector(),
             error: vector(),
             allowed: vector(),
+            wanted: (0..size).any(|unknown| system.index(unknown) > 1).then(vector),
             dy: vec![0.0; nonzeros],
             dyp: vec![0.0; nonzeros],
             linear_in_rates: system.semi_explicit().is_some(),
@@ -228,12 +232,16 @@ impl Radau {
     /// # Errors
     /// No step is short enough: what the system reported last, or what Newton was left with.
     pub(crate) fn step(&mut self, system: &mut dyn ImplicitSystem, stop: f64) -> Result<(), Failure> {
-        let (mut singular, mut failure) = (0, None);
+        let (mut singular, mut failure, mut slow) = (0, None, false);
         loop {
             let reaches = self.t + STRETCH * self.h >= stop;
             let h = if reaches { stop - self.t } else { self.h };
             if 0.1 * h <= self.t.abs() * f64::EPSILON || h.is_nan() || h < f64::MIN_POSITIVE {
-                return Err(failure.unwrap_or(Failure::StepTooSmall { time: self.t, step: h }));
+                return Err(match failure {
+                    Some(failure) => failure,
+                    None if slow => self.without_convergence(system),
+                    None => Failure::StepTooSmall { time: self.t, step: h },
+                });
             }
             match self.attempt(system, h) {
                 Ok(newton_iterations) => {
@@ -243,7 +251,7 @@ impl Radau {
                         self.accept(if reaches { stop } else { self.t + h }, h, next);
                         return Ok(());
                     }
-                    failure = None;
+                    (failure, slow) = (None, false);
                     self.work.rejected += usize::from(self.work.accepted > 0);
                     self.h = next;
                     self.renew_jacobian();
@@ -251,7 +259,7 @@ impl Radau {
                 Err(Trouble::Slow { shorten }) => {
                     self.start_otherwise();
                     self.h = shorten * h;
-                    failure = None;
+                    (failure, slow) = (None, true);
                 }
                 Err(Trouble::Failed(reason)) => {
                     self.start_otherwise();
@@ -264,6 +272,19 @@ impl Radau {
                 }
             }
         }
+    }
+
+    /// Tells where Newton was left with the greatest residual, relative to what its equation adds up.
+    fn without_convergence(&mut self, system: &mut dyn ImplicitSystem) -> Failure {
+        let (time, iterations) = (self.t, newton::MOST_ITERATIONS);
+        let mut residual = vec![0.0; self.y.len()];
+        if let Err(failure) = system.residual(time, &self.trial, &self.trial_rates, &mut residual) {
+            return failure;
+        }
+        let size = |row: usize| (residual[row] * self.matrices.row_factor(row)).abs();
+        let worst = (0..residual.len()).fold(0, |worst, row| if size(row) > size(worst) { row } else { worst });
+        let residual = residual.get(worst).map_or(0.0, |residual| residual.abs());
+        Failure::NoConvergence { time, what: system.equation_name(worst), iterations, residual }
     }
 
     /// Newton was in vain with what it started from.
@@ -283,8 +304,9 @@ impl Radau {
 
     /// Solves the equations of a step; the number of iterations that took.
     fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+        self.renew(system)?;
         self.allow(h);
-        self.linearise(system, h)?;
+        self.refactor(system, h)?;
         match self.last.ends_at(self.t) {
             true => self.last.extrapolate(h, &mut self.z),
             false => self.set_off(h),
@@ -299,11 +321,15 @@ impl Radau {
         for (i, allowed) in self.allowed.iter_mut().enumerate() {
             let index = usize::from(self.index[i]).clamp(1, more.len());
             *allowed = (self.absolute[i] + self.relative * self.y[i].abs()) * more[index - 1];
+            if let Some(wanted) = &mut self.wanted {
+                let most = if self.has_rate[i] { 1 } else { 2 };
+                wanted[i] = *allowed / more[index - 1] * more[index.min(most) - 1];
+            }
         }
     }
 
-    /// Takes the Jacobian and factors, as far as needed.
-    fn linearise(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+    /// Takes the Jacobian, if needed.
+    fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), Trouble> {
         if self.jacobian == Age::Stale {
             system.jacobian(self.t, &self.y, &self.yp, &mut self.dy, &mut self.dyp).map_err(Trouble::Failed)?;
             self.work.jacobians += 1;
@@ -319,7 +345,7 @@ impl Radau {
             self.jacobian = Age::Fresh;
             self.factored = None;
         }
-        self.refactor(system, h)
+        Ok(())
     }
 
     /// Factors for a step of `h`, unless that is done.

@@ -7,6 +7,9 @@ use crate::{Failure, ImplicitSystem};
 /// Iterations at most.
 pub(super) const MOST_ITERATIONS: usize = 7;
 
+/// Factor from one correction to the next beyond which rounding keeps Newton from getting where it should.
+const STALLED: f64 = 0.3;
+
 /// Rate of convergence beyond which there is none.
 const DIVERGENT: f64 = 0.99;
 
@@ -36,12 +39,13 @@ impl Radau {
     /// Iterates from the increments in `z`; the number of iterations.
     pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
         self.newton = Convergence { rate: super::FAST, left: libm::pow(self.newton.left.max(f64::EPSILON), 0.8) };
-        let (mut before, mut growth_before) = (0.0_f64, 0.0);
+        let (mut before, mut growth_before, mut wanted_before) = (0.0_f64, 0.0, f64::INFINITY);
         for iteration in 1..=MOST_ITERATIONS {
             self.correct(system, h)?;
             self.work.iterations += 1;
             let [a, b, c] = &self.correction;
             let size = norm(&[a, b, c], &self.allowed);
+            let wanted = self.wanted.as_ref().map_or(size, |wanted| norm(&[a, b, c], wanted));
             if iteration > 1 && iteration < MOST_ITERATIONS {
                 let growth = size / before;
                 self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
@@ -52,10 +56,13 @@ impl Radau {
                 return Err(Trouble::Slow { shorten: 0.5 });
             }
             before = size.max(f64::EPSILON);
+            let stalled = wanted > STALLED * wanted_before || iteration == MOST_ITERATIONS;
+            let enough = self.newton_tolerance / self.newton.left;
             self.apply();
-            if self.newton.left * size <= self.newton_tolerance {
+            if size <= enough && (wanted <= enough || stalled) {
                 return Ok(iteration);
             }
+            wanted_before = wanted;
         }
         Err(Trouble::Slow { shorten: 0.5 })
     }
