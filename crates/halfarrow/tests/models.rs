@@ -31,7 +31,10 @@ fn references_are_met() {
     let with_reference: Vec<PathBuf> =
         models().into_iter().filter(|folder| folder.join("reference.json").is_file()).collect();
     assert!(with_reference.len() >= 35, "only {} references", with_reference.len());
-    check_all(&with_reference, |folder| Reference::read(folder).check(folder));
+    check_all(&with_reference, |folder| {
+        let reference = Reference::read(folder);
+        [Method::Auto, Method::Radau].iter().try_for_each(|&method| reference.check(folder, method))
+    });
 }
 
 /// At every step: power and every law to rounding, energy and rates as far as the steps resolve.
@@ -95,8 +98,9 @@ impl Reference {
     }
 
     /// Each value within `tolerance` of the greatest magnitude of its variable.
-    fn check(&self, folder: &Path) -> Result<(), String> {
-        let done = load(folder)?.simulate(&self.run(folder), &mut |_| true).map_err(|error| error.render(false))?;
+    fn check(&self, folder: &Path, method: Method) -> Result<(), String> {
+        let run = Run { method, ..self.run(folder) };
+        let done = load(folder)?.simulate(&run, &mut |_| true).map_err(|error| error.render(false))?;
         let mut faults = Vec::new();
         for (name, wanted) in &self.values {
             let found = &done.trace.column(name).expect("it was recorded").values;
@@ -106,7 +110,10 @@ impl Reference {
                 let sample = done.trace.times.iter().position(|s| (s - at).abs() < 1e-9 * at).expect("a sample");
                 let error = (found[sample] - wanted).abs() / scale;
                 if error.is_nan() || error > self.tolerance {
-                    faults.push(format!("{name}({t}) = {}, but {wanted}: {error:.1e} of {scale}", found[sample]));
+                    faults.push(format!(
+                        "{method:?}: {name}({t}) = {}, but {wanted}: {error:.1e} of {scale}",
+                        found[sample]
+                    ));
                 }
             }
         }

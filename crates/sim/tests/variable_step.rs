@@ -342,3 +342,30 @@ fn the_longest_step_is_kept() {
         assert!(end.unwrap().steps >= 200);
     }
 }
+
+#[test]
+fn a_machine_that_only_its_square_moves_starts_from_rest() {
+    // An electrostatic actuator: its force is the square of a charge that starts at 0, so that magnitudes cannot be guessed.
+    const GAP: f64 = 8.8541878128e-12 * 4e-8;
+    for (method, rtol, bound) in [(Auto, 1e-6, 1e-5), (Bdf, 1e-6, 1e-5), (Radau, 1e-6, 1e-5), (Radau, 1e-12, 1e-10)] {
+        let mut system = Known::new(
+            &[0.0; 3],
+            |_, x, _, dx| {
+                dx[0] = (4.0 - x[0] * (2e-6 - x[1]) / GAP) / 1e8;
+                dx[1] = x[2];
+                dx[2] = (x[0] * x[0] / (2.0 * GAP) - 5e-6 * x[2] - x[1]) / 1e-9;
+            },
+            |_, x, v, _, jv| {
+                jv[0] = (-v[0] * (2e-6 - x[1]) + x[0] * v[1]) / GAP / 1e8;
+                jv[1] = v[2];
+                jv[2] = (x[0] * v[0] / GAP - 5e-6 * v[2] - v[1]) / 1e-9;
+            },
+            |_| vec![1.1790628968132471e-12, 1.3376904193216418e-6, 0.029_090_111_116_053_725],
+        );
+        system.scales[0] = 1e-12;
+        let (samples, end) = system.run(&Options { every: None, ..options(method, rtol, 1e-4) });
+        let (last, exact) = (samples.values.last().unwrap(), (system.solution)(1e-4));
+        let error = last.iter().zip(exact).map(|(x, exact)| (x / exact - 1.0).abs()).fold(0.0, f64::max);
+        assert!(error < bound, "{method:?} {rtol:e}: {error:e}, {last:?}, {end:?}");
+    }
+}

@@ -13,6 +13,9 @@ use crate::lu::Lu;
 /// Unknowns up to which dense matrices are faster, whatever the pattern.
 const LARGEST_DENSE: usize = 24;
 
+/// Times that rows and columns are balanced against each other.
+const SWEEPS: usize = 12;
+
 /// `factor · ∂F/∂y' + ∂F/∂y` for a real and a complex factor, and their triangular factors. Rows are measured by what
 /// their equation adds up when each unknown has its scale, columns by their greatest entry then, so that pivots are chosen
 /// alike whatever the units.
@@ -58,6 +61,14 @@ impl Matrices {
         scales: &[f64],
     ) -> Result<(), NoPivot> {
         self.measure(dy, dyp, real, scales);
+        self.factor_scaled(dy, dyp, real, complex).or_else(|_| {
+            // The scales may be far from what the equations make of each other.
+            self.balance(dy, dyp, real);
+            self.factor_scaled(dy, dyp, real, complex)
+        })
+    }
+
+    fn factor_scaled(&mut self, dy: &[f64], dyp: &[f64], real: f64, complex: c64) -> Result<(), NoPivot> {
         let entries = self.pattern.entries().enumerate().map(|(place, (row, column))| {
             let scale = self.rows[row] * self.columns[column];
             (place, row, column, scale * dy[place], scale * dyp[place])
@@ -110,6 +121,29 @@ impl Matrices {
         }
         scale(re, &self.columns);
         scale(im, &self.columns);
+    }
+
+    /// Takes factors that make the greatest entry of each row and column about 1, whatever the scales of the unknowns.
+    fn balance(&mut self, dy: &[f64], dyp: &[f64], real: f64) {
+        self.rows.fill(1.0);
+        self.columns.fill(1.0);
+        let (mut rows, mut columns) = (self.rows.clone(), self.columns.clone());
+        for _ in 0..SWEEPS {
+            rows.fill(0.0);
+            columns.fill(0.0);
+            for (place, (row, column)) in self.pattern.entries().enumerate() {
+                let size = (real * dyp[place] + dy[place]).abs() * self.rows[row] * self.columns[column];
+                rows[row] = size.max(rows[row]);
+                columns[column] = size.max(columns[column]);
+            }
+            let shrink = |(factor, most): (&mut f64, &f64)| {
+                if *most > 0.0 {
+                    *factor /= most.sqrt();
+                }
+            };
+            self.rows.iter_mut().zip(&rows).for_each(shrink);
+            self.columns.iter_mut().zip(&columns).for_each(shrink);
+        }
     }
 
     /// Takes the factors of rows and columns. A row or column of zeros keeps 1, and leaves no pivot.
