@@ -11,7 +11,10 @@ use crate::Sparsity;
 use crate::lu::Lu;
 
 /// Unknowns up to which dense matrices are faster, whatever the pattern.
-const LARGEST_DENSE: usize = 24;
+const LARGEST_DENSE: usize = 32;
+
+/// Part of all entries beyond which they are faster at any size.
+const FULL: f64 = 0.25;
 
 /// Times that rows and columns are balanced against each other.
 const SWEEPS: usize = 12;
@@ -42,7 +45,8 @@ pub(super) struct NoPivot {
 impl Matrices {
     pub(super) fn new(pattern: &Sparsity) -> Matrices {
         let size = pattern.states();
-        let sparse = (size > LARGEST_DENSE).then(|| Sparse::new(pattern)).flatten();
+        let is_full = pattern.nonzeros() as f64 > FULL * (size * size) as f64;
+        let sparse = (size > LARGEST_DENSE && !is_full).then(|| Sparse::new(pattern)).flatten();
         let dense = || Factors::Dense { real: Lu::new(size), complex: ComplexLu::new(size) };
         Matrices {
             pattern: pattern.clone(),
