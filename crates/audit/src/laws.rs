@@ -204,7 +204,7 @@ fn check(
         }
         Law::Zero { expr, what } => {
             let terms = match graph.exprs.node(*expr) {
-                Node::Add(terms) => terms.clone(),
+                Node::Add(terms) => terms.to_vec(),
                 _ => vec![*expr],
             };
             let mut rows = Vec::new();

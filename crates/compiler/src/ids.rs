@@ -106,3 +106,121 @@ impl<K: Id, V> FromIterator<V> for Table<K, V> {
         Table { entries: values.into_iter().collect(), key: PhantomData }
     }
 }
+
+/// A map keyed by ids most of which are present: as a `BTreeMap`, with one place per id.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Map<K, V> {
+    places: Vec<Option<(K, V)>>,
+    len: usize,
+}
+
+impl<K, V> Default for Map<K, V> {
+    fn default() -> Self {
+        Map { places: Vec::new(), len: 0 }
+    }
+}
+
+impl<K: Id, V> Map<K, V> {
+    /// An empty map.
+    pub fn new() -> Self {
+        Self::default()
+    }
+    /// Puts a value in the place of an id; gives what was there.
+    pub fn insert(&mut self, id: K, value: V) -> Option<V> {
+        if self.places.len() <= id.index() {
+            self.places.resize_with(id.index() + 1, || None);
+        }
+        let before = self.places[id.index()].replace((id, value));
+        self.len += usize::from(before.is_none());
+        before.map(|(_, value)| value)
+    }
+    /// Takes a value out.
+    pub fn remove(&mut self, id: &K) -> Option<V> {
+        let (_, value) = self.places.get_mut(id.index())?.take()?;
+        self.len -= 1;
+        Some(value)
+    }
+    /// The value of an id.
+    pub fn get(&self, id: &K) -> Option<&V> {
+        self.places.get(id.index())?.as_ref().map(|(_, value)| value)
+    }
+    /// The value of an id, to change.
+    pub fn get_mut(&mut self, id: &K) -> Option<&mut V> {
+        self.places.get_mut(id.index())?.as_mut().map(|(_, value)| value)
+    }
+    /// Whether the id has a value.
+    pub fn contains_key(&self, id: &K) -> bool {
+        self.get(id).is_some()
+    }
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+    /// Ids and values in order.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = (&K, &V)> + Clone {
+        self.places.iter().flatten().map(|(id, value)| (id, value))
+    }
+    /// The ids that have values, in order.
+    pub fn keys(&self) -> impl DoubleEndedIterator<Item = &K> + Clone {
+        self.iter().map(|(id, _)| id)
+    }
+    /// The values in order.
+    pub fn values(&self) -> impl DoubleEndedIterator<Item = &V> + Clone {
+        self.iter().map(|(_, value)| value)
+    }
+    /// The values in order, to change.
+    pub fn values_mut(&mut self) -> impl DoubleEndedIterator<Item = &mut V> {
+        self.places.iter_mut().flatten().map(|(_, value)| value)
+    }
+    /// Keeps only the values for which `keep` holds.
+    pub fn retain(&mut self, mut keep: impl FnMut(&K, &mut V) -> bool) {
+        for place in &mut self.places {
+            if place.as_mut().is_some_and(|(id, value)| !keep(id, value)) {
+                *place = None;
+                self.len -= 1;
+            }
+        }
+    }
+}
+
+impl<K: Id, V> std::ops::Index<&K> for Map<K, V> {
+    type Output = V;
+    fn index(&self, id: &K) -> &V {
+        self.get(id).expect("the id has a value")
+    }
+}
+
+impl<'a, K: Id, V> IntoIterator for &'a Map<K, V> {
+    type Item = (&'a K, &'a V);
+    type IntoIter =
+        std::iter::Map<std::iter::Flatten<std::slice::Iter<'a, Option<(K, V)>>>, fn(&'a (K, V)) -> (&'a K, &'a V)>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.places.iter().flatten().map(|(id, value)| (id, value))
+    }
+}
+
+impl<K: Id, V> Extend<(K, V)> for Map<K, V> {
+    fn extend<I: IntoIterator<Item = (K, V)>>(&mut self, pairs: I) {
+        pairs.into_iter().for_each(|(id, value)| {
+            self.insert(id, value);
+        });
+    }
+}
+
+impl<K: Id, V> FromIterator<(K, V)> for Map<K, V> {
+    fn from_iter<I: IntoIterator<Item = (K, V)>>(pairs: I) -> Self {
+        let mut map = Map::new();
+        map.extend(pairs);
+        map
+    }
+}
+
+impl<K: Id, V, const N: usize> From<[(K, V); N]> for Map<K, V> {
+    fn from(pairs: [(K, V); N]) -> Self {
+        pairs.into_iter().collect()
+    }
+}

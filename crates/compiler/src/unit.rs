@@ -15,6 +15,7 @@ use crate::span::Span;
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
+use std::sync::Arc;
 
 /// A unit: its dimension and the way from numbers in it to numbers in SI base units.
 ///
@@ -30,7 +31,11 @@ use num_traits::{One, ToPrimitive, Zero};
 /// assert_eq!(power, Dimension::WATT);
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unit {
+pub struct Unit(Arc<Scale>);
+
+/// What there is to know of a [`Unit`]: its fields.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scale {
     /// Exponents of the base units.
     pub dimension: Dimension,
     /// Exponent of the radian, in sixtieths: 60 for `rad/s` and `rpm`, -60 for `N.m/rad`, 0 for `1/s`.
@@ -98,13 +103,14 @@ impl Unit {
     /// The SI unit of a dimension, under its usual name.
     pub fn si(dimension: Dimension) -> Unit {
         let one = BigRational::one();
-        Unit { dimension, angle: 0, rational: one, pi: 0, offset: BigRational::zero(), text: dimension.to_string() }
+        let (offset, text) = (BigRational::zero(), dimension.to_string());
+        Scale { dimension, angle: 0, rational: one, pi: 0, offset, text }.into()
     }
 
     /// The SI unit with the dimension and the angle of this one: `rad/s` for `rpm`, `m` for `mm`.
     pub fn to_si_unit(&self) -> Unit {
         let text = dimension::with_angle(self.dimension, self.angle);
-        Unit { angle: self.angle, text, ..Unit::si(self.dimension) }
+        Scale { angle: self.angle, text, ..Scale::clone(&Unit::si(self.dimension)) }.into()
     }
 
     /// Whether numbers in this unit are SI numbers.
@@ -141,6 +147,19 @@ impl Unit {
 
 fn float(value: &BigRational) -> f64 {
     value.to_f64().unwrap_or(f64::NAN)
+}
+
+impl std::ops::Deref for Unit {
+    type Target = Scale;
+    fn deref(&self) -> &Scale {
+        &self.0
+    }
+}
+
+impl From<Scale> for Unit {
+    fn from(scale: Scale) -> Unit {
+        Unit(Arc::new(scale))
+    }
 }
 
 impl std::fmt::Display for Unit {

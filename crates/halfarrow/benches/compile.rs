@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p halfarrow --bench compile`
 
-use std::fmt::Write;
+mod shapes;
+
 use std::path::Path;
 
 use halfarrow_compiler::bond_graph::NoFiles;
@@ -25,6 +26,14 @@ const PAPER: [&str; 11] = [
     "class2_class4_two_I_variant_B",
 ];
 
+/// Rings, nets with and without algebraic loops, dependent storages, a mechanism.
+const SHAPES: [&str; 6] =
+    ["ring_1000", "junction_ring_1000", "mesh_30_class_1", "mesh_30_class_2", "gear_train_200", "pendulum_20"];
+
+/// As in the program.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() {
     divan::main();
 }
@@ -32,14 +41,36 @@ fn main() {
 /// A ladder of 1,000 resistors and capacitors: below 50 ms.
 #[divan::bench(sample_count = 20)]
 fn ladder_1000(bencher: divan::Bencher) {
-    let text = ladder(1000);
+    let text = shapes::ladder(1000);
     bencher.bench(|| runnable(&text));
 }
 
 /// A ladder of 10,000 resistors and capacitors: below 0.7 s.
 #[divan::bench(sample_count = 5)]
 fn ladder_10000(bencher: divan::Bencher) {
-    let text = ladder(10_000);
+    let text = shapes::ladder(10_000);
+    bencher.bench(|| runnable(&text));
+}
+
+/// Ten times as much, ten times as long.
+#[divan::bench(sample_count = 2)]
+fn ladder_100000(bencher: divan::Bencher) {
+    let text = shapes::ladder(100_000);
+    bencher.bench(|| runnable(&text));
+}
+
+/// Other shapes than a chain.
+#[divan::bench(args = SHAPES, sample_count = 5)]
+fn shape(bencher: divan::Bencher, name: &str) {
+    let text = match name {
+        "ring_1000" => shapes::ring(1000),
+        "junction_ring_1000" => shapes::junction_ring(1000),
+        "mesh_30_class_1" => shapes::mesh(30, 1),
+        "mesh_30_class_2" => shapes::mesh(30, 3),
+        "gear_train_200" => shapes::gear_train(200),
+        "pendulum_20" => shapes::pendulum(20),
+        _ => unreachable!("all shapes are listed"),
+    };
     bencher.bench(|| runnable(&text));
 }
 
@@ -54,18 +85,6 @@ fn paper(bencher: divan::Bencher, name: &str) {
 fn runnable(text: &str) -> Model {
     let text = Text { name: "bench.bond", text, files: &NoFiles, overrides: &[] };
     Model::new(compile(text, Form::Minimal).expect("a model without errors").ir).expect("parameters that fit")
-}
-
-/// An RC ladder of `n` sections, fed by a voltage.
-fn ladder(n: usize) -> String {
-    let mut text = "model Ladder\nparam r = 1 ohm, c = 1 mF\nSe:source(1 V) -> 1:s1\n".to_string();
-    for i in 1..=n {
-        _ = writeln!(text, "s{i} -> R:R{i}(r)\ns{i} -> 0:n{i}\nn{i} -> C:C{i}(c)");
-        if i < n {
-            _ = writeln!(text, "n{i} -> 1:s{}", i + 1);
-        }
-    }
-    text
 }
 
 fn model(name: &str) -> String {

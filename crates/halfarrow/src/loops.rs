@@ -7,7 +7,7 @@ use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
 use halfarrow_compiler::causal_graph::{CausalGraph, PortState, Role, Stroke};
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
 use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
-use halfarrow_compiler::ids::Id;
+use halfarrow_compiler::ids::{Id, Map};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -230,7 +230,7 @@ fn components(paths: &CausalPaths) -> Vec<ComponentReport> {
 fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
-    let mut known = BTreeMap::new();
+    let mut known = Map::new();
     let of_storages = causal.ports.ports.iter().filter(|s| graph.storage_symbols(s.port).is_some());
     let mut report = |state: &PortState| {
         let (co_energy, _) = graph.storage_symbols(state.port).expect("a storage");

@@ -1,14 +1,15 @@
 //! Sums, products and powers in canonical form.
 
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
-use super::node::{Expr, Function, Node};
+use super::node::{Expr, Function, Node, Parts};
 use super::rational::Rational;
 use num_integer::Integer;
+use smallvec::{SmallVec, smallvec};
 
 impl Exprs {
     /// The sum.
     pub fn add(&mut self, terms: &[Expr]) -> Expr {
-        let mut sum = Sum { constant: Rational::from(0), terms: Vec::with_capacity(terms.len()) };
+        let mut sum = Sum { constant: Rational::from(0), terms: SmallVec::new() };
         for &term in terms {
             self.collect_term(&mut sum, term, None);
         }
@@ -44,12 +45,12 @@ impl Exprs {
         }
         let factors = match self.node(monomial) {
             Node::Add(terms) if !number.is_zero() => {
-                let terms: Vec<Expr> = terms.clone();
+                let terms = terms.clone();
                 let terms = terms.into_iter().map(|t| self.scale(&number, t)).collect();
                 return self.intern(Node::Add(terms));
             }
             Node::Mul(factors) => factors.clone(),
-            _ => vec![monomial],
+            _ => smallvec![monomial],
         };
         let number = self.number(number);
         self.intern(Node::Mul(std::iter::once(number).chain(factors).collect()))
@@ -139,7 +140,7 @@ impl Exprs {
         if let ([(number, monomial)], true) = (&terms[..], constant.is_zero()) {
             return self.scale(number, *monomial);
         }
-        let mut children = Vec::with_capacity(terms.len() + 1);
+        let mut children = Parts::with_capacity(terms.len() + 1);
         if !constant.is_zero() {
             children.push(self.number(constant));
         }
@@ -164,19 +165,19 @@ impl Exprs {
     }
 
     fn product(&mut self, factors: &[Expr]) -> Expr {
-        let mut product = Product { number: Rational::from(1), powers: Vec::with_capacity(factors.len() + 2) };
+        let mut product = Product { number: Rational::from(1), powers: SmallVec::new() };
         for &factor in factors {
             self.collect_factor(&mut product, factor);
         }
         let Product { mut number, mut powers } = product;
         powers.sort_by(|a, b| self.order(a.0, b.0).then_with(|| self.order(a.1, b.1)));
-        let mut children = Vec::with_capacity(powers.len() + 1);
+        let mut children = Parts::with_capacity(powers.len() + 1);
         let mut start = 0;
         let mut regroup = false;
         while start < powers.len() {
             let base = powers[start].0;
             let end = start + powers[start..].iter().take_while(|p| p.0 == base).count();
-            let mut merged = Vec::new();
+            let mut merged = Parts::new();
             self.merge_powers(base, &powers[start..end], &mut merged);
             for power in merged {
                 match self.node(power) {
@@ -196,7 +197,7 @@ impl Exprs {
             return self.mul(&children);
         }
         if number.is_zero() {
-            children.retain(|&c| !self.total(c));
+            children.retain(|c| !self.total(*c));
         }
         children.sort_by(|&a, &b| self.order(a, b));
         match children[..] {
@@ -235,7 +236,7 @@ impl Exprs {
     }
 
     /// The powers of one base, multiplied as far as that leaves alone where they are defined.
-    fn merge_powers(&mut self, base: Expr, powers: &[(Expr, Expr)], merged: &mut Vec<Expr>) {
+    fn merge_powers(&mut self, base: Expr, powers: &[(Expr, Expr)], merged: &mut Parts) {
         if let [(base, n)] = powers {
             merged.push(if *n == ONE { *base } else { self.pow(*base, *n) });
             return;
@@ -350,7 +351,7 @@ impl Exprs {
         self.intern(Node::Pow(base, exponent))
     }
 
-    fn product_to_power(&mut self, base: Expr, factors: Vec<Expr>, n: &Rational) -> Expr {
+    fn product_to_power(&mut self, base: Expr, factors: Parts, n: &Rational) -> Expr {
         if n.is_integer() {
             let powers: Vec<Expr> = factors.into_iter().map(|f| self.pow_number(f, n)).collect();
             return self.mul(&powers);
@@ -425,12 +426,12 @@ impl Exprs {
 
 struct Sum {
     constant: Rational,
-    terms: Vec<(Rational, Expr)>,
+    terms: SmallVec<[(Rational, Expr); 4]>,
 }
 
 struct Product {
     number: Rational,
-    powers: Vec<(Expr, Expr)>,
+    powers: SmallVec<[(Expr, Expr); 8]>,
 }
 
 fn is_even(n: &Rational) -> bool {

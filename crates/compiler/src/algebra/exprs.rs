@@ -31,7 +31,11 @@ pub struct Exprs {
     pub(super) entries: Vec<Entry>,
     ids: HashTable<u32>,
     symbols: Vec<SymbolEntry>,
-    by_name: FxHashMap<Box<str>, Symbol>,
+    by_name: HashTable<u32>,
+    /// The names of all symbols, one after the other.
+    names: String,
+    /// The same with their numbers padded, so that `q2` comes before `q10`.
+    orders: Vec<u8>,
     pub(super) sets: SymbolSets,
     pub(super) tables: Vec<Table1d>,
     pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
@@ -56,9 +60,12 @@ pub(super) struct Entry {
 
 #[derive(Clone)]
 struct SymbolEntry {
-    name: Box<str>,
-    /// The name with its numbers padded, so that `q2` comes before `q10`.
-    order: Box<[u8]>,
+    /// Where it ends in `names`, and in `orders`; it starts where the one before it ends.
+    ends: (u32, u32),
+    /// From the name.
+    hash: u64,
+    /// The symbol as an expression, once there is one.
+    expr: Option<Expr>,
     facts: Facts,
 }
 
@@ -68,7 +75,9 @@ impl Default for Exprs {
             entries: Vec::new(),
             ids: HashTable::new(),
             symbols: Vec::new(),
-            by_name: FxHashMap::default(),
+            by_name: HashTable::new(),
+            names: String::new(),
+            orders: Vec::new(),
             sets: SymbolSets::default(),
             tables: Vec::new(),
             derivatives: FxHashMap::default(),
@@ -97,23 +106,39 @@ pub const MINUS_ONE: Expr = Expr(2);
 impl Exprs {
     /// The symbol of that name. The facts hold if it is new; a name always means the same symbol.
     pub fn symbol(&mut self, name: &str, facts: Facts) -> Symbol {
-        if let Some(&symbol) = self.by_name.get(name) {
-            return symbol;
+        let hash = hash_name(name);
+        if let Some(known) = self.named(name, hash) {
+            return known;
         }
-        let symbol = Symbol(u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols"));
-        self.symbols.push(SymbolEntry { name: name.into(), order: natural_order(name), facts });
-        self.by_name.insert(name.into(), symbol);
-        symbol
+        let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
+        self.names.push_str(name);
+        push_natural_order(&mut self.orders, name);
+        let place = |len: usize| u32::try_from(len).expect("names of less than 4 GiB");
+        let ends = (place(self.names.len()), place(self.orders.len()));
+        self.symbols.push(SymbolEntry { ends, hash, expr: None, facts });
+        let symbols = &self.symbols;
+        self.by_name.insert_unique(hash, id, |&id| symbols[id as usize].hash);
+        Symbol(id)
     }
 
     /// The symbol of that name, if there is one.
     pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
-        self.by_name.get(name).copied()
+        self.named(name, hash_name(name))
+    }
+
+    fn named(&self, name: &str, hash: u64) -> Option<Symbol> {
+        self.by_name.find(hash, |&id| self.name(Symbol(id)) == name).map(|&id| Symbol(id))
     }
 
     /// The name of a symbol.
     pub fn name(&self, symbol: Symbol) -> &str {
-        &self.symbols[symbol.0 as usize].name
+        let (start, end) = self.ends(symbol);
+        &self.names[start.0 as usize..end.0 as usize]
+    }
+
+    fn ends(&self, symbol: Symbol) -> ((u32, u32), (u32, u32)) {
+        let at = symbol.0 as usize;
+        (if at == 0 { (0, 0) } else { self.symbols[at - 1].ends }, self.symbols[at].ends)
     }
 
     /// What is known of a symbol.
@@ -138,7 +163,12 @@ impl Exprs {
 
     /// The symbol as an expression.
     pub fn sym(&mut self, symbol: Symbol) -> Expr {
-        self.intern(Node::Symbol(symbol))
+        if let Some(known) = self.symbols[symbol.0 as usize].expr {
+            return known;
+        }
+        let e = self.intern(Node::Symbol(symbol));
+        self.symbols[symbol.0 as usize].expr = Some(e);
+        e
     }
 
     /// An integer.
@@ -208,7 +238,8 @@ impl Exprs {
     }
 
     pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
-        &self.symbols[symbol.0 as usize].order
+        let (start, end) = self.ends(symbol);
+        &self.orders[start.1 as usize..end.1 as usize]
     }
 
     /// The entry of a node that is in canonical form.
@@ -241,7 +272,7 @@ impl Exprs {
         self.is_number(factors[0])?;
         Some(match &factors[1..] {
             [single] => *single,
-            several => self.intern(Node::Mul(several.to_vec())),
+            several => self.intern(Node::Mul(several.into())),
         })
     }
 
@@ -260,7 +291,7 @@ impl Exprs {
     fn hash_of(&self, node: &Node) -> u64 {
         let seed = match node {
             Node::Number(value) => return hash_number(value),
-            Node::Symbol(s) => return self.by_name_hash(*s),
+            Node::Symbol(s) => return self.symbols[s.0 as usize].hash,
             Node::Pi => 1,
             Node::Add(_) => 2,
             Node::Mul(_) => 3,
@@ -277,10 +308,6 @@ impl Exprs {
         let mut hash = mix(0x5eed, seed);
         node.for_each_child(|c| hash = mix(hash, self.entry(c).hash));
         hash
-    }
-
-    fn by_name_hash(&self, symbol: Symbol) -> u64 {
-        self.name(symbol).bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
     }
 }
 
@@ -302,8 +329,11 @@ fn hash_number(value: &Rational) -> u64 {
     }
 }
 
-fn natural_order(name: &str) -> Box<[u8]> {
-    let mut order = Vec::with_capacity(name.len() + 4);
+fn hash_name(name: &str) -> u64 {
+    name.bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
+}
+
+fn push_natural_order(order: &mut Vec<u8>, name: &str) {
     let mut rest = name.as_bytes();
     while let Some(&first) = rest.first() {
         if !first.is_ascii_digit() {
@@ -317,5 +347,4 @@ fn natural_order(name: &str) -> Box<[u8]> {
         order.extend_from_slice(&rest[..len]);
         rest = &rest[len..];
     }
-    order.into()
 }

@@ -4,6 +4,7 @@ use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::node::{Comparison, Expr, Function, Node};
 use super::rational::Rational;
 use super::table::TableId;
+use smallvec::smallvec;
 
 impl Exprs {
     /// A function of its arguments. Panics if their number is not its arity.
@@ -14,7 +15,7 @@ impl Exprs {
             Sqrt => self.sqrt(x[0]),
             Min | Max => self.extreme(f, x[0], x[1]),
             Mod => self.modulo(x[0], x[1]),
-            Atan2 => self.intern(Node::Call(f, x.to_vec())),
+            Atan2 => self.intern(Node::Call(f, x.into())),
             Abs => self.abs(x[0]),
             Sign => self.sign(x[0]),
             Cos | Cosh => {
@@ -151,7 +152,7 @@ impl Exprs {
             (Function::Log, Node::Call(Function::Exp, inner)) => inner[0],
             (Function::Exp, Node::Call(Function::Log, inner)) if self.positive(inner[0]) => inner[0],
             (Function::Floor, Node::Call(Function::Floor, _)) => x,
-            _ => self.intern(Node::Call(f, vec![x])),
+            _ => self.intern(Node::Call(f, smallvec![x])),
         }
     }
 
@@ -217,7 +218,7 @@ impl Exprs {
         let x = self.without_sign(x).1;
         let size = match self.node(x) {
             Node::Number(_) | Node::Call(Function::Abs, _) => x,
-            _ => self.intern(Node::Call(Function::Abs, vec![x])),
+            _ => self.intern(Node::Call(Function::Abs, smallvec![x])),
         };
         let known = self.abs_of_known(known);
         self.mul(&[known, size])
@@ -252,7 +253,7 @@ impl Exprs {
         }
         let (known, x) = self.without_known_signs(x);
         let (negative, x) = self.without_sign(x);
-        let value = self.intern(Node::Call(Function::Sign, vec![x]));
+        let value = self.intern(Node::Call(Function::Sign, smallvec![x]));
         if negative == self.positive(known) { self.neg(value) } else { value }
     }
 
@@ -262,8 +263,8 @@ impl Exprs {
         }
         match self.order(a, b) {
             std::cmp::Ordering::Equal => a,
-            std::cmp::Ordering::Less => self.intern(Node::Call(f, vec![a, b])),
-            std::cmp::Ordering::Greater => self.intern(Node::Call(f, vec![b, a])),
+            std::cmp::Ordering::Less => self.intern(Node::Call(f, smallvec![a, b])),
+            std::cmp::Ordering::Greater => self.intern(Node::Call(f, smallvec![b, a])),
         }
     }
 
@@ -274,6 +275,6 @@ impl Exprs {
             let value = p - &(q * &(p / q).floor());
             return self.number(value);
         }
-        self.intern(Node::Call(Function::Mod, vec![a, b]))
+        self.intern(Node::Call(Function::Mod, smallvec![a, b]))
     }
 }

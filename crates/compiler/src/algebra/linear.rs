@@ -1,9 +1,10 @@
 //! Linear forms and the inversion of laws.
 
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
-use super::node::{Comparison, Expr, Function, Node, Symbol};
+use super::node::{Comparison, Expr, Function, Node, Parts, Symbol};
 use super::rational::Rational;
 use rustc_hash::FxHashMap;
+use smallvec::smallvec;
 use std::collections::BTreeMap;
 
 /// Coefficients by the index of their symbol, and the rest.
@@ -42,11 +43,39 @@ impl Exprs {
     ///
     /// Divisors that are not known to be nonzero are listed by [`Exprs::divisors`]: the caller watches them.
     pub fn solve_for(&mut self, zero: Expr, symbol: Symbol) -> Option<Expr> {
+        if let Some((coefficient, rest)) = self.plainly_linear_in(zero, symbol) {
+            let minus = self.neg(rest);
+            return self.divide(minus, coefficient);
+        }
         if let Some((coefficients, rest)) = self.linear_in(zero, &[symbol]) {
             let minus = self.neg(rest);
             return self.divide(minus, coefficients[0]);
         }
         self.invert(zero, ZERO, symbol)
+    }
+
+    /// As `linear_in` for a sum of which one term is the symbol or a product with it; `None` for anything else.
+    fn plainly_linear_in(&mut self, e: Expr, symbol: Symbol) -> Option<(Expr, Expr)> {
+        let Node::Add(terms) = self.node(e) else { return None };
+        let own = terms.iter().position(|&t| self.depends_on(t, symbol))?;
+        let (mut rest, term) = (terms.clone(), terms[own]);
+        rest.remove(own);
+        if rest.iter().any(|&t| self.depends_on(t, symbol)) {
+            return None;
+        }
+        let is_own = |f: &Expr| *self.node(*f) == Node::Symbol(symbol);
+        let coefficient = match self.node(term) {
+            Node::Symbol(_) => ONE,
+            Node::Mul(factors) => {
+                let (own, others): (Parts, Parts) = factors.iter().copied().partition(is_own);
+                if own.len() != 1 || others.iter().any(|&f| self.depends_on(f, symbol)) {
+                    return None;
+                }
+                self.mul(&others)
+            }
+            _ => return None,
+        };
+        Some((coefficient, self.add(&rest)))
     }
 
     /// What the expression divides by that is not known to be nonzero.
@@ -141,7 +170,7 @@ impl Exprs {
         }
     }
 
-    fn invert_sum(&mut self, e: Expr, terms: Vec<Expr>, y: Expr, s: Symbol) -> Option<Expr> {
+    fn invert_sum(&mut self, e: Expr, terms: Parts, y: Expr, s: Symbol) -> Option<Expr> {
         let (inside, outside): (Vec<Expr>, Vec<Expr>) = terms.into_iter().partition(|&t| self.depends_on(t, s));
         let outside = self.add(&outside);
         let y = self.sub(y, outside);
@@ -167,13 +196,13 @@ impl Exprs {
     fn split_factors(&mut self, e: Expr, s: Symbol) -> (Expr, Expr) {
         let factors = match self.node(e) {
             Node::Mul(factors) => factors.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let (inside, outside): (Vec<Expr>, Vec<Expr>) = factors.into_iter().partition(|&f| self.depends_on(f, s));
         (self.mul(&outside), self.mul(&inside))
     }
 
-    fn invert_product(&mut self, e: Expr, factors: Vec<Expr>, y: Expr, s: Symbol) -> Option<Expr> {
+    fn invert_product(&mut self, e: Expr, factors: Parts, y: Expr, s: Symbol) -> Option<Expr> {
         let (inside, outside): (Vec<Expr>, Vec<Expr>) = factors.into_iter().partition(|&f| self.depends_on(f, s));
         if let [single] = inside[..] {
             let outside = self.mul(&outside);
@@ -238,13 +267,13 @@ impl Exprs {
     fn denominators(&self, e: Expr, s: Symbol) -> Vec<Expr> {
         let terms = match self.node(e) {
             Node::Add(terms) => terms.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let mut found = Vec::new();
         for term in terms {
             let factors = match self.node(term) {
                 Node::Mul(factors) => factors.clone(),
-                _ => vec![term],
+                _ => smallvec![term],
             };
             for factor in factors {
                 if let Node::Pow(base, n) = self.node(factor)
@@ -264,7 +293,7 @@ impl Exprs {
     fn multiply_out(&mut self, e: Expr, factor: Expr) -> Expr {
         let terms = match self.node(e) {
             Node::Add(terms) => terms.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let inverse = self.recip(factor);
         let products: Vec<Expr> = terms

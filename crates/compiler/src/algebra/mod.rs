@@ -30,8 +30,9 @@ pub use cost::Cost;
 pub use elimination::{BackSubstitution, Elimination, Eliminator, Pivot, SparseRow, back_substitute, eliminate};
 pub use evaluate::Evaluator;
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
-pub use node::{Comparison, Expr, Facts, Function, Node, Symbol};
+pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;
+pub use symbol_sets::Symbols;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
 pub use text::{Names, PlainNames, ascii, latex, latex_name, unicode, unicode_name};
 

@@ -4,6 +4,7 @@ use super::math;
 use super::rational::Rational;
 use super::table::TableId;
 use crate::ids::id;
+use smallvec::SmallVec;
 
 id! {
     /// An expression: an entry of the pool.
@@ -148,6 +149,9 @@ impl Comparison {
     }
 }
 
+/// Terms, factors or arguments, a few of them held in place.
+pub type Parts = SmallVec<[Expr; 4]>;
+
 /// An entry of the pool. Truth values are numbers: 0 is false, anything else true.
 ///
 /// Invariants: children stand earlier in the pool than their parents; sums and products are flat, sorted, and their
@@ -162,13 +166,13 @@ pub enum Node {
     /// A named quantity.
     Symbol(Symbol),
     /// A sum of two or more.
-    Add(Vec<Expr>),
+    Add(Parts),
     /// A product of two or more.
-    Mul(Vec<Expr>),
+    Mul(Parts),
     /// Base and exponent.
     Pow(Expr, Expr),
     /// A function of its arguments; never `Sqrt`, which is a power.
-    Call(Function, Vec<Expr>),
+    Call(Function, Parts),
     /// A relation: 1 or 0.
     Compare(Comparison, Expr, Expr),
     /// Both hold: 1 or 0.

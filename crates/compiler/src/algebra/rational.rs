@@ -192,7 +192,7 @@ impl Rational {
 
     fn reduced(n: i128, d: i128) -> Self {
         let g = if d == 1 { 1 } else { gcd(n.unsigned_abs(), d.unsigned_abs()) as i128 } * d.signum();
-        let (n, d) = (n / g, d / g);
+        let (n, d) = if g == 1 { (n, d) } else { (n / g, d / g) };
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
             _ => Rational(Repr::Big(Box::new(BigRational::new_raw(BigInt::from(n), BigInt::from(d))))),

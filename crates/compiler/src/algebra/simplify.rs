@@ -5,6 +5,7 @@ use super::node::{Expr, Function, Node};
 use super::polynomial::{Generators, Monomial, Polynomial, expand, monomial_expr, times};
 use super::rational::Rational;
 use rustc_hash::FxHashMap;
+use smallvec::smallvec;
 
 /// Expressions that are written longer than this are left as they are; their parts are not.
 const LONGEST: u64 = 600;
@@ -160,7 +161,7 @@ impl Exprs {
     fn turned_fraction(&mut self, e: Expr) -> Option<Expr> {
         let factors = match self.node(e) {
             Node::Mul(factors) => factors.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let mut changed = false;
         let mut parts = Vec::new();
@@ -194,7 +195,7 @@ impl Exprs {
     fn fraction(&mut self, e: Expr) -> Option<(Expr, Vec<(Expr, i64)>)> {
         let terms = match self.node(e) {
             Node::Add(terms) => terms.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let split: Vec<(Expr, Vec<(Expr, i64)>)> = terms.iter().map(|&t| self.split_fraction(t)).collect();
         let mut below: Vec<(Expr, i64)> = Vec::new();
@@ -245,7 +246,7 @@ impl Exprs {
     fn split_fraction(&mut self, e: Expr) -> (Expr, Vec<(Expr, i64)>) {
         let factors = match self.node(e) {
             Node::Mul(factors) => factors.clone(),
-            _ => vec![e],
+            _ => smallvec![e],
         };
         let (mut above, mut below) = (Vec::new(), Vec::new());
         for factor in factors {

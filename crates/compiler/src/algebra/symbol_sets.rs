@@ -1,10 +1,11 @@
 //! Which symbols an expression reads: small sets, each held once.
 
 use super::exprs::Exprs;
+use super::fingerprint::mix;
 use super::node::{Expr, Node, Symbol};
+use hashbrown::HashTable;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::BTreeSet;
-use std::sync::Arc;
+use smallvec::SmallVec;
 
 /// A set of symbols.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -17,39 +18,42 @@ const LARGE: SetId = SetId(1);
 
 #[derive(Clone)]
 pub(super) struct SymbolSets {
-    sets: Vec<Arc<[Symbol]>>,
-    ids: FxHashMap<Arc<[Symbol]>, SetId>,
+    /// The members of all sets, one set after the other.
+    members: Vec<Symbol>,
+    /// Where each set ends; it starts where the one before it ends.
+    ends: Vec<u32>,
+    ids: HashTable<u32>,
     unions: FxHashMap<(SetId, SetId), SetId>,
 }
 
 impl Default for SymbolSets {
     fn default() -> Self {
-        let none: Arc<[Symbol]> = Arc::from([]);
-        SymbolSets {
-            sets: vec![none.clone(), none.clone()],
-            ids: FxHashMap::from_iter([(none, EMPTY)]),
-            unions: FxHashMap::default(),
-        }
+        let mut sets =
+            SymbolSets { members: Vec::new(), ends: vec![0; 2], ids: HashTable::new(), unions: FxHashMap::default() };
+        sets.ids.insert_unique(hash_of(&[]), EMPTY.0, |_| hash_of(&[]));
+        sets
     }
 }
 
 impl SymbolSets {
     fn get(&self, id: SetId) -> Option<&[Symbol]> {
-        (id != LARGE).then(|| &*self.sets[id.0 as usize])
+        (id != LARGE).then(|| members(&self.members, &self.ends, id.0))
     }
 
-    fn intern(&mut self, symbols: Vec<Symbol>) -> SetId {
+    fn intern(&mut self, symbols: &[Symbol]) -> SetId {
         if symbols.len() > LARGEST {
             return LARGE;
         }
-        if let Some(&id) = self.ids.get(symbols.as_slice()) {
-            return id;
+        let SymbolSets { members: all, ends, ids, .. } = self;
+        let hash = hash_of(symbols);
+        if let Some(&known) = ids.find(hash, |&id| members(all, ends, id) == symbols) {
+            return SetId(known);
         }
-        let id = SetId(u32::try_from(self.sets.len()).expect("fewer than 2^32 sets"));
-        let set: Arc<[Symbol]> = symbols.into();
-        self.sets.push(set.clone());
-        self.ids.insert(set, id);
-        id
+        let id = u32::try_from(ends.len()).expect("fewer than 2^32 sets");
+        all.extend_from_slice(symbols);
+        ends.push(u32::try_from(all.len()).expect("fewer than 2^32 members of sets"));
+        ids.insert_unique(hash, id, |&id| hash_of(members(all, ends, id)));
+        SetId(id)
     }
 
     fn union(&mut self, a: SetId, b: SetId) -> SetId {
@@ -66,30 +70,84 @@ impl SymbolSets {
         if let Some(&known) = self.unions.get(&key) {
             return known;
         }
-        let mut both: Vec<Symbol> = [a, b].iter().flat_map(|s| self.sets[s.0 as usize].iter().copied()).collect();
-        both.sort_unstable();
-        both.dedup();
-        let id = self.intern(both);
+        let id = self.union_of([a, b].into_iter());
         self.unions.insert(key, id);
         id
+    }
+
+    /// The union of several sets at once, so that no set on the way to it is kept.
+    fn union_of(&mut self, sets: impl Iterator<Item = SetId>) -> SetId {
+        let mut all: SmallVec<[Symbol; 16]> = SmallVec::new();
+        for set in sets {
+            match self.get(set) {
+                Some(symbols) => all.extend_from_slice(symbols),
+                None => return LARGE,
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        self.intern(&all)
+    }
+}
+
+fn members<'a>(all: &'a [Symbol], ends: &[u32], id: u32) -> &'a [Symbol] {
+    let start = if id == 0 { 0 } else { ends[id as usize - 1] };
+    &all[start as usize..ends[id as usize] as usize]
+}
+
+fn hash_of(symbols: &[Symbol]) -> u64 {
+    symbols.iter().fold(0x5e75, |h, s| mix(h, u64::from(s.0)))
+}
+
+/// The symbols that an expression reads, ascending.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Symbols(SmallVec<[Symbol; 8]>);
+
+impl Symbols {
+    /// Whether the symbol is among them.
+    pub fn contains(&self, symbol: &Symbol) -> bool {
+        self.0.binary_search(symbol).is_ok()
+    }
+}
+
+impl std::ops::Deref for Symbols {
+    type Target = [Symbol];
+    fn deref(&self) -> &[Symbol] {
+        &self.0
+    }
+}
+
+impl IntoIterator for Symbols {
+    type Item = Symbol;
+    type IntoIter = smallvec::IntoIter<[Symbol; 8]>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
     }
 }
 
 impl Exprs {
     pub(super) fn symbols_of_node(&mut self, node: &Node) -> SetId {
         if let Node::Symbol(s) = node {
-            return self.sets.intern(vec![*s]);
+            return self.sets.intern(&[*s]);
+        }
+        let (entries, sets) = (&self.entries, &mut self.sets);
+        let of = |e: Expr| entries[e.0 as usize].symbols;
+        if let Node::Add(parts) | Node::Mul(parts) = node
+            && parts.len() > 2
+        {
+            return sets.union_of(parts.iter().map(|&e| of(e)));
         }
         let mut set = EMPTY;
-        let entries = &self.entries;
-        let sets = &mut self.sets;
-        node.for_each_child(|c| set = sets.union(set, entries[c.0 as usize].symbols));
+        node.for_each_child(|c| set = sets.union(set, of(c)));
         set
     }
 
     /// The symbols that the expression reads.
-    pub fn symbols_of(&self, e: Expr) -> BTreeSet<Symbol> {
-        let mut found = BTreeSet::new();
+    pub fn symbols_of(&self, e: Expr) -> Symbols {
+        if let Some(small) = self.sets.get(self.entry(e).symbols) {
+            return Symbols(SmallVec::from_slice(small));
+        }
+        let mut found = FxHashSet::default();
         self.walk(e, |pool, e| match pool.sets.get(pool.entry(e).symbols) {
             Some(small) => {
                 found.extend(small);
@@ -97,7 +155,9 @@ impl Exprs {
             }
             None => true,
         });
-        found
+        let mut found: SmallVec<[Symbol; 8]> = found.into_iter().collect();
+        found.sort_unstable();
+        Symbols(found)
     }
 
     /// Whether the expression reads no symbol.
@@ -112,6 +172,9 @@ impl Exprs {
 
     /// Whether a symbol for which `wanted` holds stands in the expression.
     pub fn depends_on_any(&self, e: Expr, wanted: &dyn Fn(Symbol) -> bool) -> bool {
+        if let Some(small) = self.sets.get(self.entry(e).symbols) {
+            return small.iter().any(|&s| wanted(s));
+        }
         let mut found = false;
         self.walk(e, |pool, e| match pool.sets.get(pool.entry(e).symbols) {
             Some(small) => {

@@ -13,7 +13,7 @@ use super::{Bond, BondGraph, Element, Kind, Meaning, Port, Variable};
 use crate::algebra::{Expr, Symbol};
 use crate::ast::Ast;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
-use crate::ids::{Id, Table};
+use crate::ids::{Id, Map, Table};
 use crate::unit::{Dimension, Unit};
 
 /// What has become of a model.
@@ -121,7 +121,7 @@ impl Builder<'_, '_> {
             name: String::new(),
             doc: String::new(),
             exprs: crate::algebra::Exprs::default(),
-            variables: BTreeMap::new(),
+            variables: Map::new(),
             elements,
             bonds,
             parameters: std::mem::take(&mut self.parameters),

@@ -36,10 +36,8 @@ pub use overrides::Override;
 pub use verify::verify;
 pub use warnings::warnings;
 
-use std::collections::BTreeMap;
-
 use crate::algebra::{Expr, Exprs, Symbol};
-use crate::ids::{Table, id};
+use crate::ids::{Map, Table, id};
 use crate::span::Span;
 use crate::unit::Unit;
 
@@ -82,7 +80,7 @@ pub struct BondGraph {
     /// All expressions of the graph.
     pub exprs: Exprs,
     /// What each symbol stands for.
-    pub variables: BTreeMap<Symbol, Variable>,
+    pub variables: Map<Symbol, Variable>,
     /// Elements and junctions, in the order in which they first stand in the text.
     pub elements: Table<ElementId, Element>,
     /// Bonds, in the order written.

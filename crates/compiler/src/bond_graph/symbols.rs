@@ -56,8 +56,8 @@ impl Builder<'_, '_> {
             let mut symbols = Vec::new();
             for port in 0..self.wiring.ports[part].len() {
                 let name = match p.ast.ports.get(port) {
-                    Some(n) => format!("{}.{}.{letter}", p.name, n.text),
-                    None => format!("{}.{letter}", p.name),
+                    Some(n) => [&p.name, ".", &n.text, ".", letter].concat(),
+                    None => [&p.name, ".", letter].concat(),
                 };
                 let symbol = self.fresh(&name, Facts::default());
                 let rate = self.wire_at(part, port).map(|w| match p.word {
@@ -99,8 +99,8 @@ impl Builder<'_, '_> {
                 continue;
             }
             match p.word {
-                Word::One => names[wire].1 = format!("{}.f", p.name),
-                _ => names[wire].0 = format!("{}.e", p.name),
+                Word::One => names[wire].1 = [&p.name, ".f"].concat(),
+                _ => names[wire].0 = [&p.name, ".e"].concat(),
             }
         }
         names
@@ -114,7 +114,7 @@ impl Builder<'_, '_> {
         let named = (!w.name.is_empty()).then(|| w.name.clone());
         let base = self.outer_end(wire).or(named).or_else(|| two_port(w.to, "in")).or_else(|| two_port(w.from, "out"));
         match base {
-            Some(base) => (format!("{base}.e"), format!("{base}.f")),
+            Some(base) => ([&base, ".e"].concat(), [&base, ".f"].concat()),
             None => (self.unused(format!("e{}", wire + 1)), self.unused(format!("f{}", wire + 1))),
         }
     }

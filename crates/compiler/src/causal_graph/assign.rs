@@ -9,7 +9,7 @@ use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, cont
 use crate::algebra::{Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::ids::{Id, Table};
+use crate::ids::{Id, Map, Table};
 
 /// Assigns causality: the exact one of every port, and a stroke on every determined bond.
 ///
@@ -405,7 +405,7 @@ impl Part<'_> {
             return found;
         }
         let ports = Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() };
-        let mut known = BTreeMap::new();
+        let mut known = Map::new();
         for state in solved.ports.iter().filter(|p| p.role == Role::Source) {
             let (Kind::EffortSource { value } | Kind::FlowSource { value }) =
                 self.graph.elements[state.port.element].kind
@@ -520,7 +520,7 @@ fn spanned(x: &mut Exprs, graph: &BondGraph, solved: &Solved, speed: &Virtual) -
     let ports = Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() };
     let bond = &graph.bonds[graph.elements[speed.junction].ports[0].bond];
     let common = if matches!(graph.elements[speed.junction].kind, Kind::One) { bond.flow } else { bond.effort };
-    let row = ports.resolve(x, common, &mut BTreeMap::new());
+    let row = ports.resolve(x, common, &mut Map::new());
     let allowed = |s: Symbol| {
         solved
             .ports

@@ -9,6 +9,7 @@ use crate::algebra::{Expr, Exprs, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
+use crate::ids::Map;
 use crate::span::Span;
 
 /// One demand of the modeller on a stroke.
@@ -205,7 +206,7 @@ fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>)
 
 fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
     let mut x = graph.exprs.clone();
-    let mut known = BTreeMap::new();
+    let mut known = Map::new();
     let inputs: BTreeMap<Symbol, &super::PortState> = causal.ports.ports.iter().map(|p| (p.input, p)).collect();
     for state in causal.ports.ports.iter().filter(|p| p.role == Role::Dependent) {
         let row = causal.ports.resolve(&mut x, state.output, &mut known);

@@ -14,9 +14,9 @@ mod text;
 
 use std::collections::BTreeMap;
 
-use crate::algebra::{Expr, Exprs, Symbol};
+use crate::algebra::{Expr, Exprs, ONE, Symbol};
 use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
-use crate::ids::Table;
+use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
 pub use contradiction::warnings;
@@ -55,7 +55,7 @@ pub struct Ports {
     /// The ports in order of their elements, each with its input, the priority class and the truth about it.
     pub ports: Vec<PortState>,
     /// Definitions of variables by other variables, triangular: following them ends at inputs.
-    pub definitions: BTreeMap<Symbol, Combination>,
+    pub definitions: Map<Symbol, Combination>,
     /// Expressions that were divided by and are not known to be nonzero: they are watched while running.
     pub watched: Vec<Expr>,
     /// Expressions that vanish at the given parameters only.
@@ -118,20 +118,23 @@ impl Ports {
     }
 
     /// A variable as a combination of inputs alone; `known` keeps what has been worked out.
-    pub fn resolve(&self, x: &mut Exprs, symbol: Symbol, known: &mut BTreeMap<Symbol, Combination>) -> Combination {
+    pub fn resolve(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) -> Combination {
+        self.resolve_into(x, symbol, known);
+        known.get(&symbol).cloned().unwrap_or_else(|| Combination(vec![(symbol, ONE)]))
+    }
+
+    /// Works a variable out as a combination of inputs alone, with all that it reads, into `known`; nothing if it is an
+    /// input.
+    pub fn resolve_into(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) {
         // Depth can equal the length of a chain of bonds, so the recursion keeps its own stack.
         let mut stack = vec![symbol];
         while let Some(&top) = stack.last() {
-            let Some(definition) = self.definitions.get(&top) else {
+            let Some(definition) = self.definitions.get(&top).filter(|_| !known.contains_key(&top)) else {
                 stack.pop();
                 continue;
             };
             let before = stack.len();
             let open = |s: &Symbol| self.definitions.contains_key(s) && !known.contains_key(s);
-            if known.contains_key(&top) {
-                stack.pop();
-                continue;
-            }
             stack.extend(definition.0.iter().map(|t| t.0).filter(open));
             if stack.len() == before {
                 let flat = definition.substitute(x, known);
@@ -139,7 +142,6 @@ impl Ports {
                 stack.pop();
             }
         }
-        known.get(&symbol).cloned().unwrap_or_else(|| Combination(vec![(symbol, x.int(1))]))
     }
 }
 
@@ -163,7 +165,7 @@ impl Combination {
     }
 
     /// The combination with known ones put in for their symbols.
-    fn substitute(&self, x: &mut Exprs, known: &BTreeMap<Symbol, Combination>) -> Combination {
+    fn substitute(&self, x: &mut Exprs, known: &Map<Symbol, Combination>) -> Combination {
         if self.0.iter().all(|t| !known.contains_key(&t.0)) {
             return self.clone();
         }

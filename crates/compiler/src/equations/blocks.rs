@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
+use rustc_hash::FxHashMap;
 
 use super::Step;
 use super::definitions::{Definition, Definitions};
@@ -75,8 +76,8 @@ fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Vec<Symbol>> {
 /// An edge from every symbol to each symbol that its expression reads.
 fn dependency_graph(x: &Exprs, symbols: &[Symbol], expr: impl Fn(Symbol) -> Expr) -> DiGraph<Symbol, ()> {
     let mut graph = DiGraph::with_capacity(symbols.len(), 2 * symbols.len());
-    let nodes: BTreeMap<Symbol, _> = symbols.iter().map(|&s| (s, graph.add_node(s))).collect();
-    for (symbol, &node) in &nodes {
+    let nodes: FxHashMap<Symbol, _> = symbols.iter().map(|&s| (s, graph.add_node(s))).collect();
+    for (symbol, node) in symbols.iter().zip(graph.node_indices()) {
         for read in x.symbols_of(expr(*symbol)) {
             if let Some(&target) = nodes.get(&read) {
                 graph.add_edge(node, target, ());

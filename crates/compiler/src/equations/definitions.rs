@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Unavailable;
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, Meaning};
+use crate::ids::Map;
 
 /// How a symbol gets its value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,16 +32,16 @@ pub struct Definitions<'a> {
     /// The graph.
     pub graph: &'a BondGraph,
     /// Definitions by symbol.
-    pub of: BTreeMap<Symbol, Definition>,
+    pub of: Map<Symbol, Definition>,
     /// States with the symbols of their rates.
-    pub states: BTreeMap<Symbol, Symbol>,
+    pub states: Map<Symbol, Symbol>,
     /// Stored quantities with the symbols of their rates, which the bonds carry.
-    pub stored: BTreeMap<Symbol, Symbol>,
+    pub stored: Map<Symbol, Symbol>,
     /// Conserved constants.
     pub constants: BTreeSet<Symbol>,
     /// Symbols that have no value, with the reason.
     pub missing: BTreeMap<Symbol, Unavailable>,
-    rates: BTreeMap<Symbol, Symbol>,
+    rates: Map<Symbol, Symbol>,
 }
 
 impl<'a> Definitions<'a> {
@@ -49,12 +50,12 @@ impl<'a> Definitions<'a> {
         Definitions {
             x,
             graph,
-            of: BTreeMap::new(),
-            states: BTreeMap::new(),
-            stored: BTreeMap::new(),
+            of: Map::new(),
+            states: Map::new(),
+            stored: Map::new(),
             constants: BTreeSet::new(),
             missing: BTreeMap::new(),
-            rates: BTreeMap::new(),
+            rates: Map::new(),
         }
     }
 
@@ -108,6 +109,9 @@ impl<'a> Definitions<'a> {
     pub fn rate(&mut self, e: Expr) -> Result<Expr, Unavailable> {
         let mut terms = Vec::new();
         for symbol in self.x.symbols_of(e) {
+            if self.constants.contains(&symbol) || matches!(self.meaning(symbol), Some(Meaning::Parameter(_))) {
+                continue;
+            }
             let slope = self.x.derivative(e, symbol);
             if self.x.is_zero(slope) {
                 continue;

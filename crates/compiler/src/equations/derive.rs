@@ -10,6 +10,7 @@ use crate::algebra::{Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
+use crate::ids::Map;
 use crate::span::Span;
 use crate::unit::Unit;
 
@@ -89,9 +90,8 @@ fn is_law(role: Role) -> bool {
 fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>, given: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
     let needed = reachable(d, rates);
     let mut ordered = order(d, &needed, rates)?;
-    let done: BTreeSet<Symbol> = needed.into_iter().collect();
     loop {
-        let rest: Vec<Symbol> = d.of.keys().copied().filter(|s| !done.contains(s)).collect();
+        let rest: Vec<Symbol> = d.of.keys().copied().filter(|s| needed.binary_search(s).is_err()).collect();
         match order(d, &rest, rates) {
             Ok(more) => {
                 ordered.steps.extend(more.steps);
@@ -110,15 +110,15 @@ fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>, given: &BTreeSet<Symbol>)
 
 /// What these symbols read, near or far, themselves included.
 fn reachable(d: &Definitions, from: &BTreeSet<Symbol>) -> Vec<Symbol> {
-    let mut seen: BTreeSet<Symbol> = BTreeSet::new();
+    let mut seen: Map<Symbol, ()> = Map::new();
     let mut work: Vec<Symbol> = from.iter().copied().collect();
     while let Some(symbol) = work.pop() {
         let Some(definition) = d.of.get(&symbol) else { continue };
-        if seen.insert(symbol) {
+        if seen.insert(symbol, ()).is_none() {
             work.extend(d.x.symbols_of(definition.expr()));
         }
     }
-    seen.into_iter().collect()
+    seen.keys().copied().collect()
 }
 
 /// An effort or flow that is defined only through itself: what the model does is then not known.

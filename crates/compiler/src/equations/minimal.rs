@@ -6,9 +6,10 @@ use petgraph::unionfind::UnionFind;
 
 use super::definitions::{Definition, Definitions};
 use super::{StateKind, Unavailable};
-use crate::algebra::{Expr, Exprs, Node, Symbol};
+use crate::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual};
+use crate::ids::Map;
 
 /// A state of the minimal form before it is ordered.
 #[derive(Debug, Clone)]
@@ -28,7 +29,7 @@ pub struct Assembled<'a> {
     /// The states, storages in the order of the model, then signals.
     pub states: Vec<Chosen>,
     /// Rows of the junction structure, by variable, over inputs of the structure.
-    pub rows: BTreeMap<Symbol, Combination>,
+    pub rows: Map<Symbol, Combination>,
     /// What changes the stored quantities behind the states.
     pub balances: Vec<Balance>,
     later: Vec<Later>,
@@ -71,17 +72,19 @@ struct Cell<'a> {
 pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
     let graph = &causal.graph;
     let mut d = Definitions::new(graph.exprs.clone(), graph);
-    let mut rows = BTreeMap::new();
+    let mut rows = Map::new();
     for state in &causal.ports.ports {
-        let row = causal.ports.resolve(&mut d.x, state.output, &mut rows);
-        // Where two elements share a bond, what one gives is what the other takes.
-        rows.entry(state.output).or_insert(row);
+        causal.ports.resolve_into(&mut d.x, state.output, &mut rows);
+        if !rows.contains_key(&state.output) {
+            // Where two elements share a bond, what one gives is what the other takes.
+            rows.insert(state.output, Combination(vec![(state.output, ONE)]));
+        }
     }
     for v in &causal.ports.virtual_speeds {
-        causal.ports.resolve(&mut d.x, v.reaction, &mut rows);
+        causal.ports.resolve_into(&mut d.x, v.reaction, &mut rows);
     }
     for &symbol in causal.ports.definitions.keys() {
-        causal.ports.resolve(&mut d.x, symbol, &mut rows);
+        causal.ports.resolve_into(&mut d.x, symbol, &mut rows);
     }
     for &symbol in &causal.ports.undetermined {
         d.missing.insert(symbol, Unavailable::Undetermined);
@@ -101,7 +104,7 @@ pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, U
 }
 
 /// Sources whose value is zero leave the rows: a constraint at rest imposes nothing on a dependent storage.
-fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut BTreeMap<Symbol, Combination>) {
+fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut Map<Symbol, Combination>) {
     let mut zero = BTreeSet::new();
     for state in causal.ports.ports.iter().filter(|p| matches!(p.role, Role::Source | Role::Redundant)) {
         let value = imposed(&mut d.x, causal, state);
@@ -576,7 +579,7 @@ fn groups(
     causal: &CausalGraph,
     cells: &[Cell],
     speeds: &[Virtual],
-    rows: &BTreeMap<Symbol, Combination>,
+    rows: &Map<Symbol, Combination>,
 ) -> Vec<(Vec<usize>, Vec<Virtual>)> {
     let _ = causal;
     let mut index: BTreeMap<Symbol, usize> = cells.iter().enumerate().map(|(i, c)| (c.z, i)).collect();

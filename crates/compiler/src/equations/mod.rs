@@ -9,10 +9,9 @@ mod minimal;
 mod observed;
 mod text;
 
-use std::collections::BTreeMap;
-
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{BondGraph, ElementId};
+use crate::ids::Map;
 use crate::span::Span;
 use crate::unit::Unit;
 
@@ -51,7 +50,7 @@ pub struct Equations {
     /// What the start of the run has to satisfy.
     pub conditions: Vec<Condition>,
     /// What defines each variable, before loops were opened.
-    pub definitions: BTreeMap<Symbol, Definition>,
+    pub definitions: Map<Symbol, Definition>,
     /// The rows of all linear loops.
     pub rows: Vec<LinearRow>,
     /// Co-energy variables of the storages that depend on others.

@@ -1,6 +1,9 @@
 //! What can be recorded, and what the start has to satisfy.
 
-use std::collections::BTreeSet;
+use std::hash::BuildHasher;
+
+use hashbrown::HashTable;
+use rustc_hash::FxBuildHasher;
 
 use super::definitions::Definitions;
 use super::{Condition, Observed, State, Unavailable};
@@ -17,10 +20,13 @@ pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> Str
 
 /// Every variable that can be recorded, states and outputs first.
 pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
-    let mut all = Vec::new();
-    let mut taken = BTreeSet::new();
+    let mut all: Vec<Observed> = Vec::new();
+    let mut taken: HashTable<usize> = HashTable::new();
+    let hash = |name: &str| FxBuildHasher.hash_one(name);
     let mut add = |name: String, value, unit, default| {
-        if taken.insert(name.clone()) {
+        let at = hash(&name);
+        if taken.find(at, |&i| all[i].name == name).is_none() {
+            taken.insert_unique(at, all.len(), |&i| hash(&all[i].name));
             all.push(Observed { name, value, unit, default });
         }
     };

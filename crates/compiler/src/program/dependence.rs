@@ -12,53 +12,76 @@ impl Program {
     pub(super) fn find_dependence(&mut self) {
         let sets = self.state_sets();
         let states = self.states.len() as u32;
-        let below = |v: Value| sets[v.index()].iter().copied().filter(|&s| s < states).collect();
+        let of = |v: Value| sets[v.index()].as_ref().expect("what is read from outside has its set");
+        let below = |v: Value| of(v).iter().copied().filter(|&s| s < states).collect();
         self.dependence = self.states.iter().map(|s| below(s.rate)).collect();
-        self.start.iter_mut().for_each(|c| c.reads = sets[c.residual.index()].to_vec());
+        self.start.iter_mut().for_each(|c| c.reads = of(c.residual).to_vec());
     }
 
-    /// For each value the states, and after them the conserved constants, that it reads.
-    fn state_sets(&self) -> Vec<Set> {
+    /// The states, and after them the conserved constants, that each value reads; of values that one other value reads
+    /// the set is not kept, so that a long sum has one set.
+    fn state_sets(&self) -> Vec<Option<Set>> {
         let none: Set = Rc::from([]);
         let states = self.states.len() as u32;
-        let mut sets: Vec<Set> = Vec::with_capacity(self.values.len());
+        let readers = self.readers();
+        let mut sets: Vec<Option<Set>> = Vec::with_capacity(self.values.len());
         let mut blocks: Vec<Option<Set>> = vec![None; self.blocks.len()];
         for (value, op) in self.values.iter() {
             let set = match op {
-                Op::State(i) => Rc::from([i]),
-                Op::Conserved(i) => Rc::from([states + i]),
-                Op::Side(..) | Op::Floor(..) | Op::Positive(_) => none.clone(),
+                Op::State(i) => Some(Rc::from([i])),
+                Op::Conserved(i) => Some(Rc::from([states + i])),
+                Op::Side(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
                 Op::Solution(block, _) => {
-                    let all = || self.blocks[block].reads().fold(none.clone(), |all, v| union(&all, &sets[v.index()]));
-                    blocks[block.index()].get_or_insert_with(all).clone()
+                    let all = || self.gathered(&sets, self.blocks[block].reads().collect());
+                    Some(blocks[block.index()].get_or_insert_with(all).clone())
                 }
-                _ if self.values.reads(value) == Reads::PARAMETERS => none.clone(),
-                _ => {
-                    let mut all = none.clone();
-                    op.for_each_operand(|v| all = union(&all, &sets[v.index()]));
-                    all
-                }
+                _ if self.values.reads(value) == Reads::PARAMETERS => Some(none.clone()),
+                _ if readers[value.index()] == 1 => None,
+                _ => Some(self.gathered(&sets, operands(op))),
             };
             sets.push(set);
         }
         sets
     }
+
+    /// How many times a value is read by others, by blocks, and from outside, which counts twice.
+    fn readers(&self) -> Vec<u32> {
+        let mut readers = vec![0; self.values.len()];
+        let wanted = self.states.iter().map(|s| s.rate).chain(self.start.iter().map(|c| c.residual));
+        wanted.for_each(|v| readers[v.index()] += 2);
+        self.blocks.values().flat_map(|b| b.reads()).for_each(|v| readers[v.index()] += 1);
+        self.values.iter().for_each(|(_, op)| op.for_each_operand(|v| readers[v.index()] += 1));
+        readers
+    }
+
+    /// The union of what values read.
+    fn gathered(&self, sets: &[Option<Set>], mut open: Vec<Value>) -> Set {
+        let mut parts: Vec<&Set> = Vec::new();
+        while let Some(value) = open.pop() {
+            match &sets[value.index()] {
+                Some(set) => parts.push(set),
+                None => open.extend(operands(self.values.op(value))),
+            }
+        }
+        union(parts)
+    }
 }
 
-fn union(a: &Set, b: &Set) -> Set {
-    if Rc::ptr_eq(a, b) || b.is_empty() || is_within(b, a) {
-        return a.clone();
-    }
-    if a.is_empty() || is_within(a, b) {
-        return b.clone();
-    }
-    let mut both: Vec<u32> = a.iter().chain(b.iter()).copied().collect();
-    both.sort_unstable();
-    both.dedup();
-    both.into()
+fn operands(op: Op) -> Vec<Value> {
+    let mut all = Vec::with_capacity(3);
+    op.for_each_operand(|v| all.push(v));
+    all
 }
 
-fn is_within(small: &Set, large: &Set) -> bool {
-    let mut rest = large.iter();
-    small.len() <= large.len() && small.iter().all(|s| rest.any(|l| l == s))
+fn union(mut parts: Vec<&Set>) -> Set {
+    parts.sort_unstable_by_key(|set| (std::cmp::Reverse(set.len()), Rc::as_ptr(set).cast::<u32>()));
+    parts.dedup_by(|a, b| Rc::ptr_eq(a, b) || a.is_empty());
+    let [first, rest @ ..] = &parts[..] else { return Rc::from([]) };
+    if rest.is_empty() {
+        return Rc::clone(first);
+    }
+    let mut all: Vec<u32> = parts.iter().flat_map(|set| set.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    if all.len() == first.len() { Rc::clone(first) } else { all.into() }
 }

@@ -76,16 +76,27 @@ impl<'a> Lowering<'a> {
         if let Some(known) = self.known(e) {
             return known;
         }
-        for part in self.missing_below(e) {
-            let value = self.node(part);
-            match &mut self.inner {
-                Some(inner) => {
-                    inner.known.insert(part, value);
-                }
-                None => self.known[part.0 as usize] = Some(value),
-            }
+        let mut ready = true;
+        self.exprs.node(e).for_each_child(|c| ready &= self.known(c).is_some());
+        if ready {
+            return self.node_of(e);
         }
+        self.missing_below(e).into_iter().for_each(|part| {
+            self.node_of(part);
+        });
         self.known(e).expect("an expression is lowered after its parts")
+    }
+
+    /// Lowers an expression whose parts are lowered.
+    fn node_of(&mut self, e: Expr) -> Value {
+        let value = self.node(e);
+        match &mut self.inner {
+            Some(inner) => {
+                inner.known.insert(e, value);
+            }
+            None => self.known[e.0 as usize] = Some(value),
+        }
+        value
     }
 
     fn known(&self, e: Expr) -> Option<Value> {

@@ -27,7 +27,7 @@ pub(super) fn unit(text: &str) -> Result<Unit, UnitError> {
         None => BigRational::zero(),
     };
     let Factor { dimension, angle, rational, pi } = product;
-    Ok(Unit { dimension, angle, rational, pi, offset, text: text.to_owned() })
+    Ok(Scale { dimension, angle, rational, pi, offset, text: text.to_owned() }.into())
 }
 
 pub(super) fn first_symbol(text: &str) -> &str {

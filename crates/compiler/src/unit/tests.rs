@@ -14,7 +14,7 @@ fn exact(n: i64, d: i64) -> BigRational {
 fn is(a: &str, n: i64, d: i64, b: &str) {
     let (a, b) = (unit(a), unit(b));
     assert_eq!((a.dimension, a.angle, a.pi), (b.dimension, b.angle, b.pi), "{a} and {b}");
-    assert_eq!(a.rational, b.rational * exact(n, d), "{a}");
+    assert_eq!(a.rational, &b.rational * exact(n, d), "{a}");
 }
 
 #[test]

@@ -1,14 +1,12 @@
 //! The worked examples of the paper as bond graphs with strokes, built without the language.
 
-use std::collections::BTreeMap;
-
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, Symbol};
 use halfarrow_compiler::bond_graph::{
     Bond, BondGraph, BondId, Element, ElementId, Input, InputId, Kind, Meaning, Parameter, ParameterId, Port, PortRef,
     ResistorLaw, Signal, SignalId, Storage, StorageLaw, Variable,
 };
 use halfarrow_compiler::causal_graph::{CausalGraph, Ports, Stroke};
-use halfarrow_compiler::ids::{Id, Table};
+use halfarrow_compiler::ids::{Id, Map, Table};
 use halfarrow_compiler::span::Span;
 use serde_json::Value;
 
@@ -60,7 +58,7 @@ pub fn empty(name: &str) -> BondGraph {
         name: name.to_owned(),
         doc: String::new(),
         exprs,
-        variables: BTreeMap::from([(time, Variable { meaning: Meaning::Time, unit: None })]),
+        variables: Map::from([(time, Variable { meaning: Meaning::Time, unit: None })]),
         elements: Table::new(),
         bonds: Table::new(),
         parameters: Table::new(),

@@ -4,11 +4,10 @@
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
 use halfarrow_compiler::equations::{Condition, Conserved, Equations, Form, Observed, State, StateKind, Step};
-use halfarrow_compiler::ids::Table;
+use halfarrow_compiler::ids::{Map, Table};
 use halfarrow_compiler::program::schedule;
 use halfarrow_compiler::span::Span;
 use halfarrow_exec::Model;
-use std::collections::BTreeMap;
 
 pub struct Sketch {
     pub x: Exprs,
@@ -122,7 +121,7 @@ impl Sketch {
             name: "sketch".into(),
             doc: String::new(),
             exprs: self.x,
-            variables: BTreeMap::new(),
+            variables: Map::new(),
             elements: self.elements,
             bonds: Table::new(),
             parameters: self.parameters.into_iter().collect(),
@@ -146,7 +145,7 @@ impl Sketch {
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,
-            definitions: BTreeMap::new(),
+            definitions: Map::new(),
             rows: Vec::new(),
             dependent: Vec::new(),
             meanings: Vec::new(),
