@@ -9,11 +9,27 @@ use crate::{Failure, Sparsity, System};
 pub(crate) struct Shared<'a> {
     system: RefCell<Counted<'a>>,
     failure: RefCell<Option<Failure>>,
+    /// Which states have a rate, if some have none: their rates are to be 0.
+    differential: Option<Vec<bool>>,
 }
 
 impl<'a> Shared<'a> {
     pub(crate) fn new(system: &'a mut dyn System) -> Shared<'a> {
-        Shared { system: RefCell::new(Counted { system, rates: 0, tangents: 0 }), failure: RefCell::new(None) }
+        Shared {
+            system: RefCell::new(Counted { system, rates: 0, tangents: 0 }),
+            failure: RefCell::new(None),
+            differential: None,
+        }
+    }
+
+    /// A system of which only the states marked have rates; those of the others have to be 0.
+    pub(crate) fn semi_explicit(system: &'a mut dyn System, differential: Vec<bool>) -> Shared<'a> {
+        Shared { differential: Some(differential), ..Shared::new(system) }
+    }
+
+    /// Which states have a rate, if some have none.
+    pub(crate) fn differential(&self) -> Option<&[bool]> {
+        self.differential.as_deref()
     }
 
     /// The system, to be given back before anybody else asks for it.

@@ -18,7 +18,8 @@ struct Form {
     sparsity: Sparsity,
     residual: Residual,
     derivatives: Derivatives,
-    linear: bool,
+    /// Which equations hold a rate, if that is `y' - f`.
+    differential: Option<Vec<bool>>,
     jumps: Vec<f64>,
     switch: Option<fn(&[f64]) -> f64>,
     /// Makes the unknowns and rates consistent: `(mode, y, yp)`.
@@ -36,13 +37,19 @@ impl Form {
             sparsity: Sparsity::dense(index.len()),
             residual,
             derivatives,
-            linear: true,
+            differential: None,
             jumps: vec![],
             switch: None,
             settle: |_, _, _| {},
             mode: 0,
             accepted: vec![],
         }
+    }
+
+    /// In semi-explicit form.
+    fn with_rates_in(mut self, differential: &[bool]) -> Form {
+        self.differential = Some(differential.to_vec());
+        self
     }
 
     fn run(&mut self, options: &Options) -> (Samples, Result<Summary, Stopped>) {
@@ -80,7 +87,7 @@ impl ImplicitSystem for Form {
         Ok(())
     }
     fn semi_explicit(&self) -> Option<&[bool]> {
-        self.linear.then_some(&[])
+        self.differential.as_deref()
     }
     fn observe(&mut self, _: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         out[..y.len()].copy_from_slice(y);
@@ -127,6 +134,10 @@ impl Sink for Samples {
     }
 }
 
+fn bdf(rtol: f64, to: f64, every: Option<f64>) -> Options {
+    Options { method: Method::Bdf, ..options(rtol, to, every) }
+}
+
 fn options(rtol: f64, to: f64, every: Option<f64>) -> Options {
     Options { method: Method::Radau, rtol, to, every, ..Options::default() }
 }
@@ -148,19 +159,22 @@ fn robertson() -> Form {
             (dyp[0], dyp[4]) = (1.0, 1.0);
         },
     )
+    .with_rates_in(&[true, true, false])
 }
 
 #[test]
 fn the_published_values_of_robertson_are_met() {
     let exact = [0.2083340149701255e-07, 0.8333360770334713e-13, 0.999999979166505];
-    for (rtol, bound, steps) in [(1e-4, 1e-3, 140), (1e-6, 3e-5, 260), (1e-10, 1e-7, 1100)] {
+    let radau = [(1e-4, 1e-3, 140), (1e-6, 3e-5, 260), (1e-10, 1e-7, 1100)].map(|run| (Method::Radau, run));
+    let bdf = [(1e-6, 1e-3, 1250), (1e-8, 1e-4, 2500), (1e-10, 1e-6, 6000)].map(|run| (Method::Bdf, run));
+    for (method, (rtol, bound, steps)) in radau.into_iter().chain(bdf) {
         let atol = AbsoluteTolerance::Each([1e-4, 1e-10, 1e-2].map(|share| share * rtol).to_vec());
-        let (samples, end) = robertson().run(&Options { atol, ..options(rtol, 1e11, Some(1e11)) });
+        let (samples, end) = robertson().run(&Options { atol, method, ..options(rtol, 1e11, Some(1e11)) });
         let summary = end.unwrap();
-        assert!(summary.steps <= steps, "{summary:?}");
         for (value, exact) in samples.values[1].iter().zip(exact) {
-            assert!((value / exact - 1.0).abs() < bound, "{rtol:e}: {value:e}");
+            assert!((value / exact - 1.0).abs() < bound, "{method:?} {rtol:e}: {value:e}, {summary:?}");
         }
+        assert!(summary.steps <= steps, "{method:?} {rtol:e}: {summary:?}");
     }
 }
 
@@ -172,14 +186,12 @@ fn scaled_tolerances_carry_robertson_through() {
 
 /// `y' + y'³ + y` as it is for `cos t`: the rate has no factor.
 fn cubic() -> Form {
-    let mut form = Form::new(
+    Form::new(
         &[1],
         (&[1.0], &[0.0]),
         |t, y, yp, _, out| out[0] = yp[0] + yp[0].powi(3) + y[0] + t.sin() + t.sin().powi(3) - t.cos(),
         |_, _, yp, dy, dyp| (dy[0], dyp[0]) = (1.0, 1.0 + 3.0 * yp[0].powi(2)),
-    );
-    form.linear = false;
-    form
+    )
 }
 
 #[test]
@@ -206,7 +218,6 @@ fn of_several_solutions_the_one_at_the_start_is_kept() {
             |_, y, yp, _, out| out[0] = yp[0] * yp[0] - 4.0 * y[0],
             |_, _, yp, dy, dyp| (dy[0], dyp[0]) = (-4.0, 2.0 * yp[0]),
         );
-        form.linear = false;
         let to = if rate > 0.0 { 1.0 } else { 0.5 };
         let (samples, summary) = form.run(&options(1e-8, to, None));
         let last = samples.values.last().unwrap()[0];
@@ -225,7 +236,8 @@ fn stepped() -> Form {
             dy.copy_from_slice(&[1.0, -1.0, 0.0, -1.0]);
             dyp[0] = 1.0;
         },
-    );
+    )
+    .with_rates_in(&[true, false]);
     form.jumps = vec![0.3, 0.77];
     form.settle = |mode, y, yp| {
         y[1] = LEVELS[mode];
@@ -236,17 +248,20 @@ fn stepped() -> Form {
 
 #[test]
 fn jumps_are_met_to_the_last_bit() {
-    let mut form = stepped();
-    let (samples, end) = form.run(&options(1e-10, 1.0, None));
-    assert_eq!(end.unwrap().jumps, 2);
-    for jump in [0.3, 0.77] {
-        assert_eq!(samples.times.iter().filter(|&&t| t == jump).count(), 2, "both sides of {jump}");
-        assert!(form.accepted.contains(&jump));
+    for options in [options(1e-10, 1.0, None), bdf(1e-10, 1.0, None)] {
+        let mut form = stepped();
+        let (samples, end) = form.run(&options);
+        assert_eq!(end.unwrap().jumps, 2);
+        for jump in [0.3, 0.77] {
+            assert_eq!(samples.times.iter().filter(|&&t| t == jump).count(), 2, "both sides of {jump}");
+            assert!(form.accepted.contains(&jump));
+        }
+        let relax = |x: f64, a: f64, t: f64| a + (x - a) * (-t).exp();
+        let exact = relax(relax((-0.3_f64).exp(), 1.0, 0.47), -2.0, 0.23);
+        let last = samples.values.last().unwrap();
+        assert!((last[0] - exact).abs() < 1e-9 && (last[1] + 2.0).abs() < 1e-12, "{last:?} {exact}");
+        assert!((last[2] - (-2.0 - exact)).abs() < 1e-9, "{last:?} {exact}");
     }
-    let relax = |x: f64, a: f64, t: f64| a + (x - a) * (-t).exp();
-    let exact = relax(relax((-0.3_f64).exp(), 1.0, 0.47), -2.0, 0.23);
-    let last = samples.values.last().unwrap();
-    assert!((last[0] - exact).abs() < 1e-9 && last[1] == -2.0, "{last:?} {exact}");
 }
 
 /// A ball that falls from 1 m and keeps half its speed at each bounce, with its weight as an algebraic unknown.
@@ -259,7 +274,8 @@ fn ball() -> Form {
             dy.copy_from_slice(&[0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0]);
             (dyp[0], dyp[4]) = (1.0, 1.0);
         },
-    );
+    )
+    .with_rates_in(&[true, true, false]);
     form.switch = Some(|y| y[0]);
     form.settle = |mode, y, yp| {
         if mode > 0 && y[0] <= 0.0 {
@@ -274,11 +290,71 @@ fn ball() -> Form {
 fn every_bounce_is_found() {
     let first = (2.0_f64 / 9.81).sqrt();
     let bounces: Vec<f64> = (0..8).map(|n| first * (1.0 + 2.0 * (1.0 - 0.5_f64.powi(n)))).collect();
-    let (samples, end) = ball().run(&options(1e-9, 1.3485, None));
-    assert_eq!(end.unwrap().switches, 8);
-    let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
-    assert_eq!(found.len(), 8);
-    found.iter().zip(&bounces).for_each(|(t, exact)| assert!((t - exact).abs() < 1e-9, "{t} {exact}"));
+    for options in [options(1e-9, 1.3485, None), bdf(1e-9, 1.3485, None)] {
+        let (samples, end) = ball().run(&options);
+        assert_eq!(end.unwrap().switches, 8);
+        let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+        assert_eq!(found.len(), 8);
+        found.iter().zip(&bounces).for_each(|(t, exact)| assert!((t - exact).abs() < 1e-9, "{t} {exact}"));
+    }
+}
+
+const CELLS: usize = 40;
+
+/// Heat along a rod of cells that starts as one sine arc: temperatures, then the flow into each cell and out of the last.
+fn rod() -> Form {
+    const SIZE: usize = 2 * CELLS + 1;
+    fn arc(cell: usize) -> f64 {
+        (std::f64::consts::PI * (cell + 1) as f64 / (CELLS + 1) as f64).sin()
+    }
+    let temperatures: Vec<f64> = (0..CELLS).map(arc).collect();
+    let at = |i: usize| if i == 0 || i > CELLS { 0.0 } else { temperatures[i - 1] };
+    let flows: Vec<f64> = (0..=CELLS).map(|i| 1e3 * (at(i) - at(i + 1))).collect();
+    let rates: Vec<f64> = (0..CELLS).map(|i| flows[i] - flows[i + 1]).chain(vec![0.0; CELLS + 1]).collect();
+    let start = [temperatures, flows].concat();
+    let mut form = Form::new(
+        &[1; SIZE],
+        (&start, &rates),
+        |_, y, yp, _, out| {
+            let at = |i: usize| if i == 0 || i > CELLS { 0.0 } else { y[i - 1] };
+            (0..CELLS).for_each(|i| out[i] = yp[i] - y[CELLS + i] + y[CELLS + i + 1]);
+            (0..=CELLS).for_each(|i| out[CELLS + i] = y[CELLS + i] - 1e3 * (at(i) - at(i + 1)));
+        },
+        |_, _, _, dy, dyp| {
+            for i in 0..CELLS {
+                dyp[i * SIZE + i] = 1.0;
+                (dy[i * SIZE + CELLS + i], dy[i * SIZE + CELLS + i + 1]) = (-1.0, 1.0);
+                (dy[(CELLS + i) * SIZE + i], dy[(CELLS + i + 1) * SIZE + i]) = (1e3, -1e3);
+            }
+            (CELLS..SIZE).for_each(|i| dy[i * SIZE + i] = 1.0);
+        },
+    );
+    let column = |i: usize| match i < CELLS {
+        true => vec![i, CELLS + i, CELLS + i + 1],
+        false => [Some(i), (i - CELLS).checked_sub(1), Some(i - CELLS).filter(|&row| row < CELLS)]
+            .into_iter()
+            .flatten()
+            .collect(),
+    };
+    form.sparsity = Sparsity::from_columns((0..SIZE).map(column));
+    form.differential = Some((0..SIZE).map(|i| i < CELLS).collect());
+    form
+}
+
+#[test]
+fn many_unknowns_are_solved_sparsely() {
+    let decay = 4e3 * (0.5 * std::f64::consts::PI / (CELLS + 1) as f64).sin().powi(2);
+    for (options, bound) in
+        [(options(1e-8, 1.0, None), 1e-7), (options(1e-12, 1.0, None), 1e-9), (bdf(1e-8, 1.0, None), 1e-6)]
+    {
+        let (samples, end) = rod().run(&options);
+        let (last, start) = (samples.values.last().unwrap(), rod().start.0);
+        let shrunk = (-decay).exp();
+        for (value, start) in last.iter().zip(&start) {
+            let error = (value - shrunk * start).abs() / (shrunk * start.abs().max(1e-2));
+            assert!(error < bound, "{:?}: {error:e}, {end:?}", options.method);
+        }
+    }
 }
 
 #[test]
@@ -314,6 +390,10 @@ fn a_law_without_solution_is_reported() {
 
 #[test]
 fn other_methods_are_refused() {
+    let mut refused = cubic().run(&bdf(1e-6, 1.0, None)).1.map_err(|stopped| stopped.failure);
+    assert!(matches!(refused, Err(Failure::BadMethod { .. })), "{refused:?}");
+    refused = Form { index: vec![1, 2], ..stepped() }.run(&bdf(1e-6, 1.0, None)).1.map_err(|stopped| stopped.failure);
+    assert!(matches!(refused, Err(Failure::BadMethod { .. })), "{refused:?}");
     let stopped = stepped().run(&Options { method: Method::Explicit, ..options(1e-6, 1.0, None) }).1.unwrap_err();
     assert!(matches!(stopped.failure, Failure::BadMethod { .. }), "{stopped:?}");
 }

@@ -99,7 +99,8 @@ impl Drive<'_, '_, '_, '_> {
         }
         self.tolerances.guess(&mut *self.shared.borrow_mut().0, time, (y, yp), stop - time)?;
         self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
-        let (size, speed) = (self.tolerances.norm(y, y), self.tolerances.norm(yp, y));
+        let moved = self.radau.rates_alone(&mut *self.shared.borrow_mut().0, time, y, yp)?;
+        let (size, speed) = (self.tolerances.norm(y, y), self.tolerances.norm(&moved, y));
         let step = if size < 1e-5 || speed < 1e-5 { UNKNOWN * longest } else { CAREFUL * size / speed };
         self.radau.restart(time, y, yp, step.min(longest));
         Ok(())
@@ -108,7 +109,8 @@ impl Drive<'_, '_, '_, '_> {
     /// Whether the jump left the unknowns alone and the step that ended there would not have told their rates from its own.
     fn is_corner(&self, point: &[f64]) -> bool {
         let (y, yp) = halves(point);
-        let jump: Vec<f64> = yp.iter().zip(self.radau.rates()).map(|(after, before)| after - before).collect();
+        let mut jump: Vec<f64> = yp.iter().zip(self.radau.rates()).map(|(after, before)| after - before).collect();
+        self.radau.forget_algebraic(&mut jump);
         let length = self.radau.time() - self.radau.start();
         y == self.radau.state() && self.tolerances.norm(&jump, y) * length <= 1.0
     }

@@ -223,6 +223,43 @@ impl Radau {
         &self.yp
     }
 
+    /// Makes the rates of algebraic unknowns 0.
+    pub(crate) fn forget_algebraic(&self, yp: &mut [f64]) {
+        yp.iter_mut().zip(&self.has_rate).filter(|(_, has_rate)| !**has_rate).for_each(|(rate, _)| *rate = 0.0);
+    }
+
+    /// The rates at `(t, y, y')`, but 0 for algebraic unknowns.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub(crate) fn rates_alone(
+        &mut self,
+        system: &mut dyn ImplicitSystem,
+        t: f64,
+        y: &[f64],
+        yp: &[f64],
+    ) -> Result<Vec<f64>, Failure> {
+        self.take_jacobian(system, t, y, yp)?;
+        let mut rates = yp.to_vec();
+        self.forget_algebraic(&mut rates);
+        Ok(rates)
+    }
+
+    /// Takes the Jacobian at `(t, y, y')`, and finds the unknowns that have rates.
+    fn take_jacobian(&mut self, system: &mut dyn ImplicitSystem, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
+        system.jacobian(t, y, yp, &mut self.dy, &mut self.dyp)?;
+        self.work.jacobians += 1;
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        if !(finite(&self.dy) && finite(&self.dyp)) {
+            return Err(Failure::NotFinite { time: t, what: "a derivative of the equations".into() });
+        }
+        self.has_rate.fill(false);
+        for (place, (_, column)) in system.sparsity().entries().enumerate() {
+            self.has_rate[column] |= self.dyp[place] != 0.0;
+        }
+        Ok(())
+    }
+
     pub(crate) fn work(&self) -> Work {
         self.work
     }
@@ -331,17 +368,10 @@ impl Radau {
     /// Takes the Jacobian, if needed.
     fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), Trouble> {
         if self.jacobian == Age::Stale {
-            system.jacobian(self.t, &self.y, &self.yp, &mut self.dy, &mut self.dyp).map_err(Trouble::Failed)?;
-            self.work.jacobians += 1;
-            let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-            if !(finite(&self.dy) && finite(&self.dyp)) {
-                let what = "a derivative of the equations".into();
-                return Err(Trouble::Failed(Failure::NotFinite { time: self.t, what }));
-            }
-            self.has_rate.fill(false);
-            for (place, (_, column)) in system.sparsity().entries().enumerate() {
-                self.has_rate[column] |= self.dyp[place] != 0.0;
-            }
+            let (y, yp) = (std::mem::take(&mut self.y), std::mem::take(&mut self.yp));
+            let taken = self.take_jacobian(system, self.t, &y, &yp);
+            (self.y, self.yp) = (y, yp);
+            taken.map_err(Trouble::Failed)?;
             self.jacobian = Age::Fresh;
             self.factored = None;
         }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use diffsol::matrix::sparsity::MatrixSparsity;
 use diffsol::{
-    ConstantOp, Matrix, NonLinearOp, NonLinearOpJacobian, OdeEquations, OdeEquationsRef, Op, ParameterisedOp,
+    ConstantOp, LinearOp, Matrix, NonLinearOp, NonLinearOpJacobian, OdeEquations, OdeEquationsRef, Op, ParameterisedOp,
     UnitCallable, Vector, VectorIndex,
 };
 
@@ -154,10 +154,62 @@ impl<M: Matrix<T = f64>> ConstantOp for Equations<'_, M> {
     }
 }
 
+/// Ones where a state has a rate, zeros where it has none.
+pub(super) struct Mass<'a, M: Matrix> {
+    differential: &'a [bool],
+    context: M::C,
+}
+
+impl<M: Matrix<T = f64>> Op for Mass<'_, M> {
+    type T = f64;
+    type V = M::V;
+    type M = M;
+    type C = M::C;
+
+    fn context(&self) -> &M::C {
+        &self.context
+    }
+    fn nstates(&self) -> usize {
+        self.differential.len()
+    }
+    fn nout(&self) -> usize {
+        self.differential.len()
+    }
+    fn nparams(&self) -> usize {
+        0
+    }
+}
+
+impl<M: Matrix<T = f64>> LinearOp for Mass<'_, M> {
+    fn gemv_inplace(&self, x: &M::V, _: f64, beta: f64, y: &mut M::V) {
+        y.for_each_batch_host([x], |y, [x], _| {
+            for ((y, x), differential) in y.iter_mut().zip(x).zip(self.differential) {
+                *y = beta * *y + if *differential { *x } else { 0.0 };
+            }
+        });
+    }
+
+    /// The whole diagonal: its zeros tell the library which states are algebraic.
+    fn sparsity(&self) -> Option<M::Sparsity> {
+        let size = self.differential.len();
+        let diagonal = (0..size).map(|i| (i, i)).collect();
+        M::is_sparse().then(|| M::Sparsity::try_from_indices(size, size, diagonal).ok()).flatten()
+    }
+
+    fn matrix_inplace(&self, _: f64, y: &mut M) {
+        let size = self.differential.len();
+        let places = (0..size).map(|i| if M::is_sparse() { i } else { i * (size + 1) }).collect();
+        let ones = self.differential.iter().map(|differential| f64::from(u8::from(*differential))).collect();
+        let from = <M::V as Vector>::Index::from_vec((0..size).collect(), self.context.clone());
+        let to = <M::V as Vector>::Index::from_vec(places, self.context.clone());
+        y.set_data_with_indices(&to, &from, &M::V::from_vec(ones, self.context.clone()));
+    }
+}
+
 impl<'a, M: Matrix<T = f64>> OdeEquationsRef<'a> for Equations<'_, M> {
     type Rhs = &'a Self;
     type Init = &'a Self;
-    type Mass = ParameterisedOp<'a, UnitCallable<M>>;
+    type Mass = Mass<'a, M>;
     type Root = ParameterisedOp<'a, UnitCallable<M>>;
     type Out = ParameterisedOp<'a, UnitCallable<M>>;
     type Reset = ParameterisedOp<'a, UnitCallable<M>>;
@@ -170,8 +222,9 @@ impl<M: Matrix<T = f64>> OdeEquations for Equations<'_, M> {
     fn init(&self) -> &Self {
         self
     }
-    fn mass(&self) -> Option<ParameterisedOp<'_, UnitCallable<M>>> {
-        None
+    fn mass(&self) -> Option<Mass<'_, M>> {
+        let differential = self.shared.differential()?;
+        Some(Mass { differential, context: self.context.clone() })
     }
     fn set_params(&mut self, _: &M::V) {}
     fn get_params(&self, _: &mut M::V) {}
