@@ -124,6 +124,23 @@ fn van_der_pol_takes_the_published_work() {
     );
 }
 
+#[test]
+fn van_der_pol_comes_as_near_as_it_should() {
+    // The values at 2 s from (2, 0). Source: [IVPTestSet].
+    const END: [f64; 2] = [1.706167732170483, -0.8928097010247975];
+    for (relative, steps, bound) in
+        [(1e-4, 260, 1e-5), (1e-6, 520, 5e-7), (1e-8, 1080, 5e-9), (1e-10, 2320, 1e-10), (1e-12, 5020, 3e-12)]
+    {
+        let mut system = van_der_pol();
+        let start = (&[2.0, 0.0][..], &[0.0, -2.0 / VAN_DER_POL][..]);
+        let radau = run(&mut system, relative, relative, start, 1e-6, 2.0);
+        assert!(radau.work().accepted <= steps, "{relative:e}: {:?}", radau.work());
+        for (y, end) in radau.state().iter().zip(END) {
+            assert!((y - end).abs() < bound, "{relative:e}: {y}, {end}");
+        }
+    }
+}
+
 fn robertson() -> Dense {
     Dense::new(
         &[1, 1, 1],
