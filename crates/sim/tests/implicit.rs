@@ -397,3 +397,92 @@ fn other_methods_are_refused() {
     let stopped = stepped().run(&Options { method: Method::Explicit, ..options(1e-6, 1.0, None) }).1.unwrap_err();
     assert!(matches!(stopped.failure, Failure::BadMethod { .. }), "{stopped:?}");
 }
+
+const LAGS: usize = 8;
+
+/// A chain of lags, all at 0, into the first of which 1 enters; the last unknown is what leaves the chain.
+fn lags() -> Form {
+    const SIZE: usize = LAGS + 1;
+    let mut rates = [0.0; SIZE];
+    rates[0] = 1.0;
+    Form::new(
+        &[1; SIZE],
+        (&[0.0; SIZE], &rates),
+        |_, y, yp, _, out| {
+            (0..LAGS).for_each(|i| out[i] = yp[i] + y[i] - if i == 0 { 1.0 } else { y[i - 1] });
+            out[LAGS] = 1e-6 * y[LAGS - 1] - y[LAGS];
+        },
+        |_, _, _, dy, dyp| {
+            for i in 0..LAGS {
+                (dy[i * SIZE + i], dyp[i * SIZE + i]) = (1.0, 1.0);
+                if i > 0 {
+                    dy[i * SIZE + i - 1] = -1.0;
+                }
+            }
+            (dy[SIZE * SIZE - 2], dy[SIZE * SIZE - 1]) = (1e-6, -1.0);
+        },
+    )
+    .with_rates_in(&[[true; LAGS].as_slice(), &[false]].concat())
+}
+
+#[test]
+fn what_starts_at_rest_needs_no_tolerances() {
+    let exact = |t: f64| {
+        let terms = (0..LAGS).scan(1.0, |term, k| {
+            let this = *term;
+            *term *= t / (k + 1) as f64;
+            Some(this)
+        });
+        1.0 - (-t).exp() * terms.sum::<f64>()
+    };
+    for (options, bound, steps) in [
+        (options(1e-6, 10.0, Some(1.0)), 1e-5, 400),
+        (options(1e-10, 10.0, Some(1.0)), 1e-9, 2000),
+        (bdf(1e-6, 10.0, Some(1.0)), 1e-4, 2000),
+    ] {
+        let (samples, end) = lags().run(&options);
+        let summary = end.unwrap();
+        assert!(summary.steps <= steps, "{:?}: {summary:?}", options.method);
+        for (t, values) in samples.times.iter().zip(&samples.values).skip(3) {
+            let error = (values[LAGS - 1] / exact(*t) - 1.0).abs().max((1e6 * values[LAGS] / exact(*t) - 1.0).abs());
+            assert!(error < bound, "{:?}, {t} s: {error:e}, {summary:?}", options.method);
+        }
+    }
+}
+
+/// A pendulum of 1 m released level: position, speed and tension, with its length as the constraint.
+fn pendulum() -> Form {
+    Form::new(
+        &[1, 1, 2, 2, 3],
+        (&[1.0, 0.0, 0.0, 0.0, 0.0], &[0.0, 0.0, 0.0, -9.81, 0.0]),
+        |_, y, yp, _, out| {
+            let [x, h, u, w, tension] = *y else { unreachable!() };
+            let length = x * x + h * h - 1.0;
+            out.copy_from_slice(&[yp[0] - u, yp[1] - w, yp[2] + tension * x, yp[3] + tension * h + 9.81, length]);
+        },
+        |_, y, _, dy, dyp| {
+            let [x, h, _, _, tension] = *y else { unreachable!() };
+            let entries = [(0, 2, -1.0), (1, 3, -1.0), (2, 0, tension), (2, 4, x), (3, 1, tension), (3, 4, h)];
+            entries.iter().for_each(|(row, column, value)| dy[5 * row + column] = *value);
+            (dy[20], dy[21]) = (2.0 * x, 2.0 * h);
+            (0..4).for_each(|i| dyp[6 * i] = 1.0);
+        },
+    )
+    .with_rates_in(&[true, true, true, true, false])
+}
+
+#[test]
+fn a_pendulum_of_index_3_keeps_length_and_energy_in_every_sample() {
+    for (rtol, steps, length, energy) in [(1e-6, 1000, 1e-8, 1e-3), (1e-10, 6000, 1e-11, 1e-7)] {
+        let (samples, end) = pendulum().run(&options(rtol, 10.0, Some(0.05)));
+        let summary = end.unwrap();
+        assert_eq!(samples.times.len(), 201);
+        for (t, values) in samples.times.iter().zip(&samples.values) {
+            let [x, h, u, w] = values[..4] else { unreachable!() };
+            let drift = (x * x + h * h - 1.0).abs();
+            let lost = (0.5 * (u * u + w * w) + 9.81 * h).abs() / 9.81;
+            assert!(drift < length && lost < energy, "{rtol:e}, {t} s: {drift:e} {lost:e}, {summary:?}");
+        }
+        assert!(summary.steps <= steps, "{summary:?}");
+    }
+}

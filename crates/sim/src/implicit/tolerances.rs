@@ -100,12 +100,27 @@ impl Tolerances {
             return Ok(());
         }
         let grown = grown(system, t + time, y, &matrix);
+        let unknown: Vec<usize> = (0..y.len()).filter(|&i| self.magnitudes[i] == 0.0).collect();
+        unknown.iter().for_each(|&i| self.magnitudes[i] = grown[i]);
+        self.spread(system, &matrix);
+        // What grew may be rounding: never less than a part of what the equations balance.
         let balanced = self.balanced(system, &matrix);
-        for (i, magnitude) in self.magnitudes.iter_mut().enumerate().filter(|(_, magnitude)| **magnitude == 0.0) {
-            *magnitude = grown[i].max(GUESS * balanced[i]);
-        }
+        unknown.iter().for_each(|&i| self.magnitudes[i] = grown[i].max(GUESS * balanced[i]));
         self.watch(y);
         Ok(())
+    }
+
+    /// Gives what is still not known what its equations balance, one equation further at a time.
+    fn spread(&mut self, system: &dyn ImplicitSystem, matrix: &[f64]) {
+        let unknown: Vec<usize> = (0..self.magnitudes.len()).filter(|&i| self.magnitudes[i] == 0.0).collect();
+        for _ in 0..unknown.len() {
+            let (before, balanced) = (self.magnitudes.clone(), self.balanced(system, matrix));
+            let free = unknown.iter().filter(|&&i| before[i] == 0.0);
+            free.for_each(|&i| self.magnitudes[i] = balanced[i]);
+            if self.magnitudes == before {
+                break;
+            }
+        }
     }
 
     /// A time in which what is known changes little.
@@ -126,7 +141,8 @@ impl Tolerances {
         self.magnitudes.iter_mut().zip(balanced).for_each(noise);
     }
 
-    /// The value of each unknown at which it would balance the other terms of one of its equations: the least of them.
+    /// The value of each unknown at which it would balance the known terms of one of its equations: the least of them; 0 if
+    /// none has any.
     fn balanced(&self, system: &dyn ImplicitSystem, matrix: &[f64]) -> Vec<f64> {
         let mut sizes = vec![0.0_f64; self.magnitudes.len()];
         for ((row, column), entry) in system.sparsity().entries().zip(matrix) {
@@ -134,7 +150,8 @@ impl Tolerances {
         }
         let mut balanced = vec![f64::INFINITY; sizes.len()];
         for ((row, column), entry) in system.sparsity().entries().zip(matrix).filter(|(_, entry)| **entry != 0.0) {
-            balanced[column] = balanced[column].min(sizes[row] / entry.abs());
+            let value = sizes[row] / entry.abs();
+            balanced[column] = if value > 0.0 { balanced[column].min(value) } else { balanced[column] };
         }
         balanced.iter_mut().filter(|value| value.is_infinite()).for_each(|value| *value = 0.0);
         balanced
