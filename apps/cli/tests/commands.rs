@@ -205,6 +205,21 @@ fn inputs_come_from_csv() {
 }
 
 #[test]
+fn declared_units_hold_in_files() {
+    let folder = folder("units");
+    let text = "model Tank\ninput pump : L/min = 30\nSf:s(pump) -> 0:a -> C:c(1)\na -> R:r(1)\noutput f = s.f : mL/s\n";
+    let file = write(&folder, "tank.bond", text);
+    let series = write(&folder, "pump.csv", "t,pump\n0,60\n1,60\n");
+    for (more, flow) in [(vec![], 500.0), (vec!["--input".to_string(), format!("pump={series}")], 1000.0)] {
+        let mut arguments = vec!["simulate", &file, "--to", "1", "--every", "1", "--json", "--record", "f,s.f"];
+        arguments.extend(more.iter().map(String::as_str));
+        let run = json(&halfarrow(&folder, &arguments));
+        assert_eq!(run["values"]["f"][0].as_f64().unwrap(), flow);
+        assert_eq!(run["values"]["s.f"][0].as_f64().unwrap(), flow * 1e-6);
+    }
+}
+
+#[test]
 fn a_start_at_rest_stays_at_rest() {
     let here = folder("rest");
     halfarrow(&here, &["new", "m"]);

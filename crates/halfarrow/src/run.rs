@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::schedule;
+use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
 use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate};
 use halfarrow_trace::{Trace, read_inputs};
@@ -17,7 +18,8 @@ use crate::audited::{AuditReport, Audited};
 use crate::error::{Error, Problem};
 use crate::model::Model;
 
-/// What to run and how exactly. Times in s, values in SI units.
+/// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
+/// their declarations give.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// End of the run; it begins at 0. Above 0.
@@ -156,7 +158,7 @@ impl Model {
         notes: Vec<String>,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Simulated, Error> {
-        let mut sink = Recorder { trace: empty_trace(system), progress };
+        let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate(&mut audited, options, &mut x, &mut sink);
         let (trace, audit) = (sink.trace, audited.finish());
@@ -260,12 +262,18 @@ fn conflict_diagnostic(conflict: &exec::StartConflict) -> Diagnostic {
 /// Gives the samples to a trace, and tells how far the run has come.
 struct Recorder<'p> {
     trace: Trace,
+    /// The unit of each column that is not given in SI units.
+    units: Vec<Option<Unit>>,
+    row: Vec<f64>,
     progress: &'p mut dyn FnMut(f64) -> bool,
 }
 
 impl Sink for Recorder<'_> {
     fn sample(&mut self, t: f64, values: &[f64]) {
-        self.trace.sample(t, values);
+        let given = |(unit, &si): (&Option<Unit>, &f64)| unit.as_ref().map_or(si, |unit| unit.from_si_f64(si));
+        self.row.clear();
+        self.row.extend(self.units.iter().zip(values).map(given));
+        self.trace.sample(t, &self.row);
     }
     fn progress(&mut self, t: f64) -> ControlFlow<()> {
         if (self.progress)(t) { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
@@ -279,6 +287,12 @@ fn empty_trace(system: &exec::Model) -> Trace {
         (observed[i].name.clone(), unit)
     };
     Trace::new(system.recorded().iter().map(column))
+}
+
+/// The declared units of the recorded variables, where they are not SI units.
+fn units(system: &exec::Model) -> Vec<Option<Unit>> {
+    let observed = &system.program().observed;
+    system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
 
 fn options(run: &Run) -> Result<Options, Problem> {
@@ -310,7 +324,10 @@ fn connect(system: &mut exec::Model, run: &Run) -> Result<(), Problem> {
             if columns.len() == 1 { signals.pop_first().map(|(_, signal)| signal) } else { signals.remove(name) };
         let missing = || bad(vec![format!("no column is called `{name}`: there are {}", columns.join(", "))]);
         let signal = only.ok_or_else(missing)?;
-        system.connect(name, signal.times(), signal.values()).map_err(|e| bad(vec![e.to_string()]))?;
+        let unit = system.program().inputs.iter().find(|i| i.name == *name).and_then(|i| i.unit.clone());
+        let si = |&value: &f64| unit.as_ref().map_or(value, |unit| unit.to_si_f64(value));
+        let values: Vec<f64> = signal.values().iter().map(si).collect();
+        system.connect(name, signal.times(), &values).map_err(|e| bad(vec![e.to_string()]))?;
     }
     Ok(())
 }
