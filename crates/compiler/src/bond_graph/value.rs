@@ -311,7 +311,8 @@ impl<'a> Builder<'a, '_> {
             _ => {
                 let what = format!("the argument of `{}`", f.name());
                 self.no_dimension(&args[0].quantity, call.args[0].span, &what);
-                Quantity::NONE
+                // Of plain numbers it is a plain number.
+                if args[0].quantity == Quantity::Any { Quantity::Any } else { Quantity::NONE }
             }
         }
     }

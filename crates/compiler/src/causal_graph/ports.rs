@@ -324,11 +324,15 @@ impl Net {
             }
         }
         let mut defined = vec![false; self.symbols.len()];
-        for pivot in &done.pivots {
+        let regular = regular_rows(x, &done);
+        for (i, pivot) in done.pivots.iter().enumerate() {
             defined[pivot.column] = true;
             let others = pivot.row.0.iter().filter(|e| e.0 != pivot.column);
-            let negative: Vec<(usize, Expr)> = others.map(|&(c, e)| (c, settled(x, e))).collect();
-            solved.definitions.push((self.symbols[pivot.column], self.combination(&negative)));
+            let row = match &regular {
+                Some(regular) => regular.rows[i].0.clone(),
+                None => others.map(|&(c, e)| (c, settled(x, e))).collect(),
+            };
+            solved.definitions.push((self.symbols[pivot.column], self.combination(&row)));
         }
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
@@ -337,7 +341,7 @@ impl Net {
                 solved.undetermined.push(self.symbols[self.ports[p].conjugate()]);
             }
         }
-        solved.watched = done.watched;
+        solved.watched = regular.map_or(done.watched, |regular| vec![regular.determinant]);
         solved.degenerate = done.degenerate;
     }
 }
@@ -373,6 +377,51 @@ fn law_causality(x: &Exprs, work: &mut Eliminator, port: &NetPort, wishes: &Wish
         },
         (None, None) => wish,
     }
+}
+
+/// Pivot columns by the columns that are none.
+struct RegularRows {
+    /// A row for each pivot.
+    rows: Vec<SparseRow>,
+    /// The junction structure is regular where this is not zero.
+    determinant: Expr,
+}
+
+/// The rows of an elimination without the divisors on its way that mean nothing for what comes out: where one pivot is
+/// divided by another, neither has to be nonzero, only their product, the determinant. `None` if all of them count, or
+/// if that would take too long.
+fn regular_rows(x: &mut Exprs, done: &Elimination) -> Option<RegularRows> {
+    let divided = |x: &mut Exprs, e: Expr| x.lowest_terms(e).is_some_and(|l| !l.below.is_empty());
+    if !done.watched.iter().any(|&e| divided(x, e)) {
+        return None;
+    }
+    let product = x.mul(&done.watched);
+    let determinant = x.lowest_terms(product).filter(|l| l.below.is_empty())?.above;
+    x.assume_nonzero(determinant);
+    let mut substitution = back_substitute(done);
+    let mut rows = Vec::with_capacity(done.pivots.len());
+    for pivot in &done.pivots {
+        let mut row = substitution.express(x, pivot.column).0;
+        for (_, e) in &mut row {
+            *e = continuous(x, *e)?;
+        }
+        row.retain(|&(_, e)| !x.is_zero(e));
+        rows.push(SparseRow(row));
+    }
+    Some(RegularRows { rows, determinant })
+}
+
+/// The entry as a fraction in lowest terms.
+fn continuous(x: &mut Exprs, e: Expr) -> Option<Expr> {
+    if x.is_number(e).is_some() {
+        return Some(e);
+    }
+    let lowest = x.lowest_terms(e)?;
+    let below: Vec<Expr> = lowest.below.iter().map(|&(factor, power)| x.powi(factor, power.into())).collect();
+    below.iter().for_each(|&factor| x.assume_nonzero(factor));
+    let below = x.mul(&below);
+    let fraction = x.div(lowest.above, below);
+    Some(x.simplify(fraction))
 }
 
 /// An entry with its sign turned, in its simple form.
