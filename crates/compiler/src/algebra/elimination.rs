@@ -179,7 +179,10 @@ impl Eliminator {
     fn watch(&mut self, x: &mut Exprs, row: usize, column: usize) {
         if let Some(e) = coefficient(&self.rows[row], column) {
             x.assume_nonzero(e);
-            self.done.watched.push(e);
+            // What is defined may be written shorter.
+            let short = x.simplify(e);
+            x.assume_nonzero(short);
+            self.done.watched.push(short);
         }
     }
 

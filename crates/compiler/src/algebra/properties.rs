@@ -89,8 +89,10 @@ impl Exprs {
         self.entry(e).properties.total
     }
 
-    /// From now on the expression counts as nonzero: it is watched while the program runs. Its factors are nonzero too.
+    /// From now on the expression counts as defined and nonzero: it is watched while the program runs. Its factors are
+    /// nonzero too.
     pub fn assume_nonzero(&mut self, e: Expr) {
+        self.assume_total(e);
         let monomial = self.entry(e).monomial;
         let (_, primitive) = self.primitive(monomial);
         for e in [e, monomial, primitive] {
@@ -105,6 +107,19 @@ impl Exprs {
         }
         for part in parts {
             self.assume_nonzero(part);
+        }
+    }
+
+    /// What is finite has finite parts; only what a condition chooses may be undefined.
+    fn assume_total(&mut self, e: Expr) {
+        let chosen =
+            |x: &Exprs, e: Expr| matches!(x.node(e), Node::Select(..) | Node::Call(Function::Min | Function::Max, _));
+        let mut open = vec![e];
+        while let Some(e) = open.pop() {
+            if !self.total(e) && !chosen(self, e) {
+                self.entries[e.0 as usize].properties.total = true;
+                self.node(e).for_each_child(|c| open.push(c));
+            }
         }
     }
 

@@ -117,7 +117,10 @@ impl<'a> Definitions<'a> {
                 continue;
             }
             let rate = self.rate_of(symbol)?;
-            terms.push(self.x.mul(&[slope, rate]));
+            // What keeps its value does nothing to the sum, nor to where it is defined.
+            if self.x.is_number(rate).is_none_or(|rate| !rate.is_zero()) {
+                terms.push(self.x.mul(&[slope, rate]));
+            }
         }
         Ok(self.x.add(&terms))
     }

@@ -97,7 +97,8 @@ impl Frame {
                 Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
                 Instruction::Watch { pivot, scale, watch } => {
                     let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
-                    if pivot == 0.0 || pivot.abs() <= 64.0 * f64::EPSILON * scale {
+                    let stands = pivot != 0.0 && pivot.abs() > 64.0 * f64::EPSILON * scale;
+                    if !stands {
                         return Err(Trouble::Vanished { watch });
                     }
                 }
