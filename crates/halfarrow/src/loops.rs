@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use halfarrow_compiler::algebra::{Exprs, PlainNames, Symbol, ascii};
+use halfarrow_compiler::algebra::{Exprs, Names, PlainNames, Symbol, ZERO, ascii};
 use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
-use halfarrow_compiler::causal_graph::{CausalGraph, PortState, Role, Stroke};
+use halfarrow_compiler::causal_graph::{CausalGraph, Combination, PortState, Role, Stroke};
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
 use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
 use halfarrow_compiler::ids::{Id, Map};
@@ -230,14 +230,15 @@ fn components(paths: &CausalPaths) -> Vec<ComponentReport> {
 fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
-    let mut known = Map::new();
+    let mut known: Map<Symbol, Combination> = Map::new();
+    known.extend(held_at_zero(graph).map(|symbol| (symbol, Combination::default())));
     let of_storages = causal.ports.ports.iter().filter(|s| graph.storage_symbols(s.port).is_some());
     let mut report = |state: &PortState| {
         let (co_energy, _) = graph.storage_symbols(state.port).expect("a storage");
         let follows = (state.role == Role::Dependent).then(|| {
             let combination = causal.ports.resolve(&mut x, co_energy, &mut known);
             let value = combination.expr(&mut x);
-            format!("{} = {}", x.name(co_energy), ascii(&x, value, &PlainNames(&x)))
+            format!("{} = {}", x.name(co_energy), ascii(&x, value, &OneName(&x)))
         });
         StorageReport {
             name: port_name(graph, state.port),
@@ -247,6 +248,27 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
         }
     };
     of_storages.map(&mut report).collect()
+}
+
+/// Where a variable has a twin of its own at each end of a bond, both have its name.
+struct OneName<'a>(&'a Exprs);
+
+impl Names for OneName<'_> {
+    fn ascii(&self, symbol: Symbol) -> String {
+        self.0.name(symbol).trim_end_matches('*').to_string()
+    }
+}
+
+/// The efforts and flows that sources and zero compliances hold at zero.
+fn held_at_zero(graph: &BondGraph) -> impl Iterator<Item = Symbol> {
+    graph.elements.iter().filter_map(|(_, element)| {
+        let bond = || &graph.bonds[element.ports[0].bond];
+        match element.kind {
+            Kind::ZeroCompliance { flow: ZERO } | Kind::FlowSource { value: ZERO } => Some(bond().flow),
+            Kind::EffortSource { value: ZERO } => Some(bond().effort),
+            _ => None,
+        }
+    })
 }
 
 /// Whether a storage is drawn in integral causality: an `I` is given the effort, a `C` the flow.
