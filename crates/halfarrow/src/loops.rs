@@ -231,7 +231,9 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
     let mut known: Map<Symbol, Combination> = Map::new();
-    known.extend(held_at_zero(graph).map(|symbol| (symbol, Combination::default())));
+    for symbol in held_at_zero(graph) {
+        known.insert(symbol, Combination::default());
+    }
     let of_storages = causal.ports.ports.iter().filter(|s| graph.storage_symbols(s.port).is_some());
     let mut report = |state: &PortState| {
         let (co_energy, _) = graph.storage_symbols(state.port).expect("a storage");
@@ -256,6 +258,9 @@ struct OneName<'a>(&'a Exprs);
 impl Names for OneName<'_> {
     fn ascii(&self, symbol: Symbol) -> String {
         self.0.name(symbol).trim_end_matches('*').to_string()
+    }
+    fn place(&self, symbol: Symbol) -> (u8, u32) {
+        PlainNames(self.0).place(symbol)
     }
 }
 
