@@ -44,7 +44,7 @@ Examples:
     #[command(after_help = "\
 Examples:
   halfarrow equations car.bond
-  halfarrow equations car.bond --form minimal --format latex > car.tex")]
+  halfarrow equations car.bond --form inverted --format latex > car.tex")]
     Equations(Equations),
     /// Compute a trajectory
     #[command(after_help = "\
@@ -141,6 +141,18 @@ pub struct Loops {
 pub enum Form {
     /// One explicit equation for each independent variable, nothing else
     Minimal,
+    /// One explicit equation for each independent speed, no momenta as states
+    Kane,
+    /// Storages on zero-order paths in derivative causality: implicit equations
+    Inverted,
+    /// The classical form: integral causality, break variables and multipliers
+    Break,
+    /// The classical form with resistors first, storages as they come
+    Relaxed,
+    /// All storages as states, a multiplier for every constraint
+    Lagrange,
+    /// All storages as states, a stiff spring with a damper for every constraint
+    Stiff,
 }
 
 /// Ways of writing equations.
@@ -177,7 +189,7 @@ pub enum Solver {
     Explicit,
     /// Backward differentiation formulas, variable step, for stiff models
     Bdf,
-    /// Radau IIA of order 5, implicit, variable step, for stiff models
+    /// Radau IIA of order 5, variable step, for stiff models and the only one for implicit forms
     Radau,
     /// Order 1, fixed step
     Euler,
@@ -212,6 +224,12 @@ pub struct Simulate {
     /// The formulation
     #[arg(long, default_value = "minimal")]
     pub form: Form,
+    /// Form stiff: square of the ratio of the springs' frequency to the model's own fastest rate [default: 1e6]
+    #[arg(long, value_name = "RATIO")]
+    pub stiffness: Option<f64>,
+    /// Form stiff: damping of the springs, 1 is critical [default: 1]
+    #[arg(long, value_name = "RATIO")]
+    pub damping: Option<f64>,
     /// The method
     #[arg(long, default_value = "auto")]
     pub solver: Solver,

@@ -9,6 +9,6 @@ mod model;
 
 pub use halfarrow_compiler::algebra::math;
 pub use model::{
-    Equilibrium, EquilibriumError, InputError, Model, ParameterError, RecordError, StartConflict, StartError,
-    StartValue,
+    Equilibrium, EquilibriumError, ImplicitModel, InputError, Model, ParameterError, RecordError, StartConflict,
+    StartError, StartValue,
 };

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use halfarrow_audit::{self as audit, Audit, Finding, audit, wanted};
 use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_exec as exec;
-use halfarrow_sim::{Failure, Sparsity, System};
+use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 use serde::Serialize;
+
+use crate::run::Recording;
 
 /// Samples audited at once: bounds the memory of long runs.
 const CHUNK: usize = 4096;
@@ -42,8 +44,13 @@ pub struct Miss {
 }
 
 /// A model that records for the audit what it hands out no one else.
-pub struct Audited<'a> {
-    model: &'a mut exec::Model,
+pub struct Audited<'a, M> {
+    model: &'a mut M,
+    book: Book<'a>,
+}
+
+/// What is recorded.
+struct Book<'a> {
     graph: &'a BondGraph,
     parameters: BTreeMap<String, f64>,
     names: Vec<String>,
@@ -55,9 +62,9 @@ pub struct Audited<'a> {
     report: AuditReport,
 }
 
-impl<'a> Audited<'a> {
+impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// Audits what `model` computes; what it records stays what it is.
-    pub fn new(model: &'a mut exec::Model, graph: &'a BondGraph) -> Audited<'a> {
+    pub fn new(model: &'a mut M, graph: &'a BondGraph) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked: Vec<String> = model.recorded().iter().map(|&i| observed[i].name.clone()).collect();
         let available = |name: &String| observed.iter().any(|o| o.name == *name && o.value.is_ok());
@@ -67,30 +74,57 @@ impl<'a> Audited<'a> {
         // Every name is known to have a value, so this cannot fail.
         let _ = model.record(&all);
         let known = graph.parameters.values().map(|p| p.name.clone());
-        Audited {
+        let book = Book {
             parameters: known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect(),
             shown: (names.len()..count).collect(),
             columns: vec![Vec::new(); names.len()],
             values: vec![0.0; count],
             times: Vec::new(),
             report: AuditReport::default(),
-            model,
             graph,
             names,
-        }
+        };
+        Audited { model, book }
     }
 
     /// What was found.
     pub fn finish(mut self) -> AuditReport {
-        self.audit();
-        self.report
+        self.book.audit();
+        self.book.report
     }
+}
 
-    fn record(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.model.observe(t, x, &mut self.values)?;
+/// What knows the values of parameters.
+pub trait Parameters {
+    /// The present value of a parameter.
+    fn parameter(&self, name: &str) -> Option<f64>;
+}
+
+impl Parameters for exec::Model {
+    fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameter(name)
+    }
+}
+
+impl Parameters for exec::ImplicitModel {
+    fn parameter(&self, name: &str) -> Option<f64> {
+        self.reference().parameter(name)
+    }
+}
+
+impl Book<'_> {
+    /// Keeps the values just observed at `t`.
+    fn keep(&mut self, t: f64) {
         self.times.push(t);
         self.columns.iter_mut().zip(&self.values).for_each(|(column, value)| column.push(*value));
-        Ok(())
+        if self.times.len() >= CHUNK {
+            self.audit();
+        }
+    }
+
+    /// The values that the user asked for.
+    fn hand_out(&self, out: &mut [f64]) {
+        out.iter_mut().zip(&self.shown).for_each(|(value, &i)| *value = self.values[i]);
     }
 
     /// Audits what has been recorded, and keeps the last sample to go on from.
@@ -137,7 +171,7 @@ impl From<Finding> for Miss {
     }
 }
 
-impl System for Audited<'_> {
+impl System for Audited<'_, exec::Model> {
     fn states(&self) -> usize {
         self.model.states()
     }
@@ -148,7 +182,7 @@ impl System for Audited<'_> {
         self.model.switch_name(switch)
     }
     fn observed_name(&self, value: usize) -> String {
-        self.model.observed_name(self.shown[value])
+        self.model.observed_name(self.book.shown[value])
     }
     fn scales(&self) -> &[f64] {
         self.model.scales()
@@ -163,28 +197,27 @@ impl System for Audited<'_> {
         self.model.sparsity()
     }
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.observe(t, x, &mut self.values)?;
-        out.iter_mut().zip(&self.shown).for_each(|(value, &i)| *value = self.values[i]);
+        self.model.observe(t, x, &mut self.book.values)?;
+        self.book.hand_out(out);
         Ok(())
     }
     fn observed(&self) -> usize {
-        self.shown.len()
+        self.book.shown.len()
     }
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.model.next_jump(t)
     }
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.model.cross_jump(t, x)?;
-        self.record(t, x)
+        self.model.observe(t, x, &mut self.book.values)?;
+        self.book.keep(t);
+        Ok(())
     }
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.model.accept(t, x)?;
-        if self.times.last() == Some(&t) {
-            return Ok(());
-        }
-        self.record(t, x)?;
-        if self.times.len() >= CHUNK {
-            self.audit();
+        if self.book.times.last() != Some(&t) {
+            self.model.observe(t, x, &mut self.book.values)?;
+            self.book.keep(t);
         }
         Ok(())
     }
@@ -193,5 +226,72 @@ impl System for Audited<'_> {
     }
     fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
         self.model.switch_values(t, x, g)
+    }
+}
+
+impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
+    fn unknowns(&self) -> usize {
+        self.model.unknowns()
+    }
+    fn unknown_name(&self, unknown: usize) -> String {
+        self.model.unknown_name(unknown)
+    }
+    fn equation_name(&self, equation: usize) -> String {
+        self.model.equation_name(equation)
+    }
+    fn switch_name(&self, switch: usize) -> String {
+        self.model.switch_name(switch)
+    }
+    fn observed_name(&self, value: usize) -> String {
+        self.model.observed_name(self.book.shown[value])
+    }
+    fn scales(&self) -> &[f64] {
+        self.model.scales()
+    }
+    fn index(&self, unknown: usize) -> u8 {
+        self.model.index(unknown)
+    }
+    fn residual(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.model.residual(t, y, yp, out)
+    }
+    fn sparsity(&self) -> &Sparsity {
+        self.model.sparsity()
+    }
+    fn jacobian(&mut self, t: f64, y: &[f64], yp: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
+        self.model.jacobian(t, y, yp, dy, dyp)
+    }
+    fn semi_explicit(&self) -> Option<&[bool]> {
+        self.model.semi_explicit()
+    }
+    fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.model.observe(t, y, yp, &mut self.book.values)?;
+        self.book.hand_out(out);
+        Ok(())
+    }
+    fn observed(&self) -> usize {
+        self.book.shown.len()
+    }
+    fn next_jump(&mut self, t: f64) -> Option<f64> {
+        self.model.next_jump(t)
+    }
+    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        self.model.cross_jump(t, y, yp)?;
+        self.model.observe(t, y, yp, &mut self.book.values)?;
+        self.book.keep(t);
+        Ok(())
+    }
+    fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
+        self.model.accept(t, y, yp)?;
+        if self.book.times.last() != Some(&t) {
+            self.model.observe(t, y, yp, &mut self.book.values)?;
+            self.book.keep(t);
+        }
+        Ok(())
+    }
+    fn switches(&self) -> usize {
+        self.model.switches()
+    }
+    fn switch_values(&mut self, t: f64, y: &[f64], yp: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.model.switch_values(t, y, yp, g)
     }
 }

@@ -1,12 +1,13 @@
 //! The equations, as plain data.
 
-use std::collections::BTreeMap;
-
-use halfarrow_compiler::equations::{Equations, Form, Shown, StateKind, Style, print, print_expr, print_symbol, show};
+use halfarrow_compiler::equations::{
+    Algebraic, Cause, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_expr, print_form,
+    print_symbol, show,
+};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::loops::{Count, minimal_count};
+use crate::loops::Count;
 use crate::model::Model;
 
 /// What `halfarrow equations` tells.
@@ -14,10 +15,14 @@ use crate::model::Model;
 pub struct EquationsReport {
     /// Name of the model.
     pub model: String,
-    /// The form, `minimal`.
+    /// The form, as on the command line.
     pub form: &'static str,
     /// The states, in order.
     pub states: Vec<StateReport>,
+    /// Unknowns without a rate, in order.
+    pub algebraic: Vec<AlgebraicReport>,
+    /// How few break variables open all loops.
+    pub breaks: Breaks,
     /// Names of all unknowns: the states, then what stays implicit.
     pub unknowns: Vec<String>,
     /// The equations in the model language: one for each state, then what stays implicit.
@@ -32,12 +37,38 @@ pub struct EquationsReport {
     pub conserved: Vec<String>,
     /// `meanings` and `conserved` in Unicode, for people.
     pub legend: Vec<String>,
+    /// Form `inverted`: which storage was inverted for which path, and why no other, a line each.
+    pub certificate: Vec<String>,
     /// Differentiation index of what is left; 0 for explicit ordinary differential equations.
     pub index: u8,
     /// Numbers of equations; integrated signals are not counted.
     pub counts: Count,
     /// Number of independent storages.
     pub dof: usize,
+}
+
+/// How few break variables open all loops.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Breaks {
+    /// How many there are.
+    pub number: usize,
+    /// How many are needed at least.
+    pub at_least: usize,
+}
+
+/// An unknown without a rate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AlgebraicReport {
+    /// Its name.
+    pub name: String,
+    /// `break`, `law` or `multiplier`.
+    pub cause: &'static str,
+    /// The element whose law or constraint it stands for.
+    pub element: Option<String>,
+    /// Its index, at least 1.
+    pub index: u8,
+    /// SI unit, where known.
+    pub unit: Option<String>,
 }
 
 /// A state.
@@ -60,27 +91,41 @@ impl Model {
     /// The model has errors.
     pub fn equations(&self, form: Form) -> Result<EquationsReport, Error> {
         let equations = self.equations_in(form)?;
-        let start = self.values_at_start(&equations);
+        let states = states(&equations, &self.unknowns_at_start(&equations));
         let x = &equations.graph.exprs;
-        let states = states(&equations, &start);
-        let implicit: Vec<String> = equations.implicit.iter().map(|&s| x.name(s).to_string()).collect();
+        let implicit = equations.implicit.iter().map(|&s| x.name(s).to_string());
+        let implicit: Vec<String> = equations.algebraic.iter().map(|a| a.name.clone()).chain(implicit).collect();
+        let algebraic = algebraic(&equations);
         let shown = show(equations);
         let equations = &shown.equations;
         Ok(EquationsReport {
             model: equations.graph.name.clone(),
-            form: form_name(form),
+            form: form.name(),
             unknowns: states.iter().map(|s| s.name.clone()).chain(implicit).collect(),
             states,
+            algebraic,
+            breaks: Breaks { number: equations.breaks.number, at_least: equations.breaks.at_least },
             equations: print(&shown, Style::Ascii),
             text: print(&shown, Style::Unicode),
             latex: print(&shown, Style::Latex),
             meanings: meanings(&shown, Style::Ascii),
             conserved: conserved(&shown, Style::Ascii),
             legend: [meanings(&shown, Style::Unicode), conserved(&shown, Style::Unicode)].concat(),
+            certificate: print_certificate(&shown),
             index: equations.index,
-            counts: minimal_count(equations),
+            counts: form_count(equations),
             dof: equations.dof,
         })
+    }
+}
+
+impl Model {
+    /// A form as text: counts, index, unknowns with what they are there for, equations.
+    ///
+    /// # Errors
+    /// The model has errors, or the form does not apply to it.
+    pub fn form_text(&self, form: Form) -> Result<String, Error> {
+        Ok(print_form(&show(self.equations_in(form)?)))
     }
 }
 
@@ -94,19 +139,37 @@ fn conserved(shown: &Shown, style: Style) -> Vec<String> {
     shown.equations.conserved.iter().map(|c| format!("{} = {}", c.name, value(c.value))).collect()
 }
 
-/// Its name on the command line.
-fn form_name(form: Form) -> &'static str {
-    match form {
-        Form::Minimal => "minimal",
-    }
-}
-
-fn states(equations: &Equations, start: &BTreeMap<String, f64>) -> Vec<StateReport> {
-    let report = |state: &halfarrow_compiler::equations::State| StateReport {
+fn states(equations: &Equations, start: &[f64]) -> Vec<StateReport> {
+    let report = |(i, state): (usize, &halfarrow_compiler::equations::State)| StateReport {
         name: state.name.clone(),
-        initial: start.get(&state.name).copied().filter(|v| v.is_finite()),
+        initial: start.get(i).copied().filter(|v| v.is_finite()),
         kind: if state.kind == StateKind::Signal { "signal" } else { "storage" },
         unit: state.unit.as_ref().map(ToString::to_string),
     };
-    equations.states.iter().map(report).collect()
+    equations.states.iter().enumerate().map(report).collect()
+}
+
+fn algebraic(equations: &Equations) -> Vec<AlgebraicReport> {
+    let first = equations.states.len();
+    let report = |(i, a): (usize, &Algebraic)| {
+        let (cause, element) = match a.cause {
+            Cause::Break => ("break", None),
+            Cause::Law(element) => ("law", Some(element)),
+            Cause::Multiplier(element) => ("multiplier", Some(element)),
+        };
+        AlgebraicReport {
+            name: a.name.clone(),
+            cause,
+            element: element.map(|e| equations.graph.elements[e].name.clone()),
+            index: equations.indices.get(first + i).copied().unwrap_or(1),
+            unit: a.unit.as_ref().map(ToString::to_string),
+        }
+    };
+    equations.algebraic.iter().enumerate().map(report).collect()
+}
+
+/// Numbers of equations: those of the form, and what stays implicit in its steps.
+fn form_count(equations: &Equations) -> Count {
+    let counts = equations.counts;
+    Count { differential: counts.differential, algebraic: counts.algebraic + equations.implicit.len() }
 }

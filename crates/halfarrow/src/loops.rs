@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::{Exprs, Names, PlainNames, Symbol, ZERO, ascii};
 use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
-use halfarrow_compiler::causal_graph::{CausalGraph, Combination, PortState, Role, Stroke};
+use halfarrow_compiler::causal_graph::{CausalGraph, Combination, PortState, Role, Stroke, state_rank};
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
 use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
 use halfarrow_compiler::ids::{Id, Map};
@@ -32,6 +32,21 @@ pub struct LoopsReport {
     pub counts: Counts,
     /// Number of independent storages.
     pub dof: usize,
+    /// What derivative causality says about the state matrix; `None` if the graph is not linear.
+    pub state_matrix: Option<StateMatrix>,
+}
+
+/// The state matrix `A` of a linear graph, read from causality (Sueur and Dauphin-Tanguy).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct StateMatrix {
+    /// Number of independent storages.
+    pub order: usize,
+    /// Rank.
+    pub rank: usize,
+    /// Whether it is regular: every constant input has a solution at rest.
+    pub regular: bool,
+    /// Storages that stay in integral causality when derivative causality is preferred.
+    pub integral: Vec<String>,
 }
 
 /// One zero-order causal path.
@@ -146,6 +161,12 @@ impl Model {
                 minimal: minimal_count(&equations),
             },
             dof: equations.dof,
+            state_matrix: state_rank(&causal).map(|found| StateMatrix {
+                order: found.order,
+                rank: found.rank,
+                regular: found.integral.is_empty(),
+                integral: found.integral.iter().map(|&port| causal_paths::port_name(&causal.graph, port)).collect(),
+            }),
         })
     }
 }

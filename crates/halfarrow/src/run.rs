@@ -7,10 +7,10 @@ use std::path::PathBuf;
 
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
-use halfarrow_compiler::program::schedule;
+use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
-use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate};
+use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate, simulate_implicit};
 use halfarrow_trace::{Trace, read_inputs};
 use serde::Serialize;
 
@@ -28,6 +28,10 @@ pub struct Run {
     pub every: Option<f64>,
     /// The formulation.
     pub form: Form,
+    /// Form `stiff`: square of the ratio of the springs' frequency to the fastest rate of the model; `None`: 1e6.
+    pub stiffness: Option<f64>,
+    /// Form `stiff`: damping of the springs in parts of critical damping; `None`: 1.
+    pub damping: Option<f64>,
     /// The method.
     pub method: Method,
     /// Step of a method with fixed step, longest step of the others.
@@ -71,6 +75,8 @@ impl Default for Run {
             to: 1.0,
             every: None,
             form: Form::Minimal,
+            stiffness: None,
+            damping: None,
             method: Method::Auto,
             step: None,
             rtol: 1e-6,
@@ -142,12 +148,23 @@ impl Model {
     /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
     pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(f64) -> bool) -> Result<Simulated, Error> {
         let equations = self.equations_in(run.form)?;
-        let mut system = self.system(&equations)?;
-        connect(&mut system, run)?;
+        if matches!(run.form, Form::Minimal | Form::Kane) {
+            let mut system = self.system(&equations)?;
+            connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
+            let notes = choose(&mut system, &run.record)?;
+            let start = self.start(&mut system, run.start)?;
+            return self.integrate(&mut system, start, &options(run)?, notes, progress);
+        }
+        let explicit = equations.residuals.is_empty();
+        let mut system = self.implicit_system(&equations, run)?;
         let notes = choose(&mut system, &run.record)?;
-        let start = self.start(&mut system, run.start)?;
-        let options = options(run)?;
-        self.integrate(&mut system, start, &options, notes, progress)
+        let x = self.start(system.reference_mut(), run.start)?;
+        quicken(&mut system, &x)?;
+        let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
+        match explicit {
+            true => self.integrate(&mut system.into_form(), y, &options(run)?, notes, progress),
+            false => self.integrate_implicit(&mut system, (y, yp), &implicit_options(run)?, notes, progress),
+        }
     }
 
     fn integrate(
@@ -161,7 +178,31 @@ impl Model {
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate(&mut audited, options, &mut x, &mut sink);
-        let (trace, audit) = (sink.trace, audited.finish());
+        self.ended(outcome, options, sink.trace, audited.finish(), notes)
+    }
+
+    fn integrate_implicit(
+        &self,
+        system: &mut exec::ImplicitModel,
+        (mut y, mut yp): (Vec<f64>, Vec<f64>),
+        options: &Options,
+        notes: Vec<String>,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Simulated, Error> {
+        let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
+        let mut audited = Audited::new(system, &self.graph);
+        let outcome = simulate_implicit(&mut audited, options, &mut y, &mut yp, &mut sink);
+        self.ended(outcome, options, sink.trace, audited.finish(), notes)
+    }
+
+    fn ended(
+        &self,
+        outcome: Result<Summary, halfarrow_sim::Stopped>,
+        options: &Options,
+        trace: Trace,
+        audit: AuditReport,
+        notes: Vec<String>,
+    ) -> Result<Simulated, Error> {
         match outcome {
             Ok(summary) => Ok(Simulated { trace, report: self.report(&summary, options.to, audit, notes) }),
             Err(stopped) if matches!(stopped.failure, Failure::BadOption { .. }) => {
@@ -172,6 +213,29 @@ impl Model {
                 Err(Error::Run(Box::new(Stopped { failure: stopped.failure, trace, report })))
             }
         }
+    }
+
+    /// A form beside the minimal one, with inputs connected and springs as asked.
+    fn implicit_system(&self, equations: &Equations, run: &Run) -> Result<exec::ImplicitModel, Error> {
+        let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
+        let made = exec::ImplicitModel::new(schedule(equations), minimal);
+        let mut system = made.map_err(|failure| self.stopped(failure))?;
+        connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
+        for (name, value) in [("form.stiffness", run.stiffness), ("form.damping", run.damping)] {
+            let Some(value) = value else { continue };
+            let known = system.program().parameters.iter().any(|p| p.name == name);
+            let below = if name == "form.stiffness" { value <= 0.0 } else { value < 0.0 };
+            if !known || below || !value.is_finite() {
+                let option = name.trim_start_matches("form.");
+                let reason = match known {
+                    true => format!("{option} is {value}: it has to be a finite number above zero"),
+                    false => format!("{option} is an option of the form stiff"),
+                };
+                return Err(Problem::BadOption { reason }.into());
+            }
+            system.set_parameter(name, value).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+        }
+        Ok(system)
     }
 
     fn report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
@@ -230,6 +294,12 @@ impl Model {
         self.start(&mut system, Start::Given).map(|_| ())
     }
 
+    /// The values of the unknowns of a form at the start; none where there is no start.
+    pub(crate) fn unknowns_at_start(&self, equations: &Equations) -> Vec<f64> {
+        let found = self.implicit_system(equations, &Run::default()).map(|mut system| system.initialise(0.0));
+        found.ok().and_then(Result::ok).map(|(y, _)| y).unwrap_or_default()
+    }
+
     /// The values of all variables at the start; none where there is no start.
     pub(crate) fn values_at_start(&self, equations: &Equations) -> BTreeMap<String, f64> {
         let found = self.system(equations).and_then(|mut system| {
@@ -259,6 +329,38 @@ fn conflict_diagnostic(conflict: &exec::StartConflict) -> Diagnostic {
     d.hint("take the values that would fit, or leave out all but one of them")
 }
 
+/// What records variables by name.
+pub(crate) trait Recording {
+    /// What is run.
+    fn program(&self) -> &Program;
+    /// Indices of what is recorded.
+    fn recorded(&self) -> &[usize];
+    /// Chooses what is recorded.
+    fn record(&mut self, names: &[&str]) -> Result<(), exec::RecordError>;
+    /// Records everything that has a value.
+    fn record_all(&mut self);
+}
+
+macro_rules! recording {
+    ($($model:ty),*) => {$(
+        impl Recording for $model {
+            fn program(&self) -> &Program {
+                self.program()
+            }
+            fn recorded(&self) -> &[usize] {
+                self.recorded()
+            }
+            fn record(&mut self, names: &[&str]) -> Result<(), exec::RecordError> {
+                self.record(names)
+            }
+            fn record_all(&mut self) {
+                self.record_all();
+            }
+        }
+    )*};
+}
+recording!(exec::Model, exec::ImplicitModel);
+
 /// Gives the samples to a trace, and tells how far the run has come.
 struct Recorder<'p> {
     trace: Trace,
@@ -280,7 +382,7 @@ impl Sink for Recorder<'_> {
     }
 }
 
-fn empty_trace(system: &exec::Model) -> Trace {
+fn empty_trace(system: &impl Recording) -> Trace {
     let observed = &system.program().observed;
     let column = |&i: &usize| {
         let unit = observed[i].unit.as_ref().map(ToString::to_string).unwrap_or_default();
@@ -290,7 +392,7 @@ fn empty_trace(system: &exec::Model) -> Trace {
 }
 
 /// The declared units of the recorded variables, where they are not SI units.
-fn units(system: &exec::Model) -> Vec<Option<Unit>> {
+fn units(system: &impl Recording) -> Vec<Option<Unit>> {
     let observed = &system.program().observed;
     system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
@@ -310,10 +412,38 @@ fn options(run: &Run) -> Result<Options, Problem> {
     })
 }
 
+/// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does
+/// not tell: a pendulum swings without a spring.
+fn quicken(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
+    let Some(rate) = system.program().parameters.iter().position(|p| p.name == "form.rate") else { return Ok(()) };
+    let (Some(fastest), Some(own)) = (system.fastest_rate(0.0, x), system.parameter(rate)) else { return Ok(()) };
+    if fastest <= own {
+        return Ok(());
+    }
+    system.set_form_parameter("form.rate", fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
+}
+
+/// A form with algebraic unknowns or free rates is integrated by one method only.
+fn implicit_options(run: &Run) -> Result<Options, Problem> {
+    let options = options(run)?;
+    match run.method {
+        Method::Auto | Method::Radau => Ok(Options { method: Method::Radau, ..options }),
+        _ => {
+            let reason =
+                format!("the form {} is no explicit equation: only the solver radau takes it", run.form.name());
+            Err(Problem::BadOption { reason })
+        }
+    }
+}
+
 /// Connects the files of a run to the inputs.
-fn connect(system: &mut exec::Model, run: &Run) -> Result<(), Problem> {
+fn connect(
+    inputs: &[Input],
+    run: &Run,
+    mut put: impl FnMut(&str, &[f64], &[f64]) -> Result<(), exec::InputError>,
+) -> Result<(), Problem> {
     for (name, path) in &run.inputs {
-        let known: Vec<String> = system.program().inputs.iter().map(|i| i.name.clone()).collect();
+        let known: Vec<String> = inputs.iter().map(|i| i.name.clone()).collect();
         if !known.contains(name) {
             return Err(Problem::UnknownInput { name: name.clone(), known });
         }
@@ -324,16 +454,16 @@ fn connect(system: &mut exec::Model, run: &Run) -> Result<(), Problem> {
             if columns.len() == 1 { signals.pop_first().map(|(_, signal)| signal) } else { signals.remove(name) };
         let missing = || bad(vec![format!("no column is called `{name}`: there are {}", columns.join(", "))]);
         let signal = only.ok_or_else(missing)?;
-        let unit = system.program().inputs.iter().find(|i| i.name == *name).and_then(|i| i.unit.clone());
+        let unit = inputs.iter().find(|i| i.name == *name).and_then(|i| i.unit.clone());
         let si = |&value: &f64| unit.as_ref().map_or(value, |unit| unit.to_si_f64(value));
         let values: Vec<f64> = signal.values().iter().map(si).collect();
-        system.connect(name, signal.times(), &values).map_err(|e| bad(vec![e.to_string()]))?;
+        put(name, signal.times(), &values).map_err(|e| bad(vec![e.to_string()]))?;
     }
     Ok(())
 }
 
 /// Chooses what is recorded; tells what was left out.
-fn choose(system: &mut exec::Model, record: &Record) -> Result<Vec<String>, Problem> {
+fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec<String>, Problem> {
     match record {
         Record::Default => Ok(left_out(system, true)),
         Record::All => {
@@ -348,13 +478,13 @@ fn choose(system: &mut exec::Model, record: &Record) -> Result<Vec<String>, Prob
 }
 
 /// What has no value among what would be recorded.
-fn left_out(system: &exec::Model, only_default: bool) -> Vec<String> {
+fn left_out(system: &impl Recording, only_default: bool) -> Vec<String> {
     let observed = system.program().observed.iter().filter(|o| o.default || !only_default);
     let without = observed.filter_map(|o| o.value.as_ref().err().map(|why| format!("`{}` is left out: {why}", o.name)));
     without.collect()
 }
 
-fn refused(system: &exec::Model, error: exec::RecordError) -> Problem {
+fn refused(system: &impl Recording, error: exec::RecordError) -> Problem {
     match error {
         exec::RecordError::Unknown(name) => {
             let known = system.program().observed.iter().map(|o| o.name.as_str());

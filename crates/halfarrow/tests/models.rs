@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use halfarrow::{Method, Model, Record, Run, Stage};
+use halfarrow::{Error, Form, Method, Model, Record, Run, Stage};
 use serde_json::Value;
 
 #[test]
@@ -20,6 +20,24 @@ fn every_stage_says_what_its_golden_text_says() {
             .filter_map(|stage| {
                 let text = stage.show_model(&model).map_err(|error| error.render(false));
                 text.and_then(|text| golden(&folder.join(format!("{}.txt", stage.name())), &text)).err()
+            })
+            .collect();
+        if faults.is_empty() { Ok(()) } else { Err(faults.join("\n")) }
+    });
+}
+
+#[test]
+fn every_form_says_what_its_golden_text_says() {
+    check_all(&models(), |folder| {
+        let model = load(folder)?;
+        let faults: Vec<String> = Form::ALL
+            .iter()
+            .filter(|form| **form != Form::Minimal)
+            .filter_map(|form| {
+                // Where a form does not apply its text says why, without places.
+                let why = |error: Error| format!("{}\n", error.render(false).lines().next().unwrap_or_default());
+                let text = model.form_text(*form).unwrap_or_else(why);
+                golden(&folder.join(format!("equations_{}.txt", form.name())), &text).err()
             })
             .collect();
         if faults.is_empty() { Ok(()) } else { Err(faults.join("\n")) }

@@ -51,13 +51,13 @@ impl Sparsity {
     }
 
     /// Numbers of the nonzeros of one column, counted over all columns.
-    pub(crate) fn places(&self, column: usize) -> std::ops::Range<usize> {
+    pub fn places(&self, column: usize) -> std::ops::Range<usize> {
         self.starts[column]..self.starts[column + 1]
     }
 
     /// Columns in groups, no two of a group with a nonzero in the same row: one directional derivative gives all columns
     /// of a group. Greedy, in order; at most as many groups as columns.
-    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+    pub fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
         let mut taken: Vec<Vec<bool>> = Vec::new();
         for column in 0..self.states() {

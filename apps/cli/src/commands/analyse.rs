@@ -117,7 +117,15 @@ fn counts_text(report: &LoopsReport) -> String {
     let rows = forms.map(|(name, n)| [name.to_string(), n.differential.to_string(), n.algebraic.to_string()]);
     let mut text = "\nEquations in each form\n".to_string();
     text += &screen::table(["form", "differential", "algebraic"], rows);
-    text + &format!("Independent storages: {}\n", report.dof)
+    text += &format!("Independent storages: {}\n", report.dof);
+    match &report.state_matrix {
+        Some(a) if a.regular => text + "State matrix: regular, all storages take derivative causality\n",
+        Some(a) => {
+            let stay = a.integral.join(", ");
+            text + &format!("State matrix: rank {} of {}, {stay} cannot take derivative causality\n", a.rank, a.order)
+        }
+        None => text,
+    }
 }
 
 /// The equations.
@@ -137,6 +145,12 @@ pub fn equations(arguments: &arguments::Equations) -> u8 {
 pub fn form(form: arguments::Form) -> Form {
     match form {
         arguments::Form::Minimal => Form::Minimal,
+        arguments::Form::Kane => Form::Kane,
+        arguments::Form::Inverted => Form::Inverted,
+        arguments::Form::Break => Form::Break,
+        arguments::Form::Relaxed => Form::Relaxed,
+        arguments::Form::Lagrange => Form::Lagrange,
+        arguments::Form::Stiff => Form::Stiff,
     }
 }
 
@@ -146,6 +160,14 @@ fn equations_text(report: &EquationsReport) -> String {
         text += "\nwhere\n";
     }
     report.legend.iter().for_each(|line| text += &format!("    {line}\n"));
+    if !report.certificate.is_empty() {
+        text += "\n";
+    }
+    report.certificate.iter().for_each(|line| text += &format!("{line}\n"));
+    if report.form != "minimal" {
+        let (n, index) = (&report.counts, report.index);
+        text += &format!("\n{} differential, {} algebraic, index {index}\n", n.differential, n.algebraic);
+    }
     text
 }
 

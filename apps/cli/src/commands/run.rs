@@ -52,6 +52,8 @@ fn run(arguments: &Simulate) -> Run {
         to: arguments.to,
         every: arguments.every,
         form: form(arguments.form),
+        stiffness: arguments.stiffness,
+        damping: arguments.damping,
         method: match arguments.solver {
             Solver::Auto => Method::Auto,
             Solver::Explicit => Method::Explicit,

@@ -178,7 +178,7 @@ impl Part<'_> {
         let drawn = self.propagate(strokes);
         let plain = drawn && !forced && !self.wanted.concerns(members) && is_plain(self.x, graph, members);
         if plain && let Some((definitions, watched)) = whole_truth(self.x, graph, members, strokes) {
-            let ports = local::roles(graph, members, strokes);
+            let ports = local::roles(graph, members, &|p| strokes.at(p));
             return Ok(Solved { ports, definitions, watched, ..Solved::default() });
         }
         let solved = self.solve(strokes, forced);
@@ -443,7 +443,7 @@ fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
 }
 
 /// The causality that an algebraic law asks for: the one in which it is written.
-fn wished(graph: &BondGraph, port: PortRef) -> PortCausality {
+pub(super) fn wished(graph: &BondGraph, port: PortRef) -> PortCausality {
     match &graph.elements[port.element].kind {
         Kind::Resistor(laws) => match laws[port.port as usize] {
             ResistorLaw::Conductive(_) => PortCausality::Conductive,
@@ -483,10 +483,11 @@ fn whole_truth(
     let bonds: usize = members.iter().map(|&m| graph.elements[m].ports.len()).sum::<usize>() / 2;
     let tree = bonds + 1 == members.len();
     let sensing = members.iter().any(|&m| reads_bonds(x, graph, m));
-    if (!tree || sensing) && local::roles(graph, members, strokes).iter().any(|p| p.role == Role::Dependent) {
+    if (!tree || sensing) && local::roles(graph, members, &|p| strokes.at(p)).iter().any(|p| p.role == Role::Dependent)
+    {
         return None;
     }
-    let (definitions, divisors) = local::definitions(x, graph, members, strokes);
+    let (definitions, divisors) = local::definitions(x, graph, members, &|p| strokes.at(p));
     (tree || is_triangular(&definitions)).then_some((definitions, divisors))
 }
 

@@ -1,6 +1,6 @@
 //! What strokes say about a part without rings: every variable defined by its neighbours.
 
-use super::strokes::Strokes;
+use super::ports::imposes_effort;
 use super::{Combination, PortState, Role};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
@@ -8,16 +8,19 @@ use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 /// Definitions of variables, and what they divide by that is not known to be nonzero.
 pub type Definitions = (Vec<(Symbol, Combination)>, Vec<Expr>);
 
+/// Whether the stroke of its bond sits at a port, where it is drawn.
+pub type Drawn<'a> = &'a dyn Fn(PortRef) -> Option<bool>;
+
 /// Definitions of the variables that junctions and two-ports set, one element at a time, and the moduli divided by.
 ///
 /// Triangular if no signal runs in a circle, which is so on trees.
-pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], strokes: &Strokes) -> Definitions {
+pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], drawn: Drawn) -> Definitions {
     let mut all = Vec::new();
     let mut divisors = Vec::new();
     let one = x.int(1);
     for &element in members {
         let ports = &graph.elements[element].ports;
-        let at = |i: usize| strokes.at(PortRef { element, port: i as u32 }).expect("strokes are complete");
+        let at = |i: usize| drawn(PortRef { element, port: i as u32 }).expect("strokes are complete");
         let pair = |i: usize| {
             let bond = &graph.bonds[ports[i].bond];
             (bond.effort, bond.flow)
@@ -61,13 +64,13 @@ pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], stro
 }
 
 /// The roles of the ports of a part as the strokes say.
-pub fn roles(graph: &BondGraph, members: &[ElementId], strokes: &Strokes) -> Vec<PortState> {
+pub fn roles(graph: &BondGraph, members: &[ElementId], drawn: Drawn) -> Vec<PortState> {
     let mut states = Vec::new();
     for &element in members.iter().filter(|&&m| !graph.elements[m].kind.is_inner()) {
         for index in 0..graph.elements[element].ports.len() as u32 {
             let port = PortRef { element, port: index };
             let bond = &graph.bonds[graph.bond_of(port)];
-            let effort_in = strokes.at(port).expect("strokes are complete");
+            let effort_in = drawn(port).expect("strokes are complete");
             let role = match (&graph.elements[element].kind, effort_in) {
                 (Kind::Inertance(_), true) | (Kind::Compliance(_), false) => Role::Independent,
                 (Kind::Inertance(_), false) | (Kind::Compliance(_), true) => Role::Dependent,
@@ -75,7 +78,13 @@ pub fn roles(graph: &BondGraph, members: &[ElementId], strokes: &Strokes) -> Vec
                 (Kind::Resistor(_), false) => Role::Algebraic(PortCausality::Resistive),
                 _ => Role::Source,
             };
-            let role = if super::ports::is_imposed(graph, port) { Role::Source } else { role };
+            let role = match imposes_effort(graph, port) {
+                Some(effort) if effort != effort_in => Role::Source,
+                // What it imposes is met by what it is left to give.
+                Some(_) if effort_in => Role::Algebraic(PortCausality::Conductive),
+                Some(_) => Role::Algebraic(PortCausality::Resistive),
+                None => role,
+            };
             let (input, output) = if effort_in { (bond.flow, bond.effort) } else { (bond.effort, bond.flow) };
             states.push(PortState { port, role, input, output });
         }

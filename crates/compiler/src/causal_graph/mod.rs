@@ -6,8 +6,10 @@
 mod assign;
 pub mod break_set;
 mod contradiction;
+mod drawn;
 mod local;
 mod ports;
+mod rank;
 pub mod signals;
 mod strokes;
 mod text;
@@ -20,8 +22,10 @@ use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
 pub use contradiction::warnings;
+pub use drawn::{as_drawn, resistors_first, without_constraints};
 pub use ports::Virtual;
-pub(crate) use ports::{circuits, rank_given};
+pub(crate) use ports::{circuits, imposes_effort, rank_given};
+pub use rank::{StateRank, state_rank};
 
 /// Where the causal stroke of a bond sits: at the end that the effort runs towards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

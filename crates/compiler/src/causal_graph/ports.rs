@@ -19,6 +19,10 @@ pub struct Wishes {
     pub independent: Vec<PortRef>,
     /// Common variables of junctions that shall stay independent although no storage has them.
     pub virtual_speeds: Vec<Virtual>,
+    /// Constraints that repeat others, each with whether its effort (or its flow) is taken as zero.
+    pub dropped: BTreeMap<PortRef, bool>,
+    /// Storages give their rate rather than their co-energy variable: derivative causality is preferred.
+    pub derivative_first: bool,
 }
 
 /// A variable that is independent without a storage: a storage of value zero stands for it.
@@ -69,6 +73,17 @@ enum Offer {
     Law,
     /// A storage of value zero.
     Virtual(Which),
+}
+
+impl Offer {
+    /// A storage that gives its rate.
+    fn in_derivative_causality(self) -> Offer {
+        match self {
+            Offer::Storage(Which::Effort) => Offer::Storage(Which::Flow),
+            Offer::Storage(Which::Flow) => Offer::Storage(Which::Effort),
+            other => other,
+        }
+    }
 }
 
 struct NetPort {
@@ -201,7 +216,13 @@ impl Net {
             }
             let port = PortRef { element, port: index as u32 };
             let law = wishes.sources_as_laws.contains(&port);
-            let offer = if law { Offer::Law } else { offer(graph, port) };
+            let offer = match wishes.dropped.get(&port) {
+                Some(true) => Offer::Imposed(Which::Effort),
+                Some(false) => Offer::Imposed(Which::Flow),
+                None if law => Offer::Law,
+                None => offer(graph, port),
+            };
+            let offer = if wishes.derivative_first { offer.in_derivative_causality() } else { offer };
             let (effort, flow) = (self.of(effort), self.of(flow));
             self.ports.push(NetPort { port: Some(port), effort, flow, offer });
         }
@@ -452,6 +473,14 @@ pub(crate) fn circuits(x: &mut Exprs, rows: Vec<SparseRow>) -> Vec<(usize, Spars
 /// The rank of a matrix, given by rows without zeros, at the given parameters.
 pub(crate) fn rank_given(x: &mut Exprs, columns: usize, rows: Vec<SparseRow>) -> usize {
     eliminate(x, rows, &[(0..columns).collect()]).pivots.len()
+}
+
+/// Whether a port has its effort (`true`) or its flow (`false`) imposed.
+pub fn imposes_effort(graph: &BondGraph, port: PortRef) -> Option<bool> {
+    match offer(graph, port) {
+        Offer::Imposed(which) => Some(which == Which::Effort),
+        _ => None,
+    }
 }
 
 /// Whether a port has its variable imposed: sources, constraints, detectors, compliances of known displacement.

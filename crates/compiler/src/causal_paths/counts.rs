@@ -67,7 +67,7 @@ fn inverted_count(causal: &CausalGraph, paths: &CausalPaths, multipliers: usize)
     let signals = signal_graph(graph, &inverted.strokes);
     let set = break_set(&signals.algebraic_successors(), &signals.break_ranks());
     let breaks: Vec<NodeId> = set.vertices.iter().map(|&v| NodeId::new(v)).collect();
-    let eliminated = eliminated(graph, paths, &inverted, &signals);
+    let eliminated = eliminated(graph, &paths.dependent, &inverted, &signals);
     let kept: Vec<PortRef> = state_ports(graph).into_iter().filter(|place| !eliminated.contains(place)).collect();
     let equations = kept.len() + breaks.len() + multipliers;
     let mut system = System { graph, columns: kept.iter().copied().zip(0..).collect(), exprs: graph.exprs.clone() };
@@ -76,15 +76,22 @@ fn inverted_count(causal: &CausalGraph, paths: &CausalPaths, multipliers: usize)
     Count { differential, algebraic: equations - differential }
 }
 
+/// Storages that do not stay as unknowns of the inverted form: those drawn in derivative causality before, and those
+/// that the inversion has made dependent on one in integral causality.
+pub fn eliminated_ports(causal: &CausalGraph, inverted: &Inverted) -> BTreeSet<PortRef> {
+    let before = dependent_ports(&causal.graph, &causal.strokes);
+    eliminated(&causal.graph, &before, inverted, &signal_graph(&causal.graph, &inverted.strokes))
+}
+
 /// Storages that do not stay as unknowns: those drawn in derivative causality before, and those that the inversion has
 /// made dependent on one in integral causality.
-fn eliminated(graph: &BondGraph, paths: &CausalPaths, inverted: &Inverted, signals: &SignalGraph) -> BTreeSet<PortRef> {
+fn eliminated(graph: &BondGraph, before: &[PortRef], inverted: &Inverted, signals: &SignalGraph) -> BTreeSet<PortRef> {
     let mixed: BTreeSet<ElementId> = derivative_edges(signals)
         .into_iter()
         .filter(|edge| shortest_of(signals, edge).is_some())
         .map(|edge| edge.element)
         .collect();
-    let ours = |place: &PortRef| paths.dependent.contains(place) || mixed.contains(&place.element);
+    let ours = |place: &PortRef| before.contains(place) || mixed.contains(&place.element);
     dependent_ports(graph, &inverted.strokes).into_iter().filter(ours).collect()
 }
 

@@ -202,25 +202,25 @@ impl Tries<'_> {
 }
 
 /// Turns strokes along a way through the junction structure, so that every junction and two-port stays in order.
-struct Turner<'a> {
-    graph: &'a BondGraph,
-    strokes: Table<BondId, Stroke>,
+pub(super) struct Turner<'a> {
+    pub graph: &'a BondGraph,
+    pub strokes: Table<BondId, Stroke>,
 }
 
 /// A bond that turns, and the end at which this must be made good.
 type Step = (BondId, PortRef);
 
 impl Turner<'_> {
-    fn is_resistor(&self, place: PortRef) -> bool {
+    pub fn is_resistor(&self, place: PortRef) -> bool {
         matches!(self.graph.elements[place.element].kind, Kind::Resistor(_))
     }
 
-    fn is_integral(&self, place: PortRef) -> bool {
+    pub fn is_integral(&self, place: PortRef) -> bool {
         gives_flow(self.graph, &self.strokes, place).is_some_and(|flow_out| is_integral(self.graph, place, flow_out))
     }
 
     /// Turns the bond at `start` and what follows from it, up to the nearest port that is `open`. Whether it could.
-    fn turn(&mut self, start: PortRef, open: impl Fn(PortRef, &Turner) -> bool) -> bool {
+    pub fn turn(&mut self, start: PortRef, open: impl Fn(PortRef, &Turner) -> bool) -> bool {
         let first = (self.graph.bond_of(start), self.other_end(self.graph.bond_of(start), start));
         let mut parent: BTreeMap<Step, Option<Step>> = BTreeMap::from([(first, None)]);
         let mut queue = VecDeque::from([first]);

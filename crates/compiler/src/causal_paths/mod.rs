@@ -1,16 +1,18 @@
 //! Zero-order causal paths: found along the strokes, classed, with gain, break variables and components.
 //! Source: `method.md`, section 3.
 
+mod certificate;
 mod counts;
 mod cycles;
 mod dependent;
 mod determinant;
 mod inverted;
-mod numeric;
+pub(crate) mod numeric;
 mod text;
 mod trace;
 
-pub use counts::{Count, Counts, counts};
+pub use certificate::{Certificate, Opened, Refusal, certificate, port_name};
+pub use counts::{Count, Counts, counts, eliminated_ports};
 pub use inverted::{Inverted, invert};
 
 use std::collections::BTreeSet;

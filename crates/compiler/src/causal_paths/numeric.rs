@@ -8,10 +8,10 @@ use crate::algebra::{Expr, Exprs, Symbol};
 const TINY: f64 = 1e-10;
 
 /// A row: column and entry.
-pub(super) type Row = BTreeMap<usize, f64>;
+pub(crate) type Row = BTreeMap<usize, f64>;
 
 /// Rank by elimination with threshold pivoting that keeps the rows short.
-pub(super) fn rank(rows: Vec<Row>) -> usize {
+pub(crate) fn rank(rows: Vec<Row>) -> usize {
     let mut matrix = Matrix::new(rows);
     let mut rank = 0;
     while let Some((row, column)) = matrix.pivot() {
@@ -90,7 +90,7 @@ impl Matrix {
 }
 
 /// The value of an expression at the given parameters; what varies gets an arbitrary value near 1, always the same.
-pub(super) fn sample(exprs: &Exprs, e: Expr) -> f64 {
+pub(crate) fn sample(exprs: &Exprs, e: Expr) -> f64 {
     let mut value = |symbol: Symbol| {
         let given = exprs.facts(symbol).given.and_then(|given| exprs.given_value(given));
         given.unwrap_or_else(|| arbitrary(symbol))
@@ -99,7 +99,7 @@ pub(super) fn sample(exprs: &Exprs, e: Expr) -> f64 {
 }
 
 /// A number between 0.5 and 1.5 for each symbol.
-fn arbitrary(symbol: Symbol) -> f64 {
+pub(crate) fn arbitrary(symbol: Symbol) -> f64 {
     let mixed = (u64::from(symbol.0) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     0.5 + (mixed >> 11) as f64 / (1u64 << 53) as f64
 }

@@ -39,6 +39,8 @@ pub struct Definitions<'a> {
     pub stored: Map<Symbol, Symbol>,
     /// Conserved constants.
     pub constants: BTreeSet<Symbol>,
+    /// Unknowns that nothing defines: algebraic ones and free rates of states.
+    pub free: BTreeSet<Symbol>,
     /// Symbols that have no value, with the reason.
     pub missing: BTreeMap<Symbol, Unavailable>,
     rates: Map<Symbol, Symbol>,
@@ -54,6 +56,7 @@ impl<'a> Definitions<'a> {
             states: Map::new(),
             stored: Map::new(),
             constants: BTreeSet::new(),
+            free: BTreeSet::new(),
             missing: BTreeMap::new(),
             rates: Map::new(),
         }
@@ -154,6 +157,9 @@ impl<'a> Definitions<'a> {
         if let Some(&rate) = self.rates.get(&symbol) {
             return Ok(self.x.sym(rate));
         }
+        if self.free.contains(&symbol) {
+            return Err(Unavailable::NeedsRateOfUnknown(self.x.name(symbol).trim_end_matches('*').to_string()));
+        }
         let Some(&definition) = self.of.get(&symbol) else { return Err(Unavailable::Unsolvable) };
         let rate = self.rate_symbol(symbol);
         self.rates.insert(symbol, rate);
@@ -195,6 +201,11 @@ impl<'a> Definitions<'a> {
                 }
             }
         }
+    }
+
+    /// Symbols of rates that follow by differentiating definitions.
+    pub fn derived_rates(&self) -> impl Iterator<Item = Symbol> + '_ {
+        self.rates.values().copied()
     }
 
     /// What a symbol of the graph stands for.

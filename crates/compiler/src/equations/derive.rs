@@ -2,15 +2,21 @@
 
 use std::collections::BTreeSet;
 
+use super::along::{Closure, Treatment, assemble_all};
 use super::blocks::{Insoluble, Ordered, order};
+use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
-use super::{Equations, Form, State, StateKind, Step, Unavailable, conserved, observed};
-use crate::algebra::{Exprs, Symbol};
-use crate::bond_graph::{BondGraph, ElementId, Meaning};
-use crate::causal_graph::{CausalGraph, Role};
+use super::stiff::parameters;
+use super::{
+    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, index, observed,
+};
+use crate::algebra::{Expr, Exprs, Symbol};
+use crate::bond_graph::{BondGraph, BondId, ElementId, Meaning, PortRef};
+use crate::causal_graph::{CausalGraph, Role, Stroke, as_drawn, resistors_first, without_constraints};
+use crate::causal_paths::{certificate, eliminated_ports, invert};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
-use crate::ids::Map;
+use crate::ids::{Map, Table};
 use crate::span::Span;
 use crate::unit::Unit;
 
@@ -19,12 +25,110 @@ use crate::unit::Unit;
 /// Errors: a rate of an input is needed that nobody gives (E001), a loop of variables has no unique solution (E002).
 /// Source: `method.md`, sections 4 and 5.
 pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
-    let Form::Minimal = form;
+    match form {
+        Form::Minimal | Form::Kane => minimal(causal, form),
+        Form::Inverted => inverted(causal),
+        Form::Break | Form::Relaxed => classical(causal, form),
+        Form::Lagrange => lagrange(causal),
+        Form::Stiff => stiff(causal),
+    }
+}
+
+/// Independent variables alone: one explicit equation each.
+fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
+    let momenta = form == Form::Minimal;
     let mut assembled =
-        assemble(causal).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
-    let conserved = conserved::eliminate(&mut assembled, causal);
-    let Assembled { mut d, states, .. } = assembled;
+        assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
+    let conserved = if momenta { conserved::eliminate(&mut assembled, causal) } else { Vec::new() };
+    let draft = Draft { assembled, closures: Vec::new(), conserved, breaks: BreakBound::default() };
+    finish(causal, causal, form, draft)
+}
+
+/// All storages along the strokes, dependent ones with multipliers.
+fn classical(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
+    let strokes = if form == Form::Relaxed { resistors_first(causal) } else { causal.strokes.clone() };
+    along(causal, &strokes, form, &|_| Treatment::Multiplier)
+}
+
+/// All storages, those on zero-order paths in derivative causality.
+fn inverted(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
+    let inverted = invert(causal);
+    let gone = eliminated_ports(causal, &inverted);
+    let treat = |port| if gone.contains(&port) { Treatment::Eliminated } else { Treatment::Free };
+    let mut equations = along(causal, &inverted.strokes, Form::Inverted, &treat)
+        .or_else(|_| along(causal, &inverted.strokes, Form::Inverted, &|_| Treatment::Free))?;
+    equations.certificate = Some(certificate(causal, &inverted));
+    Ok(equations)
+}
+
+fn along(
+    causal: &CausalGraph,
+    strokes: &Table<BondId, Stroke>,
+    form: Form,
+    treat: &dyn Fn(PortRef) -> Treatment,
+) -> Result<Equations, Diagnostics> {
+    let drawn = as_drawn(causal, strokes);
+    let graph = &drawn.graph;
+    let (mut assembled, mut closures) =
+        assemble_all(&drawn, treat).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
+    closures.extend(assembled.open_laws(&drawn));
+    let d = &mut assembled.d;
+    let rates: BTreeSet<Symbol> = assembled.states.iter().map(|s| d.states[&s.symbol]).collect();
+    let mut wanted = rates.clone();
+    closures.iter().for_each(|c| wanted.extend(d.x.symbols_of(c.residual)));
+    let closed = rates.into_iter().chain(d.derived_rates()).collect();
+    let (breaks, bound) = open_loops(d, strokes, &wanted, &closed);
+    closures.extend(breaks);
+    finish(&drawn, causal, form, Draft { assembled, closures, conserved: Vec::new(), breaks: bound })
+}
+
+/// All storages and constraints in the solved structure, each relation among them with a multiplier.
+fn lagrange(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
+    let open = without_constraints(causal);
+    let (assembled, closures) = constrained(&open)?;
+    finish(
+        &open,
+        causal,
+        Form::Lagrange,
+        Draft { assembled, closures, conserved: Vec::new(), breaks: BreakBound::default() },
+    )
+}
+
+/// The same with a stiff spring and a damper for each multiplier.
+fn stiff(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
+    let mut open = without_constraints(causal);
+    let springs = parameters(&mut open);
+    let (mut assembled, closures) = constrained(&open)?;
+    let closures = assembled.relax(&open, &springs, closures);
+    finish(
+        &open,
+        causal,
+        Form::Stiff,
+        Draft { assembled, closures, conserved: Vec::new(), breaks: BreakBound::default() },
+    )
+}
+
+fn constrained(open: &CausalGraph) -> Result<(Assembled<'_>, Vec<Closure>), Diagnostics> {
+    let graph = &open.graph;
+    let (mut assembled, mut closures) = assemble_all(open, &|_| Treatment::Multiplier)
+        .map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
+    closures.extend(assembled.open_constraints(open));
+    Ok((assembled, closures))
+}
+
+/// A form before its steps are in order.
+struct Draft<'a> {
+    assembled: Assembled<'a>,
+    closures: Vec<Closure>,
+    conserved: Vec<Conserved>,
+    breaks: BreakBound,
+}
+
+/// Puts everything into order. `truth` is the graph with its exact ports.
+fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -> Result<Equations, Diagnostics> {
+    let graph = &causal.graph;
+    let Draft { assembled: Assembled { mut d, states, .. }, closures, conserved, breaks } = draft;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {
@@ -32,14 +136,24 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
             return Err(needs_rate(graph, &d.x, state.symbol, reason));
         }
     }
+    let mut roots = rates.clone();
+    for closure in &closures {
+        let read = d.x.symbols_of(closure.residual);
+        if let Some((symbol, reason)) = read.iter().find_map(|s| d.missing.get_key_value(s)) {
+            return Err(needs_rate(graph, &d.x, *symbol, reason));
+        }
+        roots.extend(read);
+    }
     let given: BTreeSet<Symbol> = causal.ports.ports.iter().filter(|p| is_law(p.role)).map(|p| p.input).collect();
-    let mut ordered = sort(&mut d, &rates, &given).map_err(|insoluble| no_solution(&d, &insoluble))?;
+    let mut ordered = sort(&mut d, &roots, &rates, &given).map_err(|insoluble| no_solution(&d, &insoluble))?;
     if let Some(lost) = lost_in_itself(&d) {
         return Err(through_itself(graph, &d.x, lost));
     }
     for &pivot in &causal.ports.watched {
         ordered.steps.push(Step::Watch { pivot, elements: readers(&d, pivot) });
     }
+    let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();
+    let free_rates: BTreeSet<Symbol> = rates.intersection(&d.free).copied().collect();
     let meanings: Vec<_> = states.iter().filter_map(|s| s.meaning.map(|m| (s.symbol, m))).collect();
     let states: Vec<State> = states
         .into_iter()
@@ -52,21 +166,30 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
             span: span_of(graph, s.symbol, s.kind),
         })
         .collect();
+    let (algebraic, residuals) = unknowns(&d, &closures);
     let observed = observed::observed(&mut d, &states);
-    let conditions = observed::conditions(&mut d);
+    // The other forms start as the minimal one does.
+    let own_start = matches!(form, Form::Minimal | Form::Kane);
+    let conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
     let implicit = ordered.steps.iter().flat_map(|s| match s {
         Step::Newton { unknowns, .. } => unknowns.clone(),
         _ => Vec::new(),
     });
     let implicit = implicit.collect();
-    let dependent: Vec<Symbol> =
-        causal.ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output).collect();
-    let dof =
-        causal.ports.ports.iter().filter(|p| p.role == Role::Independent).count() + causal.ports.virtual_speeds.len();
+    let ports = &truth.ports.ports;
+    let dependent: Vec<Symbol> = match form {
+        Form::Minimal | Form::Kane => ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output).collect(),
+        _ => Vec::new(),
+    };
+    let dof = ports.iter().filter(|p| p.role == Role::Independent).count() + truth.ports.virtual_speeds.len();
+    let index::Indices { index, indices, counts } =
+        index::indices(&mut d, &states, &algebraic, &ordered.steps, &residuals);
     Ok(Equations {
         form,
         graph: graph.with_exprs(d.x),
         states,
+        algebraic,
+        residuals,
         conserved,
         steps: ordered.steps,
         observed,
@@ -75,10 +198,34 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
         rows: ordered.rows,
         dependent,
         meanings,
-        index: 0,
+        index,
+        indices,
+        counts,
+        breaks,
+        tracked,
+        free_rates,
+        certificate: None,
         dof,
         implicit,
     })
+}
+
+/// The variable of the bond that two elements share, for the one that the second of them has of its own.
+fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
+    d.x.name(symbol).strip_suffix('*').and_then(|base| d.x.find_symbol(base)).unwrap_or(symbol)
+}
+
+/// The algebraic unknowns, and what vanishes: for free rates first, then for these.
+fn unknowns(d: &Definitions, closures: &[Closure]) -> (Vec<Algebraic>, Vec<Expr>) {
+    let mut algebraic = Vec::new();
+    let mut residuals: Vec<Expr> = closures.iter().filter(|c| c.unknown.is_none()).map(|c| c.residual).collect();
+    for closure in closures {
+        let Some((symbol, cause)) = closure.unknown else { continue };
+        let tracked = of_the_bond(d, symbol);
+        algebraic.push(Algebraic { symbol, tracked, name: name_of(d, symbol), cause, unit: unit_of(d.graph, symbol) });
+        residuals.push(closure.residual);
+    }
+    (algebraic, residuals)
 }
 
 fn is_law(role: Role) -> bool {
@@ -87,8 +234,13 @@ fn is_law(role: Role) -> bool {
 
 /// All steps: first what the rates of the states need, then what can be observed besides. Loops of the latter may be
 /// insoluble (reactions that nobody determines), unless a source or law (`given`) is among them.
-fn sort(d: &mut Definitions, rates: &BTreeSet<Symbol>, given: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
-    let needed = reachable(d, rates);
+fn sort(
+    d: &mut Definitions,
+    roots: &BTreeSet<Symbol>,
+    rates: &BTreeSet<Symbol>,
+    given: &BTreeSet<Symbol>,
+) -> Result<Ordered, Insoluble> {
+    let needed = reachable(d, roots);
     let mut ordered = order(d, &needed, rates)?;
     loop {
         let rest: Vec<Symbol> = d.of.keys().copied().filter(|s| needed.binary_search(s).is_err()).collect();
@@ -142,6 +294,7 @@ fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable
         Unavailable::NeedsRateOf(input) => input.clone(),
         Unavailable::Unsolvable => return through_itself(graph, x, symbol),
         Unavailable::Undetermined => return not_determined(graph, symbol, &name),
+        Unavailable::NeedsRateOfUnknown(unknown) => return needs_rate_of_unknown(graph, symbol, &name, unknown).into(),
     };
     let span = graph.inputs.values().find(|i| i.name == input).map(|i| i.span).unwrap_or_default();
     Diagnostic::error(
@@ -162,6 +315,14 @@ fn not_determined(graph: &BondGraph, symbol: Symbol, name: &str) -> Diagnostics 
         .note("nothing in the structure says how large it is: a flow or an effort that circulates, or one that nothing takes up")
         .hint("read another variable, or put an element where this one can do work")
         .into()
+}
+
+fn needs_rate_of_unknown(graph: &BondGraph, symbol: Symbol, name: &str, unknown: &str) -> Diagnostic {
+    let span = span_of_symbols(graph, &[symbol]);
+    let title = format!("the equation of {name} needs the time derivative of {unknown}");
+    Diagnostic::error(codes::E001, title, span, "it is read here")
+        .note(format!("{unknown} is an algebraic unknown of this form, whose rate is no part of it"))
+        .hint("choose the form minimal, which solves for it first")
 }
 
 fn no_solution(d: &Definitions, insoluble: &Insoluble) -> Diagnostics {

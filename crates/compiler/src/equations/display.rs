@@ -53,6 +53,7 @@ pub struct Dependent {
 pub fn show(mut equations: Equations) -> Shown {
     let mut d = Definitions::new(std::mem::take(&mut equations.graph.exprs), &equations.graph);
     d.of = std::mem::take(&mut equations.definitions);
+    d.free.extend(equations.free_rates.iter().chain(equations.algebraic.iter().map(|a| &a.symbol)));
     let ordered = Ordered { steps: std::mem::take(&mut equations.steps), rows: std::mem::take(&mut equations.rows) };
     let states = &equations.states;
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
@@ -61,6 +62,12 @@ pub fn show(mut equations: Equations) -> Shown {
     let known = if small { expansions(&mut d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
     let aliases = aliases(&mut d, states, &known);
     let mut display = self::equations(&mut d, states, &ordered, &known);
+    let mut unknown: Vec<Symbol> = states.iter().map(|s| s.rate).collect();
+    unknown.extend(equations.algebraic.iter().map(|a| a.symbol));
+    for &residual in &equations.residuals {
+        let residual = put_in(&mut d.x, residual, &known);
+        display.push(balanced(&mut d.x, residual, &unknown));
+    }
     let mut read = BTreeSet::new();
     for equation in &mut display {
         read.extend(d.x.symbols_of(equation.left));
@@ -133,6 +140,7 @@ fn equations(
     for state in states {
         let shown_as = match by_row.get(&state.rate) {
             Some(row) => from_row(&mut d.x, row, known),
+            None if d.free.contains(&state.rate) => continue,
             None => {
                 let left = d.x.sym(state.rate);
                 let value = d.of.get(&state.rate).map(|f| f.expr()).unwrap_or(left);
@@ -216,6 +224,20 @@ fn from_row(x: &mut Exprs, row: &LinearRow, known: &BTreeMap<Symbol, Expr>) -> D
 
 fn equation(left: Expr, right: Expr) -> DisplayEquation {
     DisplayEquation { left, right, closed: (left, right) }
+}
+
+/// What vanishes, with the terms of the unknowns on the left.
+fn balanced(x: &mut Exprs, residual: Expr, unknown: &[Symbol]) -> DisplayEquation {
+    let zero = x.int(0);
+    let Some((coefficients, rest)) = x.linear_in(residual, unknown) else { return equation(zero, residual) };
+    let mut terms = Vec::new();
+    for (&coefficient, &symbol) in coefficients.iter().zip(unknown) {
+        let symbol = x.sym(symbol);
+        terms.push(x.mul(&[coefficient, symbol]));
+    }
+    let left = x.add(&terms);
+    let right = x.neg(rest);
+    if left == zero { equation(zero, rest) } else { equation(left, right) }
 }
 
 fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {

@@ -8,7 +8,7 @@ use super::definitions::{Definition, Definitions};
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
-use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual};
+use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 use crate::ids::Map;
 
 /// A state of the minimal form before it is ordered.
@@ -20,6 +20,8 @@ pub struct Chosen {
     pub kind: StateKind,
     /// For a momentum form: what the state is, in stored quantities.
     pub meaning: Option<Expr>,
+    /// The variable of the bond graph that tells the state.
+    pub tracked: Symbol,
 }
 
 /// The definitions of the minimal form.
@@ -32,7 +34,7 @@ pub struct Assembled<'a> {
     pub rows: Map<Symbol, Combination>,
     /// What changes the stored quantities behind the states.
     pub balances: Vec<Balance>,
-    later: Vec<Later>,
+    pub(super) later: Vec<Later>,
 }
 
 /// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`.
@@ -47,29 +49,40 @@ pub struct Balance {
 }
 
 /// A rate whose definition waits until all states are known.
-enum Later {
+pub(super) enum Later {
     /// The rate of the state `z` makes the rate of `X(z)` equal to what the bond carries.
     Speed { z: Symbol, rate: Symbol, stored: Expr, bond: Symbol },
     /// The rate of a dependent storage follows by differentiating what defines its stored quantity.
     Dependent { rate: Symbol, stored: Symbol },
+    /// The rate of the state is free: the bond carries the rate of `X`.
+    Free { rate: Symbol, stored: Expr, bond: Symbol },
     /// `pi' = structure + S'^T X_d`.
     Momentum { rate: Symbol, structure: Expr, followers: Vec<Follower>, z: Symbol },
 }
 
+impl Later {
+    /// Whether it is the rate of the speed `z`.
+    pub(super) fn is_speed_of(&self, z: Symbol) -> bool {
+        matches!(self, Later::Speed { z: own, .. } if *own == z)
+    }
+}
+
 /// A storage port with all that its equations need.
-struct Cell<'a> {
-    state: &'a PortState,
-    storage: &'a Storage,
-    law: StorageLaw,
+pub(super) struct Cell<'a> {
+    pub(super) state: &'a PortState,
+    pub(super) storage: &'a Storage,
+    pub(super) law: StorageLaw,
     /// Stored quantity, co-energy variable and rate, as the port has them.
-    stored: Symbol,
-    z: Symbol,
-    rate: Symbol,
+    pub(super) stored: Symbol,
+    pub(super) z: Symbol,
+    pub(super) rate: Symbol,
     inertance: bool,
 }
 
 /// Writes down what defines every variable. Errors name the variable that has no value and why.
-pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
+///
+/// With `momenta`, sums of stored quantities are states where a source moves a dependent storage.
+pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
     let graph = &causal.graph;
     let mut d = Definitions::new(graph.exprs.clone(), graph);
     let mut rows = Map::new();
@@ -96,7 +109,7 @@ pub fn assemble<'a>(causal: &'a CausalGraph) -> Result<Assembled<'a>, (Symbol, U
     }
     let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), later: Vec::new() };
     assembled.imposed_and_algebraic(causal);
-    assembled.storages(causal);
+    assembled.storages(causal, momenta);
     assembled.signals();
     assembled.rates()?;
     assembled.d.define_user_rates();
@@ -134,13 +147,22 @@ fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) -> Expr {
 }
 
 impl<'a> Assembled<'a> {
+    /// Definitions without states yet.
+    pub(super) fn empty(d: Definitions<'a>) -> Self {
+        Assembled { d, states: Vec::new(), rows: Map::new(), balances: Vec::new(), later: Vec::new() }
+    }
+
     /// Sources, constraints and algebraic laws give their variable.
-    fn imposed_and_algebraic(&mut self, causal: &'a CausalGraph) {
+    pub(super) fn imposed_and_algebraic(&mut self, causal: &'a CausalGraph) {
         let graph = &causal.graph;
         for state in &causal.ports.ports {
             match state.role {
                 Role::Source | Role::Redundant => {
-                    let value = imposed(&mut self.d.x, causal, state);
+                    let value = match self.gives_what_it_imposes(causal, state) {
+                        true => imposed(&mut self.d.x, causal, state),
+                        // A constraint that repeats others and is dropped carries nothing.
+                        false => self.d.x.int(0),
+                    };
                     self.d.set(state.input, value);
                     if let Kind::Compliance(storage) = &graph.elements[state.port.element].kind
                         && let StorageLaw::Known { displacement, .. } = storage.laws[state.port.port as usize]
@@ -152,6 +174,12 @@ impl<'a> Assembled<'a> {
                 Role::Independent | Role::Dependent => {}
             }
         }
+    }
+
+    fn gives_what_it_imposes(&self, causal: &CausalGraph, state: &PortState) -> bool {
+        let effort = causal.graph.bonds[causal.graph.bond_of(state.port)].effort;
+        let gives_effort = state.input == effort || is_twin_of(&self.d.x, state.input, effort);
+        imposes_effort(&causal.graph, state.port).is_none_or(|imposes| imposes == gives_effort)
     }
 
     fn algebraic(&mut self, causal: &'a CausalGraph, state: &PortState, causality: PortCausality) {
@@ -173,7 +201,7 @@ impl<'a> Assembled<'a> {
                 let residual = self.own(causal, state, *r);
                 return self.d.set_root(state.input, residual);
             }
-            _ => return,
+            _ => return self.met_by_the_other(causal, state, causality),
         };
         let (given, law, written) = residual;
         let law = self.own(causal, state, law);
@@ -185,6 +213,18 @@ impl<'a> Assembled<'a> {
         let given = self.own(causal, state, given);
         let residual = self.d.x.sub(given, law);
         self.d.set_root(state.input, residual);
+    }
+
+    /// A constraint that is met as a law: it gives what it imposes, or an unknown that makes the imposed variable right.
+    fn met_by_the_other(&mut self, causal: &CausalGraph, state: &PortState, causality: PortCausality) {
+        let value = imposed(&mut self.d.x, causal, state);
+        let gives_effort = causality == PortCausality::Resistive;
+        if imposes_effort(&causal.graph, state.port) == Some(gives_effort) {
+            return self.d.set(state.input, value);
+        }
+        let held = self.d.x.sym(state.output);
+        let residual = self.d.x.sub(held, value);
+        self.d.of.insert(state.input, Definition::Implicit(residual));
     }
 
     /// An expression of a law with the variables that this port itself has where two elements share a bond.
@@ -200,7 +240,7 @@ impl<'a> Assembled<'a> {
     }
 
     /// Storages, one group of mutually dependent ones after the other.
-    fn storages(&mut self, causal: &'a CausalGraph) {
+    fn storages(&mut self, causal: &'a CausalGraph, momenta: bool) {
         let cells: Vec<Cell<'a>> = causal.ports.ports.iter().filter_map(|state| self.cell(causal, state)).collect();
         for cell in &cells {
             self.d.stored.insert(cell.stored, cell.rate);
@@ -210,12 +250,17 @@ impl<'a> Assembled<'a> {
             let group: Vec<&Cell> = members.iter().map(|&m| &cells[m]).collect();
             if group.iter().all(|c| c.state.role == Role::Independent) && group_speeds.is_empty() {
                 group.iter().for_each(|cell| self.independent(cell));
-            } else if self.in_velocity_form(causal, &group) {
+            } else if !momenta || self.in_velocity_form(causal, &group) {
                 self.velocity_form(&group, &group_speeds);
             } else {
                 self.momentum_form(&group, &group_speeds);
             }
         }
+        self.sort_states();
+    }
+
+    /// Storages in the order of the model.
+    pub(super) fn sort_states(&mut self) {
         let place = |c: &Chosen| match c.kind {
             StateKind::Storage(Some(element)) => element.0,
             _ => u32::MAX,
@@ -223,7 +268,7 @@ impl<'a> Assembled<'a> {
         self.states.sort_by_key(place);
     }
 
-    fn cell(&mut self, causal: &'a CausalGraph, state: &'a PortState) -> Option<Cell<'a>> {
+    pub(super) fn cell(&mut self, causal: &'a CausalGraph, state: &'a PortState) -> Option<Cell<'a>> {
         if !matches!(state.role, Role::Independent | Role::Dependent) {
             return None;
         }
@@ -245,7 +290,7 @@ impl<'a> Assembled<'a> {
     }
 
     /// `X` as an expression of co-energy variables, if it can be written down.
-    fn stored_of(&mut self, cell: &Cell) -> Option<Expr> {
+    pub(super) fn stored_of(&mut self, cell: &Cell) -> Option<Expr> {
         match cell.law {
             StorageLaw::Derivative(e) => Some(e),
             StorageLaw::Integral(e) => {
@@ -273,11 +318,11 @@ impl<'a> Assembled<'a> {
 
     fn choose(&mut self, cell: &Cell, symbol: Symbol) {
         let kind = StateKind::Storage(Some(cell.state.port.element));
-        self.states.push(Chosen { symbol, kind, meaning: None });
+        self.states.push(Chosen { symbol, kind, meaning: None, tracked: symbol });
     }
 
     /// A storage on which no other depends: flow of a linear inertance, stored quantity of anything else.
-    fn independent(&mut self, cell: &Cell) {
+    pub(super) fn independent(&mut self, cell: &Cell) {
         if let Some(stored) = self.constant_inertance(cell) {
             return self.by_speed(cell, stored, &[]);
         }
@@ -331,7 +376,7 @@ impl<'a> Assembled<'a> {
         if followers.iter().any(|f| !self.d.is_constant(f.factor)) {
             return;
         }
-        let mut row = self.rows[&rate].clone();
+        let Some(mut row) = self.rows.get(&rate).cloned() else { return };
         let mut terms = vec![quantity];
         for f in followers {
             row.0.retain(|t| t.0 != f.rate);
@@ -373,22 +418,41 @@ impl<'a> Assembled<'a> {
     /// differentiating what they depend on.
     fn velocity_form(&mut self, group: &[&Cell], speeds: &[Virtual]) {
         for cell in group {
-            let stored = self.stored_of(cell).expect("checked before");
-            if cell.state.role == Role::Dependent {
-                self.d.set(cell.stored, stored);
-                self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
-            } else if self.constant_inertance(cell).is_some() || !matches!(cell.law, StorageLaw::Integral(_)) {
-                self.by_speed(cell, stored, group);
-            } else {
-                let StorageLaw::Integral(law) = cell.law else { unreachable!("other laws are taken above") };
-                self.by_stored(cell, group);
-                self.d.set(cell.z, law);
+            match (cell.state.role, self.stored_of(cell), cell.law) {
+                (Role::Dependent, stored, _) => {
+                    match stored {
+                        Some(stored) => self.d.set(cell.stored, stored),
+                        None => {
+                            let residual = self.law_residual(cell);
+                            self.d.set_root(cell.stored, residual);
+                        }
+                    }
+                    self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
+                }
+                (_, stored, StorageLaw::Integral(law)) => match self.constant_inertance(cell).and(stored) {
+                    Some(stored) => self.by_speed(cell, stored, group),
+                    None => {
+                        self.by_stored(cell, group);
+                        self.d.set(cell.z, law);
+                    }
+                },
+                (_, Some(stored), _) => self.by_speed(cell, stored, group),
+                (_, None, _) => {
+                    self.by_stored(cell, group);
+                    let residual = self.law_residual(cell);
+                    self.d.set_root(cell.z, residual);
+                }
             }
         }
         for v in speeds {
             let rate = self.d.state(v.speed);
             let element = Some(v.junction);
-            self.states.push(Chosen { symbol: v.speed, kind: StateKind::Storage(element), meaning: None });
+            self.states.push(Chosen {
+                symbol: v.speed,
+                kind: StateKind::Storage(element),
+                meaning: None,
+                tracked: v.speed,
+            });
             // Nothing stands there to take the reaction: what acts on the dependent storages balances itself.
             let reaction = self.d.of[&v.reaction].expr();
             let balance = self.d.x.neg(reaction);
@@ -482,12 +546,13 @@ impl<'a> Assembled<'a> {
         }
         let structure = structure.expr(&mut d.x);
         self.later.push(Later::Momentum { rate: pi_rate, structure, followers, z });
-        self.states.push(Chosen { symbol: pi, kind: StateKind::Storage(Some(element)), meaning: Some(meaning) });
+        let kind = StateKind::Storage(Some(element));
+        self.states.push(Chosen { symbol: pi, kind, meaning: Some(meaning), tracked: z });
         (sum, state)
     }
 
     /// Integrated signals; one that repeats a stored quantity is read from it.
-    fn signals(&mut self) {
+    pub(super) fn signals(&mut self) {
         let graph = self.d.graph;
         for signal in graph.signals.values() {
             if let Some(value) = self.repeated(signal) {
@@ -496,7 +561,8 @@ impl<'a> Assembled<'a> {
             }
             let rate = self.d.state(signal.symbol);
             self.d.set(rate, signal.rate);
-            self.states.push(Chosen { symbol: signal.symbol, kind: StateKind::Signal, meaning: None });
+            let symbol = signal.symbol;
+            self.states.push(Chosen { symbol, kind: StateKind::Signal, meaning: None, tracked: symbol });
         }
     }
 }
@@ -518,7 +584,7 @@ impl Assembled<'_> {
     }
 
     /// Defines the rates that were put off.
-    fn rates(&mut self) -> Result<(), (Symbol, Unavailable)> {
+    pub(super) fn rates(&mut self) -> Result<(), (Symbol, Unavailable)> {
         for later in std::mem::take(&mut self.later) {
             let d = &mut self.d;
             match later {
@@ -527,6 +593,10 @@ impl Assembled<'_> {
                     let bond = d.x.sym(bond);
                     let residual = d.x.sub(change, bond);
                     d.of.insert(rate, Definition::Implicit(residual));
+                }
+                Later::Free { rate, stored, bond } => {
+                    let change = d.rate(stored).map_err(|reason| (rate, reason))?;
+                    d.set(bond, change);
                 }
                 Later::Dependent { rate, stored } => {
                     let definition = d.of[&stored];
@@ -556,7 +626,7 @@ impl Assembled<'_> {
 
 /// A dependent storage seen from an independent one: `z_d = factor · z + …`.
 #[derive(Debug, Clone, Copy)]
-struct Follower {
+pub(super) struct Follower {
     factor: Expr,
     stored: Symbol,
     rate: Symbol,

@@ -1,16 +1,24 @@
 //! The equations of a bond graph in one of its forms, in the order in which they are evaluated.
 
+mod along;
 mod blocks;
+mod breaks;
 mod conserved;
 mod definitions;
 mod derive;
 mod display;
+mod form;
+mod index;
 mod minimal;
 mod observed;
+mod stiff;
 mod text;
 
+use std::collections::BTreeSet;
+
 use crate::algebra::{Expr, Symbol};
-use crate::bond_graph::{BondGraph, ElementId};
+use crate::bond_graph::{BondGraph, ElementId, Kind, PortRef};
+pub use crate::causal_paths::{Certificate, Count};
 use crate::ids::Map;
 use crate::span::Span;
 use crate::unit::Unit;
@@ -19,20 +27,21 @@ pub use blocks::LinearRow;
 pub use definitions::Definition;
 pub use derive::derive_equations;
 pub use display::{Dependent, DisplayEquation, Shown, show};
-pub use text::{Style, print, print_dependent, print_expr, print_meanings, print_symbol};
-
-/// A formulation, `method.md`, section 4.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Form {
-    /// One explicit ODE per degree of freedom, nothing else.
-    Minimal,
-}
+pub use form::Form;
+pub use text::{
+    Style, print, print_certificate, print_dependent, print_expr, print_form, print_meanings, print_symbol,
+};
 
 /// Equations in evaluation order.
 ///
-/// Given time, inputs, held signals, parameters, conserved constants and states, the steps define one symbol after the
-/// other; a step reads only what is given or defined before it. The rates of the states and all observed variables are
-/// among the symbols so defined. Steps that a caller does not need (say, reactions while integrating) can be left out.
+/// Given time, inputs, held signals, parameters, conserved constants and unknowns, the steps define one symbol after the
+/// other; a step reads only what is given or defined before it. All observed variables are among the symbols so
+/// defined. Steps that a caller does not need (say, reactions while integrating) can be left out.
+///
+/// The unknowns are the states, then the algebraic ones. A state whose rate is among the symbols that the steps define
+/// has an explicit equation, `x' = f`. The rates of the other states are given too, and as many residuals vanish as
+/// there are such states and algebraic unknowns. So one type says every form: explicit without residuals,
+/// semi-explicit with algebraic unknowns, implicit with free rates.
 #[derive(Debug, Clone)]
 pub struct Equations {
     /// The form.
@@ -41,6 +50,10 @@ pub struct Equations {
     pub graph: BondGraph,
     /// The states, in order.
     pub states: Vec<State>,
+    /// Unknowns without a rate, in order.
+    pub algebraic: Vec<Algebraic>,
+    /// What vanishes: one expression for each state whose rate is free, then one for each algebraic unknown.
+    pub residuals: Vec<Expr>,
     /// Quantities that stay at their start value, each in place of a state.
     pub conserved: Vec<Conserved>,
     /// The steps.
@@ -59,10 +72,47 @@ pub struct Equations {
     pub meanings: Vec<(Symbol, Expr)>,
     /// Differentiation index of what is left, 0 for an explicit ODE.
     pub index: u8,
+    /// Index of each unknown, at least 1: one more than how often an equation is differentiated until it is known.
+    pub indices: Vec<u8>,
+    /// Numbers of differential and algebraic equations; integrated signals are not counted.
+    pub counts: Count,
+    /// For each state the variable of the bond graph that tells it: itself, or the co-energy variable of its storage.
+    pub tracked: Vec<Symbol>,
+    /// Rates that nothing defines.
+    pub free_rates: BTreeSet<Symbol>,
+    /// How few break variables open all loops, where the form has any.
+    pub breaks: BreakBound,
+    /// Form `inverted`: which storage was inverted for which path, and why no other.
+    pub certificate: Option<Certificate>,
     /// Number of independent storages.
     pub dof: usize,
     /// What stays implicit: unknowns of the Newton blocks.
     pub implicit: Vec<Symbol>,
+}
+
+impl Equations {
+    /// All unknowns: states, then algebraic ones.
+    pub fn unknowns(&self) -> Vec<Symbol> {
+        self.states.iter().map(|s| s.symbol).chain(self.algebraic.iter().map(|a| a.symbol)).collect()
+    }
+
+    /// Whether the rate of a state is free: an equation without an explicit rate determines it.
+    pub fn is_free(&self, state: &State) -> bool {
+        self.free_rates.contains(&state.rate)
+    }
+
+    /// The variable of the bond that carries the rate of the quantity stored behind a state, by its number.
+    pub fn carried(&self, state: usize) -> Option<Symbol> {
+        let (symbol, tracked) = (self.states[state].symbol, self.tracked[state]);
+        let StateKind::Storage(Some(element)) = self.states[state].kind else { return None };
+        let ports = (0..self.graph.elements[element].ports.len() as u32).map(|port| PortRef { element, port });
+        let mut ports = ports.filter_map(|port| Some((port, self.graph.storage_symbols(port)?)));
+        let stored = |port: PortRef| match &self.graph.elements[element].kind {
+            Kind::Inertance(storage) | Kind::Compliance(storage) => storage.stored.get(port.port as usize).copied(),
+            _ => None,
+        };
+        ports.find(|(port, (z, _))| *z == tracked || stored(*port) == Some(symbol)).map(|(_, (_, rate))| rate)
+    }
 }
 
 /// A state.
@@ -89,6 +139,41 @@ pub enum StateKind {
     Storage(Option<ElementId>),
     /// An integrated signal.
     Signal,
+}
+
+/// An unknown without a rate.
+#[derive(Debug, Clone)]
+pub struct Algebraic {
+    /// Its symbol.
+    pub symbol: Symbol,
+    /// The variable of the bond graph that it is.
+    pub tracked: Symbol,
+    /// Its name: `R1.e`, `ZCx.e`.
+    pub name: String,
+    /// What it is there for.
+    pub cause: Cause,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+}
+
+/// What an algebraic unknown is there for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// It opens a loop of variables: the loop closes where the residual vanishes.
+    Break,
+    /// It is the law of an element that gives no value to what the element sets.
+    Law(ElementId),
+    /// It is what a constraint or a dependent storage takes: the residual is the relation that it keeps up.
+    Multiplier(ElementId),
+}
+
+/// How many break variables there are, and whether fewer could do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BreakBound {
+    /// How many there are.
+    pub number: usize,
+    /// Proven: so many are needed at least. Equal to `number` for all components up to 30 signals.
+    pub at_least: usize,
 }
 
 /// A combination of stored quantities that no motion changes.
@@ -163,6 +248,8 @@ pub enum Unavailable {
     Undetermined,
     /// It needs the time derivative of this input.
     NeedsRateOf(String),
+    /// It needs the rate of this unknown, which the form does not have.
+    NeedsRateOfUnknown(String),
     /// It needs a rate that is only defined through itself.
     Unsolvable,
 }
@@ -172,6 +259,9 @@ impl std::fmt::Display for Unavailable {
         match self {
             Unavailable::Undetermined => f.write_str("the junction structure does not determine it"),
             Unavailable::NeedsRateOf(input) => write!(f, "it needs the time derivative of the input {input}"),
+            Unavailable::NeedsRateOfUnknown(unknown) => {
+                write!(f, "it needs the rate of {unknown}, an algebraic unknown of this form")
+            }
             Unavailable::Unsolvable => f.write_str("it needs a rate that is only defined through itself"),
         }
     }

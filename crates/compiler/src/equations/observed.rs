@@ -73,7 +73,10 @@ fn value_of(d: &Definitions, e: Expr) -> Result<Expr, Unavailable> {
         if let Some(reason) = d.missing.get(&symbol) {
             return Err(reason.clone());
         }
-        let given = d.of.contains_key(&symbol) || d.states.contains_key(&symbol) || is_outside(d, symbol);
+        let given = d.of.contains_key(&symbol)
+            || d.states.contains_key(&symbol)
+            || d.free.contains(&symbol)
+            || is_outside(d, symbol);
         if !given {
             return Err(Unavailable::Undetermined);
         }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Dependent, DisplayEquation, Shown, Step};
+use super::{Cause, Dependent, DisplayEquation, Shown, Step};
 use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
-use crate::bond_graph::{BondGraph, Element, Kind, Meaning};
+use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
+use crate::causal_paths::port_name;
 
 /// A way of writing equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +42,67 @@ pub fn print_dependent(shown: &Shown, style: Style) -> Vec<String> {
     let names = Written::of(shown);
     let line = |d: &Dependent| definition(d.variable, d.value, &names, style);
     shown.dependent.iter().map(line).collect()
+}
+
+/// A form in few lines: counts, index, unknowns with what they are there for, equations.
+pub fn print_form(shown: &Shown) -> String {
+    let equations = &shown.equations;
+    let (n, index) = (equations.counts, equations.index);
+    let mut text = format!("equations {} {}\n", equations.graph.name, equations.form.name());
+    text += &format!("\n{} differential, {} algebraic, index {index}\n\nunknowns\n", n.differential, n.algebraic);
+    let mut indices = equations.indices.iter();
+    let mut higher = || indices.next().filter(|i| **i > 1).map_or(String::new(), |i| format!("  index {i}"));
+    for state in &equations.states {
+        text += &format!("  {}{}\n", state.name, higher());
+    }
+    for unknown in &equations.algebraic {
+        let element = |e: ElementId| &equations.graph.elements[e].name;
+        let cause = match unknown.cause {
+            Cause::Break => "break variable".to_string(),
+            Cause::Law(e) => format!("law of {}", element(e)),
+            Cause::Multiplier(e) => format!("multiplier of {}", element(e)),
+        };
+        text += &format!("  {}  {cause}{}\n", unknown.name, higher());
+    }
+    text += "\nequations\n";
+    print(shown, Style::Unicode).iter().for_each(|line| text += &format!("  {line}\n"));
+    print_meanings(shown, Style::Unicode).iter().for_each(|line| text += &format!("  where {line}\n"));
+    let certificate = print_certificate(shown);
+    if !certificate.is_empty() {
+        text += "\ncertificate\n";
+    }
+    certificate.iter().for_each(|line| text += &format!("  {line}\n"));
+    text
+}
+
+/// Which storage was inverted for which paths, what follows from others, and why nothing opens what is left.
+pub fn print_certificate(shown: &Shown) -> Vec<String> {
+    let equations = &shown.equations;
+    let Some(certificate) = &equations.certificate else { return Vec::new() };
+    let graph = &equations.graph;
+    let names =
+        |list: &[ElementId]| list.iter().map(|&e| graph.elements[e].name.as_str()).collect::<Vec<_>>().join(" - ");
+    let mut lines = Vec::new();
+    for opened in &certificate.inverted {
+        let paths: Vec<String> = opened.paths.iter().map(|(c, list)| format!("class {c} {}", names(list))).collect();
+        lines.push(format!("{} is inverted: it opens {}", port_name(graph, opened.port), paths.join(", ")));
+    }
+    for &port in &certificate.eliminated {
+        lines.push(format!("{} follows from the others", port_name(graph, port)));
+    }
+    for &symbol in &certificate.left {
+        let name =
+            equations.algebraic.iter().find(|a| a.symbol == symbol).map_or(names_of(graph, symbol), |a| a.name.clone());
+        lines.push(format!("{name}: no storage removes this break variable"));
+    }
+    for (port, why) in &certificate.refused {
+        lines.push(format!("{} stays as it is: {why}", port_name(graph, *port)));
+    }
+    lines
+}
+
+fn names_of(graph: &BondGraph, symbol: Symbol) -> String {
+    graph.exprs.name(symbol).trim_end_matches('*').to_string()
 }
 
 /// One expression in the names of these equations.

@@ -28,7 +28,7 @@ impl Program {
         let mut blocks: Vec<Option<Set>> = vec![None; self.blocks.len()];
         for (value, op) in self.values.iter() {
             let set = match op {
-                Op::State(i) => Some(Rc::from([i])),
+                Op::State(i) | Op::Rate(i) => Some(Rc::from([i])),
                 Op::Conserved(i) => Some(Rc::from([states + i])),
                 Op::Side(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
                 Op::Solution(block, _) => {

@@ -25,7 +25,9 @@ pub use routine::{Instruction, Layout, Register, Routine, Solve};
 pub use schedule::schedule;
 pub use values::{Op, Reads, Values};
 
-use crate::algebra::Table1d;
+use std::collections::BTreeMap;
+
+use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::HeldKind;
 pub use crate::equations::Unavailable;
 use crate::ids::{Table, id};
@@ -67,8 +69,14 @@ pub struct Program {
     pub inputs: Vec<Input>,
     /// Signals held from earlier times.
     pub held: Vec<Held>,
-    /// States.
+    /// States; in implicit form all unknowns, states before algebraic ones.
     pub states: Vec<State>,
+    /// What the equations are if they are no explicit rates.
+    pub implicit: Option<Implicit>,
+    /// The value of each variable of the bond graph that has one, by its symbol: the same in all forms of a graph.
+    pub variables: BTreeMap<Symbol, Value>,
+    /// For each state the variable of the bond graph that tells it.
+    pub tracked: Vec<Symbol>,
     /// Constants fixed by the start values.
     pub conserved: Vec<String>,
     /// What can be recorded.
@@ -77,7 +85,7 @@ pub struct Program {
     pub start: Vec<StartCondition>,
     /// Divisors that must not vanish.
     pub watches: Vec<Watch>,
-    /// For each state the states that its rate reads, ascending.
+    /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
     pub dependence: Vec<Vec<u32>>,
 }
 
@@ -118,12 +126,26 @@ pub struct Held {
     pub kind: HeldKind,
 }
 
+/// A form that is not `x' = f(t, x)`: `F(t, y, y') = 0`, as many equations as unknowns.
+#[derive(Debug, Clone)]
+pub struct Implicit {
+    /// For each equation whether it is `y' - rate`, of the unknown with its number; if not, the value in the place of the
+    /// rate is the residual.
+    pub explicit: Vec<bool>,
+    /// For each unknown whether it is a state, with a rate; if not, it is algebraic.
+    pub differential: Vec<bool>,
+    /// Index of each unknown, at least 1.
+    pub indices: Vec<u8>,
+    /// States whose rate is free, with what their bond carries: the variable of the bond graph and its value here.
+    pub carried: Vec<(u32, Symbol, Value)>,
+}
+
 /// A state.
 #[derive(Debug, Clone)]
 pub struct State {
     /// Its name.
     pub name: String,
-    /// Its rate.
+    /// Its rate, or the residual in its place.
     pub rate: Value,
     /// SI unit, where known.
     pub unit: Option<Unit>,

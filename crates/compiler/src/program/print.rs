@@ -17,10 +17,15 @@ impl fmt::Display for Program {
         }
         let rates: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
         let routine = self.watched_routine(&layout, &rates);
-        writeln!(f, "\nrates, {} instructions, {} registers", routine.code.len(), routine.registers)?;
+        let what = if self.implicit.is_some() { "rates and residuals" } else { "rates" };
+        writeln!(f, "\n{what}, {} instructions, {} registers", routine.code.len(), routine.registers)?;
         self.print_code(f, &routine, &names)?;
-        for (state, &out) in self.states.iter().zip(&routine.outputs) {
-            writeln!(f, "    {}' = {}", state.name, name(&names, out))?;
+        let explicit = |i: usize| self.implicit.as_ref().is_none_or(|all| all.explicit[i]);
+        for (i, (state, &out)) in self.states.iter().zip(&routine.outputs).enumerate() {
+            match explicit(i) {
+                true => writeln!(f, "    {}' = {}", state.name, name(&names, out))?,
+                false => writeln!(f, "    0 = {}", name(&names, out))?,
+            }
         }
         self.print_conditions(f)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
@@ -54,6 +59,10 @@ impl Program {
         group(layout.held, self.held.iter().map(|h| &h.name).collect());
         group(layout.conserved, self.conserved.iter().collect());
         group(layout.states, self.states.iter().map(|s| &s.name).collect());
+        if self.implicit.is_some() {
+            let rates: Vec<String> = self.states.iter().map(|s| format!("{}'", s.name)).collect();
+            group(layout.rates, rates.iter().collect());
+        }
         names
     }
 

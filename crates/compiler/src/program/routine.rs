@@ -172,6 +172,8 @@ pub struct Layout {
     pub conserved: Register,
     /// First register of the states.
     pub states: Register,
+    /// First register of their rates; there are some only in implicit form.
+    pub rates: Register,
     /// Number of fixed registers.
     pub size: u32,
 }
@@ -197,7 +199,8 @@ impl Program {
         layout.held = layout.inputs + self.inputs.len() as u32;
         layout.conserved = layout.held + self.held.len() as u32;
         layout.states = layout.conserved + self.conserved.len() as u32;
-        layout.size = layout.states + self.states.len() as u32;
+        layout.rates = layout.states + self.states.len() as u32;
+        layout.size = layout.rates + if self.implicit.is_some() { self.states.len() as u32 } else { 0 };
         for (value, op) in self.values.iter() {
             let register = match op {
                 Op::Parameter(i) => layout.parameters + i,
@@ -206,6 +209,7 @@ impl Program {
                 Op::Held(i) => layout.held + i,
                 Op::Conserved(i) => layout.conserved + i,
                 Op::State(i) => layout.states + i,
+                Op::Rate(i) => layout.rates + i,
                 _ => continue,
             };
             layout.registers.insert(value, register);
@@ -554,7 +558,7 @@ impl<'a> Builder<'a> {
             Op::Select(..) => Instruction::Select { out, c: a, a: b, b: c },
             Op::Table(table, piece, _) => Instruction::Table { out, a, table, piece },
             Op::TableSlope(table, piece, _) => Instruction::TableSlope { out, a, table, piece },
-            Op::Constant(_) | Op::Time | Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) => {
+            Op::Constant(_) | Op::Time | Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) | Op::Rate(_) => {
                 unreachable!("given before the routine runs")
             }
             Op::Guess(..) | Op::Solution(..) => unreachable!("written by its block"),

@@ -3,7 +3,7 @@
 use super::lower::Lowering;
 use super::values::{Op, Reads};
 use super::{
-    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Held, Input, Observed, Parameter, Program,
+    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Held, Implicit, Input, Observed, Parameter, Program,
     StartCondition, State, Value, Watch,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
@@ -88,8 +88,10 @@ impl Schedule<'_> {
         graph.held.iter().for_each(|(id, held)| give(held.symbol, Op::Held(id.0), Reads::STATE));
         let conserved = equations.conserved.iter().enumerate();
         conserved.for_each(|(i, c)| give(c.symbol, Op::Conserved(i as u32), Reads::STATE));
-        let states = equations.states.iter().enumerate();
-        states.for_each(|(i, s)| give(s.symbol, Op::State(i as u32), Reads::STATE));
+        let states = equations.unknowns().into_iter().enumerate();
+        states.for_each(|(i, s)| give(s, Op::State(i as u32), Reads::STATE));
+        let free = equations.states.iter().enumerate().filter(|(_, s)| equations.is_free(s));
+        free.for_each(|(i, s)| give(s.rate, Op::Rate(i as u32), Reads::STATE));
     }
 
     fn step(&mut self, step: &Step) {
@@ -172,16 +174,31 @@ impl Schedule<'_> {
     fn finish(mut self, equations: &Equations, parameters: Vec<Parameter>) -> Program {
         let graph = self.graph;
         let lower = &mut self.lower;
-        let rate = |s: &crate::equations::State| {
-            lower.defined(s.rate).unwrap_or_else(|| panic!("no step defines the rate of {}", s.name))
-        };
-        let rates: Vec<Value> = equations.states.iter().map(rate).collect();
-        let states = equations.states.iter().zip(rates);
+        let mut residuals = equations.residuals.iter();
+        let mut residual =
+            |lower: &mut Lowering| lower.value(*residuals.next().expect("as many equations as unknowns"));
+        let mut states = Vec::new();
+        for s in &equations.states {
+            let rate = match equations.is_free(s) {
+                true => residual(lower),
+                false => lower.defined(s.rate).unwrap_or_else(|| panic!("no step defines the rate of {}", s.name)),
+            };
+            states.push(State { name: s.name.clone(), rate, unit: s.unit.clone() });
+        }
+        for a in &equations.algebraic {
+            states.push(State { name: a.name.clone(), rate: residual(lower), unit: a.unit.clone() });
+        }
+        let implicit = implicit(lower, equations);
+        let graph_variables = graph.variables.keys().copied();
+        let variables = graph_variables.filter_map(|s| Some((s, lower.defined(s)?))).collect();
         let inputs = graph.inputs.values();
         let held = graph.held.values();
         let mut program = Program {
             name: graph.name.clone(),
-            states: states.map(|(s, rate)| State { name: s.name.clone(), rate, unit: s.unit.clone() }).collect(),
+            states,
+            implicit,
+            variables,
+            tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
             conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
             inputs: inputs
                 .map(|i| Input { name: i.name.clone(), default: lower.value(i.default), unit: i.unit.clone() })
@@ -227,6 +244,25 @@ impl Schedule<'_> {
         find_causes(&mut program, &self.kinks);
         program
     }
+}
+
+/// What the equations are, where they are no explicit rates.
+fn implicit(lower: &Lowering, equations: &Equations) -> Option<Implicit> {
+    if equations.residuals.is_empty() {
+        return None;
+    }
+    let algebraic = equations.algebraic.iter().map(|_| false);
+    let free = equations.states.iter().zip(0u32..).filter(|(s, _)| equations.is_free(s));
+    let carried = free.filter_map(|(_, i)| {
+        let bond = equations.carried(i as usize)?;
+        Some((i, bond, lower.defined(bond)?))
+    });
+    Some(Implicit {
+        explicit: equations.states.iter().map(|s| !equations.is_free(s)).chain(algebraic.clone()).collect(),
+        differential: equations.states.iter().map(|_| true).chain(algebraic).collect(),
+        indices: equations.indices.clone(),
+        carried: carried.collect(),
+    })
 }
 
 fn names(graph: &BondGraph, elements: &[ElementId]) -> String {

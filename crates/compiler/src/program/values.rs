@@ -22,6 +22,8 @@ pub enum Op {
     Conserved(u32),
     /// A state, by index.
     State(u32),
+    /// The rate of a state that no value gives, by index of the state.
+    Rate(u32),
     /// An unknown of a Newton block while it is solved.
     Guess(BlockId, u32),
     /// An unknown of a solve block once it is solved.
@@ -69,7 +71,7 @@ impl Op {
     pub fn for_each_operand(self, mut visit: impl FnMut(Value)) {
         match self {
             Op::Constant(_) | Op::Parameter(_) | Op::Time | Op::Input(_) | Op::Held(_) => {}
-            Op::Conserved(_) | Op::State(_) | Op::Guess(..) | Op::Solution(..) => {}
+            Op::Conserved(_) | Op::State(_) | Op::Rate(_) | Op::Guess(..) | Op::Solution(..) => {}
             Op::Neg(a) | Op::Powi(a, _) | Op::Call(_, a) | Op::Positive(a) | Op::Not(a) => visit(a),
             Op::Side(_, a) | Op::Floor(_, a) | Op::Table(_, _, a) | Op::TableSlope(_, _, a) => visit(a),
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::Pow(a, b) => {
@@ -99,6 +101,7 @@ impl Op {
                 | Op::Held(_)
                 | Op::Conserved(_)
                 | Op::State(_)
+                | Op::Rate(_)
         )
     }
 }

@@ -4,6 +4,7 @@ mod clock;
 mod equilibrium;
 mod errors;
 mod history;
+mod implicit;
 mod inputs;
 mod minimum_norm;
 mod start;
@@ -11,6 +12,7 @@ mod system;
 
 pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
+pub use implicit::ImplicitModel;
 
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;

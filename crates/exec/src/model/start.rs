@@ -303,7 +303,7 @@ impl Model {
         run.map_err(|trouble| self.failure(t, trouble))
     }
 
-    fn routine_for(&mut self, wanted: &[Value]) -> Routine {
+    pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {
         let routine = self.program.routine(&self.layout, wanted);
         self.frame.reserve(&routine);
         routine

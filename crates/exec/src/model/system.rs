@@ -135,6 +135,27 @@ impl Model {
         run.map_err(|trouble| self.failure(t, trouble))
     }
 
+    /// Derivative of rates and residuals along a direction of the free rates, at what was placed last.
+    pub(super) fn tangent_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, y);
+        self.still();
+        self.along(t, self.layout.rates, v, jv)
+    }
+
+    /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
+    fn along(&mut self, t: f64, first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+        self.frame.d[first as usize..][..v.len()].copy_from_slice(v);
+        self.evaluate(What::Rates, true, t)?;
+        for (state, (jv, &register)) in jv.iter_mut().zip(&self.rates.outputs).enumerate() {
+            *jv = self.frame.d[register as usize];
+            if !jv.is_finite() {
+                let what = format!("the derivative of the rate of {}", self.state_name(state));
+                return Err(Failure::NotFinite { time: t, what });
+            }
+        }
+        Ok(())
+    }
+
     fn has_delays(&self) -> bool {
         self.held.iter().any(|h| matches!(h, Held::Delay(_)))
     }
@@ -176,16 +197,7 @@ impl System for Model {
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
-        self.frame.d[self.layout.states as usize..][..v.len()].copy_from_slice(v);
-        self.evaluate(What::Rates, true, t)?;
-        for (state, (jv, &register)) in jv.iter_mut().zip(&self.rates.outputs).enumerate() {
-            *jv = self.frame.d[register as usize];
-            if !jv.is_finite() {
-                let what = format!("the derivative of the rate of {}", self.state_name(state));
-                return Err(Failure::NotFinite { time: t, what });
-            }
-        }
-        Ok(())
+        self.along(t, self.layout.states, v, jv)
     }
 
     fn sparsity(&self) -> &Sparsity {

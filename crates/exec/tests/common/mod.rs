@@ -3,7 +3,9 @@
 
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
-use halfarrow_compiler::equations::{Condition, Conserved, Equations, Form, Observed, State, StateKind, Step};
+use halfarrow_compiler::equations::{
+    BreakBound, Condition, Conserved, Count, Equations, Form, Observed, State, StateKind, Step,
+};
 use halfarrow_compiler::ids::{Map, Table};
 use halfarrow_compiler::program::schedule;
 use halfarrow_compiler::span::Span;
@@ -140,6 +142,9 @@ impl Sketch {
             form: Form::Minimal,
             graph,
             dof: self.states.len(),
+            tracked: self.states.iter().map(|s| s.symbol).collect(),
+            free_rates: Default::default(),
+            certificate: None,
             states: self.states,
             conserved: self.conserved,
             steps: self.steps,
@@ -149,7 +154,12 @@ impl Sketch {
             rows: Vec::new(),
             dependent: Vec::new(),
             meanings: Vec::new(),
+            algebraic: Vec::new(),
+            residuals: Vec::new(),
             index: 0,
+            indices: Vec::new(),
+            counts: Count { differential: 0, algebraic: 0 },
+            breaks: BreakBound::default(),
             implicit: Vec::new(),
         }
     }

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Form, StateKind, derive_equations};
 use halfarrow_compiler::program::{Unavailable, schedule};
@@ -13,6 +14,7 @@ use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Method, Options, Sink, System, simulate};
 
 use crate::exact::{self, Count, float};
+use crate::forms::check_forms;
 use crate::graph::{Graph, Kind, Modulus, Number, Random, Reading, Resisting, Signal};
 
 /// A property that a graph does not have.
@@ -24,7 +26,7 @@ pub struct Fault {
     pub details: String,
 }
 
-fn fault<T>(what: impl Into<String>, details: impl Into<String>) -> Result<T, Fault> {
+pub fn fault<T>(what: impl Into<String>, details: impl Into<String>) -> Result<T, Fault> {
     Err(Fault { what: what.into(), details: details.into() })
 }
 
@@ -48,7 +50,7 @@ impl Seen {
     }
 
     /// Refuses values above what is allowed; notes all others.
-    fn within(
+    pub fn within(
         &mut self,
         what: &'static str,
         value: f64,
@@ -65,6 +67,7 @@ impl Seen {
 
 /// A graph that has become a model.
 struct Built {
+    causal: CausalGraph,
     model: Model,
     states: usize,
     conserved: usize,
@@ -98,7 +101,7 @@ fn build(text: &str) -> Result<Outcome, Fault> {
     let states = equations.states.iter().filter(|s| s.kind != StateKind::Signal).count();
     let (conserved, dof) = (equations.conserved.len(), equations.dof);
     match Model::new(schedule(&equations)) {
-        Ok(model) => Ok(Outcome::Built(Box::new(Built { model, states, conserved, dof }))),
+        Ok(model) => Ok(Outcome::Built(Box::new(Built { causal, model, states, conserved, dof }))),
         Err(failure) => fault("model", failure.to_string()),
     }
 }
@@ -143,6 +146,9 @@ fn check_all(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
         check_polynomial(&mut built, &count, t, &x, &mut random, seen)?;
     }
     check_point(graph, &mut built.model, t, &x, seen)?;
+    if graph.has_constant_structure() {
+        check_forms(&built.causal, &built.model, t, &x, seen)?;
+    }
     check_run(graph, &mut built.model, &x, seen)?;
     seen.ran += 1;
     Ok(())

@@ -3,6 +3,7 @@
 
 mod check;
 mod exact;
+mod forms;
 mod graph;
 mod shrink;
 

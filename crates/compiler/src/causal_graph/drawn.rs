@@ -1,0 +1,263 @@
+//! The ports as the strokes draw them, neighbour by neighbour, and the ports with constraints left open: what the
+//! formulations other than the minimal one start from. Source: `method.md`, section 4.
+
+use std::collections::BTreeSet;
+
+use super::assign::wished;
+use super::ports::{Wishes, imposes_effort, solve_part};
+use super::signals::signal_graph;
+use super::strokes::{Strokes, parts};
+use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local};
+use crate::algebra::Symbol;
+use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortCausality, PortRef};
+use crate::ids::Table;
+
+/// The graph with these strokes, its ports as drawn: roles by stroke, every bond variable defined by the element that
+/// sets it. Such definitions can run in circles. Parts without a complete causality keep the ports that elimination
+/// found, with their inputs and outputs.
+pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> CausalGraph {
+    let graph = &causal.graph;
+    let mut x = graph.exprs.clone();
+    let mut ports = Ports::default();
+    let drawn = |port: PortRef| sits_at(graph, strokes, port);
+    let mut kept = BTreeSet::new();
+    for members in parts(graph) {
+        if members.iter().all(|&m| in_order(graph, &drawn, m)) && !turns_sources(causal, &members, &drawn) {
+            ports.ports.extend(local::roles(graph, &members, &drawn));
+            let (definitions, divisors) = local::definitions(&mut x, graph, &members, &drawn);
+            ports.definitions.extend(definitions);
+            ports.watched.extend(divisors);
+        } else {
+            kept.extend(members);
+        }
+    }
+    if !kept.is_empty() {
+        keep(causal, &kept, &mut ports);
+        ports.watched.extend(&causal.ports.watched);
+    }
+    ports.ports.sort_by_key(|p| p.port);
+    CausalGraph { graph: graph.with_exprs(x), strokes: strokes.clone(), ports }
+}
+
+/// Whether the stroke of its bond sits at a port; `None` without a stroke.
+fn sits_at(graph: &BondGraph, strokes: &Table<BondId, Stroke>, port: PortRef) -> Option<bool> {
+    let port = &graph.elements[port.element].ports[port.port as usize];
+    match strokes[port.bond] {
+        Stroke::Undetermined => None,
+        Stroke::To => Some(port.inward),
+        Stroke::From => Some(!port.inward),
+    }
+}
+
+/// Whether a source is drawn as if it gave the conjugate of what it imposes: then the strokes do not tell the truth.
+fn turns_sources(causal: &CausalGraph, members: &[ElementId], drawn: local::Drawn) -> bool {
+    local::roles(&causal.graph, members, drawn).iter().any(|state| {
+        let truth = causal.ports.of(state.port).map(|p| p.role);
+        matches!(truth, Some(Role::Source | Role::Redundant)) && state.role != Role::Source
+    })
+}
+
+/// Whether all bonds of an element are drawn, and a junction has one setter, a transformer hands through, a gyrator
+/// turns round.
+fn in_order(graph: &BondGraph, drawn: local::Drawn, element: ElementId) -> bool {
+    let ports = (0..graph.elements[element].ports.len() as u32).map(|port| drawn(PortRef { element, port }));
+    let Some(sits) = ports.collect::<Option<Vec<bool>>>() else { return false };
+    let here = sits.iter().filter(|here| **here).count();
+    match graph.elements[element].kind {
+        Kind::Zero => here == 1,
+        Kind::One => here + 1 == sits.len(),
+        Kind::Transformer { .. } => here == 1,
+        Kind::Gyrator { .. } => here != 1,
+        _ => true,
+    }
+}
+
+/// The ports of some elements as elimination found them, with all definitions behind them.
+fn keep(causal: &CausalGraph, members: &BTreeSet<ElementId>, ports: &mut Ports) {
+    let graph = &causal.graph;
+    let own = |p: &&PortState| members.contains(&p.port.element);
+    ports.ports.extend(causal.ports.ports.iter().filter(own).cloned());
+    let inside = |bond: BondId| members.contains(&graph.bonds[bond].from.element);
+    let bonds = graph.bonds.iter().filter(|(id, _)| inside(*id));
+    let mut work: Vec<Symbol> = bonds.flat_map(|(_, b)| [b.effort, b.flow]).collect();
+    work.extend(causal.ports.ports.iter().filter(own).map(|p| p.output));
+    for v in causal.ports.virtual_speeds.iter().filter(|v| members.contains(&v.junction)) {
+        ports.virtual_speeds.push(*v);
+        work.push(v.reaction);
+    }
+    let undetermined = causal.ports.undetermined.iter().copied();
+    let bonds: BTreeSet<Symbol> = work.iter().copied().collect();
+    ports.undetermined.extend(undetermined.filter(|s| bonds.contains(s)));
+    while let Some(symbol) = work.pop() {
+        if let Some(row) = causal.ports.definitions.get(&symbol)
+            && ports.definitions.insert(symbol, row.clone()).is_none()
+        {
+            work.extend(row.0.iter().map(|t| t.0));
+        }
+    }
+}
+
+/// The graph with its constraints taken out: zero compliances and residual sinks give an unknown and impose nothing, so
+/// that no storage depends on another because of them. Those that repeat others are dropped, with effort (or flow) zero.
+pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
+    let graph = &causal.graph;
+    let mut x = graph.exprs.clone();
+    let mut ports = Ports::default();
+    for members in parts(graph) {
+        let solved = solve_part(&mut x, graph, &members, &wishes(causal, &members));
+        ports.ports.extend(solved.ports);
+        ports.definitions.extend(solved.definitions);
+        ports.watched.extend(solved.watched);
+        ports.degenerate.extend(solved.degenerate);
+        ports.undetermined.extend(solved.undetermined);
+    }
+    ports.ports.sort_by_key(|p| p.port);
+    CausalGraph { graph: graph.with_exprs(x), strokes: causal.strokes.clone(), ports }
+}
+
+fn wishes(causal: &CausalGraph, members: &[ElementId]) -> Wishes {
+    let graph = &causal.graph;
+    let mut wishes = Wishes::default();
+    for state in causal.ports.ports.iter().filter(|p| members.binary_search(&p.port.element).is_ok()) {
+        let kind = &graph.elements[state.port.element].kind;
+        match (kind, state.role) {
+            (Kind::ZeroCompliance { .. } | Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. }, role) => {
+                let gives_effort = !matches!(kind, Kind::ResidualFlow { .. });
+                let causality = if gives_effort { PortCausality::Resistive } else { PortCausality::Conductive };
+                wishes.algebraic.insert(state.port, causality);
+                if role == Role::Redundant {
+                    wishes.dropped.insert(state.port, gives_effort);
+                } else {
+                    wishes.sources_as_laws.insert(state.port);
+                }
+            }
+            // A source that is a law to the exact causality stays one.
+            (_, Role::Algebraic(causality)) => {
+                wishes.algebraic.insert(state.port, causality);
+                if imposes_effort(graph, state.port).is_some() {
+                    wishes.sources_as_laws.insert(state.port);
+                }
+            }
+            (_, Role::Independent) => wishes.independent.push(state.port),
+            _ => {}
+        }
+    }
+    wishes
+}
+
+/// Strokes with resistors first: each in the causality that leaves the fewest break variables, then the fewest storages
+/// in derivative causality, among all resistors as written, all with flow in, all with effort in, and single changes to
+/// these. Parts that cannot be drawn so keep their strokes.
+pub fn resistors_first(causal: &CausalGraph) -> Table<BondId, Stroke> {
+    let graph = &causal.graph;
+    let mut table = causal.strokes.clone();
+    for members in parts(graph) {
+        // Where a flow circulates strokes say nothing.
+        let drawn = |port: PortRef| sits_at(graph, &causal.strokes, port);
+        if !members.iter().all(|&m| in_order(graph, &drawn, m)) {
+            continue;
+        }
+        let relaxed = Relaxed { graph, members: &members, laws: resistors(graph, &members) };
+        if let Some(strokes) = relaxed.best() {
+            for &element in &members {
+                for port in &graph.elements[element].ports {
+                    table[port.bond] = strokes[port.bond];
+                }
+            }
+        }
+    }
+    table
+}
+
+/// More resistors than this are not turned one by one.
+const TURNED_SINGLY: usize = 40;
+
+fn resistors(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
+    let laws = members.iter().filter(|&&m| matches!(graph.elements[m].kind, Kind::Resistor(_)));
+    laws.flat_map(|&element| {
+        let ports = 0..graph.elements[element].ports.len() as u32;
+        ports.map(move |port| PortRef { element, port })
+    })
+    .collect()
+}
+
+/// A part under relaxed assignment.
+struct Relaxed<'a> {
+    graph: &'a BondGraph,
+    members: &'a [ElementId],
+    laws: Vec<PortRef>,
+}
+
+/// Break variables, then storages in derivative causality.
+type Cost = (usize, usize);
+
+impl Relaxed<'_> {
+    fn best(&self) -> Option<Table<BondId, Stroke>> {
+        if self.laws.is_empty() {
+            return None;
+        }
+        let written: Vec<bool> =
+            self.laws.iter().map(|&p| wished(self.graph, p) == PortCausality::Conductive).collect();
+        let all = |here| vec![here; self.laws.len()];
+        let mut best: Option<(Cost, Vec<bool>, Table<BondId, Stroke>)> = None;
+        let consider = |choice: Vec<bool>, best: &mut Option<(Cost, Vec<bool>, Table<BondId, Stroke>)>| {
+            if let Some((cost, table)) = self.draw(&choice)
+                && best.as_ref().is_none_or(|b| cost < b.0)
+            {
+                *best = Some((cost, choice, table));
+            }
+        };
+        for choice in [written, all(true), all(false)] {
+            consider(choice, &mut best);
+        }
+        for at in 0..self.laws.len().min(TURNED_SINGLY) {
+            let Some((_, choice, _)) = &best else { break };
+            let mut turned = choice.clone();
+            turned[at] = !turned[at];
+            consider(turned, &mut best);
+        }
+        best.map(|b| b.2)
+    }
+
+    /// Sources, then resistors as chosen where they can be, then storages.
+    fn draw(&self, choice: &[bool]) -> Option<(Cost, Table<BondId, Stroke>)> {
+        let graph = self.graph;
+        let mut strokes = Strokes::new(graph);
+        let outer = self.members.iter().filter(|&&m| !graph.elements[m].kind.is_inner());
+        let ports: Vec<PortRef> = outer
+            .flat_map(|&element| {
+                (0..graph.elements[element].ports.len() as u32).map(move |port| PortRef { element, port })
+            })
+            .collect();
+        for &port in &ports {
+            if let Some(effort) = imposes_effort(graph, port) {
+                strokes.set_at(port, !effort).ok()?;
+            }
+        }
+        let either = |strokes: &mut Strokes, port: PortRef, here: bool| {
+            strokes.at(port).is_some() || strokes.set_at(port, here).is_ok() || strokes.set_at(port, !here).is_ok()
+        };
+        let laws = self.laws.iter().copied().zip(choice.iter().copied());
+        let storage = |p: &PortRef| match graph.elements[p.element].kind {
+            Kind::Inertance(_) => Some((*p, true)),
+            Kind::Compliance(_) => Some((*p, false)),
+            _ => None,
+        };
+        for (port, here) in laws.chain(ports.iter().filter_map(storage)).chain(ports.iter().map(|&p| (p, false))) {
+            if !either(&mut strokes, port, here) {
+                return None;
+            }
+        }
+        if !strokes.is_complete(self.members) {
+            strokes.complete(self.members).ok()?;
+        }
+        let table = strokes.table();
+        let drawn = |port: PortRef| strokes.at(port);
+        if !self.members.iter().all(|&m| in_order(graph, &drawn, m)) {
+            return None;
+        }
+        let derivative = local::roles(graph, self.members, &drawn).iter().filter(|p| p.role == Role::Dependent).count();
+        let breaks = break_set::count(&signal_graph(graph, &table).algebraic_successors());
+        Some(((breaks, derivative), table))
+    }
+}

@@ -1,0 +1,120 @@
+//! Loops of variables opened by the fewest break variables. Source: `method.md`, section 3.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::along::Closure;
+use super::definitions::Definitions;
+use super::{BreakBound, Cause};
+use crate::algebra::Symbol;
+use crate::bond_graph::{BondId, Meaning, PortRef};
+use crate::causal_graph::Stroke;
+use crate::causal_graph::break_set::{break_set, cyclic_components, restrict};
+use crate::causal_graph::signals::{NodeId, signal_graph};
+use crate::ids::{Id, Table};
+
+/// Opens every loop on the way to the wanted symbols: first at the break variables of the zero-order causal paths along
+/// the strokes, then, where loops run through other variables too, at a minimum set of what is left.
+pub fn open_loops(
+    d: &mut Definitions,
+    strokes: &Table<BondId, Stroke>,
+    wanted: &BTreeSet<Symbol>,
+    closed: &BTreeSet<Symbol>,
+) -> (Vec<Closure>, BreakBound) {
+    let signals = signal_graph(d.graph, strokes);
+    let set = break_set(&signals.algebraic_successors(), &signals.break_ranks());
+    let first: Vec<Symbol> = set.vertices.iter().map(|&v| NodeId::new(v).symbol(d.graph)).collect();
+    let mut bound = BreakBound::default();
+    let mut cut: BTreeSet<Symbol> = BTreeSet::new();
+    let mut planned = set.lower_bound;
+    for stage in [Some(&first), None] {
+        let web = Web::new(d, wanted, &cut, closed);
+        for component in cyclic_components(&web.successors) {
+            let members: BTreeSet<Symbol> = component.iter().map(|&v| web.symbols[v]).collect();
+            match stage {
+                Some(first) => cut.extend(first.iter().filter(|s| members.contains(s))),
+                None => {
+                    let ranks = vec![0; component.len()];
+                    let more = break_set(&restrict(&web.successors, &component), &ranks);
+                    planned += more.lower_bound;
+                    cut.extend(more.vertices.iter().map(|&v| web.symbols[component[v]]));
+                }
+            }
+        }
+    }
+    bound.number = cut.len();
+    bound.at_least = planned.min(cut.len());
+    let closures = cut.into_iter().map(|symbol| close(d, symbol)).collect();
+    (closures, bound)
+}
+
+fn close(d: &mut Definitions, symbol: Symbol) -> Closure {
+    let definition = d.of.remove(&symbol).expect("loops run through what is defined");
+    d.free.insert(symbol);
+    let residual = match definition {
+        super::definitions::Definition::Explicit(e) => {
+            let own = d.x.sym(symbol);
+            d.x.sub(own, e)
+        }
+        super::definitions::Definition::Implicit(e) => e,
+    };
+    Closure { unknown: Some((symbol, Cause::Break)), residual }
+}
+
+/// Who reads whom among the definitions on the way to what is wanted.
+struct Web {
+    symbols: Vec<Symbol>,
+    successors: Vec<Vec<u32>>,
+}
+
+impl Web {
+    /// `cut` and `closed` variables are taken as given.
+    fn new(d: &Definitions, wanted: &BTreeSet<Symbol>, cut: &BTreeSet<Symbol>, closed: &BTreeSet<Symbol>) -> Web {
+        let mut reads: BTreeMap<Symbol, BTreeSet<Symbol>> = BTreeMap::new();
+        let mut work: Vec<Symbol> = wanted.iter().copied().collect();
+        while let Some(symbol) = work.pop() {
+            let Some(definition) = d.of.get(&symbol) else { continue };
+            if reads.contains_key(&symbol) {
+                continue;
+            }
+            let read: BTreeSet<Symbol> = d.x.symbols_of(definition.expr()).into_iter().collect();
+            work.extend(&read);
+            reads.insert(symbol, read);
+        }
+        let symbols: Vec<Symbol> = reads.keys().copied().collect();
+        let open = |s: &Symbol| !cut.contains(s) && !closed.contains(s);
+        let index: BTreeMap<Symbol, u32> = symbols.iter().zip(0..).map(|(&s, i)| (s, i)).collect();
+        let heads = |s: &Symbol| reads[s].iter().filter(|r| open(r)).filter_map(|r| index.get(r).copied()).collect();
+        let successors = symbols.iter().map(|s| if open(s) { heads(s) } else { Vec::new() }).collect();
+        Web { symbols, successors }
+    }
+}
+
+/// How an unknown is named: by the element that it belongs to.
+pub fn name_of(d: &Definitions, symbol: Symbol) -> String {
+    let own = d.x.name(symbol).trim_end_matches('*').to_string();
+    let (bond, variable) = match d.meaning(symbol) {
+        Some(Meaning::Effort(bond)) => (bond, "e"),
+        Some(Meaning::Flow(bond)) => (bond, "f"),
+        _ => return own,
+    };
+    let bond = &d.graph.bonds[bond];
+    if !bond.name.is_empty() {
+        return format!("{}.{variable}", bond.name);
+    }
+    let common = |p: &PortRef| {
+        use crate::bond_graph::Kind::{One, Zero};
+        matches!((&d.graph.elements[p.element].kind, variable), (Zero, "e") | (One, "f"))
+    };
+    let outer = |p: &PortRef| !d.graph.elements[p.element].kind.is_inner();
+    let ends = [bond.from, bond.to];
+    match ends.iter().find(|p| outer(p)).or_else(|| ends.iter().find(|p| common(p))) {
+        Some(port) => {
+            let element = &d.graph.elements[port.element];
+            let name = &element.ports[port.port as usize].name;
+            let place =
+                if outer(port) && !name.is_empty() { format!("{}.{name}", element.name) } else { element.name.clone() };
+            format!("{place}.{variable}")
+        }
+        None => own,
+    }
+}

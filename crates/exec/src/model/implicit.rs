@@ -1,0 +1,550 @@
+//! Any form of a graph as a system `F(t, y, y') = 0`, with the minimal form beside it: that knows what is consistent.
+
+use super::{InputError, Model, ParameterError, RecordError, StartError};
+use crate::bytecode::Trouble;
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::program::{Implicit, Program, Routine, Value};
+use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
+
+/// Passes of Newton on states of the minimal form.
+const ITERATIONS: usize = 30;
+
+/// A form of a graph as a system in implicit form.
+///
+/// The same bytecode and the same exact derivatives serve every form: explicit ones are `y' - f(t, y)`. Consistent values
+/// come from the minimal form of the same graph, the `reference`: the forms share the variables of the graph, so that
+/// each unknown, multipliers and break variables included, is evaluated there.
+#[derive(Debug, Clone)]
+pub struct ImplicitModel {
+    form: Model,
+    reference: Model,
+    /// The state of the reference.
+    x: Vec<f64>,
+    equations: Implicit,
+    sparsity: Sparsity,
+    groups: Vec<Vec<usize>>,
+    /// States of the reference that the form can tell, and what tells them: in the form, and in the reference.
+    states: Vec<usize>,
+    seen: Routine,
+    mirrored: Routine,
+    /// Places in `states` of those that are sums of momenta, told by a speed.
+    summed: Vec<usize>,
+    /// Unknowns as the reference has them, with the routine that computes these.
+    known: Vec<usize>,
+    told: Routine,
+    /// Unknowns that it does not have, and all variables that both have: here, and there.
+    untold: Vec<usize>,
+    common: Routine,
+    common_there: Routine,
+    /// What the bonds of states with a free rate carry: in the form, and in the reference.
+    free: Vec<usize>,
+    carried: Routine,
+    carried_there: Routine,
+    /// The form is the minimal one itself: its unknowns are the states of the reference.
+    twin: bool,
+    begun: bool,
+}
+
+impl ImplicitModel {
+    /// Makes a form ready to run. `reference` is the minimal form of the same graph.
+    ///
+    /// # Errors
+    /// Equations of parameters alone that have no solution.
+    pub fn new(program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
+        let n = program.states.len();
+        let mut form = Model::new(program)?;
+        let equations = form.program.implicit.clone().unwrap_or_else(|| Implicit {
+            explicit: vec![true; n],
+            differential: vec![true; n],
+            indices: vec![1; n],
+            carried: Vec::new(),
+        });
+        let there = |s: &Symbol| reference.program.variables.get(s).copied();
+        // States of the reference that the form can tell; the others keep the value they have.
+        let mut pairs: Vec<(usize, Value, Value)> = Vec::new();
+        for (k, symbol) in reference.program.tracked.iter().enumerate() {
+            if let (Some(here), Some(value)) = (form.program.variables.get(symbol), there(symbol)) {
+                pairs.push((k, *here, value));
+            }
+        }
+        let own = |k: usize| Some(reference.layout.states + k as u32);
+        let told_by_another = |p: &(usize, Value, Value)| own(p.0) != reference.layout.registers.get(&p.2).copied();
+        let summed = (0..pairs.len()).filter(|&at| told_by_another(&pairs[at])).collect();
+        let known = |i: &usize| there(&form.program.tracked[*i]).is_some();
+        let known: Vec<usize> = (0..n).filter(known).collect();
+        let untold: Vec<usize> = (0..n).filter(|i| !known.contains(i)).collect();
+        let both = form.program.variables.iter().filter_map(|(s, v)| Some((*v, there(s)?)));
+        let (common, common_there): (Vec<Value>, Vec<Value>) = both.filter(|_| !untold.is_empty()).unzip();
+        let told: Vec<Value> = known.iter().filter_map(|&i| there(&form.program.tracked[i])).collect();
+        let carried: Vec<(usize, Value, Value)> =
+            equations.carried.iter().filter_map(|(i, s, v)| Some((*i as usize, *v, there(s)?))).collect();
+        let seen: Vec<Value> = pairs.iter().map(|p| p.1).collect();
+        let mirrored: Vec<Value> = pairs.iter().map(|p| p.2).collect();
+        let carried_here: Vec<Value> = carried.iter().map(|c| c.1).collect();
+        let carried_there: Vec<Value> = carried.iter().map(|c| c.2).collect();
+        let sparsity = sparsity_of(&form.program, &equations);
+        let names = |p: &Program| p.states.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
+        let twin = form.program.implicit.is_none()
+            && form.program.tracked == reference.program.tracked
+            && form.program.conserved == reference.program.conserved
+            && names(&form.program) == names(&reference.program);
+        let mut model = ImplicitModel {
+            seen: form.routine_for(&seen),
+            mirrored: reference.routine_for(&mirrored),
+            states: pairs.iter().map(|p| p.0).collect(),
+            summed,
+            told: reference.routine_for(&told),
+            common: form.routine_for(&common),
+            common_there: reference.routine_for(&common_there),
+            untold,
+            carried: form.routine_for(&carried_here),
+            carried_there: reference.routine_for(&carried_there),
+            free: carried.iter().map(|c| c.0).collect(),
+            x: vec![0.0; reference.program.states.len()],
+            groups: sparsity.groups(),
+            sparsity,
+            known,
+            equations,
+            form,
+            reference,
+            twin,
+            begun: false,
+        };
+        model.form.restart();
+        Ok(model)
+    }
+
+    /// The program of the form.
+    pub fn program(&self) -> &Program {
+        &self.form.program
+    }
+
+    /// The minimal form beside it.
+    pub fn reference(&self) -> &Model {
+        &self.reference
+    }
+
+    /// The minimal form beside it, to start it: [`start_at`](ImplicitModel::start_at) goes on from its state.
+    pub fn reference_mut(&mut self) -> &mut Model {
+        &mut self.reference
+    }
+
+    /// The fastest rate of the minimal form linearised at the state `x`, in 1/s: of one state by itself, or of two that
+    /// exchange energy. `None` where it has none.
+    pub fn fastest_rate(&mut self, t: f64, x: &[f64]) -> Option<f64> {
+        let n = x.len();
+        let (_, jacobian) = self.reference.at_rest(t, x).ok()?;
+        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+        let fastest =
+            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
+        (fastest > 0.0 && fastest.is_finite()).then_some(fastest)
+    }
+
+    /// The form alone, as it stands. A form with explicit equations is a [`System`]; others are not.
+    pub fn into_form(self) -> Model {
+        self.form
+    }
+
+    /// As [`Model::set_parameter`], for both forms. A parameter that only the form has is set there.
+    ///
+    /// # Errors
+    /// As [`Model::set_parameter`].
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        self.begun = false;
+        match self.reference.set_parameter(name, value) {
+            Ok(()) | Err(ParameterError::Unknown(_)) => self.form.set_parameter(name, value),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// As [`Model::set_parameter`], for a parameter that the form alone has; the minimal form keeps its state.
+    ///
+    /// # Errors
+    /// As [`Model::set_parameter`].
+    pub fn set_form_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        self.begun = false;
+        self.form.set_parameter(name, value)
+    }
+
+    /// The present value of a parameter of the form, by its number.
+    pub fn parameter(&self, index: usize) -> Option<f64> {
+        let name = &self.form.program.parameters.get(index)?.name;
+        self.form.parameter(name)
+    }
+
+    /// As [`Model::connect`], for both forms.
+    ///
+    /// # Errors
+    /// As [`Model::connect`].
+    pub fn connect(&mut self, input: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
+        self.begun = false;
+        self.reference.connect(input, times, values)?;
+        self.form.connect(input, times, values)
+    }
+
+    /// As [`Model::record`].
+    ///
+    /// # Errors
+    /// As [`Model::record`].
+    pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
+        self.form.record(names)
+    }
+
+    /// As [`Model::record_all`].
+    pub fn record_all(&mut self) {
+        self.form.record_all();
+    }
+
+    /// Indices into [`Program::observed`] of what is recorded.
+    pub fn recorded(&self) -> &[usize] {
+        self.form.recorded()
+    }
+
+    /// Unknowns and their rates at the start of a run at `t`, those of the minimal form. Unknowns that it does not know (a
+    /// reaction to an input whose rate nobody gives) are 0.
+    ///
+    /// # Errors
+    /// As [`Model::initialise`].
+    pub fn initialise(&mut self, t: f64) -> Result<(Vec<f64>, Vec<f64>), StartError> {
+        let x = self.reference.initialise(t)?;
+        self.start_at(t, &x).map_err(StartError::Failure)
+    }
+
+    /// Unknowns and their rates where the minimal form has the state `x` at the start of a run.
+    ///
+    /// # Errors
+    /// As [`Model::rates`](System::rates).
+    pub fn start_at(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        self.form.restart();
+        self.begun = false;
+        self.x.copy_from_slice(x);
+        let n = self.unknowns();
+        let (mut y, mut yp) = (vec![0.0; n], vec![0.0; n]);
+        if self.twin {
+            self.form.conserved.copy_from_slice(&self.reference.conserved);
+        }
+        self.reference.cross_jump(t, &mut self.x)?;
+        self.take_over(t, &mut y)?;
+        self.form.cross_jump(t, &mut y)?;
+        self.take_rates(t, &y, &mut yp)?;
+        self.form.scales = y.iter().map(|y| y.abs()).collect();
+        let tracked = &self.reference.program.tracked;
+        for (i, symbol) in self.form.program.tracked.iter().enumerate() {
+            if let Some(k) = tracked.iter().position(|s| s == symbol) {
+                self.form.scales[i] = self.reference.scales[k].max(self.form.scales[i]);
+            }
+        }
+        self.begun = true;
+        Ok((y, yp))
+    }
+
+    /// Unknowns and their rates where the minimal form has the state `x`, in the present mode of both.
+    ///
+    /// # Errors
+    /// As [`Model::rates`](System::rates).
+    pub fn at(&mut self, t: f64, x: &[f64], y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        self.x.copy_from_slice(x);
+        self.take_over(t, y)?;
+        self.take_rates(t, y, yp)
+    }
+
+    /// Unknowns from the state of the reference.
+    fn take_over(&mut self, t: f64, y: &mut [f64]) -> Result<(), Failure> {
+        if self.twin {
+            y.copy_from_slice(&self.x);
+            return Ok(());
+        }
+        let ImplicitModel { reference, told, x, known, .. } = self;
+        reference.place(t, x);
+        reference.frame.run(told).map_err(|trouble| reference.failure(t, trouble))?;
+        for (&i, &register) in known.iter().zip(&told.outputs) {
+            let value = reference.frame.r[register as usize];
+            if value.is_finite() {
+                y[i] = value;
+            }
+        }
+        if self.untold.is_empty() { Ok(()) } else { self.infer(t, y) }
+    }
+
+    /// Unknowns that the reference does not have, such as one of two reactions of which it knows the sum: the least that
+    /// makes all other variables right. What they carry is linear in them.
+    fn infer(&mut self, t: f64, y: &mut [f64]) -> Result<(), Failure> {
+        let ImplicitModel { reference, common_there, x, .. } = self;
+        reference.place(t, x);
+        reference.frame.run(common_there).map_err(|trouble| reference.failure(t, trouble))?;
+        let wanted: Vec<f64> = common_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
+        let (rows, columns) = (wanted.len(), self.untold.len());
+        let (mut matrix, mut miss) = (vec![0.0; rows * columns], vec![0.0; rows]);
+        let still = vec![0.0; y.len()];
+        self.untold.iter().for_each(|&i| y[i] = 0.0);
+        for column in 0..columns {
+            self.place(t, y, &still);
+            self.form.still();
+            self.form.frame.d[self.form.layout.states as usize + self.untold[column]] = 1.0;
+            self.form.frame.run_along(&self.common).map_err(|trouble| self.form.failure(t, trouble))?;
+            for (row, &register) in self.common.outputs.iter().enumerate() {
+                matrix[row * columns + column] = self.form.frame.d[register as usize];
+                miss[row] = self.form.frame.r[register as usize] - wanted[row];
+            }
+        }
+        // What does not read them says nothing about them.
+        for row in 0..rows {
+            let slopes = &mut matrix[row * columns..][..columns];
+            let good = miss[row].is_finite() && slopes.iter().all(|s| s.is_finite());
+            if !good || slopes.iter().all(|s| *s == 0.0) {
+                slopes.fill(0.0);
+                miss[row] = 0.0;
+            }
+        }
+        if let Some(step) = super::minimum_norm::step(&matrix, &miss, columns) {
+            self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] = *s);
+        }
+        Ok(())
+    }
+
+    /// Free rates from what the bonds carry in the reference, then the explicit ones.
+    fn take_rates(&mut self, t: f64, y: &[f64], yp: &mut [f64]) -> Result<(), Failure> {
+        yp.fill(0.0);
+        let free = self.free.len();
+        if free > 0 {
+            let ImplicitModel { reference, carried_there, x, .. } = self;
+            reference.place(t, x);
+            reference.frame.run(carried_there).map_err(|trouble| reference.failure(t, trouble))?;
+            let wanted: Vec<f64> = carried_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
+            // What a bond carries is linear in the rates: one step of Newton.
+            let mut matrix = vec![0.0; free * free];
+            let mut right = wanted;
+            for column in 0..free {
+                self.place(t, y, yp);
+                self.form.still();
+                self.form.frame.d[self.form.layout.rates as usize + self.free[column]] = 1.0;
+                let run = self.form.frame.run_along(&self.carried);
+                run.map_err(|trouble: Trouble| self.form.failure(t, trouble))?;
+                for (row, &register) in self.carried.outputs.iter().enumerate() {
+                    matrix[row * free + column] = self.form.frame.d[register as usize];
+                    if column == 0 {
+                        right[row] -= self.form.frame.r[register as usize];
+                    }
+                }
+            }
+            if let Some(step) = super::minimum_norm::step(&matrix, &right, free) {
+                self.free.iter().zip(&step.step).for_each(|(&i, s)| yp[i] = -s);
+            }
+        }
+        let mut out = vec![0.0; y.len()];
+        self.run_rates(t, y, yp, &mut out)?;
+        for (i, value) in out.into_iter().enumerate() {
+            if self.equations.explicit[i] {
+                yp[i] = value;
+            }
+        }
+        Ok(())
+    }
+
+    /// The state of the reference from the unknowns, both in the mode that ends here.
+    fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
+        self.place(t, y, yp);
+        self.form.frame.run(&self.seen).map_err(|trouble| self.form.failure(t, trouble))?;
+        let seen: Vec<f64> = self.seen.outputs.iter().map(|&r| self.form.frame.r[r as usize]).collect();
+        for (at, &k) in self.states.iter().enumerate() {
+            if !self.summed.contains(&at) {
+                self.x[k] = seen[at];
+            }
+        }
+        if self.summed.is_empty() {
+            return Ok(());
+        }
+        let n = self.summed.len();
+        let mut left = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let mut matrix = vec![0.0; n * n];
+            let mut right = vec![0.0; n];
+            let ImplicitModel { reference, mirrored, summed, states, x, .. } = self;
+            for column in 0..n {
+                reference.place(t, x);
+                reference.still();
+                reference.frame.d[reference.layout.states as usize + states[summed[column]]] = 1.0;
+                reference.frame.run_along(mirrored).map_err(|trouble| reference.failure(t, trouble))?;
+                for (row, &at) in summed.iter().enumerate() {
+                    let register = mirrored.outputs[at] as usize;
+                    matrix[row * n + column] = reference.frame.d[register];
+                    right[row] = reference.frame.r[register] - seen[at];
+                }
+            }
+            left = right.iter().fold(0.0f64, |most, r| most.max(r.abs()));
+            let Some(step) = super::minimum_norm::step(&matrix, &right, n) else { break };
+            let moves = |(&at, s): (&usize, &f64)| s.abs() > 4.0 * f64::EPSILON * x[states[at]].abs();
+            let moved = summed.iter().zip(&step.step).any(moves);
+            summed.iter().zip(&step.step).for_each(|(&at, s)| x[states[at]] += s);
+            if !moved || left == 0.0 {
+                return Ok(());
+            }
+        }
+        let size = seen.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        if left <= 1e-9 * size {
+            return Ok(());
+        }
+        let what = "the momenta of dependent storages".to_string();
+        Err(Failure::NoConvergence { time: t, what, iterations: ITERATIONS, residual: left })
+    }
+
+    fn place(&mut self, t: f64, y: &[f64], yp: &[f64]) {
+        self.form.place(t, y);
+        self.place_rates(yp);
+    }
+
+    fn place_rates(&mut self, yp: &[f64]) {
+        if self.form.program.implicit.is_some() {
+            let rates = self.form.layout.rates as usize;
+            self.form.frame.r[rates..rates + yp.len()].copy_from_slice(yp);
+        }
+    }
+
+    /// Rates and residuals.
+    fn run_rates(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.place_rates(yp);
+        self.form.rates(t, y, out)
+    }
+}
+
+/// Where derivatives by unknowns or their rates may be nonzero.
+fn sparsity_of(program: &Program, equations: &Implicit) -> Sparsity {
+    let mut columns = vec![Vec::new(); program.states.len()];
+    for (row, reads) in program.dependence.iter().enumerate() {
+        reads.iter().for_each(|&column| columns[column as usize].push(row));
+        if equations.explicit[row] {
+            columns[row].push(row);
+        }
+    }
+    Sparsity::from_columns(columns)
+}
+
+impl ImplicitSystem for ImplicitModel {
+    fn unknowns(&self) -> usize {
+        self.form.program.states.len()
+    }
+
+    fn unknown_name(&self, unknown: usize) -> String {
+        self.form.program.states[unknown].name.clone()
+    }
+
+    fn equation_name(&self, equation: usize) -> String {
+        let name = &self.form.program.states[equation].name;
+        if self.equations.explicit[equation] {
+            format!("the rate of {name}")
+        } else {
+            format!("the equation of {name}")
+        }
+    }
+
+    fn switch_name(&self, switch: usize) -> String {
+        self.form.switch_name(switch)
+    }
+
+    fn observed_name(&self, value: usize) -> String {
+        System::observed_name(&self.form, value)
+    }
+
+    fn scales(&self) -> &[f64] {
+        System::scales(&self.form)
+    }
+
+    fn index(&self, unknown: usize) -> u8 {
+        self.equations.indices[unknown].clamp(1, 3)
+    }
+
+    fn residual(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.run_rates(t, y, yp, out)?;
+        for (i, out) in out.iter_mut().enumerate() {
+            if self.equations.explicit[i] {
+                *out = yp[i] - *out;
+            }
+        }
+        Ok(())
+    }
+
+    fn sparsity(&self) -> &Sparsity {
+        &self.sparsity
+    }
+
+    fn jacobian(&mut self, t: f64, y: &[f64], yp: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
+        let n = y.len();
+        let (mut along, mut product) = (vec![0.0; n], vec![0.0; n]);
+        self.place_rates(yp);
+        for group in &self.groups {
+            along.fill(0.0);
+            group.iter().for_each(|&column| along[column] = 1.0);
+            self.form.tangent(t, y, &along, &mut product)?;
+            for &column in group {
+                for (place, &row) in self.sparsity.places(column).zip(self.sparsity.column(column)) {
+                    let explicit = self.equations.explicit[row];
+                    dy[place] = if explicit { -product[row] } else { product[row] };
+                    dyp[place] = f64::from(u8::from(explicit && row == column));
+                }
+            }
+            let free = |c: &&usize| self.equations.differential[**c] && !self.equations.explicit[**c];
+            if group.iter().any(|c| free(&c)) {
+                along.iter_mut().enumerate().for_each(|(c, a)| *a = if free(&&c) { *a } else { 0.0 });
+                self.form.tangent_by_rates(t, y, &along, &mut product)?;
+                for &column in group.iter().filter(free) {
+                    for (place, &row) in self.sparsity.places(column).zip(self.sparsity.column(column)) {
+                        let explicit = self.equations.explicit[row];
+                        dyp[place] += if explicit { -product[row] } else { product[row] };
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn semi_explicit(&self) -> Option<&[bool]> {
+        let free = |(explicit, differential): (&bool, &bool)| *differential && !explicit;
+        let none = !self.equations.explicit.iter().zip(&self.equations.differential).any(free);
+        none.then_some(&self.equations.explicit[..])
+    }
+
+    fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.place_rates(yp);
+        self.form.observe(t, y, out)
+    }
+
+    fn observed(&self) -> usize {
+        System::observed(&self.form)
+    }
+
+    fn next_jump(&mut self, t: f64) -> Option<f64> {
+        self.form.next_jump(t)
+    }
+
+    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        let implicit = self.form.program.implicit.is_some();
+        if !self.begun || !implicit {
+            self.begun = true;
+            self.place_rates(yp);
+            self.form.cross_jump(t, y)?;
+            if !implicit {
+                return self.take_rates(t, y, yp);
+            }
+        } else {
+            self.follow_back(t, y, yp)?;
+            self.form.cross_jump(t, y)?;
+        }
+        self.reference.cross_jump(t, &mut self.x)?;
+        self.take_over(t, y)?;
+        self.take_rates(t, y, yp)
+    }
+
+    fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
+        self.place_rates(yp);
+        self.form.accept(t, y)
+    }
+
+    fn switches(&self) -> usize {
+        System::switches(&self.form)
+    }
+
+    fn switch_values(&mut self, t: f64, y: &[f64], yp: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.place_rates(yp);
+        self.form.switch_values(t, y, g)
+    }
+}
