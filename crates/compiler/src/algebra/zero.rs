@@ -1,6 +1,7 @@
 //! Whether an expression is zero whatever its symbols are.
 
 use super::exprs::Exprs;
+use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::Expr;
 use super::precise::{Point, Verdict};
@@ -25,6 +26,18 @@ impl Exprs {
     /// Whether the expression is zero at the given parameters, for all values of what is not given.
     pub fn is_zero_given(&self, e: Expr) -> bool {
         self.is_zero_in(e, true)
+    }
+
+    /// Whether a square matrix is known to have a determinant that is not zero at the given parameters: by its values at
+    /// random points of a prime field, where these are beyond doubt. Dividing symbolically takes a time that grows
+    /// exponentially with its size.
+    pub fn is_regular_given(&self, matrix: &[Vec<Expr>]) -> bool {
+        let sure = |e: &Expr| !self.entry(*e).properties.opaque[1];
+        matrix.iter().flatten().all(sure)
+            && GIVEN.into_iter().any(|lane| {
+                let values = matrix.iter().map(|row| row.iter().map(|&e| self.fingerprint(e)[lane]).collect());
+                is_regular(values.collect())
+            })
     }
 
     fn is_zero_in(&self, e: Expr, given: bool) -> bool {
@@ -64,4 +77,24 @@ impl Exprs {
         }
         false
     }
+}
+
+/// Whether a square matrix over the prime field is regular; `false` if an entry is undefined.
+fn is_regular(mut rows: Vec<Vec<u64>>) -> bool {
+    if rows.iter().flatten().any(|&v| v == POISON) {
+        return false;
+    }
+    for column in 0..rows.len() {
+        let Some(pivot) = (column..rows.len()).find(|&r| rows[r][column] != 0) else { return false };
+        rows.swap(column, pivot);
+        let Some(inverse) = field::inverse(rows[column][column]) else { return false };
+        let (above, below) = rows.split_at_mut(column + 1);
+        for row in below {
+            let factor = field::mul(row[column], inverse);
+            for (entry, &own) in row.iter_mut().zip(&above[column]).skip(column) {
+                *entry = field::sub(*entry, field::mul(factor, own));
+            }
+        }
+    }
+    true
 }

@@ -194,6 +194,9 @@ pub fn is_singular(x: &mut Exprs, matrix: &[Vec<Expr>]) -> bool {
     if matrix.len() > 8 {
         return false; // left to the pivots of the run
     }
+    if x.is_regular_given(matrix) {
+        return false;
+    }
     let entries = |row: &Vec<Expr>| row.iter().copied().enumerate().filter(|(_, e)| !x.is_zero_given(*e)).collect();
     let rows: Vec<SparseRow> = matrix.iter().map(entries).map(SparseRow).collect();
     rank_given(x, matrix.len(), rows) < matrix.len()

@@ -82,3 +82,17 @@ fn zero_at_the_given_parameters_only() {
     let inside = read(&mut x, "if a > b then q else 0");
     assert!(!x.is_zero(inside));
 }
+
+#[test]
+fn regular_matrices_are_told_from_singular_ones_and_doubtful_ones() {
+    let mut x = Exprs::default();
+    let mut matrix = |rows: [[&str; 2]; 2]| -> Vec<Vec<Expr>> {
+        rows.iter().map(|row| row.iter().map(|text| read(&mut x, text)).collect()).collect()
+    };
+    let regular = matrix([["m + j*cos(a)^2", "j*cos(a)"], ["j*cos(a)", "j"]]);
+    let singular = matrix([["j*cos(a)^2", "j*cos(a)"], ["j*cos(a)", "j"]]);
+    let doubtful = matrix([["log(a*b)", "1"], ["log(a) + log(b)", "1"]]);
+    assert!(x.is_regular_given(&regular));
+    assert!(!x.is_regular_given(&singular));
+    assert!(!x.is_regular_given(&doubtful));
+}
