@@ -135,7 +135,7 @@ fn loops_tell_class_gain_and_breaks() {
 #[test]
 fn equations_read_as_in_a_textbook() {
     let text = halfarrow(Path::new("."), &["equations", &model("pendulum")]);
-    assert_eq!(stdout(&text), "(J + M a²) ω' = -M a g cos φ\nφ' = ω\n");
+    assert_eq!(stdout(&text), "(J + M a²) ω' = -M g a cos φ\nφ' = ω\n");
     let report = json(&halfarrow(Path::new("."), &["equations", &model("pendulum"), "--json"]));
     assert_eq!((report["form"].as_str(), report["index"].as_u64()), (Some("minimal"), Some(0)));
     assert_eq!(report["counts"], serde_json::json!({"differential": 1, "algebraic": 0}));

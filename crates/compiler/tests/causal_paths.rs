@@ -189,7 +189,7 @@ paths
 
 components
   4 signals, broken at b2.e
-    determinant R1/R2 + 1
+    determinant 1 + R1/R2
 ";
     assert_eq!(find_paths(&causal).text(&causal), expected);
 }

@@ -2,7 +2,7 @@
 
 use halfarrow_compiler::equations::{
     Algebraic, Cause, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_expr, print_form,
-    print_symbol, show,
+    print_meanings, print_symbol, show,
 };
 use serde::Serialize;
 
@@ -35,8 +35,11 @@ pub struct EquationsReport {
     pub meanings: Vec<String>,
     /// Quantities that stay at their start value, in the model language.
     pub conserved: Vec<String>,
-    /// `meanings` and `conserved` in Unicode, for people.
+    /// What the names in `text` stand for, in Unicode: sources that vary in time, states that are no variable of an
+    /// element, conserved quantities.
     pub legend: Vec<String>,
+    /// The same for `latex`.
+    pub latex_legend: Vec<String>,
     /// Form `inverted`: which storage was inverted for which path, and why no other, a line each.
     pub certificate: Vec<String>,
     /// Differentiation index of what is left; 0 for explicit ordinary differential equations.
@@ -110,7 +113,8 @@ impl Model {
             latex: print(&shown, Style::Latex),
             meanings: meanings(&shown, Style::Ascii),
             conserved: conserved(&shown, Style::Ascii),
-            legend: [meanings(&shown, Style::Unicode), conserved(&shown, Style::Unicode)].concat(),
+            legend: print_meanings(&shown, Style::Unicode),
+            latex_legend: print_meanings(&shown, Style::Latex),
             certificate: print_certificate(&shown),
             index: equations.index,
             counts: form_count(equations),

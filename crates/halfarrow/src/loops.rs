@@ -280,7 +280,7 @@ impl Names for OneName<'_> {
     fn ascii(&self, symbol: Symbol) -> String {
         self.0.name(symbol).trim_end_matches('*').to_string()
     }
-    fn place(&self, symbol: Symbol) -> (u8, u32) {
+    fn place(&self, symbol: Symbol) -> halfarrow_compiler::algebra::Place {
         PlainNames(self.0).place(symbol)
     }
 }

@@ -172,6 +172,14 @@ fn equations_text(report: &EquationsReport) -> String {
 }
 
 fn latex_text(report: &EquationsReport) -> String {
-    let lines: Vec<String> = report.latex.iter().map(|line| format!("  {}", line.replacen(" = ", " &= ", 1))).collect();
-    format!("\\begin{{align}}\n{}\n\\end{{align}}\n", lines.join(" \\\\\n"))
+    let mut text = aligned("align", &report.latex);
+    if !report.latex_legend.is_empty() {
+        text += &format!("where\n{}", aligned("align*", &report.latex_legend));
+    }
+    text
+}
+
+fn aligned(environment: &str, lines: &[String]) -> String {
+    let lines: Vec<String> = lines.iter().map(|line| format!("  {}", line.replacen(" = ", " &= ", 1))).collect();
+    format!("\\begin{{{environment}}}\n{}\n\\end{{{environment}}}\n", lines.join(" \\\\\n"))
 }

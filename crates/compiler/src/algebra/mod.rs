@@ -9,6 +9,7 @@ mod cost;
 mod elimination;
 mod evaluate;
 mod exprs;
+mod factor;
 mod field;
 mod fingerprint;
 mod functions;
@@ -25,6 +26,7 @@ mod simplify;
 mod symbol_sets;
 mod table;
 mod text;
+mod together;
 mod zero;
 
 pub use cost::Cost;
@@ -36,7 +38,7 @@ pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;
 pub use symbol_sets::Symbols;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
-pub use text::{Names, PlainNames, ascii, latex, latex_name, unicode, unicode_name};
+pub use text::{Names, Place, PlainNames, Sort, ascii, latex, latex_name, unicode, unicode_name};
 
 #[cfg(test)]
 mod tests;

@@ -39,7 +39,7 @@ impl Polynomial {
         Polynomial(BTreeMap::from([(Vec::new(), value)]))
     }
 
-    fn generator(index: usize, exponent: i64) -> Self {
+    pub fn generator(index: usize, exponent: i64) -> Self {
         let mut monomial = vec![0; index];
         monomial.push(exponent);
         Polynomial(BTreeMap::from([(monomial, Rational::from(1))]))
@@ -135,7 +135,7 @@ pub(super) fn times(a: &[i64], b: &[i64]) -> Monomial {
     trimmed((0..a.len().max(b.len())).map(|i| at(a, i) + at(b, i)).collect())
 }
 
-fn quotient_of(a: &[i64], b: &[i64]) -> Option<Monomial> {
+pub(super) fn quotient_of(a: &[i64], b: &[i64]) -> Option<Monomial> {
     let inverse: Monomial = b.iter().map(|n| -n).collect();
     Some(times(a, &inverse)).filter(|q| q.iter().all(|&n| n >= 0))
 }

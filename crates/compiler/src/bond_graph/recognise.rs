@@ -49,7 +49,9 @@ impl Builder<'_, '_> {
         let x = self.exprs.sym(stored);
         match (start, own) {
             (Some(start), Some(own)) => {
+                // What cancels has a value wherever the start values have one.
                 let offset = self.exprs.sub(start, own);
+                let offset = self.exprs.without_settled_terms(offset);
                 Some(self.exprs.add(&[x, offset]))
             }
             (None, None) if !other => Some(x),

@@ -26,7 +26,8 @@ pub(super) fn determinant(
     }
     let matrix = break_matrix(signals, component, breaks, exprs);
     let determinant = expand(&matrix, 0, &mut (0..breaks.len()).collect(), exprs);
-    Some(exprs.simplify(determinant))
+    let determinant = exprs.simplify(determinant);
+    Some(exprs.textbook(determinant))
 }
 
 /// `1 - G`: entry `[i][j]` is what break variable `i` gets from break variable `j`, subtracted from the unit matrix.

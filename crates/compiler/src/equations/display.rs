@@ -22,7 +22,7 @@ pub struct Shown {
     pub display: Vec<DisplayEquation>,
     /// Each dependent storage with its co-energy variable as a combination of independent ones: its row of `S`.
     pub dependent: Vec<Dependent>,
-    /// Sources that stand in `display` by name, with their values.
+    /// Sources, and states with a constant, that stand in `display` by name, with their values.
     pub sources: Vec<(Symbol, Expr)>,
     /// Names that outputs or `let`s give to states.
     pub aliases: BTreeMap<Symbol, String>,
@@ -55,13 +55,52 @@ pub fn show(mut equations: Equations) -> Shown {
     d.of = std::mem::take(&mut equations.definitions);
     d.free.extend(equations.free_rates.iter().chain(equations.algebraic.iter().map(|a| &a.symbol)));
     let ordered = Ordered { steps: std::mem::take(&mut equations.steps), rows: std::mem::take(&mut equations.rows) };
+    let Page { display, dependent, sources, aliases } = page(&mut d, &equations, &ordered);
+    let Definitions { x, of, .. } = d;
+    equations.graph.exprs = x;
+    equations.definitions = of;
+    Ordered { steps: equations.steps, rows: equations.rows } = ordered;
+    Shown { equations, display, dependent, sources, aliases }
+}
+
+/// What is printed; see [`Shown`].
+struct Page {
+    display: Vec<DisplayEquation>,
+    dependent: Vec<Dependent>,
+    sources: Vec<(Symbol, Expr)>,
+    aliases: BTreeMap<Symbol, String>,
+}
+
+/// The shorter page: in the states alone, or with names that the modeller gave to a state and a constant.
+fn page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
+    let plain = page_with(d, equations, ordered, &BTreeMap::new());
+    let explicit = ordered.steps.len() <= SMALL && equations.residuals.is_empty();
+    let names = if explicit { shifted_states(d, &equations.states) } else { Vec::new() };
+    if names.is_empty() {
+        return plain;
+    }
+    let shifts = names.iter().map(|n| (n.state, n.by_name)).collect();
+    let mut by_name = page_with(d, equations, ordered, &shifts);
+    by_name.sources.extend(names.iter().map(|n| (n.name, n.value)));
+    for (equation, plain) in by_name.display.iter_mut().zip(&plain.display) {
+        equation.closed = plain.closed;
+    }
+    if length(d, &by_name) < length(d, &plain) { by_name } else { plain }
+}
+
+/// The page with these expressions in place of states.
+fn page_with(d: &mut Definitions, equations: &Equations, ordered: &Ordered, shifts: &BTreeMap<Symbol, Expr>) -> Page {
     let states = &equations.states;
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
-    let named = named_sources(&d);
+    let named = named_sources(d);
     let small = ordered.steps.len() <= SMALL;
-    let known = if small { expansions(&mut d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
-    let aliases = aliases(&mut d, states, &known);
-    let mut display = self::equations(&mut d, states, &ordered, &known);
+    let mut known = if small { expansions(d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
+    let aliases = aliases(d, states, &known);
+    if !shifts.is_empty() {
+        known.values_mut().for_each(|value| *value = d.x.substitute(*value, shifts));
+        known.extend(shifts);
+    }
+    let mut display = self::equations(d, states, ordered, &known);
     let mut unknown: Vec<Symbol> = states.iter().map(|s| s.rate).collect();
     unknown.extend(equations.algebraic.iter().map(|a| a.symbol));
     for &residual in &equations.residuals {
@@ -77,17 +116,49 @@ pub fn show(mut equations: Equations) -> Shown {
     let mut dependent = Vec::with_capacity(equations.dependent.len());
     for &variable in &equations.dependent {
         if let Some(row) = d.of.get(&variable).map(|f| f.expr()) {
-            let value = put_in(&mut d.x, row, &known);
+            let value = put_in_shown(&mut d.x, row, &known);
             read.extend(d.x.symbols_of(value));
             dependent.push(Dependent { variable, value });
         }
     }
     let sources = named.into_iter().filter(|(s, _)| read.contains(s)).collect();
-    let Definitions { x, of, .. } = d;
-    equations.graph.exprs = x;
-    equations.definitions = of;
-    Ordered { steps: equations.steps, rows: equations.rows } = ordered;
-    Shown { equations, display, dependent, sources, aliases }
+    Page { display, dependent, sources, aliases }
+}
+
+/// How long it all is in print.
+fn length(d: &Definitions, shown: &Page) -> u64 {
+    let sides = shown.display.iter().flat_map(|e| [e.left, e.right]);
+    let values = shown.sources.iter().map(|s| s.1).chain(shown.dependent.iter().map(|s| s.value));
+    sides.chain(values).map(|e| d.x.printed_length(e)).sum()
+}
+
+/// A name that the modeller gave to a state and a constant.
+struct Shifted {
+    name: Symbol,
+    value: Expr,
+    state: Symbol,
+    /// The state by that name.
+    by_name: Expr,
+}
+
+/// `let`s and outputs that are a state and a constant: `x = spring.q + rest`.
+fn shifted_states(d: &mut Definitions, states: &[State]) -> Vec<Shifted> {
+    let mut found: Vec<Shifted> = Vec::new();
+    let graph = d.graph;
+    for named in graph.lets.iter().chain(&graph.outputs) {
+        let symbols = d.x.symbols_of(named.value);
+        let Some(&state) = symbols.iter().find(|s| states.iter().any(|state| state.symbol == **s)) else { continue };
+        let own = d.x.sym(state);
+        let constant = d.x.sub(named.value, own);
+        let fresh = d.x.find_symbol(&named.name).is_none_or(|s| d.meaning(s).is_none());
+        if d.is_constant(constant) && !d.x.is_zero(constant) && fresh && found.iter().all(|f| f.state != state) {
+            let name = d.x.symbol(&named.name, Default::default());
+            let by_name = d.x.sym(name);
+            let by_name = d.x.sub(by_name, constant);
+            found.push(Shifted { name, value: named.value, state, by_name });
+        }
+    }
+    found
 }
 
 /// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.
@@ -144,7 +215,7 @@ fn equations(
             None => {
                 let left = d.x.sym(state.rate);
                 let value = d.of.get(&state.rate).map(|f| f.expr()).unwrap_or(left);
-                let right = put_in(&mut d.x, value, known);
+                let right = put_in_shown(&mut d.x, value, known);
                 equation(left, right)
             }
         };
@@ -157,7 +228,7 @@ fn equations(
                 let inner = super::blocks::substituted(&mut d.x, body, residuals);
                 let zero = d.x.int(0);
                 for residual in inner {
-                    let left = put_in(&mut d.x, residual, known);
+                    let left = put_in_shown(&mut d.x, residual, known);
                     implicit.push(equation(left, zero));
                 }
             }
@@ -210,16 +281,34 @@ fn assign_rows<'a>(
     assigned
 }
 
+/// A row without what both sides have in common, with the denominators of its coefficients multiplied out if that is
+/// shorter.
 fn from_row(x: &mut Exprs, row: &LinearRow, known: &BTreeMap<Symbol, Expr>) -> DisplayEquation {
-    let mut terms = Vec::new();
-    for &(symbol, coefficient) in &row.left {
-        let coefficient = put_in(x, coefficient, known);
-        let symbol = x.sym(symbol);
-        terms.push(x.mul(&[coefficient, symbol]));
+    let mut sides: Vec<Expr> = Vec::with_capacity(row.left.len() + 1);
+    for e in row.left.iter().map(|t| t.1).chain([row.right]) {
+        sides.push(put_in(x, e, known));
     }
-    let left = x.add(&terms);
-    let right = put_in(x, row.right, known);
-    equation(left, right)
+    let plain = shortest_sides(x, &sides);
+    for k in 0..row.left.len() {
+        let below = x.denominator(sides[k]);
+        sides = sides.into_iter().map(|e| x.mul(&[e, below])).collect();
+    }
+    let whole = shortest_sides(x, &sides);
+    let length = |sides: &[Expr]| sides.iter().map(|&e| x.printed_length(e)).sum::<u64>();
+    let sides = if length(&whole) <= length(&plain) + 4 { whole } else { plain };
+    let mut left = Vec::with_capacity(row.left.len());
+    for (&(symbol, _), &coefficient) in row.left.iter().zip(&sides) {
+        let symbol = x.sym(symbol);
+        left.push(x.mul(&[coefficient, symbol]));
+    }
+    let left = x.add(&left);
+    equation(left, sides[row.left.len()])
+}
+
+fn shortest_sides(x: &mut Exprs, sides: &[Expr]) -> Vec<Expr> {
+    let common = x.common_factor(sides);
+    let divided: Vec<Expr> = sides.iter().map(|&e| x.div(e, common)).collect();
+    divided.into_iter().map(|e| textbook(x, e)).collect()
 }
 
 fn equation(left: Expr, right: Expr) -> DisplayEquation {
@@ -232,17 +321,30 @@ fn balanced(x: &mut Exprs, residual: Expr, unknown: &[Symbol]) -> DisplayEquatio
     let Some((coefficients, rest)) = x.linear_in(residual, unknown) else { return equation(zero, residual) };
     let mut terms = Vec::new();
     for (&coefficient, &symbol) in coefficients.iter().zip(unknown) {
-        let symbol = x.sym(symbol);
+        let (coefficient, symbol) = (textbook(x, coefficient), x.sym(symbol));
         terms.push(x.mul(&[coefficient, symbol]));
     }
     let left = x.add(&terms);
     let right = x.neg(rest);
+    let right = textbook(x, right);
     if left == zero { equation(zero, rest) } else { equation(left, right) }
 }
 
 fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     let e = x.substitute(e, known);
-    x.simplify(e)
+    let e = x.without_settled_terms(e);
+    let e = x.simplify(e);
+    x.without_settled_terms(e)
+}
+
+fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
+    let e = put_in(x, e, known);
+    textbook(x, e)
+}
+
+fn textbook(x: &mut Exprs, e: Expr) -> Expr {
+    let e = x.textbook(e);
+    x.without_settled_terms(e)
 }
 
 /// Every variable in terms of states, time, inputs, named sources and what stays implicit.

@@ -11,6 +11,7 @@ mod form;
 mod index;
 mod minimal;
 mod observed;
+mod places;
 mod stiff;
 mod text;
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Cause, Dependent, DisplayEquation, Shown, Step};
-use crate::algebra::{Expr, Exprs, Names, Symbol, ascii, latex, latex_name, unicode, unicode_name};
+use super::{Cause, Dependent, DisplayEquation, Shown, Step, places};
+use crate::algebra::{Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, unicode, unicode_name};
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
 use crate::causal_paths::port_name;
 
@@ -140,8 +140,10 @@ struct Written<'a> {
     x: &'a Exprs,
     aliases: &'a BTreeMap<Symbol, String>,
     states: BTreeMap<Symbol, (&'a str, bool)>,
+    /// For each rate the state that it belongs to.
+    rate_of: BTreeMap<Symbol, Symbol>,
     sources: BTreeMap<Symbol, String>,
-    place: BTreeMap<Symbol, u8>,
+    places: BTreeMap<Symbol, Place>,
 }
 
 impl<'a> Written<'a> {
@@ -152,14 +154,10 @@ impl<'a> Written<'a> {
             states.insert(state.symbol, (state.name.as_str(), false));
             states.insert(state.rate, (state.name.as_str(), true));
         }
-        let class = |m: Meaning| match m {
-            Meaning::Parameter(_) => 0,
-            Meaning::Time | Meaning::Input(_) => 1,
-            _ => 2,
-        };
-        let place = equations.graph.variables.iter().map(|(&s, v)| (s, class(v.meaning))).collect();
+        let rate_of = equations.states.iter().map(|s| (s.rate, s.symbol)).collect();
         let sources = shown.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
-        Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, sources, place }
+        let places = places::of(shown);
+        Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, rate_of, sources, places }
     }
 
     /// The name for people, and whether it is the rate of what has the name.
@@ -175,8 +173,7 @@ impl<'a> Written<'a> {
                 None => (own, false),
             },
         };
-        let of =
-            if rate { self.states.iter().find(|(_, s)| s.0 == base && !s.1).map(|(&s, _)| s) } else { Some(symbol) };
+        let of = if rate { self.rate_of.get(&symbol).copied() } else { Some(symbol) };
         let alias = of.and_then(|s| self.aliases.get(&s));
         (alias.map_or(base, String::as_str).trim_end_matches('*').to_string(), rate)
     }
@@ -194,7 +191,7 @@ impl Names for Written<'_> {
     fn unicode(&self, symbol: Symbol) -> String {
         let (name, rate) = self.name(symbol);
         let name = match subscripted(&name) {
-            Some((variable, element)) => format!("{variable}_{element}"),
+            Some((variable, element)) => format!("{}_{element}", unicode_name(variable)),
             None => unicode_name(&name),
         };
         if rate { format!("{name}'") } else { name }
@@ -204,16 +201,18 @@ impl Names for Written<'_> {
         let (name, rate) = self.name(symbol);
         match subscripted(&name) {
             Some((variable, element)) => {
-                let variable = if rate { format!("\\dot {variable}") } else { variable.to_string() };
+                let variable = latex_name(variable);
+                let variable = if rate { format!("\\dot{{{variable}}}") } else { variable };
                 format!("{variable}_{{\\mathrm{{{}}}}}", element.replace('_', "\\_"))
             }
-            None if rate => format!("\\dot{{{}}}", latex_name(&name)),
+            None if rate => latex_name(&format!("{name}'")),
             None => latex_name(&name),
         }
     }
 
-    fn place(&self, symbol: Symbol) -> (u8, u32) {
-        (self.place.get(&symbol).copied().unwrap_or(2), symbol.0)
+    fn place(&self, symbol: Symbol) -> Place {
+        let last = Place { sort: Sort::Variable, family: 3, factor: symbol.0, term: symbol.0 };
+        self.places.get(&symbol).copied().unwrap_or(last)
     }
 }
 

@@ -6,4 +6,5 @@ mod numbers;
 mod random;
 mod reader;
 mod text;
+mod together;
 mod zero;

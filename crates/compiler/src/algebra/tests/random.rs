@@ -184,6 +184,9 @@ proptest! {
         prop_assert!(x.written_length(short) <= x.written_length(e).max(600));
         let long = x.expand(e);
         prop_assert!(agrees(at(&x, long), reference));
+        let printed = x.textbook(e);
+        prop_assert!(agrees(at(&x, printed), reference), "{} to {}", ascii(&x, e, &PlainNames(&x)), ascii(&x, printed, &PlainNames(&x)));
+        prop_assert!(x.printed_length(printed) <= x.printed_length(e));
     }
 
     #[test]
@@ -204,7 +207,7 @@ proptest! {
         let e = build(&mut x, &tree);
         let value = |i: usize| if i < 3 { f64::from(point[i]) } else { 1.0 };
         let reference = direct(&tree, &value).0;
-        for form in [e, x.simplify(e), x.expand(e)] {
+        for form in [e, x.simplify(e), x.expand(e), x.textbook(e)] {
             let own = x.eval(form, &mut |s| value(NAMES.iter().position(|n| *n == x.name(s)).unwrap()));
             prop_assert!(reference.is_finite() || !own.is_finite(), "{} is {own}", ascii(&x, form, &PlainNames(&x)));
             prop_assert!(own.is_finite() || !reference.is_finite(), "{} is {own}", ascii(&x, form, &PlainNames(&x)));

@@ -26,7 +26,8 @@ prints! {
     square ascii: "x*x" => "x^2";
     negative_base ascii: "(a - b)^2*(-2)" => "-2*(a - b)^2";
     minus_goes_into_sum ascii: "K*(x - y)*(-1)" => "K*(y - x)";
-    flipped_divisor ascii: "x/(b - a)" => "x/(b - a)";
+    flipped_divisor ascii: "x/(B - A)" => "x/(B - A)";
+    divisor_that_varies_stays ascii: "x/(b - a)" => "-x/(a - b)";
     decimal_number ascii: "9.81*M" => "9.81*M";
     third ascii: "x/3" => "x/3";
     two_thirds ascii: "2*x/3" => "2*x/3";
@@ -38,10 +39,15 @@ prints! {
     third_power ascii: "abs(x)^(1/3)" => "abs(x)^(1/3)";
     root ascii: "sqrt(K/M)" => "sqrt(K/M)";
     choice ascii: "if x > 0 then a else b" => "if x > 0 then a else b";
-    choice_in_sum ascii: "1 + (if x > 0 then a else b)" => "(if x > 0 then a else b) + 1";
-    exponent_of_sum ascii: "M^(x + 1)" => "M^(x + 1)";
+    choice_in_sum ascii: "1 + (if x > 0 then a else b)" => "1 + (if x > 0 then a else b)";
+    exponent_of_sum ascii: "M^(x + 1)" => "M^(1 + x)";
     pendulum unicode: "-M*g*A*cos(phi)" => "-M A g cos φ";
     inertia unicode: "(J + M*A^2)*omega'" => "(J + M A²) ω'";
+    function_over_a_number unicode: "sin(phi)/2" => "sin(φ)/2";
+    function_over_a_number_latex latex: "sin(phi)/2" => "\\frac{\\sin\\varphi}{2}";
+    function_before_a_factor unicode: "cos(phi)*(x - y)*M" => "M (x - y) cos φ";
+    orientation unicode: "x - M*(q - P)" => "x + M (P - q)";
+    square_of_difference unicode: "(q - P)^2*x" => "x (P - q)²";
     power_of_sine unicode: "M*sin(phi)^2*omega" => "M ω sin² φ";
     sine_of_product unicode: "sin(2*phi)" => "sin(2 φ)";
     fraction unicode: "K1*x/(K1 + K2)" => "K1 x/(K1 + K2)";
@@ -51,6 +57,8 @@ prints! {
     fraction_latex latex: "K1*x/(K1 + K2)" => "\\frac{K_{1} x}{K_{1} + K_{2}}";
     half_latex latex: "M*v^2/2" => "\\frac{M v^{2}}{2}";
     squared_latex latex: "sin(phi)^2*omega'" => "\\dot{\\omega} \\sin^{2}\\varphi";
+    words_latex latex: "Load*kp*x" => "\\mathit{Load} \\, \\mathit{kp} \\, x";
+    tall_exponent_latex latex: "exp((q/C - x)/V)" => "\\exp\\left(\\frac{\\frac{q}{C} - x}{V}\\right)";
     diode_latex latex: "I0*(exp(d.e/V) - 1)" => "I_{0} \\left(e^{\\frac{e_{d}}{V}} - 1\\right)";
 }
 

@@ -5,7 +5,7 @@ mod numbers;
 mod render;
 mod shape;
 
-pub use names::{Names, PlainNames, latex_name, unicode_name};
+pub use names::{Names, Place, PlainNames, Sort, latex_name, unicode_name};
 
 use super::exprs::Exprs;
 use super::node::Expr;
@@ -13,8 +13,8 @@ use render::Style;
 
 /// The expression in the model language: `-R1/R2`, `x^2`, `if c then a else b`.
 ///
-/// Terms and factors stand in human order: a positive term first where there is one, numbers before parameters before
-/// states before functions. Parts nested deeper than 200 levels, and what comes after 20,000 parts, are left out as `…`.
+/// Terms and factors stand in human order ([`Place`]): a positive term first where there is one, what is given before
+/// what moves; numbers before parameters before states before functions before rates. Parts nested deeper than 200 levels, and what comes after 20,000 parts, are left out as `…`.
 ///
 /// ```
 /// use halfarrow_compiler::algebra::{Exprs, Facts, PlainNames, ascii};

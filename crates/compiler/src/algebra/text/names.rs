@@ -19,8 +19,8 @@ pub trait Names {
         latex_name(&self.ascii(symbol))
     }
 
-    /// Smaller ones stand further left in a product: parameters 0, what varies 1; then by position.
-    fn place(&self, symbol: Symbol) -> (u8, u32);
+    /// Where it stands among others.
+    fn place(&self, symbol: Symbol) -> Place;
 
     /// The name of a table, as of a function.
     fn table(&self, table: TableId) -> String {
@@ -28,7 +28,35 @@ pub trait Names {
     }
 }
 
-/// Symbols by their own names, in the order in which they were made, parameters first.
+/// Where a symbol stands in products and sums: smaller ones further left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// What it is.
+    pub sort: Sort,
+    /// Among the factors of a product that are of the same sort the smaller family stands further left, and the sums of
+    /// a family after its symbols: `(m1 + m2) g l`, `k2 (k1 + k3)`.
+    pub family: u8,
+    /// Its place among the factors of its family.
+    pub factor: u32,
+    /// Its place among the terms of its sort: parameters of all families, and variables of the first two, are one. Equal
+    /// ones stand by name.
+    pub term: u32,
+}
+
+/// What a symbol is to the reader of an equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sort {
+    /// It keeps its value.
+    Parameter,
+    /// It varies, and is given from outside: time, an input, a source.
+    Given,
+    /// It varies with the motion.
+    Variable,
+    /// The rate of a state; it stands last in its term: `M a² ω'`.
+    Rate,
+}
+
+/// Symbols by their own names, factors in the order in which they were made, parameters first.
 pub struct PlainNames<'a>(
     /// The pool of the symbols.
     pub &'a Exprs,
@@ -39,8 +67,9 @@ impl Names for PlainNames<'_> {
         self.0.name(symbol).to_owned()
     }
 
-    fn place(&self, symbol: Symbol) -> (u8, u32) {
-        (u8::from(self.0.facts(symbol).given.is_none()), symbol.0)
+    fn place(&self, symbol: Symbol) -> Place {
+        let sort = if self.0.facts(symbol).given.is_some() { Sort::Parameter } else { Sort::Variable };
+        Place { sort, family: 0, factor: symbol.0, term: 0 }
     }
 }
 

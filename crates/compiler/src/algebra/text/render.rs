@@ -29,12 +29,15 @@ enum Binding {
 }
 
 pub(super) fn render(shape: &Shape, names: &dyn Names, style: Style) -> String {
-    Renderer { names, style }.text(shape).0
+    Renderer { names, style, bare: true }.text(shape).0
 }
 
+#[derive(Clone, Copy)]
 struct Renderer<'a> {
     names: &'a dyn Names,
     style: Style,
+    /// Whether functions may stand without brackets.
+    bare: bool,
 }
 
 impl Renderer<'_> {
@@ -138,36 +141,50 @@ impl Renderer<'_> {
 
     fn product(&self, above: &[Shape], below: &[Shape]) -> (String, Binding) {
         if below.is_empty() {
-            return (self.factors(above), if above.len() == 1 { Binding::Atom } else { Binding::Product });
+            return (self.factors(above, false), if above.len() == 1 { Binding::Atom } else { Binding::Product });
         }
         if self.style == Style::Latex {
             let whole = |side: &[Shape]| match side {
                 [] => "1".into(),
                 [single] => self.text(single).0,
-                several => self.factors(several),
+                several => self.factors(several, false),
             };
             return (format!("\\frac{{{}}}{{{}}}", whole(above), whole(below)), Binding::Product);
         }
-        let above = if above.is_empty() { "1".into() } else { self.factors(above) };
+        let above = if above.is_empty() { "1".into() } else { self.factors(above, true) };
         let below = match below {
             [single] => self.at_least(single, Binding::Power),
-            several => self.brackets(&self.factors(several)),
+            several => self.brackets(&self.factors(several, false)),
         };
         (format!("{above}/{below}"), Binding::Product)
     }
 
-    fn factors(&self, factors: &[Shape]) -> String {
+    /// `more`: a slash follows.
+    fn factors(&self, factors: &[Shape], more: bool) -> String {
         let mut text = String::new();
         for (i, factor) in factors.iter().enumerate() {
+            let function = |f: &Shape| match f {
+                Shape::Call(..) => true,
+                Shape::Power(base, _) => matches!(**base, Shape::Call(..)),
+                _ => false,
+            };
             let part = match factor {
                 Shape::Number(_) => self.text(factor).0,
+                // What follows must not be read on as part of the argument: `cos(φ) ω'`, `cos(t)/2`.
+                _ if function(factor) && factors.get(i + 1).map_or(more, |next| !function(next)) => {
+                    Renderer { bare: false, ..*self }.at_least(factor, Binding::Prefix)
+                }
                 // A quotient among factors needs brackets, and so does what could be read on as an argument.
                 Shape::Product(..) => self.brackets(&self.text(factor).0),
                 _ => self.at_least(factor, Binding::Prefix),
             };
             if i > 0 {
                 let digits = part.starts_with(|c: char| c.is_ascii_digit());
-                text.push_str(if digits { self.pick("*", "·", " \\cdot ") } else { self.pick("*", " ", " ") });
+                let words = text.ends_with('}') && last_is_word(&text) || part.starts_with("\\mathit");
+                text.push_str(match digits {
+                    true => self.pick("*", "·", " \\cdot "),
+                    false => self.pick("*", " ", if words { " \\, " } else { " " }),
+                });
             }
             text.push_str(&part);
         }
@@ -211,7 +228,8 @@ impl Renderer<'_> {
     fn call(&self, name: &str, x: &[Shape], raised: &str) -> (String, Binding) {
         let arguments: Vec<String> = x.iter().map(|a| self.text(a).0).collect();
         let arguments = arguments.join(", ");
-        if self.style == Style::Latex && name == "exp" && raised.is_empty() {
+        let flat = arguments.matches("\\frac").count() < 2;
+        if self.style == Style::Latex && name == "exp" && raised.is_empty() && flat {
             return (format!("e^{{{arguments}}}"), Binding::Power);
         }
         let name = match (self.style, name) {
@@ -219,8 +237,10 @@ impl Renderer<'_> {
             (Style::Unicode, "log") => "ln".into(),
             _ => name.to_owned(),
         };
-        let bare =
-            self.style != Style::Ascii && matches!(x, [Shape::Name(_)]) && name.ends_with(|c: char| c.is_alphabetic());
+        let bare = self.bare
+            && self.style != Style::Ascii
+            && matches!(x, [Shape::Name(_)])
+            && name.ends_with(|c: char| c.is_alphabetic());
         if bare && TRIGONOMETRIC.contains(&name.trim_start_matches('\\')) {
             let space = if self.style == Style::Latex && arguments.starts_with('\\') { "" } else { " " };
             let space = if raised.is_empty() || self.style == Style::Unicode { space } else { "" };
@@ -253,6 +273,11 @@ impl Renderer<'_> {
         }
         (format!("if {c} then {a} else {b}"), Binding::Choice)
     }
+}
+
+/// Whether LaTeX ends in a name of several letters: `\mathit{load}`.
+fn last_is_word(latex: &str) -> bool {
+    latex.rfind("\\mathit{").is_some_and(|at| latex[at..].find('}') == Some(latex.len() - at - 1))
 }
 
 /// Functions that take a name without brackets.

@@ -1,0 +1,168 @@
+//! What is shown is what is computed, and is set without fault.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
+use halfarrow_compiler::bond_graph::{Meaning, NoFiles};
+use halfarrow_compiler::compile::{Text, to_equations};
+use halfarrow_compiler::equations::{
+    Equations, Form, Shown, Step, Style, print, print_dependent, print_meanings, show,
+};
+
+fn models() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let entries = std::fs::read_dir(folder).expect("the models").map(|e| e.expect("an entry").path());
+    let mut models: Vec<PathBuf> = entries.filter(|p| p.join("model.bond").exists()).collect();
+    models.sort();
+    models
+}
+
+fn shown(folder: &Path) -> Shown {
+    let text = std::fs::read_to_string(folder.join("model.bond")).expect("a model");
+    shown_of(&text)
+}
+
+fn shown_of(text: &str) -> Shown {
+    let text = Text { name: "model.bond", text, files: &NoFiles, overrides: &[] };
+    show(to_equations(text, Form::Minimal).expect("no fault").ir)
+}
+
+/// Values of all symbols somewhere in the space of states.
+fn values(equations: &Equations) -> BTreeMap<Symbol, f64> {
+    let x = &equations.graph.exprs;
+    let mut known = BTreeMap::new();
+    let mut next = 0.2;
+    for (&symbol, variable) in &equations.graph.variables {
+        if let Meaning::Parameter(_) = variable.meaning {
+            let e = x.facts(symbol).given.expect("the value of a parameter");
+            known.insert(symbol, x.given_value(e).expect("a number"));
+        } else {
+            next += 0.07;
+            known.insert(symbol, next);
+        }
+    }
+    for (i, symbol) in
+        equations.conserved.iter().map(|c| c.symbol).chain(equations.states.iter().map(|s| s.symbol)).enumerate()
+    {
+        known.insert(symbol, 3.1e-4 + 5e-5 * i as f64);
+    }
+    for step in &equations.steps {
+        match step {
+            Step::Assign { symbol, value } => {
+                let value = at(x, *value, &known);
+                known.insert(*symbol, value);
+            }
+            Step::Linear { unknowns, matrix, right, .. } => {
+                let row = |(row, &r): (&Vec<Expr>, &Expr)| {
+                    row.iter().chain([&r]).map(|&e| at(x, e, &known)).collect::<Vec<f64>>()
+                };
+                let solution = solved(matrix.iter().zip(right).map(row).collect());
+                known.extend(unknowns.iter().copied().zip(solution));
+            }
+            // What is shown holds for any value of what stays implicit.
+            Step::Newton { unknowns, body, .. } => {
+                known.extend(unknowns.iter().map(|&u| (u, 0.17)));
+                for &(symbol, value) in body {
+                    let value = at(x, value, &known);
+                    known.insert(symbol, value);
+                }
+            }
+            Step::Watch { .. } => {}
+        }
+    }
+    known
+}
+
+fn at(x: &Exprs, e: Expr, known: &BTreeMap<Symbol, f64>) -> f64 {
+    x.eval(e, &mut |s| known.get(&s).copied().unwrap_or(f64::NAN))
+}
+
+/// The solution of linear equations, each with its right-hand side at the end.
+fn solved(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+    let n = rows.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs())).expect("a row");
+        rows.swap(k, pivot);
+        let top = rows[k].clone();
+        for (i, row) in rows.iter_mut().enumerate().filter(|(i, _)| *i != k) {
+            let _ = i;
+            let factor = row[k] / top[k];
+            row.iter_mut().zip(&top).for_each(|(e, t)| *e -= factor * t);
+        }
+    }
+    (0..n).map(|k| rows[k][n] / rows[k][k]).collect()
+}
+
+#[test]
+fn what_is_shown_is_what_is_computed() {
+    for folder in models() {
+        let shown = shown(&folder);
+        let x = &shown.equations.graph.exprs;
+        let mut known = values(&shown.equations);
+        for &(symbol, value) in &shown.sources {
+            let value = at(x, value, &known);
+            known.entry(symbol).or_insert(value);
+        }
+        let same = |a: Expr, b: Expr| {
+            let (a, b) = (at(x, a, &known), at(x, b, &known));
+            assert!((a - b).abs() <= 1e-9 * (a.abs() + b.abs() + 1e-6), "{}: {a} for {b}", folder.display());
+        };
+        for equation in shown.display.iter().take(shown.equations.states.len()) {
+            same(equation.left, equation.right);
+            same(equation.closed.0, equation.closed.1);
+        }
+        for row in &shown.dependent {
+            let variable = known[&row.variable];
+            let value = at(x, row.value, &known);
+            assert!((variable - value).abs() <= 1e-9 * (value.abs() + 1e-6), "{}", folder.display());
+        }
+    }
+}
+
+/// Every bracket is closed, `\left` has its `\right`, and nothing stands in it that TeX does not know.
+fn well_set(line: &str) -> bool {
+    let count = |what: &str| line.matches(what).count();
+    let depth = line.chars().try_fold(0i32, |depth, c| match c {
+        '{' => Some(depth + 1),
+        '}' => Some(depth - 1).filter(|d| *d >= 0),
+        _ => Some(depth),
+    });
+    depth == Some(0)
+        && count("\\left") == count("\\right")
+        && line.is_ascii()
+        && !line.contains("__")
+        && !line.contains("^^")
+}
+
+#[test]
+fn latex_is_well_set() {
+    for folder in models() {
+        let shown = shown(&folder);
+        let lines =
+            [print(&shown, Style::Latex), print_meanings(&shown, Style::Latex), print_dependent(&shown, Style::Latex)];
+        for line in lines.concat() {
+            assert!(well_set(&line), "{}: {line}", folder.display());
+        }
+    }
+}
+
+fn text(model: &str) -> Vec<String> {
+    print(&shown_of(model), Style::Unicode)
+}
+
+#[test]
+fn weights_stand_before_arms() {
+    let text = text(
+        "model Bar\nparam J = 1, M = 2, a = 3, g = 9.81\nstate phi' = w.f from 0\n1:w -> I:IJ(J)\n\
+         w -> TF:x(-a*sin(phi)) -> I:Iu(M)\nw -> TF:y(a*cos(phi)) -> 1:v -> I:Iv(M)\nSe:weight(-M*g) -> v\n",
+    );
+    assert_eq!(text, ["(J + M a²) f_IJ' = -M g a cos φ", "φ' = f_IJ"]);
+}
+
+#[test]
+fn fractions_stand_over_one_denominator() {
+    let parallel =
+        "model P\nparam R1 = 2, R2 = 3, m = 1\nSf:s(1) -> 0:n -> R:R1(R1)\nn -> R:R2(R2)\nn -> 1:b -> I:I(m)\n";
+    assert_eq!(text(parallel), ["m f_I' = R1 R2 (1 - f_I)/(R1 + R2)"]);
+}
