@@ -130,6 +130,29 @@ fn what_nothing_moves_does_no_harm() {
 }
 
 #[test]
+fn what_acts_by_its_square_is_seen_from_rest() {
+    // A plate that a charge pulls by its square: at rest the Jacobian does not know that the charge acts on it.
+    for method in [Explicit, Bdf, Radau, Auto] {
+        let mut system = Known::new(
+            &[0.0; 3],
+            |_, x, _, dx| dx.copy_from_slice(&[1e-13 - x[0], 1e20 * x[0] * x[0], 1e3 * x[1]]),
+            |_, x, v, _, jv| jv.copy_from_slice(&[-v[0], 2e20 * x[0] * v[0], 1e3 * v[1]]),
+            |t| {
+                let (d, dd) = ((-t).exp(), (-2.0 * t).exp());
+                let pull = t - 2.0 * (1.0 - d) + 0.5 * (1.0 - dd);
+                let way = 0.5 * t * t - 2.0 * (t - 1.0 + d) + 0.5 * (t - 0.5 * (1.0 - dd));
+                vec![1e-13 * (1.0 - d), 1e-6 * pull, 1e-3 * way]
+            },
+        );
+        system.scales = vec![1e-13, 0.0, 0.0];
+        let (samples, end) = system.run(&options(method, 1e-9, 1.0));
+        let summary = end.unwrap();
+        assert!(summary.steps < 500 && !summary.stiff, "{method:?}: {summary:?}");
+        assert!(system.error(&samples) < 1e-7, "{method:?}: {:e}", system.error(&samples));
+    }
+}
+
+#[test]
 fn stiff_methods_meet_the_published_values_of_robertson() {
     for (method, rtol, bound) in
         [(Bdf, 1e-6, 1e-3), (Auto, 1e-8, 1e-5), (Bdf, 1e-10, 1e-7), (Radau, 1e-6, 3e-5), (Radau, 1e-10, 1e-7)]
