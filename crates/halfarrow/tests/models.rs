@@ -84,7 +84,7 @@ fn every_method_closes_the_electrostatic_gap() {
     let reference = Reference::read(&folder);
     let fixed = [(Euler, 1e-2), (Heun, 1e-4), (Rk4, 1e-8), (ImplicitMidpoint, 1e-4)];
     let fixed = fixed.map(|(method, bound)| (Method::Fixed(method), Some(1e-7), bound));
-    let variable = [Method::Explicit, Method::Bdf, Method::Auto].map(|method| (method, None, 1e-9));
+    let variable = [Method::Explicit, Method::Bdf, Method::Radau, Method::Auto].map(|method| (method, None, 1e-9));
     for (method, step, bound) in fixed.into_iter().chain(variable) {
         let run = Run { method, step, ..reference.run(&folder) };
         reference.check_run(&folder, &run, bound).unwrap_or_else(|fault| panic!("{method:?}: {fault}"));

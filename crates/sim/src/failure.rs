@@ -7,7 +7,7 @@ use std::fmt;
 pub enum Failure {
     /// A value is NaN or infinite.
     NotFinite {
-        /// When, in s.
+        /// When, in s; NaN, here and below, if it is so at any time.
         time: f64,
         /// Which value, such as `the rate of body.p`.
         what: String,
@@ -29,6 +29,29 @@ pub enum Failure {
         iterations: usize,
         /// What was left of the greatest residual, in the unit of its equation.
         residual: f64,
+    },
+    /// Equations have more than one solution, and the one that the run has followed goes on no further, or moves too far in
+    /// one step to be told from the others.
+    Branch {
+        /// When, in s.
+        time: f64,
+        /// Which equations, by their elements.
+        what: String,
+        /// The unknown that would leap.
+        unknown: String,
+        /// Its value when the last step was accepted.
+        from: f64,
+        /// Its value in another solution.
+        to: f64,
+    },
+    /// Equations were not solved within the bound on evaluations.
+    Bound {
+        /// When, in s.
+        time: f64,
+        /// Which equations, by their elements.
+        what: String,
+        /// The bound.
+        most: usize,
     },
     /// A law was asked for a value where it has none.
     OutOfDomain {
@@ -75,7 +98,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// When it happened, in s; `None` if the run never began.
+    /// When it happened, in s; `None` if the run never began, or if it is so at any time.
     pub fn time(&self) -> Option<f64> {
         match self {
             Failure::NotFinite { time, .. }
@@ -84,9 +107,20 @@ impl Failure {
             | Failure::OutOfDomain { time, .. }
             | Failure::StepTooSmall { time, .. }
             | Failure::Chattering { time, .. }
-            | Failure::Interrupted { time } => Some(*time),
+            | Failure::Branch { time, .. }
+            | Failure::Bound { time, .. }
+            | Failure::Interrupted { time } => Some(*time).filter(|time| !time.is_nan()),
             Failure::BadOption { .. } | Failure::BadMethod { .. } => None,
         }
+    }
+}
+
+/// How a message begins: with the time, if there is one.
+struct When(f64);
+
+impl fmt::Display for When {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_nan() { f.write_str("with these parameters") } else { write!(f, "at t = {} s", self.0) }
     }
 }
 
@@ -95,20 +129,34 @@ impl fmt::Display for Failure {
         match self {
             Failure::NotFinite { time, what } => write!(
                 f,
-                "at t = {time} s {what} is not a finite number: look for a division by zero, or for a value that grows without bound"
+                "{} {what} is not a finite number: look for a division by zero, or for a value that grows without bound",
+                When(*time)
             ),
             Failure::Singular { time, what } => write!(
                 f,
-                "at t = {time} s the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there"
+                "{} the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there",
+                When(*time)
             ),
             Failure::NoConvergence { time, what, iterations, residual } => write!(
                 f,
-                "at t = {time} s the iteration for {what} did not converge: after {iterations} iterations a residual of {residual:e} is left; \
-                 the law may have no solution there, or the step may be too long"
+                "{} the iteration for {what} did not converge: after {iterations} iterations a residual of {residual:e} is left; \
+                 the law may have no solution there, or the step may be too long",
+                When(*time)
             ),
             Failure::OutOfDomain { time, what, reason } => {
-                write!(f, "at t = {time} s {what} is asked for a value where it has none: {reason}")
+                write!(f, "{} {what} is asked for a value where it has none: {reason}", When(*time))
             }
+            Failure::Branch { time, what, unknown, from, to } => write!(
+                f,
+                "{} the equations of {what} have two solutions: {unknown} would leap from {from} to {to}; the solution that the run has \
+                 followed ends here, or a step is too long to follow it",
+                When(*time)
+            ),
+            Failure::Bound { time, what, most } => write!(
+                f,
+                "{} the equations of {what} are not solved after {most} evaluations, which is the bound",
+                When(*time)
+            ),
             Failure::StepTooSmall { time, step } => write!(
                 f,
                 "at t = {time} s even a step of {step:e} s misses the tolerance: the solution grows without bound or is not smooth there"

@@ -202,7 +202,8 @@ pub fn is_singular(x: &mut Exprs, matrix: &[Vec<Expr>]) -> bool {
     rank_given(x, matrix.len(), rows) < matrix.len()
 }
 
-fn elements_of(d: &Definitions, symbols: &[Symbol]) -> Vec<ElementId> {
+/// The elements whose efforts, flows or stored quantities these are, junctions left out.
+pub fn elements_of(d: &Definitions, symbols: &[Symbol]) -> Vec<ElementId> {
     let mut elements = BTreeSet::new();
     for &symbol in symbols {
         let port = |p: crate::bond_graph::PortRef| (!d.graph.elements[p.element].kind.is_inner()).then_some(p.element);

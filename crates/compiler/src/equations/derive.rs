@@ -9,7 +9,8 @@ use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
 use super::stiff::parameters;
 use super::{
-    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, index, observed,
+    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, domains, index,
+    observed,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Meaning, PortRef};
@@ -171,6 +172,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
     let conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
+    let domains = domains::domains(&mut d, &states);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
         Step::Newton { unknowns, .. } => unknowns.clone(),
         _ => Vec::new(),
@@ -194,6 +196,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         steps: ordered.steps,
         observed,
         conditions,
+        domains,
         definitions: d.of,
         rows: ordered.rows,
         dependent,

@@ -7,6 +7,7 @@ mod conserved;
 mod definitions;
 mod derive;
 mod display;
+mod domains;
 mod form;
 mod index;
 mod minimal;
@@ -63,6 +64,8 @@ pub struct Equations {
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
     pub conditions: Vec<Condition>,
+    /// Where laws have a value, for messages.
+    pub domains: Vec<Domain>,
     /// What defines each variable, before loops were opened.
     pub definitions: Map<Symbol, Definition>,
     /// The rows of all linear loops.
@@ -279,4 +282,43 @@ pub struct Condition {
     pub value: Expr,
     /// Where it stands.
     pub span: Span,
+}
+
+/// What must hold for a law to have a value.
+#[derive(Debug, Clone)]
+pub struct Domain {
+    /// The variable that the law gives.
+    pub symbol: Symbol,
+    /// The elements concerned.
+    pub elements: Vec<ElementId>,
+    /// What must lie in the domain.
+    pub argument: Expr,
+    /// Where it must lie.
+    pub kind: DomainKind,
+    /// The only variable that it reads, if there is just one.
+    pub asked: Option<Symbol>,
+    /// The value of that variable at which the domain ends, in parameters, where it can be written down.
+    pub limit: Option<Expr>,
+}
+
+/// Where an argument must lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DomainKind {
+    /// Above zero.
+    Positive,
+    /// Not below zero.
+    NotNegative,
+    /// Between two numbers, themselves included.
+    Within(f64, f64),
+}
+
+impl DomainKind {
+    /// Whether a number lies in it.
+    pub fn holds(self, argument: f64) -> bool {
+        match self {
+            DomainKind::Positive => argument > 0.0,
+            DomainKind::NotNegative => argument >= 0.0,
+            DomainKind::Within(low, high) => low <= argument && argument <= high,
+        }
+    }
 }

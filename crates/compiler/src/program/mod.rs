@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 
 use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::HeldKind;
-pub use crate::equations::Unavailable;
+pub use crate::equations::{DomainKind, Unavailable};
 use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::unit::Unit;
@@ -85,6 +85,8 @@ pub struct Program {
     pub start: Vec<StartCondition>,
     /// Divisors that must not vanish.
     pub watches: Vec<Watch>,
+    /// What must hold for laws to have values, for messages.
+    pub domains: Vec<Domain>,
     /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
     pub dependence: Vec<Vec<u32>>,
 }
@@ -190,6 +192,23 @@ pub struct Watch {
     pub elements: String,
 }
 
+/// What must hold for a law to have a value.
+#[derive(Debug, Clone)]
+pub struct Domain {
+    /// The variable that the law gives.
+    pub given: String,
+    /// The elements concerned.
+    pub elements: String,
+    /// What must lie in the domain.
+    pub argument: Value,
+    /// Where it must lie.
+    pub kind: DomainKind,
+    /// The only variable that it reads, if there is just one.
+    pub asked: Option<(String, Value)>,
+    /// The value of that variable at which the domain ends, in parameters.
+    pub limit: Option<Value>,
+}
+
 /// What decides between the pieces of a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
@@ -243,6 +262,8 @@ pub enum Block {
         residuals: Vec<Value>,
         /// Their exact derivatives by the guess, row by row.
         jacobian: Vec<Value>,
+        /// Names of the unknowns, for messages.
+        unknowns: Vec<String>,
         /// The elements concerned, for messages.
         elements: String,
     },
@@ -263,6 +284,13 @@ impl Block {
             Block::Newton { residuals, jacobian, .. } => (jacobian, residuals),
         };
         matrix.iter().chain(right).copied()
+    }
+    /// The name of an unknown, for messages; empty in a linear block.
+    pub fn unknown(&self, index: usize) -> &str {
+        match self {
+            Block::Linear { .. } => "",
+            Block::Newton { unknowns, .. } => &unknowns[index],
+        }
     }
     /// The elements concerned, for messages.
     pub fn elements(&self) -> &str {

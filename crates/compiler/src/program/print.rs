@@ -30,7 +30,7 @@ impl fmt::Display for Program {
         self.print_conditions(f)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
-        let routine = self.routine(&layout, &values);
+        let routine = self.watched_routine(&layout, &values);
         writeln!(f, "\nrecorded, {} instructions, {} registers", routine.code.len(), routine.registers)?;
         self.print_code(f, &routine, &names)?;
         for ((observed, _), &out) in shown.iter().zip(&routine.outputs) {

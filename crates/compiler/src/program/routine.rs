@@ -131,6 +131,8 @@ pub struct Solve {
     pub unknowns: Vec<Register>,
     /// Newton: where the guess is put before `code` runs; empty for a linear block.
     pub guess: Vec<Register>,
+    /// Newton: what varies outside and is read by `code`, in the order of the values; the same in every routine.
+    pub outer: Vec<Register>,
     /// Newton: computes right side and matrix at the guess; it holds no solve blocks.
     pub code: Vec<Instruction>,
     /// Matrix of a linear block, Jacobian of a Newton block, row by row.
@@ -217,12 +219,12 @@ impl Program {
         layout
     }
 
-    /// The code that computes all that reads parameters alone, into its fixed registers.
+    /// The code that computes all that reads parameters alone, into its fixed registers; divisors among it are watched.
     pub fn preamble(&self, layout: &Layout) -> Routine {
         let mut wanted: Vec<Value> = layout.registers.keys().copied().collect();
         wanted.retain(|&v| self.values.reads(v) == Reads::PARAMETERS);
         wanted.sort_unstable();
-        Builder::new(self, layout, true).build(&wanted, &[])
+        Builder::new(self, layout, true).build(&wanted, &self.watches_of(true))
     }
 
     /// The code that computes the wanted values from the fixed registers, in the order of [`Program::values`].
@@ -230,10 +232,16 @@ impl Program {
         Builder::new(self, layout, false).build(wanted, &[])
     }
 
-    /// The same, with all divisors watched.
+    /// The same, with all divisors watched that vary.
     pub fn watched_routine(&self, layout: &Layout, wanted: &[Value]) -> Routine {
-        let watches: Vec<u32> = (0..self.watches.len() as u32).collect();
-        Builder::new(self, layout, false).build(wanted, &watches)
+        Builder::new(self, layout, false).build(wanted, &self.watches_of(false))
+    }
+
+    /// The watches of divisors that read parameters alone, or of the others.
+    fn watches_of(&self, parameters: bool) -> Vec<u32> {
+        let fixed = |v: Value| self.values.reads(v) == Reads::PARAMETERS;
+        let chosen = self.watches.iter().enumerate().filter(|(_, w)| (fixed(w.pivot) && fixed(w.scale)) == parameters);
+        chosen.map(|(index, _)| index as u32).collect()
     }
 
     /// Marks what the wanted values read, themselves included; with what parameters alone determine if `deep`.
@@ -262,6 +270,8 @@ impl Program {
         wanted.extend(self.parameters.iter().map(|p| p.default));
         wanted.extend(self.watches.iter().flat_map(|w| [w.pivot, w.scale]));
         wanted.extend(self.conditions.values().map(|c| c.operand));
+        let asked = |d: &super::Domain| d.asked.as_ref().map(|a| a.1);
+        wanted.extend(self.domains.iter().flat_map(|d| [Some(d.argument), asked(d), d.limit]).flatten());
         self.live(&wanted, true)
     }
 }
@@ -450,7 +460,8 @@ impl<'a> Builder<'a> {
             }
         }
         let (unknowns, code) = (Vec::new(), Vec::new());
-        self.routine.solves.push(Solve { block, unknowns, guess, code, matrix: Vec::new(), right: Vec::new() });
+        let (matrix, right, outer) = (Vec::new(), Vec::new(), Vec::new());
+        self.routine.solves.push(Solve { block, unknowns, guess, outer, code, matrix, right });
     }
 
     fn close(&mut self, block: BlockId, at: u32, live: &[bool]) {
@@ -460,6 +471,12 @@ impl<'a> Builder<'a> {
         };
         let of = |values: &[Value]| values.iter().map(|v| self.register[v.index()]).collect::<Vec<_>>();
         let (matrix_registers, right_registers) = (of(matrix), of(right));
+        let newton = matches!(self.program.blocks[block], Block::Newton { .. });
+        let mut outer = if newton { self.outer_reads(block) } else { Vec::new() };
+        outer.sort_unstable();
+        outer.dedup();
+        let varies = |v: &&Value| self.program.values.reads(**v) != Reads::PARAMETERS;
+        let outer: Vec<Register> = outer.iter().filter(varies).map(|v| self.register[v.index()]).collect();
         let mut dead = Vec::new();
         let mut unknowns = Vec::new();
         for i in 0..right.len() {
@@ -475,6 +492,7 @@ impl<'a> Builder<'a> {
         }
         let solve = self.routine.solves.last_mut().expect("a block is open");
         (solve.matrix, solve.right, solve.unknowns) = (matrix_registers, right_registers, unknowns);
+        solve.outer = outer;
         self.free.extend(&solve.guess);
         self.free.extend(dead);
         let index = self.routine.solves.len() as u32 - 1;

@@ -3,8 +3,8 @@
 use super::lower::Lowering;
 use super::values::{Op, Reads};
 use super::{
-    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Held, Implicit, Input, Observed, Parameter, Program,
-    StartCondition, State, Value, Watch,
+    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Observed, Parameter,
+    Program, StartCondition, State, Value, Watch,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, ParameterId};
@@ -129,7 +129,9 @@ impl Schedule<'_> {
             guesses.iter().map(|&guess| self.lower.derivatives(&values, guess, from)).collect();
         let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
         let piecewise = self.lower.end_newton();
-        self.blocks.push(Block::Newton { residuals: values, jacobian, elements: names(self.graph, elements) });
+        let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
+        let (unknown_names, elements) = (unknowns.iter().map(name).collect(), names(self.graph, elements));
+        self.blocks.push(Block::Newton { residuals: values, jacobian, unknowns: unknown_names, elements });
         self.solved(block, unknowns);
         for &(symbol, value) in body {
             let value = self.lower.value(value);
@@ -232,6 +234,7 @@ impl Schedule<'_> {
                     span: c.span,
                 })
                 .collect(),
+            domains: equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect(),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
             parameters,
             blocks: self.blocks,
@@ -268,6 +271,20 @@ fn implicit(lower: &Lowering, equations: &Equations) -> Option<Implicit> {
 fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
     let names: Vec<&str> = elements.iter().map(|&e| graph.elements[e].name.as_str()).collect();
     names.join(", ")
+}
+
+/// A domain, if all that it reads is evaluated.
+fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Domain) -> Option<Domain> {
+    let name = |s: Symbol| graph.exprs.name(s).trim_end_matches('*').to_string();
+    let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
+    defined.then(|| Domain {
+        given: name(domain.symbol),
+        elements: names(graph, &domain.elements),
+        argument: lower.value(domain.argument),
+        kind: domain.kind,
+        asked: domain.asked.and_then(|s| Some((name(s), lower.defined(s)?))),
+        limit: domain.limit.map(|limit| lower.value(limit)),
+    })
 }
 
 /// The factors of a divisor that vary or could vanish.

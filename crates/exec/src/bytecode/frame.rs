@@ -17,6 +17,12 @@ pub(crate) enum Trouble {
     Singular { block: u32 },
     /// A Newton block found none.
     NoConvergence { block: u32, iterations: usize, residual: f64 },
+    /// The equation of a Newton block has no solution: where it comes nearest to one, and what is left there.
+    NoSolution { block: u32, nearest: f64, residual: f64 },
+    /// The solution followed ends; what one of its unknowns was, and what it is in another solution.
+    Ended { block: u32, unknown: usize, from: f64, to: f64 },
+    /// The bound on evaluations of a Newton block is hit.
+    Bound { block: u32, evaluations: usize },
 }
 
 /// Everything a routine reads and writes; all memory is taken in [`new`](Frame::new).
@@ -74,6 +80,9 @@ impl Frame {
         let size = self.r.len().max(routine.registers as usize);
         self.r.resize(size, 0.0);
         self.d.resize(size, 0.0);
+        for solve in &routine.solves {
+            self.solvers[solve.block.0 as usize].newton.reserve(solve.outer.len());
+        }
     }
 
     /// Forgets what was kept for the old parameters.

@@ -80,6 +80,15 @@ impl Lu {
         self.rest = rest;
     }
 
+    /// Whether the determinant of the factored matrix is above zero.
+    pub fn is_positive(&self) -> bool {
+        let n = self.size;
+        let minuses = (0..n).filter(|&k| self.factors[k * n + k] < 0.0).count();
+        let exchanges: usize =
+            (0..n).map(|k| self.order[k + 1..].iter().filter(|&&later| later < self.order[k]).count()).sum();
+        (minuses + exchanges) % 2 == 0
+    }
+
     fn substitute(&mut self, b: &mut [f64]) {
         let n = self.size;
         for row in 0..n {
@@ -148,6 +157,19 @@ mod tests {
         assert_eq!(solve(&[&[0.0, 2.0], &[4.0, 1.0]], &[2.0, 5.0]), Ok(vec![1.0, 1.0]));
         let x = solve(&[&[1e-20, 1e5], &[1.0, 1.0]], &[1e5, 2.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 1.0).abs() < 1e-15, "{x:?}");
+    }
+
+    #[test]
+    fn knows_the_sign_of_the_determinant() {
+        let sign = |rows: &[&[f64]]| {
+            let mut lu = Lu::new(rows.len());
+            lu.matrix().copy_from_slice(&rows.concat());
+            lu.factor().unwrap();
+            lu.is_positive()
+        };
+        assert!(sign(&[&[2.0]]) && !sign(&[&[-2.0]]));
+        assert!(!sign(&[&[0.0, 1.0], &[1.0, 0.0]]) && sign(&[&[0.0, 1.0], &[-1.0, 0.0]]));
+        assert!(sign(&[&[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0], &[1.0, 0.0, 0.0]]));
     }
 
     #[test]

@@ -1,4 +1,13 @@
 //! Newton's method for a solve block: damped by the natural test, exact Jacobian, to rounding.
+//!
+//! A law may have several solutions. At the start of a run, and after a jump, any of them may be taken: the one that the
+//! equations lead to from the last one, else the first one found. From then on it is *followed*: a solution counts as
+//! the same only if the equations run straight towards it from the one accepted last, without a fold or a pole on the
+//! way. What Newton finds elsewhere is not taken. So rates are those of one solution, and its slopes are the exact ones
+//! of the implicit function theorem. Where the solution followed ends, the run stops.
+//!
+//! Everything depends on the accepted solution ([`Newton::memory`]) and the values the block reads, on nothing else.
+//! Evaluations are bounded.
 
 use super::frame::{Frame, Trouble};
 use halfarrow_compiler::program::Solve;
@@ -9,16 +18,47 @@ const ITERATIONS: usize = 100;
 const SHORTEST: f64 = 1e-12;
 /// A relative step below this that no longer improves the residual is rounding.
 const SETTLED: f64 = 1e-9;
-/// Attempts from other points after those from the last solution and from zero.
+/// The same while a solution is followed.
+const SHORTEST_FOLLOWING: f64 = 1e-6;
+/// Shortest part of the way from one solution to the next that is gone at once.
+const SHORTEST_STRIDE: f64 = 1e-6;
+/// Part of the way below which a few looks tell whether it is straight: over a kink of a law no step contracts. The
+/// solution must have moved by no more than `SHORT_MOVE` of its magnitude.
+const SHORT_STRIDE: f64 = 1e-3;
+const SHORT_MOVE: f64 = 1e-2;
+/// Iterations of an attempt in a short stride, and the shortest fraction of a step.
+const SHORT_ITERATIONS: usize = 10;
+const SHORT_FRACTION: f64 = 0.1;
+/// Contraction of the first step below which the solution is near without doubt.
+const NEAR: f64 = 0.25;
+/// Points at which the way to a solution that is not near is looked at.
+const LOOKS: usize = 8;
+/// Attempts from other points after those from the last solution and from zero, at the start and after jumps.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
+/// Evaluations of a block at most at the start and after jumps.
+const MOST_AT_START: usize = 20_000;
+/// Evaluations of a block at most at any other time, unless a bound is set.
+pub(crate) const MOST: usize = 2_000;
+/// Powers of ten between which one unknown is searched, and points a power.
+const SEARCHED: (i32, i32, i32) = (-12, 12, 20);
 
 /// Memory and working space of a Newton block.
 #[derive(Debug, Clone)]
 pub(crate) struct Newton {
     /// Where the next solution starts: part of the model's state.
     pub memory: Vec<f64>,
-    /// The last solution found.
+    /// Whether the memory is an accepted solution, which is followed.
+    pub following: bool,
+    /// What the block read there, and its Jacobian, row by row: part of the model's state too.
+    outer_memory: Vec<f64>,
+    jacobian_memory: Vec<f64>,
+    /// The last solution found, what the block read there, and its Jacobian.
     pub x: Vec<f64>,
+    outer: Vec<f64>,
+    jacobian: Vec<f64>,
+    /// Evaluations at most while following.
+    pub most: usize,
+    evaluations: usize,
     step: Vec<f64>,
     trial: Vec<f64>,
     next: Vec<f64>,
@@ -27,24 +67,85 @@ pub(crate) struct Newton {
     /// What is subtracted from the residuals on the way from a point where they do not vanish.
     offset: Vec<f64>,
     first: Vec<f64>,
-    /// The last root on that way.
+    /// Where the attempt began: the last root on the way.
     kept: Vec<f64>,
+    /// The first step of the attempt: to first order the change of the solution.
+    lead: Vec<f64>,
+    /// Residuals where the attempt began, with the sign of a right-hand side.
+    opening: Vec<f64>,
+    /// The Jacobian of the root at which the attempt began, if it began at one.
+    base: Vec<f64>,
+    /// Magnitudes of the unknowns at the memory and where the attempt from there led.
+    span: Vec<f64>,
+    /// Whether the first step, taken whole, left little to do.
+    near: bool,
 }
 
 impl Newton {
     pub fn new(size: usize) -> Newton {
-        let line = vec![0.0; size];
+        let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
         Newton {
             memory: line.clone(),
+            following: false,
+            outer_memory: Vec::new(),
+            jacobian_memory: square.clone(),
             x: line.clone(),
+            outer: Vec::new(),
+            jacobian: square.clone(),
+            most: MOST,
+            evaluations: 0,
             step: line.clone(),
             trial: line.clone(),
             next: line.clone(),
             size: line.clone(),
             offset: line.clone(),
             first: line.clone(),
-            kept: line,
+            kept: line.clone(),
+            lead: line.clone(),
+            opening: line.clone(),
+            span: line,
+            base: square,
+            near: false,
         }
+    }
+
+    /// Makes room for so many values that the block reads.
+    pub fn reserve(&mut self, outer: usize) {
+        self.outer.resize(outer, 0.0);
+        self.outer_memory.resize(outer, 0.0);
+    }
+
+    /// Forgets the run.
+    pub fn forget(&mut self) {
+        self.memory.fill(0.0);
+        self.following = false;
+    }
+
+    /// Goes on with the solution found last.
+    pub fn accept(&mut self) {
+        self.memory.copy_from_slice(&self.x);
+        self.outer_memory.copy_from_slice(&self.outer);
+        self.jacobian_memory.copy_from_slice(&self.jacobian);
+        self.following = true;
+    }
+
+    /// How far `next` is from the first step, measured as steps are.
+    fn off_the_lead(&self) -> f64 {
+        let mut most: f64 = 0.0;
+        for i in 0..self.next.len() {
+            let (lead, off) = (self.lead[i], (self.next[i] - self.lead[i]).abs());
+            let size = self.size[i].max(lead.abs()).max(f64::MIN_POSITIVE);
+            most = if off.is_nan() { f64::INFINITY } else { most.max(off / size) };
+        }
+        most
+    }
+
+    fn limit(&self) -> usize {
+        if self.following { self.most } else { MOST_AT_START }
+    }
+
+    fn exhausted(&self) -> bool {
+        self.evaluations >= self.limit()
     }
 }
 
@@ -55,75 +156,263 @@ struct Miss {
     residual: f64,
 }
 
+/// Why the root that goes on from the last one was not found.
+#[derive(Debug, Clone, Copy)]
+enum Missed {
+    /// There is another one.
+    Elsewhere { unknown: usize, root: f64 },
+    /// None was found.
+    All(Miss),
+}
+
 impl Frame {
-    /// Finds the root of a block from its memory, or from elsewhere; leaves it in `newton.x` and in the guesses.
+    /// Finds the root of a block that goes on from its memory, at a start any root; leaves it in `newton.x` and in the
+    /// guesses.
     pub(super) fn find_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
-        let block = solve.block.0 as usize;
-        self.newton_of(solve).offset.fill(0.0);
-        let newton = self.newton_of(solve);
-        newton.x.copy_from_slice(&newton.memory);
-        let Err(first) = self.attempt(solve) else { return Ok(()) };
-        for start in std::iter::once(0.0).chain(OTHER_STARTS) {
-            self.newton_of(solve).x.fill(start);
-            if self.attempt(solve).is_ok() {
-                return Ok(());
+        let Frame { r, solvers, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        newton.evaluations = 0;
+        newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
+        if let Err(missed) = self.follow(solve)
+            && (self.newton_of(solve).following || !self.search(solve))
+        {
+            return Err(self.trouble(solve, missed));
+        }
+        self.keep_jacobian(solve);
+        Ok(())
+    }
+
+    /// Takes note of the Jacobian at the point evaluated last.
+    fn keep_jacobian(&mut self, solve: &Solve) {
+        let Frame { r, solvers, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        newton.jacobian.iter_mut().zip(&solve.matrix).for_each(|(j, &m)| *j = r[m as usize]);
+    }
+
+    /// Why there is no root to go on with.
+    fn trouble(&mut self, solve: &Solve, missed: Missed) -> Trouble {
+        let (block, newton) = (solve.block.0, self.newton_of(solve));
+        match missed {
+            Missed::Elsewhere { unknown, root } => {
+                Trouble::Ended { block, unknown, from: newton.memory[unknown], to: root }
             }
+            Missed::All(_) if newton.exhausted() => Trouble::Bound { block, evaluations: newton.limit() },
+            Missed::All(_) if solve.right.len() == 1 => match self.scan(solve) {
+                true => {
+                    let newton = self.newton_of(solve);
+                    Trouble::Ended { block, unknown: 0, from: newton.memory[0], to: newton.x[0] }
+                }
+                false => self.nowhere(solve),
+            },
+            Missed::All(Miss { iterations, residual }) => Trouble::NoConvergence { block, iterations, residual },
         }
-        if self.approach(solve) {
-            return Ok(());
-        }
-        let Miss { iterations, residual } = first;
-        Err(Trouble::NoConvergence { block: block as u32, iterations, residual })
     }
 
     fn newton_of(&mut self, solve: &Solve) -> &mut Newton {
         &mut self.solvers[solve.block.0 as usize].newton
     }
 
-    /// Follows the roots of `residual - (1 - s) residual(start)` from the memory at `s = 0` to `s = 1`.
+    /// The root that goes on from the memory.
+    fn follow(&mut self, solve: &Solve) -> Result<(), Missed> {
+        let newton = self.newton_of(solve);
+        newton.offset.fill(0.0);
+        newton.kept.copy_from_slice(&newton.memory);
+        newton.base.copy_from_slice(&newton.jacobian_memory);
+        let first = self.attempt(solve, Trust::Damped);
+        let newton = self.newton_of(solve);
+        for i in 0..newton.x.len() {
+            newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
+        }
+        let missed = match first {
+            Ok(()) if self.goes_on(solve) => return Ok(()),
+            Ok(()) => self.elsewhere(solve),
+            Err(miss) => Missed::All(miss),
+        };
+        if self.approach(solve) { Ok(()) } else { Err(missed) }
+    }
+
+    /// The root found is another one: the unknown that differs most.
+    fn elsewhere(&mut self, solve: &Solve) -> Missed {
+        let newton = self.newton_of(solve);
+        let leap = |i: usize| (newton.x[i] - newton.memory[i]).abs() / newton.size[i].max(f64::MIN_POSITIVE);
+        let unknown = (0..newton.x.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
+        Missed::Elsewhere { unknown, root: newton.x[unknown] }
+    }
+
+    /// Any root.
+    fn search(&mut self, solve: &Solve) -> bool {
+        let newton = self.newton_of(solve);
+        newton.kept.copy_from_slice(&newton.memory);
+        if self.attempt(solve, Trust::Damped).is_ok() {
+            return true;
+        }
+        for start in std::iter::once(0.0).chain(OTHER_STARTS) {
+            self.newton_of(solve).kept.fill(start);
+            if self.attempt(solve, Trust::Damped).is_ok() {
+                return true;
+            }
+        }
+        solve.right.len() == 1 && self.scan(solve)
+    }
+
+    /// Goes from the memory in strides, each short enough to tell the root: along what the block has read and reads now,
+    /// or from a point that is no root along the roots of `residual - (1 - s) residual(memory)`.
     fn approach(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
-        newton.x.copy_from_slice(&newton.memory);
         newton.offset.fill(0.0);
-        if !self.evaluate(solve, false) {
+        newton.kept.copy_from_slice(&newton.memory);
+        newton.base.copy_from_slice(&newton.jacobian_memory);
+        newton.x.copy_from_slice(&newton.memory);
+        if !newton.following && !self.evaluate(solve, false) {
             return false;
         }
         for (i, &right) in solve.right.iter().enumerate() {
             let residual = self.r[right as usize];
             self.newton_of(solve).first[i] = residual;
         }
-        let (mut s, mut stride) = (0.0f64, 0.1f64);
-        while stride > 1e-5 {
+        let (mut s, mut stride) = (0.0f64, 0.25f64);
+        while stride > SHORTEST_STRIDE && !self.newton_of(solve).exhausted() {
             let next = (s + stride).min(1.0);
-            let newton = self.newton_of(solve);
-            newton.offset.iter_mut().zip(&newton.first).for_each(|(o, f)| *o = (1.0 - next) * f);
-            newton.kept.copy_from_slice(&newton.x);
-            if self.attempt(solve).is_ok() {
+            self.go_to(solve, next);
+            let short = stride <= SHORT_STRIDE;
+            let trust = if short { Trust::Kink } else { Trust::Contraction };
+            let found = self.attempt(solve, trust).is_ok();
+            if found && (self.goes_on(solve) || short && self.moves_little(solve) && self.is_straight(solve)) {
                 if next == 1.0 {
                     return true;
                 }
+                self.keep_jacobian(solve);
+                let newton = self.newton_of(solve);
+                newton.kept.copy_from_slice(&newton.x);
+                newton.base.copy_from_slice(&newton.jacobian);
                 (s, stride) = (next, 2.0 * stride);
             } else {
-                let newton = self.newton_of(solve);
-                newton.x.copy_from_slice(&newton.kept);
                 stride *= 0.5;
             }
         }
-        self.newton_of(solve).offset.fill(0.0);
+        self.go_to(solve, 1.0);
         false
     }
 
-    /// Newton from `newton.x`.
-    fn attempt(&mut self, solve: &Solve) -> Result<(), Miss> {
+    /// Sets what the block reads, or what is taken off its residuals, to a part of the way.
+    fn go_to(&mut self, solve: &Solve, part: f64) {
+        let Frame { r, solvers, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        if !newton.following {
+            newton.offset.iter_mut().zip(&newton.first).for_each(|(o, f)| *o = (1.0 - part) * f);
+            return;
+        }
+        for (&register, (now, before)) in solve.outer.iter().zip(newton.outer.iter().zip(&newton.outer_memory)) {
+            r[register as usize] = if part == 1.0 { *now } else { before + part * (now - before) };
+        }
+    }
+
+    /// Whether the root found is without doubt the one that goes on from where the attempt began: the first step, taken
+    /// whole, came near to it, and the Jacobian there is much the same as at the beginning.
+    fn goes_on(&mut self, solve: &Solve) -> bool {
+        let solver = &mut self.solvers[solve.block.0 as usize];
+        let newton = &mut solver.newton;
+        if !newton.near || newton.lead.iter().all(|&lead| lead == 0.0) {
+            return newton.near;
+        }
+        let n = newton.x.len();
+        let mut most = SETTLED;
+        for i in 0..n {
+            let lead = newton.lead[i].abs();
+            most = most.max(lead / newton.size[i].max(lead).max(f64::MIN_POSITIVE));
+            newton.next[i] = newton.x[i] - newton.kept[i];
+        }
+        let off = newton.off_the_lead();
+        // What the first step would have been with the last Jacobian.
+        newton.next.copy_from_slice(&newton.opening);
+        solver.lu.solve(&mut newton.next);
+        let off = off.max(newton.off_the_lead());
+        if !newton.following {
+            return off <= 0.5 * most;
+        }
+        // And that of the Jacobian at the root where it began.
+        for i in 0..n {
+            newton.next[i] = newton.base[i * n..][..n].iter().zip(&newton.lead).map(|(j, lead)| j * lead).sum();
+        }
+        solver.lu.solve(&mut newton.next);
+        off.max(newton.off_the_lead()) <= 0.5 * most
+    }
+
+    fn moves_little(&mut self, solve: &Solve) -> bool {
+        let newton = self.newton_of(solve);
+        let little = |i: usize| (newton.x[i] - newton.kept[i]).abs() <= SHORT_MOVE * newton.span[i];
+        (0..newton.x.len()).all(little)
+    }
+
+    /// Whether the residuals shrink all the way from where the attempt began to the root, and the Jacobian never changes
+    /// its orientation: no fold and no pole lies between them. Ends with an evaluation at the root.
+    fn is_straight(&mut self, solve: &Solve) -> bool {
+        let straight = self.is_straight_at_looks(solve);
+        straight & self.evaluate(solve, false)
+    }
+
+    fn is_straight_at_looks(&mut self, solve: &Solve) -> bool {
+        // Measured by the Jacobian at the root, or where that is singular at the beginning.
+        if ![LOOKS, 0].into_iter().any(|look| self.look(solve, look) && self.factor(solve)) {
+            return false;
+        }
+        let mut before = f64::INFINITY;
+        for look in 0..=LOOKS {
+            if !self.look(solve, look) {
+                return false;
+            }
+            let rest = self.next_step(solve);
+            if rest.is_nan() || rest > before * (1.0 + SETTLED) + SETTLED {
+                return false;
+            }
+            before = rest;
+        }
+        let mut orientation = None;
+        for look in 0..=LOOKS {
+            let good = self.look(solve, look);
+            // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there.
+            if good && self.factor(solve) {
+                let here = self.solvers[solve.block.0 as usize].lu.is_positive();
+                if *orientation.get_or_insert(here) != here {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Evaluates a point on the way from where the attempt began to the root.
+    fn look(&mut self, solve: &Solve, look: usize) -> bool {
+        let part = look as f64 / LOOKS as f64;
+        let newton = self.newton_of(solve);
+        for i in 0..newton.x.len() {
+            newton.trial[i] = newton.kept[i] + part * (newton.x[i] - newton.kept[i]);
+        }
+        self.evaluate(solve, true)
+    }
+
+    /// Newton from `newton.kept`.
+    fn attempt(&mut self, solve: &Solve, trust: Trust) -> Result<(), Miss> {
         let n = solve.right.len();
         let newton = self.newton_of(solve);
+        // The way in short strides needs its share of the evaluations.
+        let last = newton.evaluations + newton.limit() / 4;
+        newton.x.copy_from_slice(&newton.kept);
+        newton.near = true;
+        newton.lead.fill(0.0);
+        newton.opening.fill(0.0);
         (0..n).for_each(|i| newton.size[i] = newton.x[i].abs());
         if !self.evaluate(solve, false) {
             return Err(Miss { iterations: 0, residual: f64::NAN });
         }
-        for iteration in 0..ITERATIONS {
+        let most = if trust == Trust::Kink { SHORT_ITERATIONS } else { ITERATIONS };
+        for iteration in 0..most {
             if self.residual(solve) == 0.0 {
                 return Ok(());
+            }
+            let newton = self.newton_of(solve);
+            if newton.exhausted() || newton.evaluations > last {
+                return Err(Miss { iterations: iteration, residual: self.residual(solve) });
             }
             if !self.factor(solve) {
                 self.nudge(solve, iteration);
@@ -133,11 +422,24 @@ impl Frame {
                 continue;
             }
             self.newton_step(solve);
+            if iteration == 0 {
+                let Frame { r, solvers, .. } = self;
+                let newton = &mut solvers[solve.block.0 as usize].newton;
+                newton.lead.copy_from_slice(&newton.step);
+                for (i, &right) in solve.right.iter().enumerate() {
+                    newton.opening[i] = newton.offset[i] - r[right as usize];
+                }
+            }
             let size = self.relative_step(solve);
             if !size.is_finite() {
                 break;
             }
-            match self.damped(solve, size) {
+            let (damped, near) = self.damped(solve, size, trust);
+            self.newton_of(solve).near &= iteration > 0 || near;
+            if trust == Trust::Contraction && !self.newton_of(solve).near {
+                return Err(Miss { iterations: iteration + 1, residual: self.residual(solve) });
+            }
+            match damped {
                 Damped::Done => return Ok(()),
                 Damped::Moved => {}
                 Damped::Stuck => {
@@ -145,11 +447,11 @@ impl Frame {
                 }
             }
         }
-        Err(Miss { iterations: ITERATIONS, residual: self.residual(solve) })
+        Err(Miss { iterations: most, residual: self.residual(solve) })
     }
 
-    /// Takes the step, or as much of it as makes the next one shorter.
-    fn damped(&mut self, solve: &Solve, size: f64) -> Damped {
+    /// Takes the step, or as much of it as makes the next one shorter; and whether all of it left little to do.
+    fn damped(&mut self, solve: &Solve, size: f64, trust: Trust) -> (Damped, bool) {
         let mut fraction = 1.0;
         loop {
             let newton = self.newton_of(solve);
@@ -161,18 +463,25 @@ impl Frame {
                 let next = self.next_step(solve);
                 if next <= (1.0 - 0.25 * fraction) * size || size <= 2.0 * f64::EPSILON {
                     self.accept_trial(solve);
-                    return if size <= 4.0 * f64::EPSILON { Damped::Done } else { Damped::Moved };
+                    let near = fraction == 1.0 && (next <= NEAR * size || size <= SETTLED);
+                    return (if size <= 4.0 * f64::EPSILON { Damped::Done } else { Damped::Moved }, near);
                 }
             }
             if size <= SETTLED {
                 // Rounding keeps the step from shrinking: it is as good as it gets.
                 self.evaluate(solve, false);
-                return Damped::Done;
+                return (Damped::Done, true);
             }
             fraction *= 0.5;
-            if fraction < SHORTEST {
+            let newton = self.newton_of(solve);
+            let shortest = match trust {
+                Trust::Kink => SHORT_FRACTION,
+                _ if newton.following => SHORTEST_FOLLOWING,
+                _ => SHORTEST,
+            };
+            if fraction < shortest || newton.exhausted() {
                 self.evaluate(solve, false);
-                return Damped::Stuck;
+                return (Damped::Stuck, false);
             }
         }
     }
@@ -185,6 +494,8 @@ impl Frame {
 
     /// Runs the code at `x` (or the trial point); whether residuals and Jacobian are finite.
     fn evaluate(&mut self, solve: &Solve, trial: bool) -> bool {
+        let newton = self.newton_of(solve);
+        newton.evaluations += 1;
         let newton = &self.solvers[solve.block.0 as usize].newton;
         let point = if trial { &newton.trial } else { &newton.x };
         solve.guess.iter().zip(point).for_each(|(&g, &x)| self.r[g as usize] = x);
@@ -252,6 +563,7 @@ impl Frame {
     /// Leaves a point at which the Jacobian is singular.
     fn nudge(&mut self, solve: &Solve, iteration: usize) {
         let newton = self.newton_of(solve);
+        newton.near = false;
         for (i, x) in newton.x.iter_mut().enumerate() {
             let away = 1e-3 * (1.0 + iteration as f64) * newton.size[i].max(1.0);
             *x += if i % 2 == iteration % 2 { away } else { 0.5 * away };
@@ -259,9 +571,91 @@ impl Frame {
     }
 }
 
+/// What an attempt may lead to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trust {
+    /// Any root that damped steps find.
+    Damped,
+    /// A root that few steps find.
+    Kink,
+    /// A root that the first step comes near to, or none.
+    Contraction,
+}
+
 /// What became of a step.
 enum Damped {
     Done,
     Moved,
     Stuck,
+}
+
+/// One equation in one unknown: a search over all magnitudes.
+impl Frame {
+    /// A root anywhere, those near the memory first; left in `newton.x`.
+    fn scan(&mut self, solve: &Solve) -> bool {
+        self.newton_of(solve).offset.fill(0.0);
+        let middle = self.newton_of(solve).memory[0];
+        let mut ends = [None; 2];
+        for distance in distances() {
+            for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
+                let at = middle + sign * distance;
+                let here = self.residual_at(solve, at);
+                let before = std::mem::replace(end, here.map(|r| (at, r)));
+                let (Some(r), Some(before)) = (here, before) else { continue };
+                if r.signum() != before.1.signum() && self.between(solve, before, (at, r)) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn residual_at(&mut self, solve: &Solve, at: f64) -> Option<f64> {
+        let newton = self.newton_of(solve);
+        newton.trial[0] = at;
+        let finite = self.evaluate(solve, true);
+        finite.then(|| self.r[solve.right[0] as usize])
+    }
+
+    /// Halves an interval at whose ends the residual differs in sign. A pole is no root.
+    fn between(&mut self, solve: &Solve, mut a: (f64, f64), mut b: (f64, f64)) -> bool {
+        let jump = a.1.abs().min(b.1.abs());
+        for _ in 0..200 {
+            let middle = 0.5 * (a.0 + b.0);
+            if middle == a.0 || middle == b.0 {
+                break;
+            }
+            let Some(r) = self.residual_at(solve, middle) else { return false };
+            if r.signum() == a.1.signum() { a = (middle, r) } else { b = (middle, r) }
+        }
+        let best = if a.1.abs() < b.1.abs() { a } else { b };
+        if best.1.abs() > jump {
+            return false;
+        }
+        self.newton_of(solve).kept[0] = best.0;
+        self.newton_of(solve).evaluations = 0;
+        self.attempt(solve, Trust::Damped).is_ok()
+    }
+
+    /// Where the residual of a block without root is least.
+    fn nowhere(&mut self, solve: &Solve) -> Trouble {
+        let middle = self.newton_of(solve).memory[0];
+        let mut best = (middle, self.residual_at(solve, middle).map_or(f64::INFINITY, f64::abs));
+        for distance in distances() {
+            for at in [middle + distance, middle - distance] {
+                let r = self.residual_at(solve, at).map_or(f64::INFINITY, f64::abs);
+                if r < best.1 {
+                    best = (at, r);
+                }
+            }
+        }
+        Trouble::NoSolution { block: solve.block.0, nearest: best.0, residual: best.1 }
+    }
+}
+
+/// Distances from tiny to huge.
+fn distances() -> impl Iterator<Item = f64> {
+    let (low, high, points) = SEARCHED;
+    std::iter::once(0.0)
+        .chain((low * points..=high * points).map(move |k| crate::math::pow(10.0, f64::from(k) / f64::from(points))))
 }

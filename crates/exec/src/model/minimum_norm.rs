@@ -19,15 +19,22 @@ pub(super) struct Step {
 /// Computes it; `jacobian` row by row. `None` if something is not finite or the singular values do not come out.
 pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option<Step> {
     let rows = residual.len();
+    let weights: Vec<f64> = match columns {
+        0 => vec![1.0; rows],
+        _ => jacobian.chunks(columns).map(|row| inverse(greatest(&mut row.iter().copied()))).collect(),
+    };
+    weighed_step(jacobian, residual, columns, weights)
+}
+
+/// The same with the weights of the rows given.
+pub(super) fn weighed_step(jacobian: &[f64], residual: &[f64], columns: usize, weights: Vec<f64>) -> Option<Step> {
+    let rows = residual.len();
     if rows == 0 || columns == 0 {
-        return Some(Step { step: vec![0.0; columns], rank: 0, weights: vec![1.0; rows] });
+        return Some(Step { step: vec![0.0; columns], rank: 0, weights });
     }
     if jacobian.iter().chain(residual).any(|v| !v.is_finite()) {
         return None;
     }
-    let greatest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |most, v| most.max(v.abs()));
-    let inverse = |most: f64| if most > 0.0 { 1.0 / most } else { 1.0 };
-    let weights: Vec<f64> = jacobian.chunks(columns).map(|row| inverse(greatest(&mut row.iter().copied()))).collect();
     let weighed = |j: usize| (0..rows).map(move |i| (i, j));
     let sizes: Vec<f64> = (0..columns)
         .map(|j| inverse(greatest(&mut weighed(j).map(|(i, j)| jacobian[i * columns + j] * weights[i]))))
@@ -39,6 +46,14 @@ pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option
     let rank = svd.rank(limit);
     let solution = svd.solve(&right, limit).ok()?;
     Some(Step { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
+}
+
+fn greatest(values: &mut dyn Iterator<Item = f64>) -> f64 {
+    values.fold(0.0f64, |most, v| most.max(v.abs()))
+}
+
+fn inverse(most: f64) -> f64 {
+    if most > 0.0 { 1.0 / most } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod clock;
 mod equilibrium;
 mod errors;
+mod explain;
 mod history;
 mod implicit;
 mod inputs;
@@ -47,7 +48,7 @@ pub struct Model {
     /// Values of the conserved constants.
     conserved: Vec<f64>,
     dx: Vec<f64>,
-    /// Blocks that no rate needs.
+    /// Newton blocks that recorded values need and no rate does.
     shown_blocks: Vec<BlockId>,
     /// Whether the run has begun: conditions are held.
     begun: bool,
@@ -83,7 +84,6 @@ impl Model {
         for routine in [&rates, &preamble, &sources, &switching, clock.routine()] {
             frame.reserve(routine);
         }
-        let used: Vec<BlockId> = rates.solves.iter().map(|s| s.block).collect();
         let n = program.states.len();
         let mut model = Model {
             sparsity: sparsity_of(&program),
@@ -92,7 +92,7 @@ impl Model {
             scales: vec![0.0; n],
             conserved: vec![0.0; program.conserved.len()],
             dx: vec![0.0; n],
-            shown_blocks: program.blocks.ids().filter(|b| !used.contains(b)).collect(),
+            shown_blocks: Vec::new(),
             begun: false,
             crossed: f64::NEG_INFINITY,
             observe: Routine::default(),
@@ -186,13 +186,20 @@ impl Model {
         &self.recorded
     }
 
+    /// Bounds the evaluations of each block of nonlinear equations, every time it is solved while running: what needs more
+    /// stops the run and says so. For real time; without it the bound is 2000. The start of a run and its jumps may
+    /// take more.
+    pub fn bound_iterations(&mut self, most: usize) {
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.most = most.max(1));
+    }
+
     /// Forgets a run: the next crossing is its start. Parameters, inputs and conserved constants stay.
     pub fn restart(&mut self) {
         self.begun = false;
         self.crossed = f64::NEG_INFINITY;
         self.follow();
         self.inputs.iter_mut().for_each(Signal::release);
-        self.frame.solvers.iter_mut().for_each(|s| s.newton.memory.fill(0.0));
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
         let time = |i: usize| self.layout.registers.get(&self.program.held[i].time).map(|&r| self.frame.r[r as usize]);
         let held = self.program.held.iter().enumerate().map(|(i, h)| {
             let time = time(i).unwrap_or(f64::NAN);
@@ -211,8 +218,12 @@ impl Model {
 
     fn parameters_changed(&mut self) -> Result<(), Failure> {
         self.frame.parameters_changed();
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
         let run = self.frame.run(&self.preamble);
         run.map_err(|trouble| self.failure(f64::NAN, trouble))?;
+        if let Some(failure) = self.violated_always() {
+            return Err(failure);
+        }
         for (i, input) in self.program.inputs.iter().enumerate() {
             if let Some(&register) = self.layout.registers.get(&input.default) {
                 self.inputs[i].set_default(self.frame.r[register as usize]);
@@ -225,8 +236,11 @@ impl Model {
     fn choose_recorded(&mut self) {
         let value = |&i: &usize| self.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = self.recorded.iter().filter_map(value).collect();
-        self.observe = self.program.routine(&self.layout, &wanted);
+        self.observe = self.program.watched_routine(&self.layout, &wanted);
         self.frame.reserve(&self.observe);
+        let of_rates = |block: BlockId| self.rates.solves.iter().any(|s| s.block == block);
+        let newton = self.observe.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
+        self.shown_blocks = newton.filter(|&block| !of_rates(block)).collect();
     }
 
     /// Puts time, inputs, held signals, constants and states where routines read them.
@@ -259,15 +273,28 @@ impl Model {
 
     /// What stopped a routine, for the modeller.
     fn failure(&self, time: f64, trouble: Trouble) -> Failure {
-        let elements = |block: u32| self.program.blocks[BlockId(block)].elements().to_string();
+        let block = |block: u32| &self.program.blocks[BlockId(block)];
+        let what = |b: u32| block(b).elements().to_string();
+        let unknown = |b: u32, unknown: usize| block(b).unknown(unknown).to_string();
         match trouble {
             Trouble::Vanished { watch } => {
                 Failure::Singular { time, what: self.program.watches[watch as usize].elements.clone() }
             }
-            Trouble::Singular { block } => Failure::Singular { time, what: elements(block) },
+            Trouble::Singular { block } => Failure::Singular { time, what: what(block) },
             Trouble::NoConvergence { block, iterations, residual } => {
-                Failure::NoConvergence { time, what: elements(block), iterations, residual }
+                Failure::NoConvergence { time, what: what(block), iterations, residual }
             }
+            Trouble::NoSolution { block, nearest, residual } => {
+                let name = unknown(block, 0);
+                let reason = format!(
+                    "no value of {name} solves its equation; {name} = {nearest:.3} comes nearest and leaves {residual:.3e}"
+                );
+                Failure::OutOfDomain { time, what: what(block), reason }
+            }
+            Trouble::Ended { block, unknown: index, from, to } => {
+                Failure::Branch { time, what: what(block), unknown: unknown(block, index), from, to }
+            }
+            Trouble::Bound { block, evaluations } => Failure::Bound { time, what: what(block), most: evaluations },
         }
     }
 }

@@ -29,6 +29,14 @@ struct Group {
     unknowns: Vec<u32>,
 }
 
+/// A group at the time of the start, with the routine that computes its residuals.
+#[derive(Clone, Copy)]
+struct Routed<'a> {
+    t: f64,
+    routine: &'a Routine,
+    group: &'a Group,
+}
+
 impl Model {
     /// The state at the start of a run at `t`, which meets all start conditions; unknowns that they leave free are as
     /// near to zero as they allow. Fixes the conserved constants. The run starts anew.
@@ -179,8 +187,9 @@ impl Model {
 
     /// Gauss-Newton of minimum norm, damped.
     fn solve_group(&mut self, t: f64, routine: &Routine, group: &Group, all: &mut Unknowns) -> Result<(), StartError> {
-        let names = || group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
-        let not_found = StartError::NotFound(names());
+        let names: Vec<String> = group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
+        let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
+        let not_found = StartError::NotFound(names);
         let mut z = all.z.clone();
         let starts = [0.0, 1e-6, 1e-3, 1.0];
         let mut at = None;
@@ -197,47 +206,84 @@ impl Model {
             Some(at) => at,
             None => {
                 let run = self.residuals(t, routine, &z, None);
-                return Err(run.err().map_or(not_found, StartError::Failure));
+                return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
             }
         };
-        for _ in 0..ITERATIONS {
+        let mut weights = None;
+        // At first every row weighs as its Jacobian says, which finds a start if there is one. What is missed then is
+        // missed by as little as possible with the weights as they are there.
+        loop {
+            let routed = Routed { t, routine, group };
+            let moves = if weights.is_none() { ITERATIONS } else { 10 * ITERATIONS };
+            for _ in 0..moves {
+                if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), weights.as_deref()) {
+                    break;
+                }
+            }
+            let missed = self.missed(group, &z, &residual, &jacobian);
+            if missed.is_empty() {
+                all.z = z;
+                group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
+                return Ok(());
+            }
             let Some(step) = minimum_norm::step(&jacobian, &residual, group.unknowns.len()) else {
                 return Err(not_found);
             };
-            let norm = |r: &[f64]| r.iter().zip(&step.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
-            let moves = |(u, s): (&u32, &f64)| s.abs() > 4.0 * f64::EPSILON * z[*u as usize].abs();
-            if norm(&residual) == 0.0 || !group.unknowns.iter().zip(&step.step).any(moves) {
-                break;
-            }
-            let mut fraction = 1.0;
-            let moved = loop {
-                let mut trial = z.clone();
-                group.unknowns.iter().zip(&step.step).for_each(|(&u, s)| trial[u as usize] += fraction * s);
-                match self.linearised(t, routine, group, &trial) {
-                    Some(next) if norm(&next.0) < norm(&residual) => break Some((trial, next)),
-                    _ if fraction < 1e-9 => break None,
-                    _ => fraction *= 0.5,
+            match weights {
+                None => weights = Some(step.weights),
+                Some(weights) => {
+                    return Err(self.conflict(routed, &z, (&residual, &jacobian), &weights).unwrap_or(not_found));
                 }
-            };
-            // No step helps any more: this is as near as it gets.
-            let Some((trial, next)) = moved else { break };
-            z = trial;
-            (residual, jacobian) = next;
+            }
         }
-        let missed = self.missed(group, &z, &residual, &jacobian);
-        if missed.is_empty() {
-            all.z = z;
-            group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
-            return Ok(());
+    }
+
+    /// One damped step; whether it helped.
+    fn nearer(
+        &mut self,
+        Routed { t, routine, group }: Routed,
+        z: &mut Vec<f64>,
+        (residual, jacobian): (&mut Vec<f64>, &mut Vec<f64>),
+        weights: Option<&[f64]>,
+    ) -> bool {
+        let n = group.unknowns.len();
+        let step = match weights {
+            None => minimum_norm::step(jacobian, residual, n),
+            Some(weights) => minimum_norm::weighed_step(jacobian, residual, n, weights.to_vec()),
+        };
+        let Some(step) = step else { return false };
+        let norm = |r: &[f64]| r.iter().zip(&step.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
+        let moves = |(u, s): (&u32, &f64)| s.abs() > 4.0 * f64::EPSILON * z[*u as usize].abs();
+        if norm(residual) == 0.0 || !group.unknowns.iter().zip(&step.step).any(moves) {
+            return false;
         }
-        Err(self.conflict(t, group, &z, &residual, &jacobian).unwrap_or(not_found))
+        let mut fraction = 1.0;
+        while fraction >= 1e-9 {
+            let mut trial = z.clone();
+            group.unknowns.iter().zip(&step.step).for_each(|(&u, s)| trial[u as usize] += fraction * s);
+            match self.linearised(t, routine, group, &trial) {
+                Some(next) if norm(&next.0) < norm(residual) => {
+                    *z = trial;
+                    (*residual, *jacobian) = next;
+                    return true;
+                }
+                _ => fraction *= 0.5,
+            }
+        }
+        // No step helps any more: this is as near as it gets.
+        false
     }
 
     /// The contradiction, if the point is as near as any to all conditions.
-    fn conflict(&mut self, t: f64, group: &Group, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Option<StartError> {
-        let weights = minimum_norm::step(jacobian, residual, group.unknowns.len())?.weights;
+    fn conflict(
+        &mut self,
+        Routed { t, group, .. }: Routed,
+        z: &[f64],
+        (residual, jacobian): (&[f64], &[f64]),
+        weights: &[f64],
+    ) -> Option<StartError> {
         let n = group.unknowns.len();
-        let weighed: Vec<f64> = residual.iter().zip(&weights).map(|(r, w)| r * w).collect();
+        let weighed: Vec<f64> = residual.iter().zip(weights).map(|(r, w)| r * w).collect();
         let most = weighed.iter().fold(0.0f64, |most, r| most.max(r.abs()));
         // At a least-squares point the residual is orthogonal to whatever the unknowns can do.
         for j in 0..n {

@@ -56,13 +56,20 @@ impl Model {
         result
     }
 
-    /// Commits the Newton solutions found last.
-    fn remember(&mut self, shown: bool) {
-        let blocks = if shown { self.observe.solves.iter() } else { self.rates.solves.iter() };
-        for solve in blocks.filter(|s| !shown || self.shown_blocks.contains(&s.block)) {
-            let newton = &mut self.frame.solvers[solve.block.0 as usize].newton;
-            newton.memory.copy_from_slice(&newton.x);
+    /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
+    fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if !self.rates.solves.is_empty() {
+            self.rates_at(t, x)?;
+            let blocks = self.rates.solves.iter().map(|solve| solve.block);
+            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
         }
+        if !self.shown_blocks.is_empty() {
+            self.place(t, x);
+            self.evaluate(What::Recorded, false, t)?;
+            let blocks = self.shown_blocks.iter();
+            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+        }
+        Ok(())
     }
 
     /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
@@ -188,7 +195,8 @@ impl System for Model {
         for (state, (dx, &register)) in dx.iter_mut().zip(&self.rates.outputs).enumerate() {
             *dx = self.frame.r[register as usize];
             if !dx.is_finite() {
-                return Err(Failure::NotFinite { time: t, what: format!("the rate of {}", self.state_name(state)) });
+                let what = format!("the rate of {}", self.state_name(state));
+                return Err(self.explain(t).unwrap_or(Failure::NotFinite { time: t, what }));
             }
         }
         Ok(())
@@ -208,7 +216,15 @@ impl System for Model {
         self.place(t, x);
         self.evaluate(What::Recorded, false, t)?;
         out.iter_mut().zip(&self.observe.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
-        self.remember(true);
+        match out.iter().position(|value| value.is_nan()).or(out.iter().position(|value| value.is_infinite())) {
+            // What a modeller computes for himself may be infinite, what a law gives may not.
+            Some(value) if out[value].is_infinite() => self.explain(t).map_or(Ok(()), Err)?,
+            Some(value) => {
+                let not_finite = Failure::NotFinite { time: t, what: self.observed_name(value) };
+                return Err(self.explain(t).unwrap_or(not_finite));
+            }
+            None => {}
+        }
         Ok(())
     }
 
@@ -232,6 +248,8 @@ impl System for Model {
         self.crossed = t;
         self.inputs.iter_mut().for_each(|signal| signal.hold(t));
         self.frame.conditions.state = Hold::Follow;
+        // A solution may leap where something jumps.
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
         self.clock.cross(&mut self.frame, t);
         if !self.begun {
             self.begin_held(t, x)?;
@@ -249,7 +267,7 @@ impl System for Model {
                 }
             }
         }
-        Ok(())
+        self.follow_solutions(t, x)
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
@@ -262,11 +280,8 @@ impl System for Model {
                     delay.append(t, value, slope);
                 }
             }
-        } else if !self.rates.solves.is_empty() {
-            self.rates_at(t, x)?;
         }
-        self.remember(false);
-        Ok(())
+        self.follow_solutions(t, x)
     }
 
     fn switches(&self) -> usize {

@@ -150,6 +150,7 @@ impl Sketch {
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,
+            domains: Vec::new(),
             definitions: Map::new(),
             rows: Vec::new(),
             dependent: Vec::new(),

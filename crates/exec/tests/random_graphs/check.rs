@@ -11,7 +11,7 @@ use halfarrow_compiler::program::{Unavailable, schedule};
 use halfarrow_compiler::{ast, bond_graph, causal_graph};
 use halfarrow_exec::{Model, StartError};
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Method, Options, Sink, System, simulate};
+use halfarrow_sim::{Failure, Method, Options, Sink, System, simulate};
 
 use crate::exact::{self, Count, float};
 use crate::forms::check_forms;
@@ -75,12 +75,17 @@ struct Built {
 }
 
 enum Outcome {
-    Refused { stage: &'static str, faults: Diagnostics },
+    /// Its parameters leave it no value.
+    Without,
+    Refused {
+        stage: &'static str,
+        faults: Diagnostics,
+    },
     Built(Box<Built>),
 }
 
-/// Model text to model.
-fn build(text: &str) -> Result<Outcome, Fault> {
+/// Model text to model; `constant` if no modulus reads a state.
+fn build(text: &str, constant: bool) -> Result<Outcome, Fault> {
     let mut sources = Sources::new();
     let file = sources.add("random.bond", text);
     let tree = match ast::parse(text, file).into_result() {
@@ -102,6 +107,8 @@ fn build(text: &str) -> Result<Outcome, Fault> {
     let (conserved, dof) = (equations.conserved.len(), equations.dof);
     match Model::new(schedule(&equations)) {
         Ok(model) => Ok(Outcome::Built(Box::new(Built { causal, model, states, conserved, dof }))),
+        // A modulus that reads what a source fixes: no value fits, or the structure degenerates there.
+        Err(Failure::OutOfDomain { .. } | Failure::Singular { .. }) if !constant => Ok(Outcome::Without),
         Err(failure) => fault("model", failure.to_string()),
     }
 }
@@ -119,7 +126,11 @@ pub fn check(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
 fn check_all(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
     let mut random = Random::new(seed ^ 0xabcd);
     let count = exact::count(graph, &mut random);
-    let mut built = match build(&graph.text())? {
+    let mut built = match build(&graph.text(), graph.has_constant_structure())? {
+        Outcome::Without => {
+            seen.no_point += 1;
+            return Ok(());
+        }
         Outcome::Refused { stage, faults } => {
             seen.refused += 1;
             let codes: Vec<&str> = faults.0.iter().filter(|d| d.is_error()).map(|d| d.code.name).collect();
@@ -223,7 +234,9 @@ fn random_point(
             seen.start_conflicts += 1;
             let mut free = graph.clone();
             free.nodes.iter_mut().for_each(|n| n.start = None);
-            let Outcome::Built(again) = build(&free.text())? else { return fault("start", "refused without starts") };
+            let Outcome::Built(again) = build(&free.text(), graph.has_constant_structure())? else {
+                return fault("start", "refused without starts");
+            };
             *model = again.model;
             match model.initialise(0.0) {
                 Ok(x0) => x0,
