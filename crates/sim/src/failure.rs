@@ -37,12 +37,8 @@ pub enum Failure {
         time: f64,
         /// Which equations, by their elements.
         what: String,
-        /// The unknown that would leap.
-        unknown: String,
-        /// Its value when the last step was accepted.
-        from: f64,
-        /// Its value in another solution.
-        to: f64,
+        /// What would happen in another solution.
+        leap: Box<Leap>,
     },
     /// Equations were not solved within the bound on evaluations.
     Bound {
@@ -97,6 +93,17 @@ pub enum Failure {
     },
 }
 
+/// How an unknown would leap from one solution to another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leap {
+    /// The unknown.
+    pub unknown: String,
+    /// Its value when the last step was accepted.
+    pub from: f64,
+    /// Its value in another solution.
+    pub to: f64,
+}
+
 impl Failure {
     /// When it happened, in s; `None` if the run never began, or if it is so at any time.
     pub fn time(&self) -> Option<f64> {
@@ -146,11 +153,14 @@ impl fmt::Display for Failure {
             Failure::OutOfDomain { time, what, reason } => {
                 write!(f, "{} {what} is asked for a value where it has none: {reason}", When(*time))
             }
-            Failure::Branch { time, what, unknown, from, to } => write!(
+            Failure::Branch { time, what, leap } => write!(
                 f,
-                "{} the equations of {what} have two solutions: {unknown} would leap from {from} to {to}; the solution that the run has \
+                "{} the equations of {what} have two solutions: {} would leap from {} to {}; the solution that the run has \
                  followed ends here, or a step is too long to follow it",
-                When(*time)
+                When(*time),
+                leap.unknown,
+                leap.from,
+                leap.to
             ),
             Failure::Bound { time, what, most } => write!(
                 f,

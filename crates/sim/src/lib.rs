@@ -21,7 +21,7 @@ mod sparsity;
 mod system;
 mod variable_step;
 
-pub use failure::Failure;
+pub use failure::{Failure, Leap};
 pub use implicit::simulate_implicit;
 pub use implicit_system::ImplicitSystem;
 pub use options::{AbsoluteTolerance, Method, Options};

@@ -13,7 +13,7 @@ use super::{
     observed,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
-use crate::bond_graph::{BondGraph, BondId, ElementId, Meaning, PortRef};
+use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
 use crate::causal_graph::{CausalGraph, Role, Stroke, as_drawn, resistors_first, without_constraints};
 use crate::causal_paths::{certificate, eliminated_ports, invert};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
@@ -137,6 +137,11 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
             return Err(needs_rate(graph, &d.x, state.symbol, reason));
         }
     }
+    if form == Form::Minimal
+        && let Some(unknown) = source_without_value(causal, &d)
+    {
+        return Err(unknown);
+    }
     let mut roots = rates.clone();
     for closure in &closures {
         let read = d.x.symbols_of(closure.residual);
@@ -231,6 +236,28 @@ fn unknowns(d: &Definitions, closures: &[Closure]) -> (Vec<Algebraic>, Vec<Expr>
     (algebraic, residuals)
 }
 
+/// A source that reads what the structure does not determine, or one that is a law through what it reads and needs a
+/// rate that nobody gives.
+fn source_without_value(causal: &CausalGraph, d: &Definitions) -> Option<Diagnostics> {
+    let graph = &causal.graph;
+    causal.ports.ports.iter().find_map(|port| {
+        let element = &graph.elements[port.port.element];
+        if !matches!(element.kind, Kind::EffortSource { .. } | Kind::FlowSource { .. }) {
+            return None;
+        }
+        match (d.missing.get(&port.input)?, port.role) {
+            (Unavailable::Undetermined, _) => {
+                let title = format!("{} reads a variable that is not determined", element.name);
+                Some(undetermined(title, element.span))
+            }
+            (reason @ Unavailable::NeedsRateOf(_), Role::Algebraic(_)) => {
+                Some(needs_rate(graph, &d.x, port.input, reason))
+            }
+            _ => None,
+        }
+    })
+}
+
 fn is_law(role: Role) -> bool {
     matches!(role, Role::Source | Role::Algebraic(_))
 }
@@ -313,7 +340,10 @@ fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable
 
 fn not_determined(graph: &BondGraph, symbol: Symbol, name: &str) -> Diagnostics {
     let span = span_of_symbols(graph, &[symbol]);
-    let title = format!("the rate of {name} reads a variable that is not determined");
+    undetermined(format!("the rate of {name} reads a variable that is not determined"), span)
+}
+
+fn undetermined(title: String, span: Span) -> Diagnostics {
     Diagnostic::error(codes::E002, title, span, "this needs it")
         .note("nothing in the structure says how large it is: a flow or an effort that circulates, or one that nothing takes up")
         .hint("read another variable, or put an element where this one can do work")
@@ -358,7 +388,6 @@ fn span_of_symbols(graph: &BondGraph, symbols: &[Symbol]) -> Span {
 
 /// The elements whose moduli read what a pivot reads.
 fn readers(d: &Definitions, pivot: crate::algebra::Expr) -> Vec<ElementId> {
-    use crate::bond_graph::Kind;
     let symbols = d.x.symbols_of(pivot);
     let modulus = |k: &Kind| match k {
         Kind::Transformer { modulus } | Kind::Gyrator { modulus } => Some(*modulus),

@@ -86,7 +86,7 @@ impl Lu {
         let minuses = (0..n).filter(|&k| self.factors[k * n + k] < 0.0).count();
         let exchanges: usize =
             (0..n).map(|k| self.order[k + 1..].iter().filter(|&&later| later < self.order[k]).count()).sum();
-        (minuses + exchanges) % 2 == 0
+        (minuses + exchanges).is_multiple_of(2)
     }
 
     fn substitute(&mut self, b: &mut [f64]) {

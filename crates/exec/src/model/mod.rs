@@ -19,7 +19,7 @@ use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Layout, Program, Routine, Value};
-use halfarrow_sim::{Failure, Sparsity};
+use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
 
@@ -292,7 +292,8 @@ impl Model {
                 Failure::OutOfDomain { time, what: what(block), reason }
             }
             Trouble::Ended { block, unknown: index, from, to } => {
-                Failure::Branch { time, what: what(block), unknown: unknown(block, index), from, to }
+                let leap = Leap { unknown: unknown(block, index), from, to };
+                Failure::Branch { time, what: what(block), leap: Box::new(leap) }
             }
             Trouble::Bound { block, evaluations } => Failure::Bound { time, what: what(block), most: evaluations },
         }

@@ -174,8 +174,8 @@ fn refused_for_cause(graph: &Graph, count: &Count, codes: &[&str]) -> bool {
     {
         return true;
     }
-    // A modulus that turns with a source's value makes its rate count.
-    if codes == ["E001"] && !graph.inputs().is_empty() && !graph.has_constant_structure() {
+    // A modulus that turns with a source's value makes its rate count, and so does a source that reads what an input sets.
+    if codes == ["E001"] && !graph.inputs().is_empty() && (graph.senses() || !graph.has_constant_structure()) {
         return true;
     }
     // What is integrated has to be determined.
@@ -494,7 +494,10 @@ fn modulus(graph: &Graph, modulus: Modulus, values: &Values) -> Option<f64> {
 
 /// No junction structure keeps or loses power: what sources and laws bring sums to zero.
 fn check_power(graph: &Graph, values: &Values, seen: &mut Seen) -> Result<(), Fault> {
-    let (mut sum, mut scale) = (0.0, 0.0f64);
+    let variables = (0..graph.bonds.len()).flat_map(|b| [values.effort(b), values.flow(b)]).flatten();
+    let largest = variables.fold(0.0f64, |most, v| most.max(v.abs()));
+    // An effort that should be 0 and is what rounding left of others makes no power to speak of.
+    let (mut sum, mut scale) = (0.0, 1e-3 * largest * largest);
     for (node, it) in graph.nodes.iter().enumerate() {
         let Some(bond) = graph.bond_of(node) else { continue };
         if matches!(it.kind, Kind::Zero | Kind::One | Kind::Transformer(_) | Kind::Gyrator(_)) {
