@@ -250,3 +250,20 @@ fn a_run_can_be_rolled_back() {
         assert_eq!(first, second);
     }
 }
+
+#[test]
+fn start_values_give_way_to_constraints() {
+    // A four-bar linkage whose loop does not close at the angles given.
+    let mut linkage = model(
+        "1:w1 -> I:crank(1/10); 1:w2 -> I:coupler(1/3); 1:w3 -> I:rocker(1/5); \
+         state a' = w1.f from 1; state b' = w2.f from 1/2; state c' = w3.f from 3/2; \
+         constraint lx: cos(a) + 2*cos(b) - 1.5*cos(c) - 2 = 0; constraint ly: sin(a) + 2*sin(b) - 1.5*sin(c) = 0",
+    );
+    let Err(StartError::Conflict(conflict)) = linkage.initialise(0.0) else { panic!("no conflict") };
+    let names: Vec<&str> = conflict.values.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["a", "b", "c"]);
+    let [a, b, c] = [0, 1, 2].map(|i| conflict.values[i].fitting);
+    let missed = [a.cos() + 2.0 * b.cos() - 1.5 * c.cos() - 2.0, a.sin() + 2.0 * b.sin() - 1.5 * c.sin()];
+    assert!(missed.iter().all(|m| m.abs() < 1e-7), "{missed:?}");
+    assert!((a - 1.0).abs() < 0.3 && (b - 0.5).abs() < 0.3 && (c - 1.5).abs() < 0.3, "{a} {b} {c}");
+}

@@ -280,6 +280,8 @@ pub struct Condition {
     pub name: String,
     /// The value asked for.
     pub value: Expr,
+    /// It is a constraint: it holds whatever start values are given.
+    pub firm: bool,
     /// Where it stands.
     pub span: Span,
 }

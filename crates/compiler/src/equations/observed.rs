@@ -127,7 +127,7 @@ pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
         let own = d.x.sym(symbol);
         let residual = d.x.sub(own, value);
         let name = d.x.name(symbol).to_string();
-        all.push(Condition { residual, name, value, span });
+        all.push(Condition { residual, name, value, firm: false, span });
     };
     for element in graph.elements.values() {
         if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
@@ -147,6 +147,7 @@ pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
             residual: constraint.expr,
             name: constraint.name.clone(),
             value: zero,
+            firm: true,
             span: constraint.span,
         });
     }

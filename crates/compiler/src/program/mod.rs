@@ -175,6 +175,8 @@ pub struct StartCondition {
     pub residual: Value,
     /// The value asked for.
     pub asked: Value,
+    /// It is a constraint: it holds whatever start values are given.
+    pub firm: bool,
     /// States (by index) and, after them, conserved constants that the residual reads, ascending.
     pub reads: Vec<u32>,
     /// Where it stands.

@@ -230,6 +230,7 @@ impl Schedule<'_> {
                     name: c.name.clone(),
                     residual: lower.value(c.residual),
                     asked: lower.value(c.value),
+                    firm: c.firm,
                     reads: Vec::new(),
                     span: c.span,
                 })

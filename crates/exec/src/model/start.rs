@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 /// A start condition is met if it is missed by less than this fraction of the terms it is made of.
 const MET: f64 = 1e-9;
+/// How much more a constraint weighs than a start value, where they contradict each other.
+const FIRM: f64 = 1e4;
 /// Passes over conditions that one unknown is left in.
 const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
@@ -209,7 +211,7 @@ impl Model {
                 return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
             }
         };
-        let mut weights = None;
+        let mut weights: Option<Vec<f64>> = None;
         // At first every row weighs as its Jacobian says, which finds a start if there is one. What is missed then is
         // missed by as little as possible with the weights as they are there.
         loop {
@@ -230,7 +232,11 @@ impl Model {
                 return Err(not_found);
             };
             match weights {
-                None => weights = Some(step.weights),
+                None => {
+                    let firm = |&c: &usize| if self.program.start[c].firm { FIRM } else { 1.0 };
+                    let all = step.weights.iter().zip(group.conditions.iter().map(firm));
+                    weights = Some(all.map(|(weight, firm)| weight * firm).collect());
+                }
                 Some(weights) => {
                     return Err(self.conflict(routed, &z, (&residual, &jacobian), &weights).unwrap_or(not_found));
                 }
@@ -294,7 +300,12 @@ impl Model {
                 return None;
             }
         }
-        let involved: Vec<usize> = (0..residual.len()).filter(|&i| weighed[i].abs() > 1e-6 * most).collect();
+        let mut involved: Vec<usize> = (0..residual.len()).filter(|&i| weighed[i].abs() > 1e-6 * most).collect();
+        // Constraints stay: it is the start values that give way, unless there are none.
+        let firm = |i: &usize| self.program.start[group.conditions[*i]].firm;
+        if !involved.iter().all(firm) {
+            involved.retain(|i| !firm(i));
+        }
         let values = involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect();
         Some(StartError::Conflict(StartConflict { values }))
     }
