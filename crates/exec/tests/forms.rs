@@ -88,6 +88,7 @@ fn compare(name: &str, form: Form, model: &mut ImplicitModel, reference: &mut Mo
     for point in points {
         model.at(point.t, &point.x, &mut y, &mut yp).unwrap_or_else(|f| panic!("{name} {form:?}: {f}"));
         model.observe(point.t, &y, &yp, &mut ours).expect("values");
+        reference.cross_jump(point.t, &mut point.x.clone()).expect("a point");
         reference.observe(point.t, &point.x, &mut theirs).expect("values");
         for i in 0..common.len() {
             greatest[i] = greatest[i].max(theirs[i].abs());

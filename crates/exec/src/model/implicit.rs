@@ -244,6 +244,10 @@ impl ImplicitModel {
     /// As [`Model::rates`](System::rates).
     pub fn at(&mut self, t: f64, x: &[f64], y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
         self.x.copy_from_slice(x);
+        // The state may be far from the last one.
+        for model in [&mut self.reference, &mut self.form] {
+            model.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
+        }
         self.take_over(t, y)?;
         self.take_rates(t, y, yp)
     }
