@@ -1,7 +1,7 @@
 //! Units: what their text means, exactly.
 //!
 //! Torque times angular velocity is a power, so an angle has no dimension here: a radian is remembered beside the
-//! dimension ([`Unit::angle`]) and never decides whether two units fit.
+//! dimension (`angle`) and never decides whether two units fit.
 
 mod dimension;
 mod read;

@@ -251,6 +251,19 @@ fn a_run_can_be_rolled_back() {
     }
 }
 
+/// A diode has one solution, however long the steps are.
+#[test]
+fn long_steps_over_monotone_laws_are_followed() {
+    let mut model = model(
+        "param g = 1; 0:a; 1:b; 1:c; Sf:feed(1 + 2*sin(3*t)); R:r1(1); R:d(f = 1e-9*(exp(e/0.05) - 1)); R:r2(f = g*(e + e^3)); C:s(1); \
+         feed -> a; a -> b; b -> d; b -> r1; a -> c; c -> s; c -> r2",
+    );
+    for step in [0.5, 0.25, 0.1, 0.01] {
+        let (_, end) = run(&mut model, &["d.e", "r2.f"], &steps(step, 10.0));
+        end.unwrap_or_else(|stopped| panic!("step {step}: {stopped}"));
+    }
+}
+
 #[test]
 fn start_values_give_way_to_constraints() {
     // A four-bar linkage whose loop does not close at the angles given.

@@ -8,7 +8,7 @@ use crate::bond_graph::{BondGraph, Kind, Meaning, PortRef, ResistorLaw, StorageL
 
 /// Rank of the state matrix `A` of a linear graph, read from causality: the number of independent storages less that of
 /// the storages that stay in integral causality when derivative causality is preferred. The graph has a solution at rest
-/// for every constant input, and `A` has no eigenvalue zero, exactly if no storage stays. Source: [SD].
+/// for every constant input, and `A` has no eigenvalue zero, exactly if no storage stays. Source: \[SD\].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StateRank {
     /// Number of independent storages, the order of `A`.

@@ -33,6 +33,8 @@ const SHORT_FRACTION: f64 = 0.1;
 const NEAR: f64 = 0.25;
 /// Points at which the way to a solution that is not near is looked at.
 const LOOKS: usize = 8;
+/// The same where the way may be long.
+const MORE_LOOKS: usize = 64;
 /// Attempts from other points after those from the last solution and from zero, at the start and after jumps.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 /// Evaluations of a block at most at the start and after jumps.
@@ -224,7 +226,9 @@ impl Frame {
             newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
         }
         let missed = match first {
-            Ok(()) if self.goes_on(solve) => return Ok(()),
+            Ok(()) if self.goes_on(solve) || self.newton_of(solve).following && self.is_straight(solve, MORE_LOOKS) => {
+                return Ok(());
+            }
             Ok(()) => self.elsewhere(solve),
             Err(miss) => Missed::All(miss),
         };
@@ -277,7 +281,7 @@ impl Frame {
             let short = stride <= SHORT_STRIDE;
             let trust = if short { Trust::Kink } else { Trust::Contraction };
             let found = self.attempt(solve, trust).is_ok();
-            if found && (self.goes_on(solve) || short && self.moves_little(solve) && self.is_straight(solve)) {
+            if found && (self.goes_on(solve) || short && self.moves_little(solve) && self.is_straight(solve, LOOKS)) {
                 if next == 1.0 {
                     return true;
                 }
@@ -346,19 +350,19 @@ impl Frame {
 
     /// Whether the residuals shrink all the way from where the attempt began to the root, and the Jacobian never changes
     /// its orientation: no fold and no pole lies between them. Ends with an evaluation at the root.
-    fn is_straight(&mut self, solve: &Solve) -> bool {
-        let straight = self.is_straight_at_looks(solve);
+    fn is_straight(&mut self, solve: &Solve, looks: usize) -> bool {
+        let straight = self.is_straight_at(solve, looks);
         straight & self.evaluate(solve, false)
     }
 
-    fn is_straight_at_looks(&mut self, solve: &Solve) -> bool {
+    fn is_straight_at(&mut self, solve: &Solve, looks: usize) -> bool {
         // Measured by the Jacobian at the root, or where that is singular at the beginning.
-        if ![LOOKS, 0].into_iter().any(|look| self.look(solve, look) && self.factor(solve)) {
+        if ![1.0, 0.0].into_iter().any(|part| self.look(solve, part) && self.factor(solve)) {
             return false;
         }
         let mut before = f64::INFINITY;
-        for look in 0..=LOOKS {
-            if !self.look(solve, look) {
+        for look in 0..=looks {
+            if !self.look(solve, look as f64 / looks as f64) {
                 return false;
             }
             let rest = self.next_step(solve);
@@ -368,8 +372,8 @@ impl Frame {
             before = rest;
         }
         let mut orientation = None;
-        for look in 0..=LOOKS {
-            let good = self.look(solve, look);
+        for look in 0..=looks {
+            let good = self.look(solve, look as f64 / looks as f64);
             // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there.
             if good && self.factor(solve) {
                 let here = self.solvers[solve.block.0 as usize].lu.is_positive();
@@ -381,9 +385,8 @@ impl Frame {
         true
     }
 
-    /// Evaluates a point on the way from where the attempt began to the root.
-    fn look(&mut self, solve: &Solve, look: usize) -> bool {
-        let part = look as f64 / LOOKS as f64;
+    /// Evaluates a point on the way from where the attempt began (0) to the root (1).
+    fn look(&mut self, solve: &Solve, part: f64) -> bool {
         let newton = self.newton_of(solve);
         for i in 0..newton.x.len() {
             newton.trial[i] = newton.kept[i] + part * (newton.x[i] - newton.kept[i]);
