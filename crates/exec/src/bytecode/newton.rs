@@ -35,6 +35,8 @@ const NEAR: f64 = 0.25;
 const LOOKS: usize = 8;
 /// The same where the way may be long.
 const MORE_LOOKS: usize = 64;
+/// A Jacobian whose entries change by less than this part of their row does not change.
+const LINEAR: f64 = 1e-9;
 /// Attempts from other points after those from the last solution and from zero, at the start and after jumps.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 /// Evaluations of a block at most at the start and after jumps.
@@ -71,6 +73,8 @@ pub(crate) struct Newton {
     first: Vec<f64>,
     /// Where the attempt began: the last root on the way.
     kept: Vec<f64>,
+    /// Where the attempt began, while another way is looked at.
+    began: Vec<f64>,
     /// The first step of the attempt: to first order the change of the solution.
     lead: Vec<f64>,
     /// Residuals where the attempt began, with the sign of a right-hand side.
@@ -103,6 +107,7 @@ impl Newton {
             offset: line.clone(),
             first: line.clone(),
             kept: line.clone(),
+            began: line.clone(),
             lead: line.clone(),
             opening: line.clone(),
             span: line,
@@ -226,7 +231,7 @@ impl Frame {
             newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
         }
         let missed = match first {
-            Ok(()) if self.goes_on(solve) || self.newton_of(solve).following && self.is_straight(solve, MORE_LOOKS) => {
+            Ok(()) if self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve) => {
                 return Ok(());
             }
             Ok(()) => self.elsewhere(solve),
@@ -385,6 +390,42 @@ impl Frame {
         true
     }
 
+    /// Whether the root found is without doubt the only one near the way to it. Ends with an evaluation at the root.
+    fn is_the_only_one(&mut self, solve: &Solve) -> bool {
+        let linear = self.is_linear(solve);
+        (linear || self.is_straight_at(solve, MORE_LOOKS)) & self.evaluate(solve, false)
+    }
+
+    /// Whether the Jacobian is the same all the way from where the attempt began to `x`: what differs is rounding.
+    fn is_linear(&mut self, solve: &Solve) -> bool {
+        let n = solve.right.len();
+        let mut same = true;
+        for look in 0..=LOOKS {
+            same &= self.look(solve, look as f64 / LOOKS as f64);
+            let Frame { r, solvers, .. } = self;
+            let newton = &mut solvers[solve.block.0 as usize].newton;
+            if look == 0 {
+                newton.jacobian.iter_mut().zip(&solve.matrix).for_each(|(j, &m)| *j = r[m as usize]);
+            }
+            for (row, entries) in newton.jacobian.chunks(n).zip(solve.matrix.chunks(n)) {
+                let most = row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
+                same &= row.iter().zip(entries).all(|(j, &m)| (r[m as usize] - j).abs() <= LINEAR * most);
+            }
+        }
+        same
+    }
+
+    /// Whether the Jacobian is the same at `x` and a whole step from there: that the step does not help is rounding.
+    fn is_rounding(&mut self, solve: &Solve) -> bool {
+        let newton = self.newton_of(solve);
+        newton.began.copy_from_slice(&newton.kept);
+        newton.kept.iter_mut().zip(newton.x.iter().zip(&newton.step)).for_each(|(k, (x, step))| *k = x + step);
+        let linear = self.is_linear(solve);
+        let newton = self.newton_of(solve);
+        newton.kept.copy_from_slice(&newton.began);
+        linear & self.evaluate(solve, false)
+    }
+
     /// Evaluates a point on the way from where the attempt began (0) to the root (1).
     fn look(&mut self, solve: &Solve, part: f64) -> bool {
         let newton = self.newton_of(solve);
@@ -483,8 +524,7 @@ impl Frame {
                 _ => SHORTEST,
             };
             if fraction < shortest || newton.exhausted() {
-                self.evaluate(solve, false);
-                return (Damped::Stuck, false);
+                return if self.is_rounding(solve) { (Damped::Done, true) } else { (Damped::Stuck, false) };
             }
         }
     }
