@@ -105,6 +105,27 @@ proptest! {
         }
     }
 
+    #[test]
+    fn derivatives_at_once_are_those_along_directions(recipe in recipe(), x in prop::array::uniform3(-2.0f64..2.0)) {
+        let program = halfarrow_compiler::program::schedule(&build(&recipe).0.equations());
+        let mut model = halfarrow_exec::Model::with_jacobian(program).unwrap();
+        model.cross_jump(0.7, &mut x.to_vec()).unwrap();
+        let pattern = model.sparsity().clone();
+        let mut values = vec![0.0; pattern.nonzeros()];
+        let mut jv = [0.0; STATES];
+        prop_assume!(model.tangent(0.7, &x, &[1.0; STATES], &mut jv).is_ok());
+        prop_assert_eq!(model.jacobian(0.7, &x, &mut values), Ok(true));
+        for column in 0..STATES {
+            let mut v = [0.0; STATES];
+            v[column] = 1.0;
+            prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+            for (place, &row) in pattern.places(column).zip(pattern.column(column)) {
+                let size = 1.0 + jv[row].abs();
+                prop_assert!((values[place] - jv[row]).abs() <= 1e-9 * size, "{} {}", values[place], jv[row]);
+            }
+        }
+    }
+
     /// What stands nowhere in the sparsity does not move.
     #[test]
     fn the_sparsity_holds_all_that_moves(recipe in recipe(), x in prop::array::uniform3(-2.0f64..2.0)) {

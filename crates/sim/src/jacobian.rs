@@ -1,4 +1,4 @@
-//! A Jacobian from directional derivatives, a group of columns at a time.
+//! A Jacobian at once where the system has it, else from directional derivatives, a group of columns at a time.
 
 use crate::{Failure, Sparsity, System};
 
@@ -8,6 +8,7 @@ pub(crate) struct Jacobian {
     groups: Vec<Vec<usize>>,
     direction: Vec<f64>,
     product: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl Jacobian {
@@ -18,6 +19,7 @@ impl Jacobian {
             groups: sparsity.groups(),
             direction: vec![0.0; states],
             product: vec![0.0; states],
+            values: vec![0.0; sparsity.nonzeros()],
         }
     }
 
@@ -30,6 +32,14 @@ impl Jacobian {
         x: &[f64],
         mut entry: impl FnMut(usize, usize, usize, f64),
     ) -> Result<(), Failure> {
+        if system.jacobian(t, x, &mut self.values)? {
+            for column in 0..self.sparsity.states() {
+                for (place, &row) in self.sparsity.places(column).zip(self.sparsity.column(column)) {
+                    entry(row, column, place, self.values[place]);
+                }
+            }
+            return Ok(());
+        }
         for group in &self.groups {
             self.direction.fill(0.0);
             group.iter().for_each(|&column| self.direction[column] = 1.0);

@@ -60,6 +60,16 @@ pub trait System {
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 
+    /// All of `∂f/∂x` at once, in the present mode: its nonzeros in the order of [`sparsity`](System::sparsity). False if
+    /// the system has it by [`tangent`](System::tangent) only; then nothing is written.
+    ///
+    /// # Errors
+    /// As [`rates`](System::rates).
+    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        let _ = (t, x, values);
+        Ok(false)
+    }
+
     /// Values recorded at `(t, x)`, [`observed`](System::observed) of them.
     ///
     /// # Errors

@@ -160,14 +160,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    pub fn op(&mut self, op: Op) -> Value {
-        self.values.add(op, Reads::PARAMETERS)
-    }
-
-    pub fn constant(&mut self, value: f64) -> Value {
-        self.op(Op::Constant(value.to_bits()))
-    }
-
     fn number(&mut self, number: &Rational) -> Value {
         self.constant(number.to_f64())
     }
@@ -361,64 +353,33 @@ impl<'a> Lowering<'a> {
     }
 }
 
-/// Operations, with what is trivial left out.
+/// Operations on values.
 impl Lowering<'_> {
-    fn is(&self, a: Value, number: f64) -> bool {
-        self.values.constant(a) == Some(number)
+    pub fn op(&mut self, op: Op) -> Value {
+        self.values.op_of(op)
     }
-
-    pub fn neg(&mut self, a: Value) -> Value {
-        match self.values.op(a) {
-            Op::Neg(b) => b,
-            Op::Sub(b, c) => self.op(Op::Sub(c, b)),
-            Op::Constant(bits) => self.constant(-f64::from_bits(bits)),
-            _ => self.op(Op::Neg(a)),
-        }
+    pub fn constant(&mut self, value: f64) -> Value {
+        self.values.number(value)
     }
-
+    fn neg(&mut self, a: Value) -> Value {
+        self.values.neg(a)
+    }
     pub fn add(&mut self, a: Value, b: Value) -> Value {
-        match () {
-            () if self.is(a, 0.0) => b,
-            () if self.is(b, 0.0) => a,
-            () => self.op(Op::Add(a, b)),
-        }
+        self.values.plus(a, b)
     }
-
-    pub fn sub(&mut self, a: Value, b: Value) -> Value {
-        match () {
-            () if self.is(a, 0.0) => self.neg(b),
-            () if self.is(b, 0.0) => a,
-            () => self.op(Op::Sub(a, b)),
-        }
+    fn sub(&mut self, a: Value, b: Value) -> Value {
+        self.values.minus(a, b)
     }
-
-    pub fn mul(&mut self, a: Value, b: Value) -> Value {
-        match () {
-            () if self.is(a, 1.0) => b,
-            () if self.is(b, 1.0) => a,
-            () if self.is(a, -1.0) => self.neg(b),
-            () => self.op(Op::Mul(a, b)),
-        }
+    fn mul(&mut self, a: Value, b: Value) -> Value {
+        self.values.times(a, b)
     }
-
-    pub fn div(&mut self, a: Value, b: Value) -> Value {
-        if self.is(b, 1.0) { a } else { self.op(Op::Div(a, b)) }
+    fn div(&mut self, a: Value, b: Value) -> Value {
+        self.values.over(a, b)
     }
-
-    pub fn powi(&mut self, a: Value, n: u32) -> Value {
-        match n {
-            0 => self.constant(1.0),
-            1 => a,
-            2 => self.op(Op::Mul(a, a)),
-            _ => self.op(Op::Powi(a, n)),
-        }
+    fn powi(&mut self, a: Value, n: u32) -> Value {
+        self.values.powi(a, n)
     }
-
-    pub fn select(&mut self, condition: Value, then: Value, other: Value) -> Value {
-        match self.values.constant(condition) {
-            Some(c) => [then, other][usize::from(c == 0.0)],
-            None if then == other => then,
-            None => self.op(Op::Select(condition, then, other)),
-        }
+    fn select(&mut self, condition: Value, then: Value, other: Value) -> Value {
+        self.values.select(condition, then, other)
     }
 }

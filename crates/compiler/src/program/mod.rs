@@ -15,12 +15,15 @@
 
 mod dependence;
 mod derive;
+mod jacobian;
 mod lower;
+mod operations;
 mod print;
 mod routine;
 mod schedule;
 mod values;
 
+pub use jacobian::{Differentiated, Entry};
 pub use routine::{Instruction, Layout, Register, Routine, Solve};
 pub use schedule::schedule;
 pub use values::{Op, Reads, Values};
@@ -255,6 +258,8 @@ pub enum Block {
         matrix: Vec<Value>,
         /// Right-hand side.
         right: Vec<Value>,
+        /// A solution of an earlier block with the same matrix, whose factors serve.
+        shared: Option<Value>,
         /// The elements concerned, for messages.
         elements: String,
     },
@@ -271,6 +276,15 @@ pub enum Block {
     },
 }
 
+impl Program {
+    /// The block whose factors serve this one.
+    pub(crate) fn shared(&self, block: BlockId) -> Option<BlockId> {
+        let Block::Linear { shared: Some(solution), .. } = self.blocks[block] else { return None };
+        let Op::Solution(block, _) = self.values.op(solution) else { panic!("factors are shared with a block") };
+        Some(block)
+    }
+}
+
 impl Block {
     /// Number of unknowns.
     pub fn size(&self) -> usize {
@@ -281,11 +295,11 @@ impl Block {
     }
     /// What it reads.
     pub fn reads(&self) -> impl Iterator<Item = Value> + '_ {
-        let (matrix, right) = match self {
-            Block::Linear { matrix, right, .. } => (matrix, right),
-            Block::Newton { residuals, jacobian, .. } => (jacobian, residuals),
+        let (matrix, right, shared) = match self {
+            Block::Linear { matrix, right, shared, .. } => (matrix, right, *shared),
+            Block::Newton { residuals, jacobian, .. } => (jacobian, residuals, None),
         };
-        matrix.iter().chain(right).copied()
+        matrix.iter().chain(right).copied().chain(shared)
     }
     /// The name of an unknown, for messages; empty in a linear block.
     pub fn unknown(&self, index: usize) -> &str {

@@ -134,6 +134,7 @@ fn text(instruction: &Instruction, names: &Names) -> String {
         Select { out, c, a, b } => format!("{} = if {} then {} else {}", n(out), n(c), n(a), n(b)),
         Table { out, a, table, .. } => format!("{} = table {table} at {}", n(out), n(a)),
         TableSlope { out, a, table, .. } => format!("{} = slope of table {table} at {}", n(out), n(a)),
+        TableCurvature { out, a, table, .. } => format!("{} = curvature of table {table} at {}", n(out), n(a)),
         Watch { pivot, .. } => format!("stop if {} vanishes", n(pivot)),
         Solve { solve } => format!("solve {solve}"),
     }

@@ -110,6 +110,12 @@ pub enum Instruction {
         table: u32,
         piece: Option<ConditionId>,
     },
+    TableCurvature {
+        out: Register,
+        a: Register,
+        table: u32,
+        piece: Option<ConditionId>,
+    },
     /// Stops if the pivot vanishes against its scale.
     Watch {
         pivot: Register,
@@ -127,6 +133,8 @@ pub enum Instruction {
 pub struct Solve {
     /// The block.
     pub block: BlockId,
+    /// The block that has factored the same matrix, if there is one.
+    pub shared: Option<BlockId>,
     /// Where the unknowns are written.
     pub unknowns: Vec<Register>,
     /// Newton: where the guess is put before `code` runs; empty for a linear block.
@@ -183,9 +191,14 @@ pub struct Layout {
 impl Program {
     /// The fixed registers.
     pub fn layout(&self) -> Layout {
+        self.layout_with(&[])
+    }
+
+    /// The fixed registers where these values are wanted too.
+    pub fn layout_with(&self, more: &[Value]) -> Layout {
         let mut layout = Layout { parameters: 0, ..Layout::default() };
         let mut next = self.parameters.len() as u32;
-        let live = self.live_anywhere();
+        let live = self.live_anywhere(more);
         for (value, op) in self.values.iter().filter(|(v, _)| live[v.index()]) {
             let computed = self.values.reads(value) == Reads::PARAMETERS && !matches!(op, Op::Parameter(_));
             if computed {
@@ -261,8 +274,8 @@ impl Program {
         live
     }
 
-    fn live_anywhere(&self) -> Vec<bool> {
-        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
+    fn live_anywhere(&self, more: &[Value]) -> Vec<bool> {
+        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).chain(more.iter().copied()).collect();
         wanted.extend(self.observed.iter().filter_map(|o| o.value.clone().ok()));
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
         wanted.extend(self.held.iter().flat_map(|h| [h.source, h.time]));
@@ -461,7 +474,8 @@ impl<'a> Builder<'a> {
         }
         let (unknowns, code) = (Vec::new(), Vec::new());
         let (matrix, right, outer) = (Vec::new(), Vec::new(), Vec::new());
-        self.routine.solves.push(Solve { block, unknowns, guess, outer, code, matrix, right });
+        let shared = self.program.shared(block);
+        self.routine.solves.push(Solve { block, shared, unknowns, guess, outer, code, matrix, right });
     }
 
     fn close(&mut self, block: BlockId, at: u32, live: &[bool]) {
@@ -576,6 +590,7 @@ impl<'a> Builder<'a> {
             Op::Select(..) => Instruction::Select { out, c: a, a: b, b: c },
             Op::Table(table, piece, _) => Instruction::Table { out, a, table, piece },
             Op::TableSlope(table, piece, _) => Instruction::TableSlope { out, a, table, piece },
+            Op::TableCurvature(table, piece, _) => Instruction::TableCurvature { out, a, table, piece },
             Op::Constant(_) | Op::Time | Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) | Op::Rate(_) => {
                 unreachable!("given before the routine runs")
             }

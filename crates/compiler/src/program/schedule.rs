@@ -112,7 +112,8 @@ impl Schedule<'_> {
     fn linear(&mut self, unknowns: &[Symbol], matrix: &[Vec<Expr>], right: &[Expr], elements: &[ElementId]) {
         let matrix = matrix.iter().flatten().map(|&e| self.lower.value(e)).collect();
         let right = right.iter().map(|&e| self.lower.value(e)).collect();
-        let block = self.blocks.push(Block::Linear { matrix, right, elements: names(self.graph, elements) });
+        let block =
+            self.blocks.push(Block::Linear { matrix, right, shared: None, elements: names(self.graph, elements) });
         self.solved(block, unknowns);
     }
 
@@ -126,7 +127,7 @@ impl Schedule<'_> {
         }
         let values: Vec<Value> = residuals.iter().map(|&e| self.lower.value(e)).collect();
         let columns: Vec<Vec<Value>> =
-            guesses.iter().map(|&guess| self.lower.derivatives(&values, guess, from)).collect();
+            guesses.iter().map(|&guess| self.lower.values.derivatives(&values, guess, from)).collect();
         let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
         let piecewise = self.lower.end_newton();
         let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
@@ -351,7 +352,7 @@ fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
 fn condition_of(op: Op) -> Option<ConditionId> {
     match op {
         Op::Side(c, _) | Op::Floor(c, _) => Some(c),
-        Op::Table(_, c, _) | Op::TableSlope(_, c, _) => c,
+        Op::Table(_, c, _) | Op::TableSlope(_, c, _) | Op::TableCurvature(_, c, _) => c,
         _ => None,
     }
 }

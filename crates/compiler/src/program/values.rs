@@ -64,6 +64,8 @@ pub enum Op {
     Table(u32, Option<ConditionId>, Value),
     /// The slope of a table.
     TableSlope(u32, Option<ConditionId>, Value),
+    /// The derivative of the slope of a table.
+    TableCurvature(u32, Option<ConditionId>, Value),
 }
 
 impl Op {
@@ -73,7 +75,8 @@ impl Op {
             Op::Constant(_) | Op::Parameter(_) | Op::Time | Op::Input(_) | Op::Held(_) => {}
             Op::Conserved(_) | Op::State(_) | Op::Rate(_) | Op::Guess(..) | Op::Solution(..) => {}
             Op::Neg(a) | Op::Powi(a, _) | Op::Call(_, a) | Op::Positive(a) | Op::Not(a) => visit(a),
-            Op::Side(_, a) | Op::Floor(_, a) | Op::Table(_, _, a) | Op::TableSlope(_, _, a) => visit(a),
+            Op::Side(_, a) | Op::Floor(_, a) | Op::Table(_, _, a) => visit(a),
+            Op::TableSlope(_, _, a) | Op::TableCurvature(_, _, a) => visit(a),
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::Pow(a, b) => {
                 visit(a);
                 visit(b);
@@ -87,6 +90,33 @@ impl Op {
                 visit(b);
                 visit(c);
             }
+        }
+    }
+
+    /// The same operation on other values.
+    pub(super) fn map_operands(self, to: impl Fn(Value) -> Value) -> Op {
+        match self {
+            Op::Constant(_) | Op::Parameter(_) | Op::Time | Op::Input(_) | Op::Held(_) => self,
+            Op::Conserved(_) | Op::State(_) | Op::Rate(_) | Op::Guess(..) | Op::Solution(..) => self,
+            Op::Neg(a) => Op::Neg(to(a)),
+            Op::Add(a, b) => Op::Add(to(a), to(b)),
+            Op::Sub(a, b) => Op::Sub(to(a), to(b)),
+            Op::Mul(a, b) => Op::Mul(to(a), to(b)),
+            Op::Div(a, b) => Op::Div(to(a), to(b)),
+            Op::Powi(a, n) => Op::Powi(to(a), n),
+            Op::Pow(a, b) => Op::Pow(to(a), to(b)),
+            Op::Call(f, a) => Op::Call(f, to(a)),
+            Op::Call2(f, a, b) => Op::Call2(f, to(a), to(b)),
+            Op::Positive(a) => Op::Positive(to(a)),
+            Op::Side(c, a) => Op::Side(c, to(a)),
+            Op::Floor(c, a) => Op::Floor(c, to(a)),
+            Op::And(a, b) => Op::And(to(a), to(b)),
+            Op::Or(a, b) => Op::Or(to(a), to(b)),
+            Op::Not(a) => Op::Not(to(a)),
+            Op::Select(a, b, c) => Op::Select(to(a), to(b), to(c)),
+            Op::Table(t, c, a) => Op::Table(t, c, to(a)),
+            Op::TableSlope(t, c, a) => Op::TableSlope(t, c, to(a)),
+            Op::TableCurvature(t, c, a) => Op::TableCurvature(t, c, to(a)),
         }
     }
 

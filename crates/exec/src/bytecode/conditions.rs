@@ -122,8 +122,8 @@ pub(crate) fn piece_of(table: &Table1d, x: f64) -> usize {
     table.x().partition_point(|&p| p <= x)
 }
 
-/// Value, slope and curvature of a table on a piece of it.
-pub(crate) fn table_on(table: &Table1d, piece: usize, x: f64) -> [f64; 3] {
+/// Value and three derivatives of a table on a piece of it.
+pub(crate) fn table_on(table: &Table1d, piece: usize, x: f64) -> [f64; 4] {
     let (points, n) = (table.x(), table.x().len());
     let end = match piece {
         0 => Some(0),
@@ -133,12 +133,12 @@ pub(crate) fn table_on(table: &Table1d, piece: usize, x: f64) -> [f64; 3] {
     if let Some(end) = end {
         let beyond = if end == 0 && piece == 0 { x < points[0] } else { x > points[n - 1] };
         match table.outside() {
-            Outside::Clamp => return [table.y()[end], 0.0, 0.0],
-            Outside::Error if beyond => return [f64::NAN; 3],
+            Outside::Clamp => return [table.y()[end], 0.0, 0.0, 0.0],
+            Outside::Error if beyond => return [f64::NAN; 4],
             _ => {}
         }
     }
     let start = piece.saturating_sub(1).min(n - 1);
     let (d, [c0, c1, c2, c3]) = (x - points[start], table.pieces()[start]);
-    [((c3 * d + c2) * d + c1) * d + c0, (3.0 * c3 * d + 2.0 * c2) * d + c1, 6.0 * c3 * d + 2.0 * c2]
+    [((c3 * d + c2) * d + c1) * d + c0, (3.0 * c3 * d + 2.0 * c2) * d + c1, 6.0 * c3 * d + 2.0 * c2, 6.0 * c3]
 }

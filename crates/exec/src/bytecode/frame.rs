@@ -60,7 +60,16 @@ impl Frame {
             let constant = matches!(block, Block::Linear { matrix, .. }
                 if matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS));
             let newton = Newton::new(if matches!(block, Block::Newton { .. }) { n } else { 0 });
-            Solver { lu: Lu::new(n), x: vec![0.0; n], rate: vec![0.0; n], constant, factored: false, newton }
+            // Factors that another block has made need no place here.
+            let shared = matches!(block, Block::Linear { shared: Some(_), .. });
+            Solver {
+                lu: Lu::new(if shared { 0 } else { n }),
+                x: vec![0.0; n],
+                rate: vec![0.0; n],
+                constant,
+                factored: false,
+                newton,
+            }
         };
         let mut r = vec![0.0; registers.max(layout.size) as usize];
         layout.constants.iter().for_each(|&(register, value)| r[register as usize] = value);
@@ -127,8 +136,8 @@ impl Frame {
 
     fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
         let Frame { r, d, solvers, .. } = self;
-        let solver = &mut solvers[solve.block.0 as usize];
-        if !(solver.constant && solver.factored) {
+        let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
+        if solve.shared.is_none() && !(solver.constant && solver.factored) {
             solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
             solver.factored = solver.lu.factor().is_ok();
         }
@@ -182,7 +191,7 @@ impl Frame {
         }
     }
 
-    fn table<const ALONG: bool>(&mut self, a: u32, table: u32, piece: Option<ConditionId>) -> [f64; 3] {
+    fn table<const ALONG: bool>(&mut self, a: u32, table: u32, piece: Option<ConditionId>) -> [f64; 4] {
         let piece = match piece {
             Some(condition) => self.condition::<ALONG>(condition, a) as usize,
             None => piece_of(&self.tables[table as usize], self.r[a as usize]),
@@ -246,13 +255,18 @@ impl Frame {
             }
             Table { out, a, table, piece } => {
                 let rate = d(a);
-                let [value, slope, _] = self.table::<ALONG>(a, table, piece);
+                let [value, slope, ..] = self.table::<ALONG>(a, table, piece);
                 self.put::<ALONG>(out, value, along(slope, rate));
             }
             TableSlope { out, a, table, piece } => {
                 let rate = d(a);
-                let [_, slope, curvature] = self.table::<ALONG>(a, table, piece);
+                let [_, slope, curvature, _] = self.table::<ALONG>(a, table, piece);
                 self.put::<ALONG>(out, slope, along(curvature, rate));
+            }
+            TableCurvature { out, a, table, piece } => {
+                let rate = d(a);
+                let [_, _, curvature, third] = self.table::<ALONG>(a, table, piece);
+                self.put::<ALONG>(out, curvature, along(third, rate));
             }
             Parameter { out, index, default } => {
                 let value = self.set[index as usize].unwrap_or(r(default));

@@ -7,6 +7,7 @@ mod explain;
 mod history;
 mod implicit;
 mod inputs;
+mod jacobian;
 mod minimum_norm;
 mod start;
 mod system;
@@ -18,10 +19,11 @@ pub use implicit::ImplicitModel;
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Layout, Program, Routine, Value};
+use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Entry, Layout, Program, Routine, Value};
 use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
+use jacobian::Slopes;
 
 /// A model that runs: a program, the values of its parameters, what is connected to its inputs, and its memory.
 ///
@@ -44,6 +46,8 @@ pub struct Model {
     inputs: Vec<Signal>,
     held: Vec<Held>,
     sparsity: Sparsity,
+    /// Derivatives of the rates, if they are computed at once.
+    slopes: Option<Slopes>,
     scales: Vec<f64>,
     /// Values of the conserved constants.
     conserved: Vec<f64>,
@@ -69,7 +73,22 @@ impl Model {
     /// # Errors
     /// Equations of parameters alone that have no solution.
     pub fn new(program: Program) -> Result<Model, Failure> {
-        let layout = program.layout();
+        Model::made_of(program, None)
+    }
+
+    /// The same, with all derivatives of the rates by the states at once: [`System::jacobian`](halfarrow_sim::System)
+    /// has them. Without it they come from directions, a group of columns at a time, as [`Model::new`] leaves it.
+    ///
+    /// # Errors
+    /// As [`Model::new`].
+    pub fn with_jacobian(program: Program) -> Result<Model, Failure> {
+        let differentiated = program.jacobian();
+        Model::made_of(differentiated.program, Some(differentiated.entries))
+    }
+
+    fn made_of(program: Program, entries: Option<Vec<Entry>>) -> Result<Model, Failure> {
+        let derivatives: Vec<Value> = entries.iter().flatten().map(|e| e.value).collect();
+        let layout = program.layout_with(&derivatives);
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = program.watched_routine(&layout, &rates);
         let preamble = program.preamble(&layout);
@@ -81,12 +100,16 @@ impl Model {
         let switching = program.routine(&layout, &operands);
         let clock = Clock::new(&program, &layout);
         let mut frame = Frame::new(&program, &layout, layout.size);
-        for routine in [&rates, &preamble, &sources, &switching, clock.routine()] {
+        let sparsity = sparsity_of(&program);
+        let slopes = entries.map(|entries| Slopes::new(&program, &layout, &sparsity, &entries));
+        let of_slopes = slopes.as_ref().map(|s| &s.routine);
+        for routine in [&rates, &preamble, &sources, &switching, clock.routine()].into_iter().chain(of_slopes) {
             frame.reserve(routine);
         }
         let n = program.states.len();
         let mut model = Model {
-            sparsity: sparsity_of(&program),
+            sparsity,
+            slopes,
             inputs: program.inputs.iter().map(|_| Signal::default()).collect(),
             held: Vec::new(),
             scales: vec![0.0; n],

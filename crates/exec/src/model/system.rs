@@ -6,10 +6,12 @@ use halfarrow_sim::{Failure, Sparsity, System};
 
 /// Which routine is run.
 #[derive(Debug, Clone, Copy)]
-enum What {
+pub(super) enum What {
     Rates,
     Recorded,
     Switches,
+    /// Derivatives of the rates, if the model has them.
+    Slopes,
 }
 
 impl Model {
@@ -18,6 +20,7 @@ impl Model {
             What::Rates => &self.rates,
             What::Recorded => &self.observe,
             What::Switches => &self.switching,
+            What::Slopes => &self.slopes.as_ref().expect("asked for only where they are").routine,
         };
         match along {
             false => self.frame.run(routine)?,
@@ -29,7 +32,7 @@ impl Model {
 
     /// Runs a routine with conditions as held. Beyond a switch the held branch may have no value any more: then the
     /// conditions are followed instead.
-    fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
+    pub(super) fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
         let first = self.once(what, along);
         let held = self.frame.conditions.state == Hold::Keep && !self.switches.is_empty();
         if !held || matches!(first, Ok(true)) {
@@ -210,6 +213,10 @@ impl System for Model {
 
     fn sparsity(&self) -> &Sparsity {
         &self.sparsity
+    }
+
+    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        self.slopes_at(t, x, values)
     }
 
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {

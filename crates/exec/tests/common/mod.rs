@@ -1,13 +1,15 @@
-//! Equations made by hand.
+//! Equations made by hand, and the programs of the models.
 #![allow(dead_code)]
 
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
+use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
+use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::{
     BreakBound, Condition, Conserved, Count, Equations, Form, Observed, State, StateKind, Step,
 };
 use halfarrow_compiler::ids::{Map, Table};
-use halfarrow_compiler::program::schedule;
+use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_compiler::span::Span;
 use halfarrow_exec::Model;
 
@@ -167,4 +169,20 @@ impl Sketch {
     pub fn model(self) -> Model {
         Model::new(schedule(&self.equations())).expect("parameters have values")
     }
+}
+
+/// The minimal form of every model of `models/`, by name.
+pub fn models() -> Vec<(String, Program)> {
+    let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the models are there") {
+        let folder = entry.expect("a folder").path();
+        let Ok(text) = std::fs::read_to_string(folder.join("model.bond")) else { continue };
+        let name = folder.file_name().expect("a name").to_string_lossy().to_string();
+        let text = Text { name: &name, text: &text, files: &NoFiles, overrides: &[] };
+        let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false)));
+        found.push((name, program.ir));
+    }
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    found
 }

@@ -1,0 +1,49 @@
+//! All derivatives of the rates by the states at once.
+
+use super::Model;
+use super::system::What;
+use halfarrow_compiler::program::{Entry, Layout, Program, Routine, Value};
+use halfarrow_sim::{Failure, Sparsity, System};
+
+/// The code of the derivatives, and where in the pattern each of them stands.
+#[derive(Debug, Clone)]
+pub(super) struct Slopes {
+    pub routine: Routine,
+    places: Vec<usize>,
+}
+
+impl Slopes {
+    pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[Entry]) -> Slopes {
+        let values: Vec<Value> = entries.iter().map(|e| e.value).collect();
+        let place = |e: &Entry| {
+            let (row, column) = (e.row as usize, e.column as usize);
+            let found = sparsity.column(column).binary_search(&row);
+            sparsity.places(column).start + found.expect("what moves stands in the pattern")
+        };
+        Slopes { routine: program.watched_routine(layout, &values), places: entries.iter().map(place).collect() }
+    }
+}
+
+impl Model {
+    /// Writes the nonzeros in the order of the pattern; false if the model was made without them.
+    pub(super) fn slopes_at(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        if self.slopes.is_none() {
+            return Ok(false);
+        }
+        self.place(t, x);
+        self.evaluate(What::Slopes, false, t)?;
+        let Some(slopes) = &self.slopes else { return Ok(false) };
+        values.fill(0.0);
+        for (&place, &register) in slopes.places.iter().zip(&slopes.routine.outputs) {
+            values[place] = self.frame.r[register as usize];
+        }
+        match values.iter().position(|v| !v.is_finite()) {
+            None => Ok(true),
+            Some(place) => {
+                let row = self.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
+                let what = format!("the derivative of the rate of {}", self.state_name(row));
+                Err(Failure::NotFinite { time: t, what })
+            }
+        }
+    }
+}
