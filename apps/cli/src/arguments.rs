@@ -57,6 +57,13 @@ Examples:
     /// Draw the bond graph with its causal strokes and paths
     #[command(after_help = "Example:\n  halfarrow draw car.bond --out car.svg")]
     Draw(Draw),
+    /// Write the model as code for elsewhere
+    #[command(after_help = "\
+Examples:
+  halfarrow export c car.bond --out car                C99 into the folder car, with a CMake file
+  halfarrow export c car.bond --out car --method heun --step 0.5e-3
+  halfarrow export latex car.bond --out car.tex        the equations as a document")]
+    Export(Export),
 }
 
 /// A model and how to answer.
@@ -270,6 +277,50 @@ pub struct Draw {
     /// Where to draw it: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,
+}
+
+/// What can be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Target {
+    /// C99: header, source, main.c and CMakeLists.txt in a folder
+    C,
+    /// The equations as a LaTeX document
+    Latex,
+}
+
+/// Methods with fixed step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum FixedSolver {
+    /// Order 1
+    Euler,
+    /// Order 2
+    Heun,
+    /// Order 4
+    Rk4,
+    /// Order 2, implicit
+    ImplicitMidpoint,
+}
+
+/// `export`.
+#[derive(Debug, Args)]
+pub struct Export {
+    /// What to write
+    pub target: Target,
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Where to write it: a folder, or a file
+    #[arg(long, value_name = "PATH")]
+    pub out: PathBuf,
+    /// The formulation; code takes minimal and kane
+    #[arg(long, default_value = "minimal")]
+    pub form: Form,
+    /// The method of a step
+    #[arg(long, default_value = "rk4")]
+    pub method: FixedSolver,
+    /// The length of a step, in s
+    #[arg(long, value_name = "TIME", default_value_t = 1e-3)]
+    pub step: f64,
 }
 
 /// Reads `name=value`.

@@ -1,11 +1,13 @@
 //! The commands: each gives its exit status.
 
 mod analyse;
+mod export;
 mod files;
 mod picture;
 mod run;
 
 pub use analyse::{check, equations, loops, show};
+pub use export::export;
 pub use files::{fmt, new};
 pub use picture::draw;
 pub use run::simulate;

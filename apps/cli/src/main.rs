@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Equations(a) => commands::equations(&a),
         Command::Simulate(a) => commands::simulate(&a),
         Command::Draw(a) => commands::draw(&a),
+        Command::Export(a) => commands::export(&a),
     };
     ExitCode::from(outcome)
 }

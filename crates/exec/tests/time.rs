@@ -87,6 +87,20 @@ fn pulses_jump_at_their_edges_to_the_last_bit() {
     assert!((x[0] - 0.6).abs() < 1e-13, "{x:?}");
 }
 
+/// A condition may read time itself: nothing is computed of it, and it runs all the same.
+#[test]
+fn whole_seconds_are_met() {
+    let mut s = Sketch::default();
+    s.state("x");
+    let t = s.t;
+    let rate = s.call(Function::Floor, t);
+    s.rate("x", rate);
+    let mut model = s.model();
+    assert_eq!(jumps(&mut model, 3.5), [1.0, 2.0, 3.0]);
+    let (x, ..) = run(&mut model, 3.5, 1e-6);
+    assert!((x[0] - 4.5).abs() < 1e-13, "{x:?}");
+}
+
 /// A curve in time is searched: `if sin(5 t²) > 0.5`, narrower and narrower.
 #[test]
 fn changes_on_a_curve_are_found_in_order() {

@@ -254,17 +254,17 @@ impl Model {
         }
     }
 
-    fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
+    pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
         exec::Model::new(schedule(equations)).map_err(|failure| self.stopped(failure))
     }
 
     /// A run that never began.
-    fn stopped(&self, failure: Failure) -> Error {
+    pub(crate) fn stopped(&self, failure: Failure) -> Error {
         let report = self.report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
         Error::Run(Box::new(Stopped { failure, trace: Trace::default(), report }))
     }
 
-    fn start(&self, system: &mut exec::Model, start: Start) -> Result<Vec<f64>, Error> {
+    pub(crate) fn start(&self, system: &mut exec::Model, start: Start) -> Result<Vec<f64>, Error> {
         let x = system.initialise(0.0).map_err(|error| self.no_start(error))?;
         match start {
             Start::Given => Ok(x),

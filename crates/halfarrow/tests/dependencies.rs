@@ -17,6 +17,7 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
         ("crates/audit", &["halfarrow-compiler"]),
         ("crates/compiler", &[]),
         ("crates/draw", &["halfarrow-compiler"]),
+        ("crates/emit", &["halfarrow-compiler"]),
         ("crates/exec", &["halfarrow-compiler", "halfarrow-sim"]),
         (
             "crates/halfarrow",
@@ -24,6 +25,7 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
                 "halfarrow-audit",
                 "halfarrow-compiler",
                 "halfarrow-draw",
+                "halfarrow-emit",
                 "halfarrow-exec",
                 "halfarrow-sim",
                 "halfarrow-trace",

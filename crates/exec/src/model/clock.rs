@@ -46,15 +46,15 @@ impl Clock {
         let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
         self.next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);
+        frame.d[self.time] = 0.0;
     }
 
-    /// Operands and their rates at `t`.
+    /// Operands and their rates at `t`; one of them may be time itself, which runs on.
     fn evaluate(&self, frame: &mut Frame, t: f64) {
         frame.r[self.time] = t;
         frame.d[self.time] = 1.0;
         // Time alone is read: no block can fail that has not failed for the parameters.
         let _ = frame.run_along(&self.routine);
-        frame.d[self.time] = 0.0;
     }
 
     /// Straight lines: where each meets the border it runs towards, computed from time zero so that the result does not

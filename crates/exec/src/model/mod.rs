@@ -19,7 +19,7 @@ pub use implicit::ImplicitModel;
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Entry, Layout, Program, Routine, Value};
+use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value};
 use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
@@ -163,6 +163,17 @@ impl Model {
     pub fn parameter(&self, name: &str) -> Option<f64> {
         let index = self.program.parameters.iter().position(|p| p.name == name)?;
         Some(self.frame.r[self.layout.parameters as usize + index])
+    }
+
+    /// Values of the conserved constants, as the last start has fixed them.
+    pub fn conserved(&self) -> &[f64] {
+        &self.conserved
+    }
+
+    /// What a value of parameters alone comes to: a delay, the default of an input.
+    pub fn constant(&self, value: Value) -> Option<f64> {
+        let register = *self.layout.registers.get(&value)?;
+        (self.program.values.reads(value) == Reads::PARAMETERS).then(|| self.frame.r[register as usize])
     }
 
     /// Connects a table of values over time to an input: straight lines between the points, the first value before

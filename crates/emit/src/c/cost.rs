@@ -1,0 +1,192 @@
+//! What a step costs at most, counted in the code that was written.
+
+use std::ops::{Add, Mul};
+
+use halfarrow_compiler::program::{BlockId, Program};
+
+use super::plan::Plan;
+use super::ssa::{Act, Code, Inner};
+
+/// Jumps within one step at most; more of them are an error.
+pub(super) const MOST_JUMPS: u64 = 64;
+/// Evaluations of a Newton block at most while a solution is followed, the looks at its end counted.
+const EVALUATIONS: u64 = 2_000 + 400;
+/// The same at the start and at jumps: attempts from eight points, and a search over all magnitudes.
+const EVALUATIONS_AT_JUMPS: u64 = 20_000 + 400;
+
+/// What a function does.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Work {
+    /// Additions, products, comparisons.
+    pub operations: u64,
+    /// Divisions and square roots.
+    pub divisions: u64,
+    /// Elementary functions.
+    pub calls: u64,
+    /// Linear solve blocks.
+    pub solves: u64,
+    /// Newton blocks: how often each is solved, and what one evaluation of it costs.
+    pub newton: Vec<(BlockId, u64, u64)>,
+}
+
+impl Work {
+    /// What code does.
+    pub fn of(program: &Program, code: &Code, inner: &Inner) -> Work {
+        let mut work = Work::default();
+        for step in &code.steps {
+            match step.act {
+                Act::Div => work.divisions += 1,
+                Act::Call(halfarrow_compiler::algebra::Function::Sqrt) => work.divisions += 1,
+                Act::Call(_) | Act::Call2(_) | Act::Pow => work.calls += 1,
+                Act::Powi(n) => work.operations += u64::from(2 * n.max(1).ilog2()),
+                Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => work.operations += 40,
+                Act::Linear(block) => {
+                    work.solves += 1;
+                    work.operations += elimination(program.blocks[block].size());
+                }
+                Act::Newton(block) => {
+                    let n = program.blocks[block].size();
+                    let one = inner.get(&block).map(|code| Work::of(program, code, inner));
+                    let one = one.map_or(0, |w| w.operations + w.divisions + w.calls);
+                    work.newton.push((block, 1, one + elimination(n) + 20 * n as u64));
+                }
+                _ => work.operations += 1,
+            }
+        }
+        work
+    }
+
+    /// The same with derivatives beside the values.
+    pub fn along(self) -> Work {
+        Work { operations: 4 * self.operations, divisions: 3 * self.divisions, calls: 2 * self.calls, ..self }
+    }
+
+    fn newton_solves(&self) -> u64 {
+        self.newton.iter().map(|n| n.1).sum()
+    }
+
+    /// All operations, if each Newton block takes so many evaluations.
+    fn total(&self, evaluations: u64) -> u64 {
+        let newton: u64 = self.newton.iter().map(|(_, times, one)| times * one * evaluations).sum();
+        self.operations + self.divisions + self.calls + newton
+    }
+}
+
+/// Factoring, two solutions and a refinement.
+fn elimination(n: usize) -> u64 {
+    let n = n as u64;
+    match n {
+        0 | 1 => n,
+        n => n * n * n + 8 * n * n,
+    }
+}
+
+impl Add for Work {
+    type Output = Work;
+    fn add(mut self, other: Work) -> Work {
+        self.operations += other.operations;
+        self.divisions += other.divisions;
+        self.calls += other.calls;
+        self.solves += other.solves;
+        for (block, times, one) in other.newton {
+            match self.newton.iter_mut().find(|n| n.0 == block) {
+                Some(known) => known.1 += times,
+                None => self.newton.push((block, times, one)),
+            }
+        }
+        self
+    }
+}
+
+impl Mul<u64> for Work {
+    type Output = Work;
+    fn mul(mut self, n: u64) -> Work {
+        self.operations *= n;
+        self.divisions *= n;
+        self.calls *= n;
+        self.solves *= n;
+        self.newton.iter_mut().for_each(|(_, times, _)| *times *= n);
+        self.newton.retain(|n| n.1 > 0);
+        self
+    }
+}
+
+/// What a step costs at most.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cost {
+    /// Additions, products, comparisons of a step in which nothing jumps; of the midpoint rule in all its iterations.
+    pub operations: u64,
+    /// Divisions and square roots of such a step.
+    pub divisions: u64,
+    /// Elementary functions of such a step.
+    pub calls: u64,
+    /// Linear solve blocks of such a step.
+    pub linear_solves: u64,
+    /// Newton blocks solved in such a step.
+    pub newton_solves: u64,
+    /// Evaluations at most in each of them.
+    pub newton_evaluations: u64,
+    /// Newton iterations of the method in a step.
+    pub method_iterations: u64,
+    /// Operations of all kinds in such a step, if all Newton blocks take all their evaluations.
+    pub total: u64,
+    /// Operations of all kinds that a jump adds.
+    pub jump_total: u64,
+    /// Jumps in a step at most; each of them begins a part of the step that costs as much as one.
+    pub most_jumps: u64,
+    /// Points of a delay at most; each step may look at all of them.
+    pub delay_points: u64,
+    /// Size of the work arrays of the model, in numbers.
+    pub memory: u64,
+}
+
+impl Cost {
+    pub(super) fn new(step: Work, jump: Work, plan: &Plan) -> Cost {
+        let s = &plan.sizes;
+        let jumps = !(plan.export.program.held.is_empty() && plan.export.program.conditions.is_empty());
+        let implicit = plan.export.method == crate::Method::ImplicitMidpoint;
+        let newton_solves = step.newton_solves();
+        Cost {
+            operations: step.operations,
+            divisions: step.divisions,
+            calls: step.calls,
+            linear_solves: step.solves,
+            newton_solves,
+            newton_evaluations: if newton_solves > 0 { EVALUATIONS } else { 0 },
+            method_iterations: if implicit { 20 } else { 0 },
+            total: step.total(EVALUATIONS),
+            jump_total: jump.total(EVALUATIONS_AT_JUMPS * 9),
+            most_jumps: if jumps || !plan.export.program.inputs.is_empty() { MOST_JUMPS } else { 0 },
+            delay_points: plan.delays.iter().map(|d| d.1 as u64).sum(),
+            memory: (s.memory + s.work + s.crossing + s.factors + s.derived) as u64,
+        }
+    }
+
+    /// It in words, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = vec![format!(
+            "a step without jumps: {} operations, {} divisions, {} elementary functions",
+            self.operations, self.divisions, self.calls
+        )];
+        if self.method_iterations > 0 {
+            lines.push(format!("in them {} Newton iterations of the method", self.method_iterations));
+        }
+        if self.linear_solves > 0 {
+            lines.push(format!("{} linear solve blocks", self.linear_solves));
+        }
+        if self.newton_solves > 0 {
+            lines.push(format!(
+                "{} solutions of Newton blocks, each at most {} evaluations",
+                self.newton_solves, self.newton_evaluations
+            ));
+        }
+        lines.push(format!("{} operations of all kinds at most", self.total));
+        if self.most_jumps > 0 {
+            lines.push(format!(
+                "at most {} jumps in a step, each as much again and {} operations more",
+                self.most_jumps, self.jump_total
+            ));
+        }
+        lines
+    }
+}

@@ -1,0 +1,152 @@
+//! What failures mean, in words.
+
+use std::fmt::Write;
+
+use halfarrow_compiler::program::{Domain, DomainKind};
+
+use super::plan::Plan;
+
+/// Failures, each with the texts of all places where it may happen.
+fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
+    let p = plan.program;
+    let block = |text: &dyn Fn(&str) -> String| p.blocks.values().map(|b| text(b.elements())).collect::<Vec<_>>();
+    let singular = |what: &str| {
+        format!(
+            "the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there"
+        )
+    };
+    let not_finite = |what: String| {
+        format!("{what} is not a finite number: look for a division by zero, or for a value that grows without bound")
+    };
+    let states = |text: &dyn Fn(&str) -> String| p.states.iter().map(|s| text(&s.name)).collect::<Vec<_>>();
+    let conditions = plan.switches.iter().flat_map(|&c| vec![c; p.conditions[c].kind.switches()]);
+    let group = |g: &super::start::Group| {
+        let names: Vec<&str> = g.conditions.iter().map(|&c| p.start[c].name.as_str()).collect();
+        format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
+    };
+    vec![
+        ("VANISHED", p.watches.iter().map(|w| singular(&w.elements)).collect()),
+        ("SINGULAR", block(&singular)),
+        (
+            "NO_CONVERGENCE",
+            block(&|what| format!("the iteration for {what} did not converge; the law may have no solution there, or the step may be too long")),
+        ),
+        (
+            "BRANCH",
+            block(&|what| {
+                format!("the equations of {what} have two solutions; the one that the run has followed ends here, or a step is too long to follow it")
+            }),
+        ),
+        ("BOUND", block(&|what| format!("the equations of {what} are not solved within the bound on evaluations"))),
+        ("OUT_OF_DOMAIN", p.domains.iter().map(domain).collect()),
+        ("RATE_NOT_FINITE", states(&|name| not_finite(format!("the rate of {name}")))),
+        ("STATE_NOT_FINITE", states(&|name| not_finite(name.to_string()))),
+        ("DERIVATIVE_NOT_FINITE", states(&|name| not_finite(format!("the derivative of the rate of {name}")))),
+        (
+            "OUTPUT_NOT_FINITE",
+            plan.export.recorded.iter().map(|&i| not_finite(p.observed[i].name.clone())).collect(),
+        ),
+        (
+            "CONDITION_NOT_FINITE",
+            conditions.enumerate().map(|(i, _)| not_finite(format!("condition {}", i + 1))).collect(),
+        ),
+        ("INPUT_NOT_FINITE", p.inputs.iter().map(|i| not_finite(format!("the input {}", i.name))).collect()),
+        ("NO_STEP", vec!["the iteration for the implicit midpoint step did not converge; the step may be too long".into()]),
+        ("STEP_SINGULAR", states(&|name| singular(&format!("the step of {name}")))),
+        ("TOO_MANY_JUMPS", vec!["more jumps than a step may hold: make the step shorter".into()]),
+        (
+            "NO_ROOM",
+            plan.delays.iter().map(|(i, points)| format!("{} keeps more than {points} points: the step is shorter than the one exported for, or much jumps", p.held[*i].name)).collect(),
+        ),
+        ("NO_START", plan.groups.iter().map(group).collect()),
+        (
+            "BAD_PARAMETER",
+            match &p.parameters[..] {
+                [] => vec!["the model has no parameters".into()],
+                all => all.iter().map(|p| format!("{} is set to a value that is not finite, or is a constant", p.name)).collect(),
+            },
+        ),
+        ("NOT_STARTED", vec!["the model has not been started".into()]),
+    ]
+}
+
+fn domain(d: &Domain) -> String {
+    let what = match d.elements.as_str() {
+        "" => d.given.clone(),
+        elements => format!("the law of {elements}"),
+    };
+    let asked = d.asked.as_ref().map_or(d.given.clone(), |(name, _)| format!("{} at that {name}", d.given));
+    let needs = match d.kind {
+        DomainKind::Positive => "the logarithm of a number that is not above zero".to_string(),
+        DomainKind::NotNegative => "a root of a number below zero".to_string(),
+        DomainKind::Within(low, high) => format!("a value outside of {low} to {high}"),
+    };
+    format!("{what} is asked for a value where it has none: {asked} needs {needs}")
+}
+
+/// The codes, as the lines of an enumeration.
+pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
+    let meaning = |code: &str| match code {
+        "VANISHED" => "a divisor vanishes",
+        "SINGULAR" => "linear equations have no unique solution",
+        "NO_CONVERGENCE" => "nonlinear equations have no solution, or none was found",
+        "BRANCH" => "the solution that was followed ends",
+        "BOUND" => "the bound on evaluations is hit",
+        "OUT_OF_DOMAIN" => "a law is asked for a value where it has none",
+        "RATE_NOT_FINITE" => "a rate is no finite number",
+        "STATE_NOT_FINITE" => "a state is no finite number",
+        "DERIVATIVE_NOT_FINITE" => "a derivative of a rate is no finite number",
+        "OUTPUT_NOT_FINITE" => "an output is no number",
+        "CONDITION_NOT_FINITE" => "a condition is no number",
+        "INPUT_NOT_FINITE" => "an input is no finite number",
+        "NO_STEP" => "the implicit step was not solved",
+        "STEP_SINGULAR" => "the implicit step has no unique solution",
+        "TOO_MANY_JUMPS" => "more jumps than a step may hold",
+        "NO_ROOM" => "a delay keeps more points than there is room for",
+        "NO_START" => "no start was found for these parameters",
+        "BAD_PARAMETER" => "no such parameter, a constant, or a value that is not finite",
+        _ => "a step before the start",
+    };
+    texts(plan).into_iter().map(|(code, _)| (code, meaning(code))).collect()
+}
+
+/// The function that gives them.
+pub(super) fn messages(plan: &Plan) -> String {
+    let mut text = String::from("\n/* ---- what failures mean ---- */\n\n");
+    let mut cases = String::new();
+    for (code, texts) in texts(plan).iter().filter(|(_, texts)| !texts.is_empty()) {
+        let name = code.to_ascii_lowercase();
+        let _ = writeln!(text, "static const char *const ha_text_{name}[] = {{");
+        for one in texts {
+            let _ = writeln!(text, "    \"{}\",", escaped(one));
+        }
+        text += "};\n";
+        let count = texts.len();
+        let _ = writeln!(
+            cases,
+            "    case MODEL_{code}:\n        return m->failure.where >= 0 && m->failure.where < {count} ? ha_text_{name}[m->failure.where] : \"\";"
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\nconst char *MODEL_message(const MODEL *m)\n{{\n    switch (m->failure.code) {{\n{cases}    default:\n        return \"\";\n    }}\n}}"
+    );
+    text
+}
+
+/// A text within quotes of C: what is not ASCII as bytes of UTF-8 in octal.
+pub(crate) fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    for byte in text.bytes() {
+        match byte {
+            b'"' => out.push_str("\\\""),
+            b'\\' => out.push_str("\\\\"),
+            b'?' => out.push_str("\\?"),
+            0x20..=0x7e => out.push(byte as char),
+            byte => {
+                let _ = write!(out, "\\{byte:03o}");
+            }
+        }
+    }
+    out
+}

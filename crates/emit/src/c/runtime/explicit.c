@@ -1,0 +1,37 @@
+
+/* ---- an explicit Runge-Kutta method ---- */
+
+/* out = x + h * sum of weight * rates. */
+static void ha_advance(const ha_model *m, const double *x, double h, const double *weights, int stages, double *out)
+{
+    int stage;
+    int i;
+    for (i = 0; i < HA_NX; ++i) {
+        double sum = -0.0;
+        for (stage = 0; stage < stages; ++stage) {
+            const double part = weights[stage] * m->stages[stage * HA_NX + i];
+            sum += part;
+        }
+        sum *= h;
+        out[i] = x[i] + sum;
+    }
+}
+
+/* From t to t + h: the end in m->trial. */
+static int ha_method(ha_model *m, double t, double h, const double *x)
+{
+    static const double nodes[] = {NODES};
+    static const double weights[][STAGES] = {WEIGHTS};
+    int stage;
+    for (stage = 0; stage < STAGES; ++stage) {
+        const double part = nodes[stage] * h;
+        int status;
+        ha_advance(m, x, h, weights[stage], stage, m->trial);
+        status = MODEL_rates(m, t + part, m->trial, m->stages + stage * HA_NX);
+        if (status != MODEL_OK) {
+            return status;
+        }
+    }
+    ha_advance(m, x, h, weights[STAGES], STAGES, m->trial);
+    return MODEL_OK;
+}

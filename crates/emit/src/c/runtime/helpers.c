@@ -1,0 +1,63 @@
+/* ---- small things ---- */
+
+static int ha_finite(double a)
+{
+    return a - a == 0.0;
+}
+
+static int ha_all_finite(const double *a, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        if (!ha_finite(a[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static void ha_copy(double *to, const double *from, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        to[i] = from[i];
+    }
+}
+
+static void ha_fill(double *to, double value, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        to[i] = value;
+    }
+}
+
+/* A slope times a rate; what does not move has no rate even where the slope is infinite. */
+static double ha_along(double slope, double rate)
+{
+    return rate == 0.0 ? 0.0 : slope * rate;
+}
+
+static double ha_pow_along(double value, double a, double da, double b, double db)
+{
+    const double base = da == 0.0 ? 0.0 : b * ha_pow(a, b - 1.0) * da;
+    const double exponent = db == 0.0 || value == 0.0 ? 0.0 : value * ha_log(a) * db;
+    return base + exponent;
+}
+
+/* Whether an entry can be divided by: not 0 to rounding, and finite. */
+static int ha_is_pivot(double a)
+{
+    const double size = fabs(a);
+    const double weight = size / (size > DBL_MIN ? size : DBL_MIN);
+    return weight > DBL_EPSILON && ha_finite(weight);
+}
+
+/* Takes note of a failure. */
+static int ha_fail(ha_model *m, int code, int where, double t)
+{
+    m->failure.code = code;
+    m->failure.where = where;
+    m->failure.time = t;
+    return code;
+}

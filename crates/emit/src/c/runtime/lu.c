@@ -1,0 +1,224 @@
+
+/* ---- linear equations: rows scaled, threshold pivoting, one refinement ---- */
+
+typedef struct {
+    int n;
+    double *matrix;
+    double *factors;
+    double *scale;
+    double *work;
+    double *rest;
+    int *order;
+} ha_lu;
+
+/* Its parts in a row: 2 n*n + 3 n numbers. */
+static ha_lu ha_lu_at(double *place, int *order, int n)
+{
+    ha_lu l;
+    l.n = n;
+    l.matrix = place;
+    l.factors = place + n * n;
+    l.scale = l.factors + n * n;
+    l.work = l.scale + n;
+    l.rest = l.work + n;
+    l.order = order;
+    return l;
+}
+
+/* The row to bring to place k, -1 if all are 0 to rounding. */
+static int ha_lu_pivot(const ha_lu *l, int k)
+{
+    const int n = l->n;
+    const double diagonal = fabs(l->factors[k * n + k]) / l->scale[k];
+    double most = diagonal;
+    int best = k;
+    int row;
+    for (row = k + 1; row < n; ++row) {
+        const double weight = fabs(l->factors[row * n + k]) / l->scale[row];
+        if (weight > most || weight != weight) {
+            best = row;
+            most = weight;
+        }
+    }
+    if (diagonal >= 0.1 * most) {
+        best = k;
+        most = diagonal;
+    }
+    return most > DBL_EPSILON * (double)n && ha_finite(most) ? best : -1;
+}
+
+static void ha_lu_swap(ha_lu *l, int a, int b)
+{
+    const int n = l->n;
+    const double scale = l->scale[a];
+    const int order = l->order[a];
+    int j;
+    if (a == b) {
+        return;
+    }
+    for (j = 0; j < n; ++j) {
+        const double entry = l->factors[a * n + j];
+        l->factors[a * n + j] = l->factors[b * n + j];
+        l->factors[b * n + j] = entry;
+    }
+    l->scale[a] = l->scale[b];
+    l->scale[b] = scale;
+    l->order[a] = l->order[b];
+    l->order[b] = order;
+}
+
+/* Factors the matrix; 0 if no pivot is left, or if an entry is not finite. */
+static int ha_lu_factor(ha_lu *l)
+{
+    const int n = l->n;
+    int row;
+    int j;
+    int k;
+    for (row = 0; row < n; ++row) {
+        double most = DBL_MIN;
+        for (j = 0; j < n; ++j) {
+            const double size = fabs(l->matrix[row * n + j]);
+            l->factors[row * n + j] = l->matrix[row * n + j];
+            if (size > most) {
+                most = size;
+            }
+        }
+        l->order[row] = row;
+        l->scale[row] = most;
+    }
+    for (k = 0; k < n; ++k) {
+        const int pivot = ha_lu_pivot(l, k);
+        if (pivot < 0) {
+            return 0;
+        }
+        ha_lu_swap(l, k, pivot);
+        for (row = k + 1; row < n; ++row) {
+            if (l->factors[row * n + k] != 0.0) {
+                const double factor = l->factors[row * n + k] / l->factors[k * n + k];
+                l->factors[row * n + k] = factor;
+                for (j = k + 1; j < n; ++j) {
+                    const double product = factor * l->factors[k * n + j];
+                    l->factors[row * n + j] -= product;
+                }
+            }
+        }
+    }
+    return 1;
+}
+
+static void ha_lu_substitute(ha_lu *l, double *b)
+{
+    const int n = l->n;
+    int row;
+    int j;
+    for (row = 0; row < n; ++row) {
+        double sum = -0.0;
+        for (j = 0; j < row; ++j) {
+            const double product = l->factors[row * n + j] * l->work[j];
+            sum += product;
+        }
+        l->work[row] = b[l->order[row]] - sum;
+    }
+    for (row = n - 1; row >= 0; --row) {
+        double sum = -0.0;
+        for (j = row + 1; j < n; ++j) {
+            const double product = l->factors[row * n + j] * b[j];
+            sum += product;
+        }
+        b[row] = (l->work[row] - sum) / l->factors[row * n + row];
+    }
+}
+
+/* Replaces b by the solution, refined once. */
+static void ha_lu_solve(ha_lu *l, double *b)
+{
+    const int n = l->n;
+    int row;
+    int j;
+    if (n == 1) {
+        b[0] /= l->factors[0];
+        return;
+    }
+    ha_copy(l->rest, b, n);
+    ha_lu_substitute(l, b);
+    for (row = 0; row < n; ++row) {
+        for (j = 0; j < n; ++j) {
+            const double product = l->matrix[row * n + j] * b[j];
+            l->rest[row] -= product;
+        }
+    }
+    ha_lu_substitute(l, l->rest);
+    for (row = 0; row < n; ++row) {
+        /* A refinement that is no small correction is none: the equations are not finite. */
+        if (ha_finite(l->rest[row])) {
+            b[row] += l->rest[row];
+        }
+    }
+}
+
+/* Whether the determinant of the factored matrix is above zero. */
+static int ha_lu_is_positive(const ha_lu *l)
+{
+    const int n = l->n;
+    int changes = 0;
+    int j;
+    int k;
+    for (k = 0; k < n; ++k) {
+        if (l->factors[k * n + k] < 0.0) {
+            ++changes;
+        }
+        for (j = k + 1; j < n; ++j) {
+            if (l->order[j] < l->order[k]) {
+                ++changes;
+            }
+        }
+    }
+    return changes % 2 == 0;
+}
+
+/* a x = b with a matrix that varies: the solution in x. 0 if there is none or more than one. */
+static int ha_linear(ha_model *m, int n, const double *a, const double *b, double *x)
+{
+    ha_lu l = ha_lu_at(m->work, m->order, n);
+    ha_copy(l.matrix, a, n * n);
+    if (!ha_lu_factor(&l)) {
+        return 0;
+    }
+    ha_copy(x, b, n);
+    ha_lu_solve(&l, x);
+    return 1;
+}
+
+/* The same with a matrix of parameters alone, factored once for a set of parameters. */
+static int ha_linear_constant(ha_model *m, int number, int place, int order, int n, const double *a, const double *b, double *x)
+{
+    ha_lu l = ha_lu_at(m->factors + place, m->factors_order + order, n);
+    if (!m->factored[number]) {
+        ha_copy(l.matrix, a, n * n);
+        m->factored[number] = ha_lu_factor(&l);
+    }
+    if (!m->factored[number]) {
+        return 0;
+    }
+    ha_copy(x, b, n);
+    ha_lu_solve(&l, x);
+    return 1;
+}
+
+/* The rate of the solution, once it has been computed with the matrix in l. */
+static void ha_linear_rate(ha_lu l, const double *da, const double *db, const double *x, double *dx)
+{
+    const int n = l.n;
+    int i;
+    int j;
+    for (i = 0; i < n; ++i) {
+        double moved = -0.0;
+        for (j = 0; j < n; ++j) {
+            const double product = da[i * n + j] * x[j];
+            moved += product;
+        }
+        dx[i] = db[i] - moved;
+    }
+    ha_lu_solve(&l, dx);
+}
+

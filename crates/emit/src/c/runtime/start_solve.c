@@ -1,0 +1,408 @@
+/* Start conditions in which one unknown is left, solved together: unknowns (states, then conserved constants) and code. */
+typedef int (*ha_start_code)(ha_model *m, double t, const double *x, const double *e, double *out, double *rates);
+
+typedef struct {
+    int count;
+    const int *unknowns;
+    const int *conditions;
+    ha_start_code code;
+} ha_pass;
+
+/* Start conditions that share unknowns; without code where all of them are solved one by one. */
+typedef struct {
+    int rows;
+    int columns;
+    const int *conditions;
+    const int *unknowns;
+    ha_start_code code;
+} ha_group;
+
+START_TABLES
+enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = MOST_AT_ONCE, HA_MOST_ROWS = MOST_ROWS, HA_MOST_COLUMNS = MOST_COLUMNS };
+
+/* Residuals at z and their derivatives along the direction in m->along. */
+static int ha_start_residuals(ha_model *m, double t, ha_start_code code, const double *z, double *out, double *rates)
+{
+//if conserved
+    ha_copy(m->k, z + HA_NX, HA_NK);
+//end
+//if held
+    ha_place(m, t);
+//end
+    return code(m, t, z, m->along, out, rates);
+}
+
+static double *ha_along_unknown(ha_model *m, int unknown)
+{
+    return &m->along[unknown < HA_NX ? HA_STATES_AT + unknown : HA_CONSERVED_AT + unknown - HA_NX];
+}
+
+/* Newton for each unknown of a pass by itself. */
+static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z, unsigned char *known, unsigned char *met)
+{
+    double out[HA_MOST_AT_ONCE];
+    double slope[HA_MOST_AT_ONCE];
+    double least[HA_MOST_AT_ONCE];
+    double best[HA_MOST_AT_ONCE];
+    double step[HA_MOST_AT_ONCE];
+    unsigned char done[HA_MOST_AT_ONCE];
+    int iteration;
+    int i;
+    for (i = 0; i < pass->count; ++i) {
+        least[i] = HUGE_VAL;
+        best[i] = z[pass->unknowns[i]];
+        step[i] = 0.0;
+        done[i] = 0;
+    }
+    for (iteration = 0; iteration < 60; ++iteration) {
+        int all = 1;
+        ha_fill(m->along, 0.0, HA_DIRECTION);
+        for (i = 0; i < pass->count; ++i) {
+            *ha_along_unknown(m, pass->unknowns[i]) = 1.0;
+        }
+        if (ha_start_residuals(m, t, pass->code, z, out, slope) != MODEL_OK) {
+            break;
+        }
+        for (i = 0; i < pass->count; ++i) {
+            double *place = &z[pass->unknowns[i]];
+            if (done[i]) {
+                continue;
+            }
+            if (fabs(out[i]) < least[i]) {
+                least[i] = fabs(out[i]);
+                best[i] = *place;
+                step[i] = -out[i] / slope[i];
+            } else {
+                step[i] *= 0.5;
+            }
+            done[i] = out[i] == 0.0 || fabs(step[i]) <= 2.0 * DBL_EPSILON * fabs(best[i]);
+            *place = done[i] || !ha_finite(step[i]) ? best[i] : best[i] + step[i];
+            all = all && done[i];
+        }
+        if (all) {
+            break;
+        }
+    }
+    for (i = 0; i < pass->count; ++i) {
+        known[pass->unknowns[i]] = done[i];
+        met[pass->conditions[i]] = done[i];
+        if (!done[i]) {
+            z[pass->unknowns[i]] = 0.0;
+        }
+    }
+}
+
+//if start_groups
+/* Residuals of a group and their derivatives, row by row; whether all are finite. */
+static int ha_linearised(ha_model *m, double t, const ha_group *g, const double *z, double *residual, double *jacobian)
+{
+    double rates[HA_MOST_ROWS];
+    int i;
+    int j;
+    for (j = 0; j < (g->columns > 0 ? g->columns : 1); ++j) {
+        ha_fill(m->along, 0.0, HA_DIRECTION);
+        if (g->columns > 0) {
+            *ha_along_unknown(m, g->unknowns[j]) = 1.0;
+        }
+        if (ha_start_residuals(m, t, g->code, z, residual, rates) != MODEL_OK) {
+            return 0;
+        }
+        for (i = 0; i < g->rows && g->columns > 0; ++i) {
+            jacobian[i * g->columns + j] = rates[i];
+        }
+    }
+    return ha_all_finite(residual, g->rows) && ha_all_finite(jacobian, g->rows * g->columns);
+}
+
+/* Whether all conditions of a group are met to rounding of the terms they are made of. */
+static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const double *residual, const double *jacobian)
+{
+    double asked[START_CONDITIONS];
+    int i;
+    int j;
+    ha_asked_code(m, asked);
+    for (i = 0; i < g->rows; ++i) {
+        double size = fabs(asked[g->conditions[i]]);
+        for (j = 0; j < g->columns; ++j) {
+            const double term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
+            size += fabs(term);
+        }
+        if (!(fabs(residual[i]) <= 1e-9 * size)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* The shortest of the steps that reduce jacobian * step + residual most, rows and columns weighed so that the greatest
+ * entry of each is 1: singular values by rotations of columns in pairs. */
+static int ha_shortest_step(int rows, int columns, const double *jacobian, const double *residual, double *weights, double *step)
+{
+    double b[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    double v[HA_MOST_ROWS * HA_MOST_ROWS];
+    double sizes[HA_MOST_COLUMNS] = {0.0};
+    double right[HA_MOST_ROWS] = {0.0};
+    const int wide = rows < columns;
+    const int n = wide ? rows : columns;
+    const int length = wide ? columns : rows;
+    double greatest = 0.0;
+    int sweep;
+    int i;
+    int j;
+    int k;
+    for (i = 0; i < rows; ++i) {
+        double most = 0.0;
+        for (j = 0; j < columns; ++j) {
+            most = ha_max(most, fabs(jacobian[i * columns + j]));
+        }
+        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
+        right[i] = -residual[i] * weights[i];
+    }
+    for (j = 0; j < columns; ++j) {
+        double most = 0.0;
+        for (i = 0; i < rows; ++i) {
+            most = ha_max(most, fabs(jacobian[i * columns + j] * weights[i]));
+        }
+        sizes[j] = most > 0.0 ? 1.0 / most : 1.0;
+    }
+    for (i = 0; i < rows; ++i) {
+        for (j = 0; j < columns; ++j) {
+            const double entry = jacobian[i * columns + j] * weights[i] * sizes[j];
+            b[wide ? j * n + i : i * n + j] = entry;
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        for (j = 0; j < n; ++j) {
+            v[i * n + j] = i == j ? 1.0 : 0.0;
+        }
+    }
+    for (sweep = 0; sweep < 60; ++sweep) {
+        int turned = 0;
+        for (i = 0; i + 1 < n; ++i) {
+            for (j = i + 1; j < n; ++j) {
+                double a = 0.0;
+                double c = 0.0;
+                double d = 0.0;
+                for (k = 0; k < length; ++k) {
+                    a += b[k * n + i] * b[k * n + i];
+                    c += b[k * n + j] * b[k * n + j];
+                    d += b[k * n + i] * b[k * n + j];
+                }
+                if (fabs(d) > DBL_EPSILON * sqrt(a * c) && d != 0.0) {
+                    const double zeta = (c - a) / (2.0 * d);
+                    const double tangent = (zeta < 0.0 ? -1.0 : 1.0) / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
+                    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+                    const double sine = cosine * tangent;
+                    turned = 1;
+                    for (k = 0; k < length; ++k) {
+                        const double one = b[k * n + i];
+                        b[k * n + i] = cosine * one - sine * b[k * n + j];
+                        b[k * n + j] = sine * one + cosine * b[k * n + j];
+                    }
+                    for (k = 0; k < n; ++k) {
+                        const double one = v[k * n + i];
+                        v[k * n + i] = cosine * one - sine * v[k * n + j];
+                        v[k * n + j] = sine * one + cosine * v[k * n + j];
+                    }
+                }
+            }
+        }
+        if (!turned) {
+            break;
+        }
+    }
+    for (j = 0; j < n; ++j) {
+        double square = 0.0;
+        for (k = 0; k < length; ++k) {
+            square += b[k * n + j] * b[k * n + j];
+        }
+        greatest = ha_max(greatest, square);
+    }
+    ha_fill(step, 0.0, columns);
+    for (j = 0; j < n; ++j) {
+        double square = 0.0;
+        double part = 0.0;
+        for (k = 0; k < length; ++k) {
+            square += b[k * n + j] * b[k * n + j];
+        }
+        if (!(sqrt(square) > 1e-11 * sqrt(greatest))) {
+            continue;
+        }
+        for (k = 0; k < rows; ++k) {
+            part += (wide ? v[k * n + j] : b[k * n + j]) * right[k];
+        }
+        for (k = 0; k < columns; ++k) {
+            step[k] += (wide ? b[k * n + j] : v[k * n + j]) * part / square;
+        }
+    }
+    for (j = 0; j < columns; ++j) {
+        step[j] *= sizes[j];
+    }
+    return ha_all_finite(step, columns);
+}
+
+static double ha_weighed(const double *residual, const double *weights, int n)
+{
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < n; ++i) {
+        const double part = residual[i] * weights[i];
+        sum += part * part;
+    }
+    return sqrt(sum);
+}
+
+/* One damped step of Gauss-Newton of minimum norm; whether it helped. */
+static int ha_nearer(ha_model *m, double t, const ha_group *g, double *z, double *residual, double *jacobian)
+{
+    double weights[HA_MOST_ROWS];
+    double step[HA_MOST_COLUMNS];
+    double before[HA_MOST_COLUMNS] = {0.0};
+    double next[HA_MOST_ROWS];
+    double next_jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    double fraction = 1.0;
+    double norm;
+    int moves = 0;
+    int halving;
+    int j;
+    if (!ha_shortest_step(g->rows, g->columns, jacobian, residual, weights, step)) {
+        return 0;
+    }
+    norm = ha_weighed(residual, weights, g->rows);
+    for (j = 0; j < g->columns; ++j) {
+        before[j] = z[g->unknowns[j]];
+        moves = moves || fabs(step[j]) > 4.0 * DBL_EPSILON * fabs(before[j]);
+    }
+    if (norm == 0.0 || !moves) {
+        return 0;
+    }
+    for (halving = 0; halving < 30; ++halving) {
+        for (j = 0; j < g->columns; ++j) {
+            const double move = fraction * step[j];
+            z[g->unknowns[j]] = before[j] + move;
+        }
+        if (ha_linearised(m, t, g, z, next, next_jacobian) && ha_weighed(next, weights, g->rows) < norm) {
+            ha_copy(residual, next, g->rows);
+            ha_copy(jacobian, next_jacobian, g->rows * g->columns);
+            return 1;
+        }
+        fraction *= 0.5;
+    }
+    for (j = 0; j < g->columns; ++j) {
+        z[g->unknowns[j]] = before[j];
+    }
+    return 0;
+}
+
+static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, unsigned char *known)
+{
+    static const double starts[] = {0.0, 1e-6, 1e-3, 1.0};
+    double residual[HA_MOST_ROWS];
+    double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    int there = 0;
+    int i;
+    int j;
+    for (i = 0; i < 4 && !there; ++i) {
+        for (j = 0; j < g->columns; ++j) {
+            if (!known[g->unknowns[j]]) {
+                z[g->unknowns[j]] = starts[i];
+            }
+        }
+        there = ha_linearised(m, t, g, z, residual, jacobian);
+    }
+    if (!there) {
+        return 0;
+    }
+    for (i = 0; i < 60; ++i) {
+        if (!ha_nearer(m, t, g, z, residual, jacobian)) {
+            break;
+        }
+    }
+    for (j = 0; j < g->columns; ++j) {
+        known[g->unknowns[j]] = 1;
+    }
+    return ha_is_met(m, g, z, residual, jacobian);
+}
+
+//end
+/* What is given holds, the rest is solved for, remaining freedom is zero. */
+static int ha_solve_start_once(ha_model *m, double t, double *z)
+{
+    unsigned char known[HA_START_UNKNOWNS + 1];
+    unsigned char met[START_CONDITIONS + 1];
+    int i;
+    int j;
+    memset(known, 0, sizeof known);
+    memset(met, 0, sizeof met);
+    ha_fill(z, 0.0, HA_START_UNKNOWNS);
+    for (i = 0; i < PASSES; ++i) {
+        ha_solve_each(m, t, &ha_passes[i], z, known, met);
+    }
+    for (i = 0; i < START_GROUPS; ++i) {
+        const ha_group *g = &ha_groups[i];
+        int all = 1;
+        for (j = 0; j < g->rows; ++j) {
+            all = all && met[g->conditions[j]];
+        }
+        if (all) {
+            continue;
+        }
+//if start_groups
+        if (g->code != NULL) {
+            double residual[HA_MOST_ROWS];
+            double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+            int solved = 1;
+            for (j = 0; j < g->columns; ++j) {
+                solved = solved && known[g->unknowns[j]];
+            }
+            if (solved && ha_linearised(m, t, g, z, residual, jacobian) && ha_is_met(m, g, z, residual, jacobian)) {
+                continue;
+            }
+            if (ha_solve_group(m, t, g, z, known)) {
+                continue;
+            }
+        }
+//end
+        return ha_fail(m, MODEL_NO_START, i, t);
+    }
+    ha_copy(m->x, z, HA_NX);
+//if conserved
+    ha_copy(m->k, z + HA_NX, HA_NK);
+//end
+    m->failure.code = MODEL_OK;
+    return MODEL_OK;
+}
+
+static int ha_solve_start(ha_model *m, double t)
+{
+//if held
+    double before[HA_START_UNKNOWNS + 1];
+    double z[HA_START_UNKNOWNS + 1];
+    int round;
+    ha_fill(before, 0.0, HA_START_UNKNOWNS);
+    for (round = 0; round < 20; ++round) {
+        int same = 1;
+        int i;
+        int status = ha_solve_start_once(m, t, z);
+        if (status != MODEL_OK) {
+            return status;
+        }
+        for (i = 0; i < HA_START_UNKNOWNS; ++i) {
+            same = same && z[i] == before[i];
+            before[i] = z[i];
+        }
+        if (same) {
+            break;
+        }
+        /* Held signals start with what the start makes of them. */
+        status = ha_begin_held(m, t, m->x);
+        if (status != MODEL_OK) {
+            return status;
+        }
+    }
+    return MODEL_OK;
+//else
+    double z[HA_START_UNKNOWNS + 1];
+    return ha_solve_start_once(m, t, z);
+//end
+}

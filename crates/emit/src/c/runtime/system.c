@@ -1,0 +1,532 @@
+
+/* ---- rates, outputs, jumps ---- */
+
+//if held
+/* Puts what is delayed or sampled where it is read. */
+static void ha_place(ha_model *m, double t)
+{
+//if delays
+    static const int places[] = {DELAY_PLACES};
+    int d;
+    for (d = 0; d < DELAYS; ++d) {
+        double slope;
+        m->z[places[d]] = ha_delay_at(m, d, t, &slope);
+    }
+//end
+//if samples
+    {
+        static const int held[] = {SAMPLE_PLACES};
+        int s;
+        for (s = 0; s < SAMPLES; ++s) {
+            m->z[held[s]] = m->samples[s].value;
+        }
+    }
+//end
+//if only_samples
+    (void)t;
+//end
+}
+
+//end
+typedef int (*ha_code)(ha_model *m, double t, const double *x, double *out);
+
+/* Runs code with conditions as held. Beyond a switch the held branch may have no value any more: then the conditions are
+ * followed instead. */
+static int ha_run(ha_model *m, ha_code code, double t, const double *x, double *out, int n)
+{
+    int status;
+//if held
+    ha_place(m, t);
+//end
+    status = code(m, t, x, out);
+//if switches
+    if (m->state_hold != HA_KEEP || (status == MODEL_OK && ha_all_finite(out, n))) {
+        return status;
+    }
+    m->state_hold = HA_FOLLOW;
+    status = code(m, t, x, out);
+    if (status != MODEL_OK || !ha_all_finite(out, n)) {
+        m->state_hold = HA_KEEP;
+        status = code(m, t, x, out);
+    }
+    m->state_hold = HA_KEEP;
+    if (status == MODEL_OK) {
+        m->failure.code = MODEL_OK;
+    }
+//else
+    (void)n;
+//end
+    return status;
+}
+
+//if domains
+/* The failure behind a value that is not a number: the first law without a value, if there is one. */
+static int ha_explain(ha_model *m, double t, const double *x, int code, int where)
+{
+    double arguments[DOMAINS];
+    int i;
+    ha_fill(arguments, 0.0, DOMAINS);
+    if (ha_domains_code(m, t, x, arguments) != MODEL_OK) {
+        return ha_fail(m, code, where, t);
+    }
+    for (i = 0; i < DOMAINS; ++i) {
+        if (ha_finite(arguments[i]) && !ha_is_within(i, arguments[i])) {
+            return ha_fail(m, MODEL_OUT_OF_DOMAIN, i, t);
+        }
+    }
+    return ha_fail(m, code, where, t);
+}
+
+//end
+int MODEL_rates(MODEL *m, double t, const double *x, double *dx)
+{
+    const int status = ha_run(m, ha_rates_code, t, x, dx, HA_NX);
+    int i;
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (i = 0; i < HA_NX; ++i) {
+        if (!ha_finite(dx[i])) {
+//if domains
+            return ha_explain(m, t, x, MODEL_RATE_NOT_FINITE, i);
+//else
+            return ha_fail(m, MODEL_RATE_NOT_FINITE, i, t);
+//end
+        }
+    }
+    return MODEL_OK;
+}
+
+int MODEL_observe(MODEL *m, double t, const double *x, double *y)
+{
+//if outputs
+    const int status = ha_run(m, ha_observe_code, t, x, y, HA_NY);
+    int infinite = -1;
+    int i;
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (i = 0; i < HA_NY; ++i) {
+        if (y[i] != y[i]) {
+//if domains
+            return ha_explain(m, t, x, MODEL_OUTPUT_NOT_FINITE, i);
+//else
+            return ha_fail(m, MODEL_OUTPUT_NOT_FINITE, i, t);
+//end
+        }
+        if (!ha_finite(y[i]) && infinite < 0) {
+            infinite = i;
+        }
+    }
+//if domains
+    /* What a modeller computes for himself may be infinite, what a law gives may not. */
+    return infinite < 0 ? MODEL_OK : ha_explain(m, t, x, MODEL_OK, 0);
+//else
+    return MODEL_OK;
+//end
+//else
+    (void)m;
+    (void)t;
+    (void)x;
+    (void)y;
+    return MODEL_OK;
+//end
+}
+
+//if tangent
+int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv)
+{
+    double *e = m->along;
+    double *dx = m->along_out;
+    int status;
+    int i;
+    ha_fill(e, 0.0, HA_DIRECTION);
+    ha_copy(e + HA_STATES_AT, v, HA_NX);
+//if held
+    ha_place(m, t);
+//end
+    status = ha_rates_along(m, t, x, e, dx, dv);
+//if switches
+    if (m->state_hold == HA_KEEP && (status != MODEL_OK || !ha_all_finite(dv, HA_NX))) {
+        m->state_hold = HA_FOLLOW;
+        status = ha_rates_along(m, t, x, e, dx, dv);
+        if (status != MODEL_OK || !ha_all_finite(dv, HA_NX)) {
+            m->state_hold = HA_KEEP;
+            status = ha_rates_along(m, t, x, e, dx, dv);
+        }
+        m->state_hold = HA_KEEP;
+        if (status == MODEL_OK) {
+            m->failure.code = MODEL_OK;
+        }
+    }
+//end
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (i = 0; i < HA_NX; ++i) {
+        if (!ha_finite(dv[i])) {
+            return ha_fail(m, MODEL_DERIVATIVE_NOT_FINITE, i, t);
+        }
+    }
+    return MODEL_OK;
+}
+
+//end
+//if derivatives
+int MODEL_directional(MODEL *m, double t, const double *x, const double *v, const double *w, double *dv, double *dy)
+{
+    double *e = m->along;
+    int status = MODEL_OK;
+    ha_fill(e, 0.0, HA_DIRECTION);
+    ha_copy(e + HA_STATES_AT, v, HA_NX);
+    ha_copy(e + 1, w, HA_NU);
+//if held
+    ha_place(m, t);
+//end
+    if (dv != NULL) {
+        status = ha_rates_along(m, t, x, e, m->along_out, dv);
+    }
+//if outputs
+    if (status == MODEL_OK && dy != NULL) {
+        status = ha_observe_along(m, t, x, e, m->along_out, dy);
+    }
+//else
+    (void)dy;
+//end
+    return status;
+}
+
+//end
+//if switches
+int MODEL_indicators(MODEL *m, double t, const double *x, double *g)
+{
+    static const int conditions[] = {SWITCH_CONDITIONS};
+    const int status = ha_run(m, ha_switching_code, t, x, m->operands, SWITCHES);
+    int next = 0;
+    int i;
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (i = 0; i < SWITCHES; ++i) {
+        double low;
+        double high;
+        if (ha_kinds[conditions[i]] == 0) {
+            g[next] = m->operands[i];
+            ++next;
+            continue;
+        }
+        ha_borders(m, conditions[i], &low, &high);
+        g[next] = low - m->operands[i];
+        g[next + 1] = m->operands[i] - high;
+        next += 2;
+    }
+    return MODEL_OK;
+}
+
+/* Takes the sides at (t, x). */
+static int ha_take_sides(ha_model *m, double t, const double *x)
+{
+    static const int conditions[] = {SWITCH_CONDITIONS};
+    int status;
+    int i;
+    m->state_hold = HA_TAKE;
+//if held
+    ha_place(m, t);
+//end
+    status = ha_switching_code(m, t, x, m->operands);
+    for (i = 0; i < SWITCHES; ++i) {
+        switch (ha_kinds[conditions[i]]) {
+//if sign_conditions
+        case 0:
+            (void)ha_side(m, HA_TAKE, conditions[i], m->operands[i]);
+            break;
+//end
+//if floor_conditions
+        case 1:
+            (void)ha_whole(m, HA_TAKE, conditions[i], m->operands[i]);
+            break;
+//end
+        default:
+//if piece_conditions
+            (void)ha_piece(m, HA_TAKE, conditions[i], ha_kinds[conditions[i]] - 2, m->operands[i]);
+//end
+            break;
+        }
+    }
+    m->state_hold = HA_KEEP;
+    return status;
+}
+
+int MODEL_switched(MODEL *m, double t, const double *x, int *switched)
+{
+    const int status = MODEL_indicators(m, t, x, m->beyond);
+    int i;
+    *switched = 0;
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (i = 0; i < HA_NG; ++i) {
+        if (m->beyond[i] != m->beyond[i]) {
+            return ha_fail(m, MODEL_CONDITION_NOT_FINITE, i, t);
+        }
+        if (m->sides[i] != (m->beyond[i] > 0.0)) {
+            *switched = 1;
+        }
+    }
+    return MODEL_OK;
+}
+
+//end
+//if held
+/* Values and rates of what is delayed or sampled. */
+static int ha_sources(ha_model *m, double t, const double *x)
+{
+    double *e = m->along;
+    int status = MODEL_rates(m, t, x, m->dx);
+    if (status != MODEL_OK) {
+        return status;
+    }
+    ha_fill(e, 0.0, HA_DIRECTION);
+    e[0] = 1.0;
+//if delays
+    {
+        static const int places[] = {DELAY_PLACES};
+        int d;
+        for (d = 0; d < DELAYS; ++d) {
+            (void)ha_delay_at(m, d, t, &e[HA_HELD_AT + places[d]]);
+        }
+    }
+//end
+    ha_copy(e + HA_STATES_AT, m->dx, HA_NX);
+    status = ha_sources_along(m, t, x, e, m->source, m->source_rate);
+    return status;
+}
+
+/* Held signals at the start of a run. They may read each other: passes until nothing changes. */
+static int ha_begin_held(ha_model *m, double t, const double *x)
+{
+    int pass;
+    for (pass = 0; pass < HA_NZ; ++pass) {
+        const int status = ha_sources(m, t, x);
+        if (status != MODEL_OK) {
+            return status;
+        }
+//if delays
+        {
+            static const int places[] = {DELAY_PLACES};
+            int d;
+            for (d = 0; d < DELAYS; ++d) {
+                ha_delay_begin(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+            }
+        }
+//end
+//if samples
+        {
+            static const int held[] = {SAMPLE_PLACES};
+            int s;
+            for (s = 0; s < SAMPLES; ++s) {
+                m->samples[s].value = m->source[held[s]];
+                m->samples[s].taken = t;
+                m->samples[s].next = floor(t / m->samples[s].period);
+                ha_sample_pass(m, s, t);
+            }
+        }
+//end
+    }
+    return MODEL_OK;
+}
+
+//end
+//if samples
+/* Takes the samples that are due, in order: each sees those taken before it. One that was taken at this very instant is
+ * taken again if an input or a parameter has changed. */
+static int ha_take_samples(ha_model *m, double t, const double *x)
+{
+    static const int held[] = {SAMPLE_PLACES};
+    int s;
+    for (s = 0; s < SAMPLES; ++s) {
+        if (t >= ha_sample_next(m, s) || (m->cross_due && t == m->samples[s].taken)) {
+            const int status = ha_sources(m, t, x);
+            if (status != MODEL_OK) {
+                return status;
+            }
+            m->samples[s].value = m->source[held[s]];
+            m->samples[s].taken = t;
+            ha_sample_pass(m, s, t);
+        }
+    }
+    return MODEL_OK;
+}
+
+//end
+//if follows
+/* Goes on with the Newton solutions at (t, x). */
+static int ha_follow_solutions(ha_model *m, double t, const double *x)
+{
+    int status = MODEL_OK;
+//if rates_newton
+    {
+        static const int blocks[] = {RATES_BLOCKS};
+        int i;
+        status = MODEL_rates(m, t, x, m->dx);
+        if (status != MODEL_OK) {
+            return status;
+        }
+        for (i = 0; i < RATES_BLOCK_COUNT; ++i) {
+            ha_newton_accept(m, blocks[i]);
+        }
+    }
+//end
+//if shown_newton
+    {
+        static const int blocks[] = {SHOWN_BLOCKS};
+        int i;
+        status = ha_run(m, ha_observe_code, t, x, m->shown, HA_NY);
+        if (status != MODEL_OK) {
+            return status;
+        }
+        for (i = 0; i < SHOWN_BLOCK_COUNT; ++i) {
+            ha_newton_accept(m, blocks[i]);
+        }
+    }
+//end
+    return status;
+}
+
+//end
+int MODEL_accept(MODEL *m, double t, const double *x)
+{
+//if delays
+    static const int places[] = {DELAY_PLACES};
+    int d;
+    const int status = ha_sources(m, t, x);
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (d = 0; d < DELAYS; ++d) {
+        ha_delay_append(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+        if (m->delays[d].full) {
+            return ha_fail(m, MODEL_NO_ROOM, d, t);
+        }
+    }
+//end
+//if follows
+    return ha_follow_solutions(m, t, x);
+//else
+    (void)m;
+    (void)t;
+    (void)x;
+    return MODEL_OK;
+//end
+}
+
+double MODEL_next_jump(MODEL *m, double t)
+{
+    double next = HUGE_VAL;
+    (void)m;
+    (void)t;
+//if delays
+    {
+        int d;
+        for (d = 0; d < DELAYS; ++d) {
+            const double at = ha_delay_next(m, d, t);
+            if (at > t && at < next) {
+                next = at;
+            }
+        }
+    }
+//end
+//if samples
+    {
+        int s;
+        for (s = 0; s < SAMPLES; ++s) {
+            const double at = ha_sample_next(m, s);
+            if (at > t && at < next) {
+                next = at;
+            }
+        }
+    }
+//end
+//if clocks
+    if (m->clock_next > t && m->clock_next < next) {
+        next = m->clock_next;
+    }
+//end
+    return next;
+}
+
+int MODEL_cross(MODEL *m, double t, const double *x)
+{
+    int status = MODEL_OK;
+    m->crossed = t;
+    ha_copy(m->u_crossed, m->u, HA_NU);
+//if switches
+    m->state_hold = HA_FOLLOW;
+//end
+//if newton
+    {
+        /* A solution may leap where something jumps. */
+        int i;
+        for (i = 0; i < BLOCKS; ++i) {
+            m->following[i] = 0;
+        }
+    }
+//end
+//if clocks
+    ha_clock_cross(m, t);
+//end
+//if held
+    if (!m->begun) {
+        status = ha_begin_held(m, t, x);
+//if samples
+    } else {
+        status = ha_take_samples(m, t, x);
+//end
+    }
+    if (status != MODEL_OK) {
+        return status;
+    }
+//end
+    m->begun = 1;
+    m->cross_due = 0;
+//if switches
+    status = ha_take_sides(m, t, x);
+    if (status != MODEL_OK) {
+        return status;
+    }
+//end
+//if delays
+    {
+        static const int places[] = {DELAY_PLACES};
+        int d;
+        status = ha_sources(m, t, x);
+        if (status != MODEL_OK) {
+            return status;
+        }
+        for (d = 0; d < DELAYS; ++d) {
+            ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+            if (m->delays[d].full) {
+                return ha_fail(m, MODEL_NO_ROOM, d, t);
+            }
+        }
+    }
+//end
+//if follows
+    status = ha_follow_solutions(m, t, x);
+    if (status != MODEL_OK) {
+        return status;
+    }
+//end
+//if switches
+    status = MODEL_indicators(m, t, x, m->beyond);
+    if (status == MODEL_OK) {
+        int i;
+        for (i = 0; i < HA_NG; ++i) {
+            m->sides[i] = m->beyond[i] > 0.0;
+        }
+    }
+//else
+    (void)x;
+//end
+    return status;
+}

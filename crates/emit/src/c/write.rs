@@ -1,0 +1,634 @@
+//! Steps as C functions: straight lines in chunks, what crosses from one to the next in the model's work array.
+
+use std::fmt::Write;
+
+use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::program::{Block, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::ssa::{Act, Arg, Code, Step};
+
+/// Steps in one C function: compilers take more than linear time for long ones.
+const CHUNK: usize = 250;
+
+/// How a function is called.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    /// Its parameters.
+    pub parameters: &'static str,
+    /// What its chunks are called with.
+    pub arguments: &'static str,
+    /// Whether it gives no status.
+    pub void: bool,
+    /// Time, where failures note it.
+    pub time: &'static str,
+    /// The fixed registers that move, if derivatives are wanted: ranges within the direction.
+    pub along: Option<Moving>,
+}
+
+/// What has derivatives.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moving {
+    pub time: bool,
+    pub inputs: bool,
+    pub held: bool,
+    pub conserved: bool,
+    pub states: bool,
+    /// What a Newton block reads from outside.
+    pub outer: bool,
+}
+
+/// Where linear blocks with a constant matrix keep their factors.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Factored {
+    /// Number, first place and first place of the order of each such block.
+    pub places: FxHashMap<u32, (usize, usize, usize)>,
+    /// Numbers taken in all.
+    pub size: usize,
+    /// Places of orders taken in all.
+    pub orders: usize,
+}
+
+/// Writes functions.
+pub(super) struct Writer<'a> {
+    pub program: &'a Program,
+    pub layout: &'a Layout,
+    /// The place in `m->c` of each fixed register computed from parameters.
+    pub derived: FxHashMap<Register, usize>,
+    constants: FxHashMap<Register, f64>,
+    pub factored: Factored,
+    /// Places of the work array taken so far.
+    pub crossing: usize,
+}
+
+/// A number as C reads it back to the bit.
+pub(super) fn number(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "((double)NAN)".into(),
+        v if v == f64::INFINITY => "HUGE_VAL".into(),
+        v if v == f64::NEG_INFINITY => "(-HUGE_VAL)".into(),
+        v if v.is_sign_negative() => format!("({v:?})"),
+        v => format!("{v:?}"),
+    }
+}
+
+/// Numbers as the lines of a table.
+pub(super) fn numbers(values: &[f64]) -> String {
+    match values {
+        [] => "    0.0".into(),
+        values => values
+            .chunks(4)
+            .map(|row| format!("    {}", row.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ")))
+            .collect::<Vec<_>>()
+            .join(",\n"),
+    }
+}
+
+impl<'a> Writer<'a> {
+    pub fn new(program: &'a Program, layout: &'a Layout) -> Writer<'a> {
+        let constants: FxHashMap<Register, f64> = layout.constants.iter().copied().collect();
+        let first = program.parameters.len() as Register;
+        let computed = (first..layout.time).filter(|r| !constants.contains_key(r));
+        let derived = computed.enumerate().map(|(place, r)| (r, place)).collect();
+        let mut factored = Factored::default();
+        for (id, block) in program.blocks.iter() {
+            let Block::Linear { matrix, .. } = block else { continue };
+            let n = block.size();
+            if n > 1 && matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
+                let number = factored.places.len();
+                factored.places.insert(id.0, (number, factored.size, factored.orders));
+                factored.size += 2 * n * n + 3 * n;
+                factored.orders += n;
+            }
+        }
+        Writer { program, layout, derived, constants, factored, crossing: 0 }
+    }
+
+    /// A fixed register in C.
+    pub fn fixed(&self, r: Register) -> String {
+        let l = self.layout;
+        match r {
+            r if r < self.program.parameters.len() as Register => format!("m->p[{r}]"),
+            r if r < l.time => match self.constants.get(&r) {
+                Some(&value) => number(value),
+                None => format!("m->c[{}]", self.derived[&r]),
+            },
+            r if r == l.time => "t".into(),
+            r if r < l.held => format!("m->u[{}]", r - l.inputs),
+            r if r < l.conserved => format!("m->z[{}]", r - l.held),
+            r if r < l.states => format!("m->k[{}]", r - l.conserved),
+            r => format!("x[{}]", r - l.states),
+        }
+    }
+
+    /// Whether a fixed register moves, and where it stands in the direction.
+    fn fixed_rate(&self, r: Register, moving: Moving) -> Option<String> {
+        let l = self.layout;
+        let moves = match r {
+            r if r < l.time => false,
+            r if r == l.time => moving.time,
+            r if r < l.held => moving.inputs,
+            r if r < l.conserved => moving.held,
+            r if r < l.states => moving.conserved,
+            _ => moving.states,
+        };
+        moves.then(|| format!("e[{}]", r - l.time))
+    }
+
+    /// A function that computes code; `values` says where its outputs go, `rates` where their derivatives go.
+    pub fn function(&mut self, name: &str, shape: Shape, code: &Code, values: &[String], rates: &[String]) -> String {
+        let moves = self.moves(code, shape, !rates.is_empty());
+        let chunks: Vec<&[Step]> = if code.steps.is_empty() { vec![&[]] } else { code.steps.chunks(CHUNK).collect() };
+        let mut f = Body {
+            shape,
+            moves,
+            read: code.read(),
+            home: vec![0; code.locals as usize],
+            place: vec![usize::MAX; code.locals as usize],
+            rate_place: vec![usize::MAX; code.locals as usize],
+            chunk: 0,
+            text: String::new(),
+        };
+        for (c, steps) in chunks.iter().enumerate() {
+            steps.iter().flat_map(|s| &s.outs).for_each(|&out| f.home[out as usize] = c);
+        }
+        for (c, steps) in chunks.iter().enumerate() {
+            for a in steps.iter().flat_map(|s| &s.args) {
+                if let Arg::Local(i) = *a
+                    && f.home[i as usize] != c
+                {
+                    self.cross(&mut f, i as usize);
+                }
+            }
+        }
+        let mut names = Vec::new();
+        let mut text = String::new();
+        let kind = if shape.void { "void" } else { "int" };
+        for (c, steps) in chunks.iter().enumerate() {
+            f.chunk = c;
+            f.text.clear();
+            steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
+            self.outputs(&mut f, code, (values, rates), chunks.len());
+            let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
+            let _ = writeln!(text, "static {kind} {called}({})\n{{", shape.parameters);
+            if !shape.void && f.text.contains("status") {
+                text += "    int status;\n";
+            }
+            text += &without_the_unused(&f.text);
+            for parameter in shape.arguments.split(", ") {
+                let _ = writeln!(text, "    (void){parameter};");
+            }
+            text += if shape.void { "}\n\n" } else { "    return MODEL_OK;\n}\n\n" };
+            names.push(called);
+        }
+        if chunks.len() > 1 {
+            let _ = writeln!(text, "static {kind} {name}({})\n{{", shape.parameters);
+            if !shape.void {
+                text += "    int status;\n";
+            }
+            for called in &names {
+                let _ = match shape.void {
+                    true => writeln!(text, "    {called}({});", shape.arguments),
+                    false => writeln!(
+                        text,
+                        "    status = {called}({});\n    if (status != MODEL_OK) {{\n        return status;\n    }}",
+                        shape.arguments
+                    ),
+                };
+            }
+            text += if shape.void { "}\n\n" } else { "    return MODEL_OK;\n}\n\n" };
+        }
+        text
+    }
+
+    fn cross(&mut self, f: &mut Body, local: usize) {
+        if f.place[local] == usize::MAX {
+            f.place[local] = self.crossing;
+            self.crossing += 1;
+            if f.moves[local] {
+                f.rate_place[local] = self.crossing;
+                self.crossing += 1;
+            }
+        }
+    }
+
+    /// Which locals have derivatives that somebody asks for.
+    fn moves(&self, code: &Code, shape: Shape, rates: bool) -> Vec<bool> {
+        let mut moves = vec![false; code.locals as usize];
+        let Some(moving) = shape.along else { return moves };
+        for step in &code.steps {
+            let one = step.args.iter().any(|&a| match a {
+                Arg::Fixed(r) => self.fixed_rate(r, moving).is_some(),
+                Arg::Local(i) => moves[i as usize],
+                Arg::Outer(_) => moving.outer,
+                Arg::Guess(_) => false,
+            });
+            let none = matches!(
+                step.act,
+                Act::Positive | Act::Side(_) | Act::Floor(_) | Act::And | Act::Or | Act::Not | Act::Parameter(_)
+            ) || matches!(step.act, Act::Call(Function::Sign | Function::Floor));
+            step.outs.iter().for_each(|&out| moves[out as usize] = one && !none);
+        }
+        let mut asked = vec![false; moves.len()];
+        let ask = |asked: &mut Vec<bool>, a: Arg| {
+            if let Arg::Local(i) = a {
+                asked[i as usize] = true;
+            }
+        };
+        code.outputs.iter().filter(|_| rates).for_each(|&a| ask(&mut asked, a));
+        for step in code.steps.iter().rev() {
+            let wanted = step.outs.iter().any(|&out| moves[out as usize] && asked[out as usize]);
+            let condition = match step.act {
+                Act::Side(c) | Act::Floor(c) | Act::Table(_, Some(c)) | Act::TableSlope(_, Some(c)) | Act::TableCurvature(_, Some(c)) => Some(c),
+                _ => None,
+            };
+            let timed = condition.is_some_and(|c| self.takes_rate(c, moving));
+            let first = usize::from(step.act == Act::Select);
+            if wanted || timed {
+                step.args[first..].iter().for_each(|&a| ask(&mut asked, a));
+            }
+        }
+        moves.iter().zip(&asked).map(|(moves, asked)| *moves && *asked).collect()
+    }
+
+    /// Whether a condition is taken with the rate of its operand: only what time alone moves is.
+    fn takes_rate(&self, condition: ConditionId, moving: Moving) -> bool {
+        moving.time && self.program.conditions[condition].cause != Cause::State
+    }
+
+    fn outputs(&self, f: &mut Body, code: &Code, (values, rates): (&[String], &[String]), chunks: usize) {
+        let here = |a: Arg, f: &Body| match a {
+            Arg::Local(i) => f.home[i as usize] == f.chunk,
+            _ => f.chunk + 1 == chunks,
+        };
+        let wanted: Vec<(usize, Arg)> = code.outputs.iter().copied().enumerate().filter(|(_, a)| here(*a, f)).collect();
+        for (i, a) in wanted {
+            if let Some(place) = values.get(i) {
+                let value = self.arg(f, a);
+                let _ = writeln!(f.text, "    {place} = {value};");
+            }
+            if let Some(place) = rates.get(i) {
+                let rate = self.rate(f, a).unwrap_or_else(|| "0.0".into());
+                let _ = writeln!(f.text, "    {place} = {rate};");
+            }
+        }
+        let fixed: Vec<(Register, Arg)> = code.fixed.iter().copied().filter(|(_, a)| here(*a, f)).collect();
+        for (r, a) in fixed {
+            let (place, value) = (self.fixed(r), self.arg(f, a));
+            let _ = writeln!(f.text, "    {place} = {value};");
+        }
+    }
+
+    fn arg(&self, f: &Body, a: Arg) -> String {
+        match a {
+            Arg::Fixed(r) => self.fixed(r),
+            Arg::Local(i) if f.home[i as usize] == f.chunk => format!("v{i}"),
+            Arg::Local(i) => format!("m->w[{}]", f.place[i as usize]),
+            Arg::Outer(i) => format!("o[{i}]"),
+            Arg::Guess(i) => format!("g[{i}]"),
+        }
+    }
+
+    /// The derivative, if it moves.
+    fn rate(&self, f: &Body, a: Arg) -> Option<String> {
+        let moving = f.shape.along?;
+        match a {
+            Arg::Fixed(r) => self.fixed_rate(r, moving),
+            Arg::Local(i) if !f.moves[i as usize] => None,
+            Arg::Local(i) if f.home[i as usize] == f.chunk => Some(format!("d{i}")),
+            Arg::Local(i) => Some(format!("m->w[{}]", f.rate_place[i as usize])),
+            Arg::Outer(i) => moving.outer.then(|| format!("e[{i}]")),
+            Arg::Guess(_) => None,
+        }
+    }
+
+    fn step(&self, f: &mut Body, step: &Step, place: usize) {
+        let a: Vec<String> = step.args.iter().map(|&a| self.arg(f, a)).collect();
+        let d: Vec<Option<String>> = step.args.iter().map(|&a| self.rate(f, a)).collect();
+        match step.act {
+            Act::Watch(watch) => {
+                let _ = writeln!(
+                    f.text,
+                    "    if (!({0} != 0.0 && fabs({0}) > {1} * {2})) {{\n        return ha_fail(m, MODEL_VANISHED, {watch}, {3});\n    }}",
+                    a[0],
+                    number(64.0 * f64::EPSILON),
+                    a[1],
+                    f.shape.time
+                );
+            }
+            Act::Linear(block) => self.linear(f, step, (&a, &d), (block.0, place)),
+            Act::Newton(block) => self.newton(f, step, (&a, &d), (block.0, place)),
+            Act::Table(table, piece) | Act::TableSlope(table, piece) | Act::TableCurvature(table, piece) => {
+                self.table(f, step, (&a[0], d[0].as_deref()), (table, piece, place));
+            }
+            _ => self.plain(f, step, &a, &d),
+        }
+    }
+
+    fn plain(&self, f: &mut Body, step: &Step, a: &[String], d: &[Option<String>]) {
+        let out = step.outs[0];
+        if let Act::Powi(n) = step.act {
+            let value = power(&mut f.text, &format!("v{out}"), &a[0], n);
+            self.put(f, out, &value, None);
+            if f.moves[out as usize] {
+                let below = power(&mut f.text, &format!("d{out}"), &a[0], n.saturating_sub(1));
+                let slope = format!("{} * ({below})", number(f64::from(n)));
+                let rate = d[0].as_ref().map(|d| format!("ha_along({slope}, {d})"));
+                self.put_rate(f, out, &rate.unwrap_or_else(|| "0.0".into()));
+            }
+            return;
+        }
+        let value = self.value(f, step.act, a, d);
+        let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
+        self.put(f, out, &value, rate.as_deref());
+    }
+
+    fn value(&self, f: &Body, act: Act, a: &[String], d: &[Option<String>]) -> String {
+        match act {
+            Act::Neg => format!("-{}", a[0]),
+            Act::Add => format!("{} + {}", a[0], a[1]),
+            Act::Sub => format!("{} - {}", a[0], a[1]),
+            Act::Mul => format!("{} * {}", a[0], a[1]),
+            Act::Div => format!("{} / {}", a[0], a[1]),
+            Act::Pow => format!("ha_pow({}, {})", a[0], a[1]),
+            Act::Call(function) => call(function, &a[0]),
+            Act::Call2(Function::Atan2) => format!("ha_atan2({}, {})", a[0], a[1]),
+            Act::Call2(Function::Min) => format!("ha_min({}, {})", a[0], a[1]),
+            Act::Call2(Function::Max) => format!("ha_max({}, {})", a[0], a[1]),
+            Act::Call2(_) => format!("{0} - {1} * floor({0} / {1})", a[0], a[1]),
+            Act::Positive => format!("{} > 0.0 ? 1.0 : 0.0", a[0]),
+            Act::And => format!("{} != 0.0 && {} != 0.0 ? 1.0 : 0.0", a[0], a[1]),
+            Act::Or => format!("{} != 0.0 || {} != 0.0 ? 1.0 : 0.0", a[0], a[1]),
+            Act::Not => format!("{} == 0.0 ? 1.0 : 0.0", a[0]),
+            Act::Select => format!("{} != 0.0 ? {} : {}", a[0], a[1], a[2]),
+            Act::Parameter(index) => format!("m->set[{index}] ? m->p[{index}] : {}", a[0]),
+            Act::Side(condition) | Act::Floor(condition) => self.condition(f, condition, &a[0], d[0].as_deref()),
+            Act::Powi(_) | Act::Watch(_) | Act::Linear(_) | Act::Newton(_) => unreachable!("written elsewhere"),
+            Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => unreachable!("written elsewhere"),
+        }
+    }
+
+    fn condition(&self, f: &Body, id: ConditionId, a: &str, d: Option<&str>) -> String {
+        let condition = &self.program.conditions[id];
+        let hold = match condition.cause {
+            Cause::Clock | Cause::Curve => "m->clock_hold",
+            Cause::State => "m->state_hold",
+            Cause::Shown => "HA_FOLLOW",
+        };
+        let (name, table) = match condition.kind {
+            ConditionKind::Sign => ("side", String::new()),
+            ConditionKind::Floor => ("whole", String::new()),
+            ConditionKind::Piece(table) => ("piece", format!("{table}, ")),
+        };
+        match d.filter(|_| f.shape.along.is_some_and(|moving| self.takes_rate(id, moving))) {
+            Some(d) => format!("ha_{name}_along(m, {hold}, {}, {table}{a}, {d}, t)", id.0),
+            None => format!("ha_{name}(m, {hold}, {}, {table}{a})", id.0),
+        }
+    }
+
+    fn table(
+        &self,
+        f: &mut Body,
+        step: &Step,
+        (a, d): (&str, Option<&str>),
+        (table, piece, number): (u32, Option<ConditionId>, usize),
+    ) {
+        let piece = match piece {
+            Some(condition) => format!("(int){}", self.condition(f, condition, a, d)),
+            None => format!("ha_piece_of(&ha_tables[{table}], {a})"),
+        };
+        let _ = writeln!(f.text, "    double q{number}[4];");
+        let _ = writeln!(f.text, "    ha_table_on(&ha_tables[{table}], {piece}, {a}, q{number});");
+        let at = match step.act {
+            Act::TableSlope(..) => 1,
+            Act::TableCurvature(..) => 2,
+            _ => 0,
+        };
+        let rate = d.map(|d| format!("ha_along(q{number}[{}], {d})", at + 1));
+        self.put(f, step.outs[0], &format!("q{number}[{at}]"), rate.as_deref());
+    }
+
+    fn linear(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), (block, number): (u32, usize)) {
+        let n = step.outs.len();
+        let fail = format!("        return ha_fail(m, MODEL_SINGULAR, {block}, {});\n    }}", f.shape.time);
+        let moves = step.outs.iter().any(|&out| f.moves[out as usize]);
+        if n == 1 {
+            let _ = writeln!(f.text, "    if (!ha_is_pivot({})) {{\n{fail}", a[0]);
+            let out = step.outs[0];
+            if !f.read[out as usize] {
+                return;
+            }
+            let rate = moves.then(|| {
+                let right = d[1].clone().unwrap_or_else(|| "0.0".into());
+                match &d[0] {
+                    Some(da) => format!("({right} - {da} * v{out}) / {}", a[0]),
+                    None => format!("{right} / {}", a[0]),
+                }
+            });
+            return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
+        }
+        let (matrix, right) = a.split_at(n * n);
+        let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
+        let _ = writeln!(f.text, "    const double b{number}[] = {{{}}};", right.join(", "));
+        let _ = writeln!(f.text, "    double s{number}[{n}];");
+        let lu = match self.factored.places.get(&block) {
+            Some((which, place, order)) => {
+                let call =
+                    format!("ha_linear_constant(m, {which}, {place}, {order}, {n}, a{number}, b{number}, s{number})");
+                let _ = writeln!(f.text, "    if (!{call}) {{\n{fail}");
+                format!("ha_lu_at(m->factors + {place}, m->factors_order + {order}, {n})")
+            }
+            None => {
+                let _ = writeln!(f.text, "    if (!ha_linear(m, {n}, a{number}, b{number}, s{number})) {{\n{fail}");
+                format!("ha_lu_at(m->work, m->order, {n})")
+            }
+        };
+        if moves {
+            let zero = |d: &Option<String>| d.clone().unwrap_or_else(|| "0.0".into());
+            let (matrix, right) = d.split_at(n * n);
+            let (matrix, right): (Vec<_>, Vec<_>) =
+                (matrix.iter().map(zero).collect(), right.iter().map(zero).collect());
+            let _ = writeln!(f.text, "    const double da{number}[] = {{{}}};", matrix.join(", "));
+            let _ = writeln!(f.text, "    const double db{number}[] = {{{}}};", right.join(", "));
+            let _ = writeln!(f.text, "    double ds{number}[{n}];");
+            let _ = writeln!(f.text, "    ha_linear_rate({lu}, da{number}, db{number}, s{number}, ds{number});");
+        }
+        self.solved(f, step, number);
+    }
+
+    fn newton(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), (block, number): (u32, usize)) {
+        let n = step.outs.len();
+        let list = |values: Vec<String>| if values.is_empty() { "0.0".to_string() } else { values.join(", ") };
+        let _ = writeln!(f.text, "    const double o{number}[] = {{{}}};", list(a.to_vec()));
+        let _ = writeln!(f.text, "    double s{number}[{n}];");
+        let which = format!("BLOCK_{block}_");
+        if step.outs.iter().any(|&out| f.moves[out as usize]) {
+            let rates = d.iter().map(|d| d.clone().unwrap_or_else(|| "0.0".into())).collect();
+            let _ = writeln!(f.text, "    const double e{number}[] = {{{}}};", list(rates));
+            let _ = writeln!(f.text, "    double ds{number}[{n}];");
+            let _ = writeln!(
+                f.text,
+                "    status = ha_root_along(m, {which}, o{number}, e{number}, s{number}, ds{number});"
+            );
+        } else {
+            let _ = writeln!(f.text, "    status = ha_find_root(m, {which}, o{number}, s{number});");
+        }
+        let _ = writeln!(
+            f.text,
+            "    if (status != MODEL_OK) {{\n        return ha_fail(m, status, {block}, {});\n    }}",
+            f.shape.time
+        );
+        self.solved(f, step, number);
+    }
+
+    fn solved(&self, f: &mut Body, step: &Step, number: usize) {
+        for (i, &out) in step.outs.iter().enumerate() {
+            if f.read[out as usize] {
+                let rate = f.moves[out as usize].then(|| format!("ds{number}[{i}]"));
+                self.put(f, out, &format!("s{number}[{i}]"), rate.as_deref());
+            }
+        }
+    }
+
+    fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
+        let _ = writeln!(f.text, "    const double v{out} = {value};");
+        if f.place[out as usize] != usize::MAX {
+            let _ = writeln!(f.text, "    m->w[{}] = v{out};", f.place[out as usize]);
+        }
+        if let Some(rate) = rate {
+            self.put_rate(f, out, rate);
+        }
+    }
+
+    fn put_rate(&self, f: &mut Body, out: u32, rate: &str) {
+        let _ = writeln!(f.text, "    const double d{out} = {rate};");
+        if f.rate_place[out as usize] != usize::MAX {
+            let _ = writeln!(f.text, "    m->w[{}] = d{out};", f.rate_place[out as usize]);
+        }
+    }
+}
+
+/// A function while it is written.
+struct Body {
+    shape: Shape,
+    moves: Vec<bool>,
+    read: Vec<bool>,
+    /// The chunk that computes each local.
+    home: Vec<usize>,
+    /// Where a local is kept that crosses from one chunk to another, and where its derivative is.
+    place: Vec<usize>,
+    rate_place: Vec<usize>,
+    chunk: usize,
+    text: String,
+}
+
+/// The lines of straight code without values that no later line reads.
+fn without_the_unused(text: &str) -> String {
+    let mut seen: FxHashSet<&str> = FxHashSet::default();
+    let mut kept = Vec::new();
+    for line in text.lines().rev() {
+        let declared = line.trim_start().strip_prefix("const double ").and_then(|rest| rest.split([' ', '[']).next());
+        if declared.is_some_and(|name| !seen.contains(name)) {
+            continue;
+        }
+        seen.extend(line.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
+        kept.push(line);
+    }
+    kept.reverse();
+    kept.iter().flat_map(|line| [line, "\n"]).collect()
+}
+
+/// A whole power by repeated squaring, in the order of `math::powi`; gives the expression of the result.
+fn power(text: &mut String, name: &str, a: &str, n: u32) -> String {
+    if n == 0 {
+        return "1.0".into();
+    }
+    let (mut result, mut square, mut left, mut at) = (None::<String>, a.to_string(), n, 0);
+    loop {
+        if left & 1 == 1 {
+            result = Some(match result {
+                None => square.clone(),
+                Some(before) if left == 1 => return format!("{before} * {square}"),
+                Some(before) => {
+                    let _ = writeln!(text, "    const double {name}_r{at} = {before} * {square};");
+                    format!("{name}_r{at}")
+                }
+            });
+        }
+        left >>= 1;
+        if left == 0 {
+            return result.unwrap_or_else(|| "1.0".into());
+        }
+        at += 1;
+        let _ = writeln!(text, "    const double {name}_s{at} = {square} * {square};");
+        square = format!("{name}_s{at}");
+    }
+}
+
+fn call(f: Function, a: &str) -> String {
+    match f {
+        Function::Sqrt => format!("sqrt({a})"),
+        Function::Abs => format!("fabs({a})"),
+        Function::Floor => format!("floor({a})"),
+        f => format!("ha_{}({a})", f.name()),
+    }
+}
+
+/// The derivative of a plain step.
+fn rate_of(act: Act, a: &[String], d: &[Option<String>], value: &str) -> Option<String> {
+    let along = |slope: &str, rate: &Option<String>| rate.as_ref().map(|r| format!("ha_along({slope}, {r})"));
+    let zero = |rate: &Option<String>| rate.clone().unwrap_or_else(|| "0.0".into());
+    let sum = |one: Option<String>, other: Option<String>| match (one, other) {
+        (Some(one), Some(other)) => Some(format!("{one} + {other}")),
+        (one, other) => one.or(other),
+    };
+    match act {
+        Act::Neg => d[0].as_ref().map(|d| format!("-{d}")),
+        Act::Add => sum(d[0].clone(), d[1].clone()),
+        Act::Sub => match (&d[0], &d[1]) {
+            (Some(one), Some(other)) => Some(format!("{one} - {other}")),
+            (Some(one), None) => Some(one.clone()),
+            (None, other) => other.as_ref().map(|other| format!("-{other}")),
+        },
+        Act::Mul => sum(along(&a[1], &d[0]), along(&a[0], &d[1])),
+        Act::Div => Some(match (&d[0], along(value, &d[1])) {
+            (Some(one), Some(other)) => format!("({one} - {other}) / {}", a[1]),
+            (Some(one), None) => format!("{one} / {}", a[1]),
+            (None, other) => format!("(0.0 - {}) / {}", other?, a[1]),
+        }),
+        Act::Pow => Some(format!("ha_pow_along({value}, {}, {}, {}, {})", a[0], zero(&d[0]), a[1], zero(&d[1]))),
+        Act::Call(f) => along(&slope(f, &a[0], value)?, &d[0]),
+        Act::Call2(f) => {
+            let (x, y, dx, dy) = (&a[0], &a[1], zero(&d[0]), zero(&d[1]));
+            Some(match f {
+                Function::Atan2 => format!("({y} * {dx} - {x} * {dy}) / ({x} * {x} + {y} * {y})"),
+                Function::Min => format!("{x} < {y} ? {dx} : {dy}"),
+                Function::Max => format!("{x} > {y} ? {dx} : {dy}"),
+                _ => format!("{dx} - {dy} * floor({x} / {y})"),
+            })
+        }
+        Act::Select => Some(format!("{} != 0.0 ? {} : {}", a[0], zero(&d[1]), zero(&d[2]))),
+        _ => None,
+    }
+}
+
+fn slope(f: Function, a: &str, value: &str) -> Option<String> {
+    use Function::*;
+    Some(match f {
+        Sin => format!("ha_cos({a})"),
+        Cos => format!("-ha_sin({a})"),
+        Tan => format!("1.0 + {value} * {value}"),
+        Asin => format!("1.0 / sqrt(1.0 - {a} * {a})"),
+        Acos => format!("-1.0 / sqrt(1.0 - {a} * {a})"),
+        Atan => format!("1.0 / (1.0 + {a} * {a})"),
+        Exp => value.to_string(),
+        Log => format!("1.0 / {a}"),
+        Log10 => format!("1.0 / ({a} * {})", number(std::f64::consts::LN_10)),
+        Sqrt => format!("0.5 / {value}"),
+        Abs => format!("ha_sign({a})"),
+        Sinh => format!("ha_cosh({a})"),
+        Cosh => format!("ha_sinh({a})"),
+        Tanh => format!("1.0 - {value} * {value}"),
+        Sign | Floor | Atan2 | Min | Max | Mod => return None,
+    })
+}

@@ -1,0 +1,108 @@
+//! Programs as files for elsewhere, in memory: [`c`] writes C99, [`latex`] a document of the equations.
+//!
+//! What is written computes what the interpreter computes, to the last bit: the same operations in the same order.
+#![forbid(unsafe_code)]
+
+pub mod c;
+pub mod latex;
+mod names;
+
+use std::fmt;
+
+/// A file in memory.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct File {
+    /// Its path, with `/` between folders.
+    pub path: String,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+}
+
+impl File {
+    /// A file of text.
+    pub fn text(path: impl Into<String>, text: impl Into<String>) -> File {
+        File { path: path.into(), bytes: text.into().into_bytes() }
+    }
+}
+
+/// Fixed-step methods; see `halfarrow_sim::fixed_step`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Explicit Euler.
+    Euler,
+    /// Heun, the explicit trapezoidal rule.
+    Heun,
+    /// The classical Runge-Kutta method.
+    Rk4,
+    /// The implicit midpoint rule, at most 20 Newton iterations a step.
+    ImplicitMidpoint,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Method; 4] = [Method::Euler, Method::Heun, Method::Rk4, Method::ImplicitMidpoint];
+
+    /// Its name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Euler => "euler",
+            Method::Heun => "heun",
+            Method::Rk4 => "rk4",
+            Method::ImplicitMidpoint => "implicit_midpoint",
+        }
+    }
+
+    /// Evaluations of the rates in a step; of the midpoint rule in an iteration.
+    pub fn stages(self) -> usize {
+        match self {
+            Method::Euler | Method::ImplicitMidpoint => 1,
+            Method::Heun => 2,
+            Method::Rk4 => 4,
+        }
+    }
+}
+
+/// The model at the start of a run at time 0 with all parameters and inputs at their defaults.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Start {
+    /// Its states.
+    pub states: Vec<f64>,
+    /// Its conserved constants.
+    pub conserved: Vec<f64>,
+    /// Typical magnitudes of its states, 0 where unknown.
+    pub scales: Vec<f64>,
+    /// Delays and periods of its held signals, in s.
+    pub times: Vec<f64>,
+    /// Values of its parameters.
+    pub parameters: Vec<f64>,
+    /// Values of its inputs.
+    pub inputs: Vec<f64>,
+    /// What is recorded, at the start; NaN where it has no value.
+    pub observed: Vec<f64>,
+}
+
+/// Why a program cannot be written.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EmitError {
+    /// Its equations are no explicit rates.
+    Implicit,
+    /// The step is not a finite number above zero.
+    Step(f64),
+    /// A delay would keep too many points with this step: its name, and how many.
+    Delay(String, f64),
+}
+
+impl fmt::Display for EmitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            EmitError::Implicit => f.write_str("only explicit equations are exported: use the form minimal or kane"),
+            EmitError::Step(step) => write!(f, "the step is {step}: it has to be a finite number above zero"),
+            EmitError::Delay(name, points) => write!(
+                f,
+                "{name} would keep {points:.0} points with this step: there is no heap to put them on; choose a longer step"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for EmitError {}

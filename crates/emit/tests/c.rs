@@ -1,0 +1,149 @@
+//! Every model in C: the trajectory of the interpreter, to the last bit.
+//!
+//! All of them are compiled in one go, with every warning an error, and run as one program.
+
+mod common;
+
+use common::{Exported, Rows, build, build_with, export, models, own};
+use halfarrow_emit::Method;
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+
+const STEPS: usize = 150;
+
+#[test]
+fn c_does_what_the_interpreter_does() {
+    let mut all = Vec::new();
+    for (i, path) in models().iter().enumerate() {
+        let own = path.parent().is_some_and(|folder| folder.ends_with("tests/models"));
+        let methods = if own { vec![Method::Heun, Method::ImplicitMidpoint] } else { vec![Method::ALL[i % 4]] };
+        for method in methods {
+            all.push(export(path, method, 1e-3));
+        }
+    }
+    assert!(all.len() >= 50, "{} models", all.len());
+    check("c", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.simulate(STEPS));
+}
+
+/// Parameters set before the start, the start values that follow them, a copy of the model in the middle of the run, and an
+/// input that jumps.
+#[test]
+fn c_follows_parameters_and_inputs() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let model = |name: &str| root.join(name).join("model.bond");
+    let cases = [
+        (model("quarter_car"), "ks", 21e3),
+        (model("slider_crank"), "l", 0.61),
+        (model("series_springs"), "k1", 130.0),
+        (model("rc_bridge_cubic"), "r1", 900.0),
+        (own("delay"), "dead", 0.0331),
+        (own("sampled"), "period", 5e-3),
+        (own("bridge"), "c", 2e-6),
+    ];
+    let all: Vec<Exported> = cases.iter().map(|(path, ..)| export(path, Method::Heun, 1e-3)).collect();
+    let of = |one: &Exported| {
+        let at = all.iter().position(|e| e.written.name == one.written.name).expect("one of them");
+        let (_, name, value) = &cases[at];
+        (*name, *value)
+    };
+    let index = |one: &Exported| {
+        let (name, value) = of(one);
+        let place = one.model.program().parameters.iter().position(|p| p.name == name);
+        (place.unwrap_or_else(|| panic!("{} has no {name}", one.written.name)) as i32, value)
+    };
+    check("parameters", &all, &driver(&all, &index), |one| {
+        let (name, value) = of(one);
+        let mut model = one.model.clone();
+        model.set_parameter(name, value).expect("it can be set");
+        if let Some(input) = model.program().inputs.first().map(|i| i.name.clone()) {
+            let default = model.constant(model.program().inputs[0].default).expect("a default");
+            model.connect(&input, &[0.0, 0.05, 0.05, 1.0], &[default, default, 1.5, 1.5]).expect("an input");
+        }
+        let start = model.initialise(0.0).expect("a start");
+        one.simulate_from(model, start, STEPS)
+    });
+}
+
+/// No undefined behaviour, nothing read that was not written; clang sees no warning and gives the same bits.
+#[test]
+fn c_is_clean() {
+    let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh", "clock", "sampled", "names"]
+        .iter()
+        .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
+        .collect();
+    let driver = driver(&all, &|_| (-1, 0.0));
+    let checked =
+        build_with("undefined", &all, &driver, &["-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=all"]);
+    let wanted = checked.run(&[]);
+    let required = std::env::var_os("HALFARROW_C_TOOLS").is_some();
+    let there = |tool: &str| Command::new(tool).arg("--version").output().is_ok_and(|out| out.status.success());
+    if required || there("clang") {
+        let with_clang = common::build_by("clang", "clang", &all, &driver, &["-O2"]);
+        assert!(with_clang.run(&[]) == wanted, "clang gives other bits");
+    }
+    if required || there("valgrind") {
+        let plain = build_with("plain", &all, &driver, &["-O2", "-g"]);
+        assert!(plain.run(&[]) == wanted, "-O2 gives other bits");
+        let out = Command::new("valgrind")
+            .args(["--error-exitcode=9", "--leak-check=full", "--quiet"])
+            .arg(plain.path())
+            .output()
+            .expect("valgrind runs");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(String::from_utf8_lossy(&out.stdout) == wanted, "valgrind gives other bits");
+    }
+}
+
+/// Builds and runs models and compares each with what is wanted of it.
+fn check(name: &str, all: &[Exported], driver: &str, wanted: impl Fn(&Exported) -> (Rows, Option<String>)) {
+    let output = build(name, all, driver).run(&[]);
+    let mut faults = Vec::new();
+    let mut texts = output.split("== ").skip(1);
+    for one in all {
+        let text = texts.next().expect("each model says something");
+        if let Err(fault) = compare(one, text, &wanted(one)) {
+            faults.push(format!("{}: {fault}", one.written.name));
+        }
+    }
+    assert!(faults.is_empty(), "{} of {}\n{}", faults.len(), all.len(), faults.join("\n"));
+}
+
+/// A program that runs all models and prints the bits of their outputs; with the number of a parameter for each, and its
+/// value, if it is not below 0.
+fn driver(all: &[Exported], set: &dyn Fn(&Exported) -> (i32, f64)) -> String {
+    let mut text = String::from(common::DRIVER);
+    for one in all {
+        let name = &one.written.name;
+        let _ = write!(text, "RUN({name}, {})\n", name.to_uppercase());
+    }
+    text += "int main(void)\n{\n";
+    for one in all {
+        let _ = write!(text, "    run_{}({STEPS}, {}, {:?});\n", one.written.name, set(one).0, set(one).1);
+    }
+    text + "    return 0;\n}\n"
+}
+
+fn compare(one: &Exported, text: &str, (wanted, failure): &(Rows, Option<String>)) -> Result<(), String> {
+    let rows: Vec<Vec<u64>> = text
+        .lines()
+        .skip(1)
+        .filter(|line| !line.starts_with('!'))
+        .map(|line| line.split_whitespace().map(|w| u64::from_str_radix(w, 16).expect("bits")).collect())
+        .collect();
+    let said = text.lines().find_map(|line| line.strip_prefix("! "));
+    for (i, (found, wanted)) in rows.iter().zip(wanted).enumerate() {
+        for (k, (&found, &wanted)) in found.iter().zip(wanted).enumerate() {
+            if found != wanted.to_bits() {
+                let what = if k == 0 { "t" } else { one.outputs[k - 1].as_str() };
+                let found = f64::from_bits(found);
+                return Err(format!("{what} is {found:?} at step {i}, but {wanted:?}: {:e}", found - wanted));
+            }
+        }
+    }
+    match (said, failure) {
+        (None, None) if rows.len() == wanted.len() => Ok(()),
+        (Some(_), Some(_)) if rows.len() == wanted.len() => Ok(()),
+        (said, failure) => Err(format!("{} rows, but {}: {said:?}, but {failure:?}", rows.len(), wanted.len())),
+    }
+}

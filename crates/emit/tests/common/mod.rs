@@ -1,0 +1,191 @@
+//! Models in C, built and run beside the interpreter.
+#![allow(dead_code)]
+
+use halfarrow_compiler::bond_graph::{FileError, Files};
+use halfarrow_compiler::compile::{Text, compile};
+use halfarrow_compiler::equations::Form;
+use halfarrow_emit::c::{Export, Written, write};
+use halfarrow_emit::{Method, Start};
+use halfarrow_exec::Model;
+use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::{Options, Sink, System, simulate};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+pub const DRIVER: &str = include_str!("driver.c");
+pub const FLAGS: [&str; 7] =
+    ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"];
+
+struct Disk;
+
+impl Files for Disk {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        fs::read_to_string(path).map_err(|why| FileError::Unreadable(why.to_string()))
+    }
+}
+
+/// A model, written and ready to be run.
+pub struct Exported {
+    pub model: Model,
+    pub start: Vec<f64>,
+    pub written: Written,
+    pub method: Method,
+    pub step: f64,
+    pub outputs: Vec<String>,
+}
+
+/// Time and outputs at each step.
+pub type Rows = Vec<Vec<f64>>;
+
+/// All models of the repository, and those of these tests.
+pub fn models() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = fs::read_dir(root.join("../../models")).expect("models/");
+    let mut all: Vec<PathBuf> = folders.map(|e| e.unwrap().path().join("model.bond")).filter(|p| p.is_file()).collect();
+    let own = fs::read_dir(root.join("tests/models")).expect("models of the tests");
+    all.extend(own.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "bond")));
+    all.sort();
+    all
+}
+
+/// A model of these tests.
+pub fn own(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(format!("{name}.bond"))
+}
+
+pub fn export(path: &Path, method: Method, step: f64) -> Exported {
+    let text = fs::read_to_string(path).expect("a model");
+    let name = path.to_string_lossy();
+    let reached = compile(Text { name: &name, text: &text, files: &Disk, overrides: &[] }, Form::Minimal);
+    let mut program = reached.unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+    program.name = format!("{}_{}", program.name, method.name());
+    export_program(program, method, step, false)
+}
+
+pub fn export_program(
+    program: halfarrow_compiler::program::Program,
+    method: Method,
+    step: f64,
+    derivatives: bool,
+) -> Exported {
+    let mut model = Model::new(program.clone()).expect("parameters have values");
+    let mut x = model.initialise(0.0).expect("a start");
+    let start = Start {
+        states: x.clone(),
+        conserved: model.conserved().to_vec(),
+        scales: model.scales().to_vec(),
+        times: program.held.iter().map(|h| model.constant(h.time).unwrap_or(f64::NAN)).collect(),
+        parameters: program.parameters.iter().map(|p| model.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
+        inputs: program.inputs.iter().map(|i| model.constant(i.default).unwrap_or(0.0)).collect(),
+        observed: vec![f64::NAN; model.observed()],
+    };
+    let recorded = model.recorded().to_vec();
+    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives };
+    let written = write(&export).expect("an explicit program");
+    let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
+    x.truncate(program.states.len());
+    Exported { model, start: x, written, method, step, outputs }
+}
+
+struct Collect(Rows);
+
+impl Sink for Collect {
+    fn sample(&mut self, t: f64, values: &[f64]) {
+        self.0.push(std::iter::once(t).chain(values.iter().copied()).collect());
+    }
+}
+
+impl Exported {
+    /// The same run by the interpreter: the samples, and why it stopped early.
+    pub fn simulate(&self, steps: usize) -> (Rows, Option<String>) {
+        self.simulate_from(self.model.clone(), self.start.clone(), steps)
+    }
+
+    /// The same with another model, from other start values.
+    pub fn simulate_from(&self, mut model: Model, mut x: Vec<f64>, steps: usize) -> (Rows, Option<String>) {
+        let method = match self.method {
+            Method::Euler => FixedMethod::Euler,
+            Method::Heun => FixedMethod::Heun,
+            Method::Rk4 => FixedMethod::Rk4,
+            Method::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
+        };
+        let per_second = (1.0 / self.step).round();
+        let to = if 1.0 / per_second == self.step { steps as f64 / per_second } else { steps as f64 * self.step };
+        let (method, step) = (halfarrow_sim::Method::Fixed(method), Some(self.step));
+        let options = Options { to, every: step, step, method, ..Options::default() };
+        let mut sink = Collect(Vec::new());
+        let outcome = simulate(&mut model, &options, &mut x, &mut sink);
+        (sink.0, outcome.err().map(|stopped| stopped.to_string()))
+    }
+}
+
+/// A program that was built.
+pub struct Built(PathBuf);
+
+impl Built {
+    /// What it prints.
+    pub fn run(&self, arguments: &[&str]) -> String {
+        let out = Command::new(&self.0).args(arguments).output().expect("it runs");
+        assert!(out.status.success(), "{:?}\n{}", out.status, String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).expect("text")
+    }
+
+    /// The path of the program.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+/// A folder of this name for the files of a test, empty.
+pub fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("emit").join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// Writes models and a driver, compiles them on two threads, links them.
+pub fn build(name: &str, all: &[Exported], driver: &str) -> Built {
+    build_with(name, all, driver, &["-O0"])
+}
+
+pub fn build_with(name: &str, all: &[Exported], driver: &str, more: &[&str]) -> Built {
+    build_by(&compiler(), name, all, driver, more)
+}
+
+fn compiler() -> String {
+    std::env::var("CC").unwrap_or_else(|_| "cc".to_string())
+}
+
+/// The same with a compiler of this name.
+pub fn build_by(compiler: &str, name: &str, all: &[Exported], driver: &str, more: &[&str]) -> Built {
+    let folder = folder(name);
+    let includes: String = all.iter().map(|e| format!("#include \"{}.h\"\n", e.written.name)).collect();
+    fs::write(folder.join("driver.c"), includes + driver).expect("a file");
+    let mut sources = vec!["driver.c".to_string()];
+    for one in all {
+        let w = &one.written;
+        fs::write(folder.join(format!("{}.h", w.name)), &w.header).expect("a file");
+        fs::write(folder.join(format!("{}.c", w.name)), &w.source).expect("a file");
+        sources.push(format!("{}.c", w.name));
+    }
+    let half = sources.len().div_ceil(2);
+    std::thread::scope(|scope| {
+        for part in sources.chunks(half) {
+            let folder = &folder;
+            scope.spawn(move || cc(compiler, folder, |c| c.args(FLAGS).args(more).arg("-c").args(part)));
+        }
+    });
+    let objects: Vec<String> = sources.iter().map(|s| s.replace(".c", ".o")).collect();
+    cc(compiler, &folder, |c| c.args(more).args(&objects).args(["-o", "program", "-lm"]));
+    Built(folder.join("program"))
+}
+
+/// Runs the C compiler.
+fn cc(compiler: &str, folder: &Path, arguments: impl FnOnce(&mut Command) -> &mut Command) {
+    let mut command = Command::new(compiler);
+    let out = arguments(command.current_dir(folder)).output().expect("a C compiler: cc, or what CC names");
+    let errors: String = String::from_utf8_lossy(&out.stderr).lines().take(40).map(|l| format!("{l}\n")).collect();
+    assert!(out.status.success(), "{errors}");
+}

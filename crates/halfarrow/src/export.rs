@@ -1,0 +1,257 @@
+//! The model as code for elsewhere.
+
+use halfarrow_compiler::equations::{Form, show};
+use halfarrow_compiler::program::Program;
+use halfarrow_emit::{self as emit, EmitError, File, latex};
+use halfarrow_exec as exec;
+use halfarrow_sim::System;
+use halfarrow_sim::fixed_step::FixedMethod;
+use serde::Serialize;
+
+use crate::error::{Error, Problem};
+use crate::model::Model;
+use crate::run::Start;
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// C99: header, source, a program that steps it, a CMake file.
+    C,
+    /// The equations as a LaTeX document.
+    Latex,
+}
+
+impl Target {
+    /// Its name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Target::C => "c",
+            Target::Latex => "latex",
+        }
+    }
+}
+
+/// What to write, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Export {
+    /// What is written.
+    pub target: Target,
+    /// The form of the equations; code takes `minimal` and `kane` only.
+    pub form: Form,
+    /// The method of a step.
+    pub method: FixedMethod,
+    /// The length of a step, in s.
+    pub step: f64,
+}
+
+impl Default for Export {
+    /// C with the minimal form, the classical Runge-Kutta method and steps of 1 ms.
+    fn default() -> Export {
+        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3 }
+    }
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    /// The files, in memory.
+    pub files: Vec<File>,
+    /// What there is to know of them.
+    pub report: ExportReport,
+}
+
+/// What there is to know of what was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExportReport {
+    /// Name of the model.
+    pub model: String,
+    /// `c` or `latex`.
+    pub target: &'static str,
+    /// The name before all functions in C; empty without code.
+    pub name: String,
+    /// The method of a step, if there is code.
+    pub method: Option<&'static str>,
+    /// The length of a step, in s, if there is code.
+    pub step: Option<f64>,
+    /// Names of the states.
+    pub states: Vec<String>,
+    /// Names of the inputs.
+    pub inputs: Vec<String>,
+    /// Names of the parameters that can be set.
+    pub parameters: Vec<String>,
+    /// Names of what is computed after each step.
+    pub outputs: Vec<String>,
+    /// What a step costs at most, if there is code.
+    pub cost: Option<CostReport>,
+    /// The same in words.
+    pub cost_text: Vec<String>,
+    /// Paths of the files.
+    pub files: Vec<String>,
+}
+
+/// What a step costs at most: see [`halfarrow_emit::c::Cost`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[allow(missing_docs)]
+pub struct CostReport {
+    pub operations: u64,
+    pub divisions: u64,
+    pub calls: u64,
+    pub linear_solves: u64,
+    pub newton_solves: u64,
+    pub newton_evaluations: u64,
+    pub method_iterations: u64,
+    pub total: u64,
+    pub jump_total: u64,
+    pub most_jumps: u64,
+    pub delay_points: u64,
+    pub memory: u64,
+}
+
+impl Model {
+    /// Writes the model, in memory.
+    ///
+    /// # Errors
+    /// The model has errors or no start, or something is asked that cannot be.
+    pub fn export(&self, export: &Export) -> Result<Exported, Error> {
+        match export.target {
+            Target::C => self.export_c(export),
+            Target::Latex => self.export_latex(export),
+        }
+    }
+
+    fn export_latex(&self, export: &Export) -> Result<Exported, Error> {
+        let equations = self.equations_in(export.form)?;
+        let start = self.unknowns_at_start(&equations);
+        let states: Vec<String> = equations.states.iter().map(|s| s.name.clone()).collect();
+        let shown = show(equations);
+        let start: Vec<f64> = start.into_iter().take(states.len()).collect();
+        let name = format!("{}.tex", self.name());
+        let files = vec![File::text(&name, latex::document(&shown, &start))];
+        let report = ExportReport {
+            model: self.name().to_string(),
+            target: export.target.name(),
+            name: String::new(),
+            method: None,
+            step: None,
+            states,
+            inputs: Vec::new(),
+            parameters: Vec::new(),
+            outputs: Vec::new(),
+            cost: None,
+            cost_text: Vec::new(),
+            files: vec![name],
+        };
+        Ok(Exported { files, report })
+    }
+
+    fn export_c(&self, export: &Export) -> Result<Exported, Error> {
+        let code = Code::new(self, export)?;
+        let written = code.write(false)?;
+        let w = &written;
+        let files = vec![
+            File::text(format!("{}.h", w.name), &*w.header),
+            File::text(format!("{}.c", w.name), &*w.source),
+            File::text("main.c", &*w.main),
+            File::text("CMakeLists.txt", &*w.cmake),
+        ];
+        Ok(Exported { report: code.report(w, &files), files })
+    }
+}
+
+/// A program with its start, ready to be written.
+struct Code<'a> {
+    export: &'a Export,
+    program: Program,
+    start: emit::Start,
+    recorded: Vec<usize>,
+}
+
+impl<'a> Code<'a> {
+    fn new(model: &Model, export: &'a Export) -> Result<Code<'a>, Error> {
+        if !matches!(export.form, Form::Minimal | Form::Kane) {
+            return Err(refused(EmitError::Implicit));
+        }
+        let mut system = model.system(&model.equations_in(export.form)?)?;
+        let states = model.start(&mut system, Start::Given)?;
+        let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
+        let recorded = system.recorded().to_vec();
+        Ok(Code { export, program: system.program().clone(), start, recorded })
+    }
+
+    fn write(&self, derivatives: bool) -> Result<emit::c::Written, Error> {
+        let export = emit::c::Export {
+            program: &self.program,
+            start: &self.start,
+            method: method(self.export.method),
+            step: self.export.step,
+            recorded: &self.recorded,
+            derivatives,
+        };
+        emit::c::write(&export).map_err(refused)
+    }
+
+    fn report(&self, written: &emit::c::Written, files: &[File]) -> ExportReport {
+        let p = &self.program;
+        let c = &written.cost;
+        let cost = CostReport {
+            operations: c.operations,
+            divisions: c.divisions,
+            calls: c.calls,
+            linear_solves: c.linear_solves,
+            newton_solves: c.newton_solves,
+            newton_evaluations: c.newton_evaluations,
+            method_iterations: c.method_iterations,
+            total: c.total,
+            jump_total: c.jump_total,
+            most_jumps: c.most_jumps,
+            delay_points: c.delay_points,
+            memory: c.memory,
+        };
+        ExportReport {
+            model: p.name.clone(),
+            target: self.export.target.name(),
+            name: written.name.clone(),
+            method: Some(method(self.export.method).name()),
+            step: Some(self.export.step),
+            states: p.states.iter().map(|s| s.name.clone()).collect(),
+            inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
+            parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
+            outputs: self.recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
+            cost: Some(cost),
+            cost_text: c.lines(),
+            files: files.iter().map(|f| f.path.clone()).collect(),
+        }
+    }
+}
+
+/// Everything at the start of a run.
+fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarrow_sim::Failure> {
+    let mut begun = system.clone();
+    let mut x = states.clone();
+    let mut observed = vec![0.0; system.observed()];
+    begun.cross_jump(0.0, &mut x)?;
+    begun.observe(0.0, &x, &mut observed)?;
+    let p = system.program();
+    Ok(emit::Start {
+        states,
+        conserved: system.conserved().to_vec(),
+        scales: system.scales().to_vec(),
+        times: p.held.iter().map(|h| system.constant(h.time).unwrap_or(f64::NAN)).collect(),
+        parameters: p.parameters.iter().map(|p| system.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
+        inputs: p.inputs.iter().map(|i| system.constant(i.default).unwrap_or(0.0)).collect(),
+        observed,
+    })
+}
+
+fn method(method: FixedMethod) -> emit::Method {
+    match method {
+        FixedMethod::Euler => emit::Method::Euler,
+        FixedMethod::Heun => emit::Method::Heun,
+        FixedMethod::Rk4 => emit::Method::Rk4,
+        FixedMethod::ImplicitMidpoint => emit::Method::ImplicitMidpoint,
+    }
+}
+
+fn refused(error: EmitError) -> Error {
+    Problem::BadOption { reason: error.to_string() }.into()
+}
