@@ -280,3 +280,29 @@ fn help_has_an_example_for_every_command() {
         assert!(help.contains("Example") && help.contains(&format!("halfarrow {command} ")), "{command}: {help}");
     }
 }
+
+#[test]
+fn a_model_is_exported_as_c() {
+    let here = folder("export");
+    let car = model("quarter_car");
+    let report = json(&halfarrow(&here, &["export", "c", &car, "--out", "car", "--method", "heun", "--json"]));
+    assert_eq!(report["name"], "quarter_car");
+    assert_eq!(
+        report["written"],
+        serde_json::json!(["car/quarter_car.h", "car/quarter_car.c", "car/main.c", "car/CMakeLists.txt"])
+    );
+    assert!(report["cost"]["operations"].as_u64().is_some_and(|n| n > 0));
+    let header = fs::read_to_string(here.join("car/quarter_car.h")).unwrap();
+    assert!(header.contains("QUARTER_CAR_U_road = 0") && header.contains("heun with a step of 0.001 s"), "{header}");
+    let shown = halfarrow(&here, &["export", "c", &car, "--out", "car"]);
+    assert!(stdout(&shown).contains("rk4") && stdout(&shown).contains("operations"), "{}", stdout(&shown));
+    let latex = halfarrow(&here, &["export", "latex", &car, "--out", "car.tex"]);
+    assert_eq!(status(&latex), 0, "{}", stderr(&latex));
+    let text = fs::read_to_string(here.join("car.tex")).unwrap();
+    assert!(text.starts_with("\\documentclass") && text.contains("\\dot{f}_{\\mathrm{wheel}}"), "{text}");
+    for wrong in [&["--step", "0"][..], &["--form", "lagrange"]] {
+        let arguments = [&["export", "c", &car, "--out", "car"], wrong].concat();
+        assert_eq!(status(&halfarrow(&here, &arguments)), 2, "{wrong:?}");
+    }
+    assert_eq!(status(&halfarrow(&here, &["export", "latex", &car, "--out", "car.txt"])), 2);
+}

@@ -239,7 +239,11 @@ impl<'a> Writer<'a> {
         for step in code.steps.iter().rev() {
             let wanted = step.outs.iter().any(|&out| moves[out as usize] && asked[out as usize]);
             let condition = match step.act {
-                Act::Side(c) | Act::Floor(c) | Act::Table(_, Some(c)) | Act::TableSlope(_, Some(c)) | Act::TableCurvature(_, Some(c)) => Some(c),
+                Act::Side(c)
+                | Act::Floor(c)
+                | Act::Table(_, Some(c))
+                | Act::TableSlope(_, Some(c))
+                | Act::TableCurvature(_, Some(c)) => Some(c),
                 _ => None,
             };
             let timed = condition.is_some_and(|c| self.takes_rate(c, moving));
