@@ -258,7 +258,7 @@ pub struct Simulate {
     /// What to record instead of states and outputs: names with commas between them, or `all`
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub record: Vec<String>,
-    /// Where to write the trajectory: a .csv file, or `-` for CSV on stdout; may be repeated
+    /// Where to write the trajectory: a .csv or .parquet file, or `-` for CSV on stdout; may be repeated
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
     /// Where to plot it: a .svg or .png file; may be repeated

@@ -35,7 +35,7 @@ pub use halfarrow_compiler::equations::Form;
 pub use halfarrow_emit::File;
 pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::{Failure, Method};
-pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_whole};
+pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text};
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};

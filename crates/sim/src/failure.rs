@@ -147,7 +147,8 @@ impl fmt::Display for Failure {
             Failure::NoConvergence { time, what, iterations, residual } => write!(
                 f,
                 "{} the iteration for {what} did not converge: after {iterations} iterations a residual of {residual:e} is left; \
-                 the law may have no solution there, or the step may be too long",
+                 a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the \
+                 unknowns any more (then give them a leakage: an R of large resistance beside them)",
                 When(*time)
             ),
             Failure::OutOfDomain { time, what, reason } => {

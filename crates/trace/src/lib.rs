@@ -1,9 +1,11 @@
-//! What a run computed: a [`Trace`] of named columns with units, written as CSV or drawn as a plot, and the signals that go into a run,
+//! What a run computed: a [`Trace`] of named columns with units, written as CSV or Parquet or drawn as a plot, and the signals that go into a run,
 //! read from CSV.
 #![forbid(unsafe_code)]
 
 mod csv;
 mod input;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plot;
 #[cfg(feature = "png")]
 mod png;
@@ -12,6 +14,8 @@ mod whole;
 
 pub use csv::{csv_text, write_csv};
 pub use input::{InputError, parse_inputs, read_inputs};
+#[cfg(feature = "parquet")]
+pub use parquet::{ParquetTable, write_parquet};
 pub use plot::plot;
 #[cfg(feature = "png")]
 pub use png::{PngError, png};

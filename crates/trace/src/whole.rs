@@ -19,13 +19,13 @@ pub struct WriteError {
 ///
 /// # Errors
 /// The folder does not exist, the disk is full, and the like.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> Result<(), WriteError> {
     let ordinary = fs::metadata(path).map_or(true, |metadata| metadata.is_file());
     let written = if ordinary { replace(path, fill) } else { File::create(path).and_then(|file| fill_up(file, fill)) };
     written.map_err(|source| WriteError { path: path.to_owned(), source })
 }
 
-fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn replace(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it has no file name"))?;
     let mut neighbour = std::ffi::OsString::from(".");
     neighbour.push(name);
@@ -39,7 +39,7 @@ fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> 
     written
 }
 
-fn fill_up(file: File, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn fill_up(file: File, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
     let ordinary = file.metadata()?.is_file();
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use halfarrow::{
     Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start, Trace, csv_text,
-    write_csv,
+    write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -83,13 +83,16 @@ fn run(arguments: &Simulate) -> Run {
 /// That everything can be written, before anything is computed.
 fn check_files(arguments: &Simulate) -> Result<(), Problem> {
     for path in &arguments.out {
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        if !is_stdout(path) && extension.as_deref() != Some("csv") {
-            return Err(Problem::UnknownKind { path: path.clone(), known: vec!["csv"] });
+        if !is_stdout(path) && !["csv", "parquet"].contains(&extension(path).as_str()) {
+            return Err(Problem::UnknownKind { path: path.clone(), known: vec!["csv", "parquet"] });
         }
     }
     check_names(&arguments.plot)?;
     check_names(&arguments.draw)
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).unwrap_or_default()
 }
 
 fn is_stdout(path: &Path) -> bool {
@@ -101,7 +104,8 @@ fn finish(arguments: &Simulate, model: &Model, done: &Simulated) -> Result<(), E
         if is_stdout(path) {
             screen::print(&csv_text(&done.trace));
         } else {
-            write_csv(&done.trace, path)
+            let write = if extension(path) == "parquet" { write_parquet } else { write_csv };
+            write(&done.trace, path)
                 .map_err(|why| Problem::Unwritable { path: path.clone(), why: why.source.to_string() })?;
         }
     }

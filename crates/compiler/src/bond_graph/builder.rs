@@ -93,6 +93,8 @@ pub(super) struct Builder<'a, 'f> {
     pub files: &'f dyn Files,
     pub exprs: Exprs,
     pub dims: Dimensions,
+    /// Whether the model writes any unit: without one, nothing is said about units.
+    pub units_written: bool,
     /// Equalities of dimensions that are put off.
     pub later: Option<Vec<(Quantity, Quantity, Span, String)>>,
     pub faults: Vec<Diagnostic>,
@@ -143,6 +145,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             files,
             exprs,
             dims: Dimensions::default(),
+            units_written: false,
             later: None,
             faults: Vec::new(),
             incomplete: wiring.broken,
@@ -246,6 +249,13 @@ impl<'a, 'f> Builder<'a, 'f> {
         let reason = Reason { span, part: None };
         for clash in self.dims.equal(left, right, &reason) {
             self.clash(&clash, what, span);
+        }
+    }
+
+    /// Takes back what was said about units in a model that writes none: `f = e + e^3` is a law of plain numbers there.
+    pub fn forgive_unwritten_units(&mut self) {
+        if !self.units_written {
+            self.faults.retain(|fault| ![codes::U003, codes::U005, codes::U006].contains(&fault.code));
         }
     }
 

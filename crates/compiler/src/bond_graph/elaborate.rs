@@ -94,6 +94,7 @@ fn build(
     let sides = b.constraint_sides();
     let rates = b.rates_of_signals();
     let relations = b.relations(&sides, &rates);
+    b.forgive_unwritten_units();
     let complete = !faulty && !b.incomplete && b.faults.is_empty() && kinds.iter().all(Option::is_some);
     if !complete {
         return (None, b.faults);
@@ -108,6 +109,7 @@ fn build(
     let mut graph = b.finish(graph);
     graph.replace_symbols(&rates);
     graph.replace_symbols(&repeated);
+    b.forgive_unwritten_units();
     (Some(graph), b.faults)
 }
 
@@ -186,7 +188,7 @@ impl Builder<'_, '_> {
         graph.variables = variables.into_iter().collect();
         for named in graph.lets.iter_mut().chain(&mut graph.outputs) {
             if let (None, Some(quantity)) = (&named.unit, self.named_quantities.get(&named.name)) {
-                named.unit = self.dims.value(quantity).map(Unit::si);
+                named.unit = self.dims.value(quantity).filter(|_| self.units_written).map(Unit::si);
             }
         }
         graph.exprs = std::mem::take(&mut self.exprs);
@@ -201,7 +203,7 @@ impl Builder<'_, '_> {
         quantity: &Quantity,
         units: &mut BTreeMap<(Dimension, bool), Unit>,
     ) -> Option<Unit> {
-        let dim = self.dims.value(quantity)?;
+        let dim = self.dims.value(quantity).filter(|_| self.units_written)?;
         let turning = self.is_turning(meaning);
         let make = || match (turning, dim == Dimension::NONE) {
             (true, true) => Unit::parse("rad").unwrap_or_else(|_| Unit::si(dim)),

@@ -21,6 +21,7 @@ pub(super) struct Scale {
 impl Builder<'_, '_> {
     /// Reads a unit; says so if it is none.
     pub fn unit(&mut self, text: &ast::UnitText) -> Option<Scale> {
+        self.units_written = true;
         let unit = match Unit::parse(&text.text) {
             Ok(unit) => unit,
             Err(why) => {

@@ -236,19 +236,41 @@ fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnos
 }
 
 fn circulating(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    let undetermined = |symbol: Symbol| causal.ports.undetermined.contains(&symbol);
     let bonds: Vec<BondId> =
         causal.strokes.iter().filter(|(_, s)| **s == Stroke::Undetermined).map(|(id, _)| id).collect();
     let Some(&first) = bonds.first() else { return };
     let numbers: Vec<String> = bonds.iter().map(|b| (b.index() + 1).to_string()).collect();
+    let efforts = bonds.iter().any(|&b| undetermined(graph.bonds[b].effort));
+    let flows = bonds.iter().any(|&b| undetermined(graph.bonds[b].flow));
+    let (what, note, hint) = match (efforts, flows) {
+        (true, false) => (
+            "the efforts",
+            "nothing sets the level from which they are counted (a circuit without ground), or a ring of bonds passes \
+             one on unchanged; all elements are determined",
+            "to set the level, put a source `Se(0)` at one of the 0-junctions; in a ring, leave out one of the bonds",
+        ),
+        (false, true) => (
+            "the flows",
+            "a flow can circulate in them: they form a ring that passes it on unchanged; all elements outside the ring \
+             are determined",
+            "leave out one of the bonds",
+        ),
+        _ => (
+            "efforts and flows",
+            "the bonds form a ring that passes them on unchanged; all elements outside the ring are determined",
+            "leave out one of the bonds",
+        ),
+    };
     all.push(
         Diagnostic::warning(
             codes::C006,
-            format!("a flow or effort can circulate in bonds {}", numbers.join(", ")),
+            format!("{what} of bonds {} are not determined", numbers.join(", ")),
             graph.bonds[first].span,
-            "it is not determined here",
+            "this is one of them",
         )
-        .note("the bonds form a ring that passes it on unchanged; all elements outside the ring are determined")
-        .hint("leave out one of the bonds"),
+        .note(note)
+        .hint(hint),
     );
 }
 

@@ -40,7 +40,7 @@ codes! {
     C003 "forced strokes or causality cannot hold together";
     C004 "a source or constraint repeats what others impose (warning)";
     C005 "sources alone fix a storage (warning)";
-    C006 "a flow or effort circulates undetermined (warning)";
+    C006 "efforts or flows that nothing determines (warning)";
     C007 "the structure degenerates at the given parameters (warning)";
     C008 "a forced causality that the equations cannot follow (warning)";
     E001 "an equation needs the time derivative of an input";

@@ -101,6 +101,7 @@ fn block(
     let mut residuals = Vec::with_capacity(torn.len());
     for &t in &torn {
         residuals.push(match d.of[&t] {
+            _ if d.written.contains_key(&t) => d.written[&t],
             Definition::Explicit(e) => {
                 let own = d.x.sym(t);
                 d.x.sub(own, e)
@@ -148,10 +149,11 @@ impl Ordered {
     }
 }
 
-/// The variables at which a loop is torn: all implicit ones, then preferred ones, then a minimum set of the others.
+/// The variables at which a loop is torn: all that have no value of their own, be it that their law cannot be inverted
+/// or that its inverse may end where Newton looks; then preferred ones, then a minimum set of the others.
 fn tear(d: &Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Vec<Symbol> {
-    let mut torn: BTreeSet<Symbol> =
-        symbols.iter().copied().filter(|s| matches!(d.of[s], Definition::Implicit(_))).collect();
+    let looked_for = |s: &Symbol| matches!(d.of[s], Definition::Implicit(_)) || d.written.contains_key(s);
+    let mut torn: BTreeSet<Symbol> = symbols.iter().copied().filter(looked_for).collect();
     for preferred in [true, false] {
         let open: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
         for component in components(d, &open) {

@@ -33,6 +33,8 @@ pub struct Definitions<'a> {
     pub graph: &'a BondGraph,
     /// Definitions by symbol.
     pub of: Map<Symbol, Definition>,
+    /// What nonlinear laws make vanish, as written, for variables whose definition is the inverted law.
+    pub written: Map<Symbol, Expr>,
     /// States with the symbols of their rates.
     pub states: Map<Symbol, Symbol>,
     /// Stored quantities with the symbols of their rates, which the bonds carry.
@@ -53,6 +55,7 @@ impl<'a> Definitions<'a> {
             x,
             graph,
             of: Map::new(),
+            written: Map::new(),
             states: Map::new(),
             stored: Map::new(),
             constants: BTreeSet::new(),
@@ -67,10 +70,16 @@ impl<'a> Definitions<'a> {
         self.of.insert(symbol, Definition::Explicit(value));
     }
 
-    /// Defines a symbol as what makes an expression vanish; solved for it where that can be written down.
+    /// Defines a symbol as what makes an expression vanish; solved for it where that can be written down. A nonlinear
+    /// expression is kept as well: Newton works on laws as written, since an inverse may end where the law saturates.
     pub fn set_root(&mut self, symbol: Symbol, residual: Expr) {
         let definition = match self.solve_for(residual, symbol) {
-            Some(value) => Definition::Explicit(value),
+            Some(value) => {
+                if self.x.linear_in(residual, &[symbol]).is_none() {
+                    self.written.insert(symbol, residual);
+                }
+                Definition::Explicit(value)
+            }
             None => Definition::Implicit(residual),
         };
         self.of.insert(symbol, definition);

@@ -1,6 +1,7 @@
 //! The differentiation index of a form and of each of its unknowns, and the counts of its equations.
 //!
-//! From the linearisation at the given parameters and an arbitrary state: of the equations `E y' + A y = 0` and those
+//! From the linearisation at the given parameters and an arbitrary state, or if that has a higher index than the form
+//! promises, at the first of some others that has not: of the equations `E y' + A y = 0` and those
 //! differentiated `k` times, an unknown has an index of at most `k` if they determine its rate. For semi-explicit systems
 //! in Hessenberg form, which these are, that is the differentiation index.
 
@@ -18,6 +19,9 @@ const EXAMINED: usize = 150;
 const HIGHEST: u8 = 4;
 /// Entries below this, in rows scaled to 1, count as zero.
 const TINY: f64 = 1e-9;
+
+/// Sizes of the arbitrary states: an exponential law can be steep or flat beyond the digits at any one of them.
+const SIZES: [f64; 4] = [1.0, 1e-1, 1e-2, 1e-4];
 
 /// What the linearisation tells.
 pub struct Indices {
@@ -48,9 +52,23 @@ pub fn indices(
     if n > EXAMINED {
         return promised(promised_indices(states, algebraic));
     }
-    let Some(rows) = Linearised::of(d, states, algebraic, steps).rows(states, residuals) else {
-        return promised(promised_indices(states, algebraic));
-    };
+    let promise = promised(promised_indices(states, algebraic));
+    let mut first = None;
+    for size in SIZES {
+        let rows = Linearised::of(d, size, states, algebraic, steps).rows(states, residuals);
+        let Some(found) = rows.map(|rows| indices_at(&rows, states, algebraic)) else { continue };
+        if found.index <= promise.index {
+            return found;
+        }
+        first = first.or(Some(found));
+    }
+    first.unwrap_or(promise)
+}
+
+/// What one linearisation tells.
+fn indices_at(rows: &[Linear], states: &[State], algebraic: &[Algebraic]) -> Indices {
+    let n = states.len() + algebraic.len();
+    let storages = states.iter().filter(|s| s.kind != StateKind::Signal).count();
     let storage = |i: usize| states.get(i).is_some_and(|s| s.kind != StateKind::Signal);
     let ours = |row: &Linear| row.rates.iter().filter(|(i, _)| storage(**i)).map(|(&i, &e)| (i, e)).collect::<Row>();
     let differential = rank(rows.iter().map(ours).collect());
@@ -58,7 +76,7 @@ pub fn indices(
     let mut indices = vec![HIGHEST; n];
     let mut index = HIGHEST;
     for k in 0..HIGHEST {
-        let determined = determined(&rows, n, k as usize);
+        let determined = determined(rows, n, k as usize);
         for (i, known) in determined.iter().enumerate() {
             if *known {
                 indices[i] = indices[i].min(k.max(1));
@@ -100,12 +118,20 @@ struct Linearised<'d, 'a> {
     d: &'d mut Definitions<'a>,
     values: BTreeMap<Symbol, f64>,
     gradients: BTreeMap<Symbol, Linear>,
+    /// Size of the arbitrary state.
+    size: f64,
     good: bool,
 }
 
 impl<'d, 'a> Linearised<'d, 'a> {
-    fn of(d: &'d mut Definitions<'a>, states: &[State], algebraic: &[Algebraic], steps: &[Step]) -> Self {
-        let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), good: true };
+    fn of(
+        d: &'d mut Definitions<'a>,
+        size: f64,
+        states: &[State],
+        algebraic: &[Algebraic],
+        steps: &[Step],
+    ) -> Self {
+        let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), size, good: true };
         let unknowns = states.iter().map(|s| s.symbol).chain(algebraic.iter().map(|a| a.symbol));
         for (i, symbol) in unknowns.enumerate() {
             all.gradients.insert(symbol, Linear { values: Row::from([(i, 1.0)]), rates: Row::new() });
@@ -121,7 +147,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
         let x = &self.d.x;
         x.eval(e, &mut |symbol| match self.values.get(&symbol) {
             Some(&value) => value,
-            None => x.facts(symbol).given.and_then(|g| x.given_value(g)).unwrap_or_else(|| arbitrary(symbol)),
+            None => x.facts(symbol).given.and_then(|g| x.given_value(g)).unwrap_or_else(|| self.size * arbitrary(symbol)),
         })
     }
 

@@ -14,6 +14,8 @@ use halfarrow_compiler::program::Solve;
 
 /// Iterations of one attempt.
 const ITERATIONS: usize = 100;
+/// The same at the start and after jumps: from far up an exponential law every step takes off one constant of it only.
+const ITERATIONS_AT_START: usize = 2_000;
 /// Shortest fraction of a step that is tried.
 const SHORTEST: f64 = 1e-12;
 /// A relative step below this that no longer improves the residual is rounding.
@@ -449,7 +451,11 @@ impl Frame {
         if !self.evaluate(solve, false) {
             return Err(Miss { iterations: 0, residual: f64::NAN });
         }
-        let most = if trust == Trust::Kink { SHORT_ITERATIONS } else { ITERATIONS };
+        let most = match trust {
+            Trust::Kink => SHORT_ITERATIONS,
+            _ if self.newton_of(solve).following => ITERATIONS,
+            _ => ITERATIONS_AT_START,
+        };
         for iteration in 0..most {
             if self.residual(solve) == 0.0 {
                 return Ok(());

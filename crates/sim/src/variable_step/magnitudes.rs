@@ -6,6 +6,9 @@ use crate::{Failure, System};
 /// Times the system is looked at: at the start, then where the states known so far will have moved.
 const LOOKS: usize = 4;
 
+/// Part of the shortest time of the system from one look to the next: sources may start from 0 themselves.
+const PART: f64 = 0.1;
+
 /// Part of what moves a state below which its magnitude is what rounding left of it: a machine at rest in equilibrium.
 const NOISE: f64 = 1e-12;
 
@@ -34,8 +37,9 @@ pub(super) fn guess_magnitudes(
 ) -> Result<(), Failure> {
     let mut jacobian = Jacobian::new(system.sparsity());
     let (mut looked_at, mut rates) = (x.to_vec(), vec![0.0; x.len()]);
+    let mut later = t;
     for look in 0..LOOKS {
-        let entries = match entries(system, &mut jacobian, t, &looked_at, &mut rates) {
+        let entries = match entries(system, &mut jacobian, later, &looked_at, &mut rates) {
             Ok(entries) => entries,
             Err(failure) if look == 0 => return Err(failure),
             Err(_) => return Ok(()), // the system need not exist there
@@ -49,9 +53,10 @@ pub(super) fn guess_magnitudes(
         couplings.spread(magnitudes);
         let now_known = magnitudes.iter().filter(|&&magnitude| magnitude > 0.0).count();
         // What acts by its square is seen only where it has moved: the first look alone proves nothing.
-        if now_known == x.len() || (look > 0 && now_known == known) {
+        if now_known == x.len() || (look > 0 && now_known == known && now_known > 0) {
             return Ok(());
         }
+        later += PART * couplings.shortest;
         for (i, looked_at) in looked_at.iter_mut().enumerate() {
             let moved = couplings.shortest * rates[i];
             *looked_at = x[i] + if moved == 0.0 { magnitudes[i] } else { moved };
