@@ -19,7 +19,10 @@ pub struct WriteError {
 ///
 /// # Errors
 /// The folder does not exist, the disk is full, and the like.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> Result<(), WriteError> {
+pub fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+) -> Result<(), WriteError> {
     let ordinary = fs::metadata(path).map_or(true, |metadata| metadata.is_file());
     let written = if ordinary { replace(path, fill) } else { File::create(path).and_then(|file| fill_up(file, fill)) };
     written.map_err(|source| WriteError { path: path.to_owned(), source })

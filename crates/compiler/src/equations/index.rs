@@ -124,13 +124,7 @@ struct Linearised<'d, 'a> {
 }
 
 impl<'d, 'a> Linearised<'d, 'a> {
-    fn of(
-        d: &'d mut Definitions<'a>,
-        size: f64,
-        states: &[State],
-        algebraic: &[Algebraic],
-        steps: &[Step],
-    ) -> Self {
+    fn of(d: &'d mut Definitions<'a>, size: f64, states: &[State], algebraic: &[Algebraic], steps: &[Step]) -> Self {
         let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), size, good: true };
         let unknowns = states.iter().map(|s| s.symbol).chain(algebraic.iter().map(|a| a.symbol));
         for (i, symbol) in unknowns.enumerate() {
@@ -147,7 +141,9 @@ impl<'d, 'a> Linearised<'d, 'a> {
         let x = &self.d.x;
         x.eval(e, &mut |symbol| match self.values.get(&symbol) {
             Some(&value) => value,
-            None => x.facts(symbol).given.and_then(|g| x.given_value(g)).unwrap_or_else(|| self.size * arbitrary(symbol)),
+            None => {
+                x.facts(symbol).given.and_then(|g| x.given_value(g)).unwrap_or_else(|| self.size * arbitrary(symbol))
+            }
         })
     }
 
