@@ -1,13 +1,19 @@
 //! Runs a [`Program`](halfarrow_compiler::program::Program): [`Model`] is the [`System`](halfarrow_sim::System) that it
 //! becomes, with parameters that can be set, inputs that can be connected, and start values that fit.
 //!
-//! The bytecode is the meaning of a program. Elementary functions come from [`math`] alone.
+//! The bytecode is the meaning of a program; [`Model::compile_machine`] turns it into machine code with the same bits. Elementary functions come from [`math`] alone.
 #![deny(unsafe_code)]
 
 mod bytecode;
+#[cfg(feature = "machine")]
+mod machine;
+#[cfg(not(feature = "machine"))]
+#[path = "machine/absent.rs"]
+mod machine;
 mod model;
 
 pub use halfarrow_compiler::algebra::math;
+pub use machine::MachineError;
 pub use model::{
     Equilibrium, EquilibriumError, ImplicitModel, InputError, Model, ParameterError, RecordError, StartConflict,
     StartError, StartValue,

@@ -51,7 +51,15 @@ fn a_step_takes_no_memory() {
     let limit = s.x.call(Function::Min, &[size, one]);
     let rate = s.x.mul(&[ee, limit]);
     s.rate("x", rate);
-    let mut model = s.model();
+    let model = s.model();
+    takes_no_memory(model.clone());
+    let mut machine = model;
+    if machine.compile_machine().and_then(|()| machine.compile_tangent()).is_ok() {
+        takes_no_memory(machine);
+    }
+}
+
+fn takes_no_memory(mut model: halfarrow_exec::Model) {
     let mut x = model.initialise(0.0).unwrap();
     model.cross_jump(0.0, &mut x).unwrap();
     let (mut dx, mut out, mut g) = ([0.0], [0.0], vec![0.0; model.switches()]);

@@ -293,6 +293,12 @@ impl Block {
             Block::Newton { residuals, .. } => residuals.len(),
         }
     }
+    /// Whether its matrix is symmetric whatever the values.
+    pub fn is_symmetric(&self) -> bool {
+        let (Block::Linear { matrix, .. } | Block::Newton { jacobian: matrix, .. }) = self;
+        let n = self.size();
+        (0..n).all(|i| (0..i).all(|j| matrix[i * n + j] == matrix[j * n + i]))
+    }
     /// What it reads.
     pub fn reads(&self) -> impl Iterator<Item = Value> + '_ {
         let (matrix, right, shared) = match self {

@@ -7,6 +7,16 @@ use super::piece_of;
 use crate::math;
 use halfarrow_compiler::algebra::{Function, Table1d};
 use halfarrow_compiler::program::{Block, ConditionId, Instruction, Layout, Program, Reads, Routine, Solve};
+use std::sync::Arc;
+
+/// A watched divisor vanishes below this part of the terms that it is made of.
+pub(crate) const PIVOT_BELOW: f64 = 64.0 * f64::EPSILON;
+
+/// The inner code of a Newton block in another form.
+pub(crate) trait InnerCode: std::fmt::Debug + Send + Sync {
+    /// Runs it, with derivatives if `along`.
+    fn run(&self, frame: &mut Frame, solve: &Solve, along: bool);
+}
 
 /// Why a routine stopped.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +48,8 @@ pub(crate) struct Frame {
     pub set: Vec<Option<f64>>,
     pub tables: Vec<Table1d>,
     time: u32,
+    /// The code of the Newton block that is being solved, where it is not to be interpreted.
+    pub inner: Option<Arc<dyn InnerCode>>,
 }
 
 /// What a solve block needs.
@@ -48,7 +60,7 @@ pub(crate) struct Solver {
     x: Vec<f64>,
     rate: Vec<f64>,
     /// Whether the matrix reads parameters alone, and has been factored since they were set.
-    constant: bool,
+    pub constant: bool,
     factored: bool,
     pub newton: Newton,
 }
@@ -63,7 +75,7 @@ impl Frame {
             // Factors that another block has made need no place here.
             let shared = matches!(block, Block::Linear { shared: Some(_), .. });
             Solver {
-                lu: Lu::new(if shared { 0 } else { n }),
+                lu: Lu::new(if shared { 0 } else { n }, block.is_symmetric()),
                 x: vec![0.0; n],
                 rate: vec![0.0; n],
                 constant,
@@ -81,6 +93,7 @@ impl Frame {
             set: vec![None; program.parameters.len()],
             tables: program.tables.clone(),
             time: layout.time,
+            inner: None,
         }
     }
 
@@ -110,12 +123,17 @@ impl Frame {
     }
 
     fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), Trouble> {
-        for instruction in &routine.code {
+        self.part::<ALONG>(routine, &routine.code)
+    }
+
+    /// Runs a part of the code of a routine.
+    pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), Trouble> {
+        for instruction in code {
             match *instruction {
                 Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
                 Instruction::Watch { pivot, scale, watch } => {
                     let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
-                    let stands = pivot != 0.0 && pivot.abs() > 64.0 * f64::EPSILON * scale;
+                    let stands = pivot != 0.0 && pivot.abs() > PIVOT_BELOW * scale;
                     if !stands {
                         return Err(Trouble::Vanished { watch });
                     }
@@ -126,11 +144,22 @@ impl Frame {
         Ok(())
     }
 
-    pub(super) fn plain<const ALONG: bool>(&mut self, code: &[Instruction]) {
+    /// The inner code of a Newton block.
+    pub(super) fn inner<const ALONG: bool>(&mut self, solve: &Solve) {
+        match self.inner.take() {
+            Some(code) => {
+                code.run(self, solve, ALONG);
+                self.inner = Some(code);
+            }
+            None => self.plain::<ALONG>(&solve.code),
+        }
+    }
+
+    pub(crate) fn plain<const ALONG: bool>(&mut self, code: &[Instruction]) {
         code.iter().for_each(|instruction| self.step::<ALONG>(instruction));
     }
 
-    fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
         if solve.guess.is_empty() { self.linear::<ALONG>(solve) } else { self.newton::<ALONG>(solve) }
     }
 
@@ -165,7 +194,7 @@ impl Frame {
         let size = solve.right.len();
         if ALONG {
             solve.guess.iter().for_each(|&g| self.d[g as usize] = 0.0);
-            self.plain::<true>(&solve.code);
+            self.inner::<true>(solve);
             let Frame { r, d, solvers, .. } = self;
             let solver = &mut solvers[solve.block.0 as usize];
             solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
@@ -283,7 +312,8 @@ fn along(slope: f64, rate: f64) -> f64 {
     if rate == 0.0 { 0.0 } else { slope * rate }
 }
 
-fn slope_of_power(value: f64, (a, da): (f64, f64), (b, db): (f64, f64)) -> f64 {
+/// Derivative of `value = a^b`.
+pub(crate) fn slope_of_power(value: f64, (a, da): (f64, f64), (b, db): (f64, f64)) -> f64 {
     let base = if da == 0.0 { 0.0 } else { b * math::pow(a, b - 1.0) * da };
     let exponent = if db == 0.0 || value == 0.0 { 0.0 } else { value * math::call(Function::Log, a) * db };
     base + exponent

@@ -1,4 +1,7 @@
-//! Small dense linear equations without allocation: rows scaled, threshold pivoting, one refinement.
+//! Small dense linear equations without allocation. A symmetric matrix that is positive definite is factored as
+//! `Uᵀ D U`; all others with rows scaled, threshold pivoting and one refinement.
+//!
+//! Machine code and exported C do the same operations in the same order.
 
 /// The diagonal stays the pivot while it is at least this fraction of the best one in its column.
 const THRESHOLD: f64 = 0.1;
@@ -7,6 +10,10 @@ const THRESHOLD: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(crate) struct Lu {
     size: usize,
+    /// Whether the matrix is symmetric whatever its values.
+    symmetric: bool,
+    /// Whether the factors are those of a symmetric matrix: `U` above the diagonal, the inverse of `D` in `scale`.
+    definite: bool,
     /// The matrix, row by row.
     matrix: Vec<f64>,
     factors: Vec<f64>,
@@ -18,11 +25,13 @@ pub(crate) struct Lu {
 }
 
 impl Lu {
-    pub fn new(size: usize) -> Lu {
+    pub fn new(size: usize, symmetric: bool) -> Lu {
         let square = vec![0.0; size * size];
         let line = vec![0.0; size];
         Lu {
             size,
+            symmetric: symmetric && size > 1,
+            definite: false,
             matrix: square.clone(),
             factors: square,
             order: vec![0; size],
@@ -39,6 +48,33 @@ impl Lu {
 
     /// Factors the matrix; `Err(column)` if no pivot is left for it, or if an entry is not finite.
     pub fn factor(&mut self) -> Result<(), usize> {
+        self.definite = self.symmetric && self.factor_definite();
+        if self.definite { Ok(()) } else { self.factor_general() }
+    }
+
+    /// `Uᵀ D U`, `U` with ones on its diagonal; false if a pivot is not above rounding of the entry that it comes from.
+    fn factor_definite(&mut self) -> bool {
+        let n = self.size;
+        self.factors.copy_from_slice(&self.matrix);
+        for k in 0..n {
+            let (upper, lower) = self.factors.split_at_mut((k + 1) * n);
+            let row = &mut upper[k * n + k..];
+            let pivot = row[0];
+            if !is_definite(pivot, self.matrix[k * n + k], n) {
+                return false;
+            }
+            let inverse = 1.0 / pivot;
+            for (j, below) in lower.chunks_exact_mut(n).enumerate() {
+                let factor = row[j + 1] * inverse;
+                below[k + 1 + j..].iter_mut().zip(&row[j + 1..]).for_each(|(a, u)| *a -= factor * u);
+            }
+            row[1..].iter_mut().for_each(|u| *u *= inverse);
+            self.scale[k] = inverse;
+        }
+        true
+    }
+
+    fn factor_general(&mut self) -> Result<(), usize> {
         let n = self.size;
         self.factors.copy_from_slice(&self.matrix);
         for row in 0..n {
@@ -61,9 +97,12 @@ impl Lu {
         Ok(())
     }
 
-    /// Replaces `b` by the solution, refined once. The matrix must have been factored.
+    /// Replaces `b` by the solution. The matrix must have been factored.
     pub fn solve(&mut self, b: &mut [f64]) {
         let n = self.size;
+        if self.definite {
+            return self.solve_definite(b);
+        }
         if n == 1 {
             b[0] /= self.factors[0];
             return;
@@ -80,8 +119,24 @@ impl Lu {
         self.rest = rest;
     }
 
+    fn solve_definite(&self, b: &mut [f64]) {
+        let n = self.size;
+        for k in 0..n {
+            let (done, left) = b.split_at_mut(k + 1);
+            left.iter_mut().zip(&self.factors[k * n + k + 1..]).for_each(|(b, u)| *b -= u * done[k]);
+        }
+        b.iter_mut().zip(&self.scale).for_each(|(b, inverse)| *b *= inverse);
+        for k in (0..n).rev() {
+            let (left, done) = b.split_at_mut(k + 1);
+            left[k] = less_products(left[k], &self.factors[k * n + k + 1..][..n - k - 1], done);
+        }
+    }
+
     /// Whether the determinant of the factored matrix is above zero.
     pub fn is_positive(&self) -> bool {
+        if self.definite {
+            return true;
+        }
         let n = self.size;
         let minuses = (0..n).filter(|&k| self.factors[k * n + k] < 0.0).count();
         let exchanges: usize =
@@ -93,13 +148,11 @@ impl Lu {
         let n = self.size;
         for row in 0..n {
             let factors = &self.factors[row * n..row * n + row];
-            let sum: f64 = factors.iter().zip(&self.work).map(|(f, w)| f * w).sum();
-            self.work[row] = b[self.order[row]] - sum;
+            self.work[row] = less_products(b[self.order[row]], factors, &self.work[..row]);
         }
         for row in (0..n).rev() {
             let factors = &self.factors[row * n..(row + 1) * n];
-            let sum: f64 = factors[row + 1..].iter().zip(&b[row + 1..]).map(|(f, x)| f * x).sum();
-            b[row] = (self.work[row] - sum) / factors[row];
+            b[row] = less_products(self.work[row], &factors[row + 1..], &b[row + 1..]) / factors[row];
         }
     }
 
@@ -127,12 +180,37 @@ impl Lu {
     }
 }
 
+/// Whether a pivot of a symmetric matrix is above rounding of the diagonal entry that it comes from.
+fn is_definite(pivot: f64, entry: f64, size: usize) -> bool {
+    pivot > 0.0 && pivot > f64::EPSILON * size as f64 * entry && pivot < f64::INFINITY
+}
+
+/// `start - a·b`: the sum of groups of four products, each of the four places apart, then the products that are left.
+fn less_products(start: f64, a: &[f64], b: &[f64]) -> f64 {
+    let (groups_a, rest_a) = a.as_chunks::<4>();
+    let (groups_b, rest_b) = b.as_chunks::<4>();
+    let mut result = start;
+    if !groups_a.is_empty() {
+        let mut sums = [0.0; 4];
+        for (a, b) in groups_a.iter().zip(groups_b) {
+            (0..4).for_each(|i| sums[i] += a[i] * b[i]);
+        }
+        result -= (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    }
+    rest_a.iter().zip(rest_b).for_each(|(a, b)| result -= a * b);
+    result
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn solve(rows: &[&[f64]], b: &[f64]) -> Result<Vec<f64>, usize> {
-        let mut lu = Lu::new(b.len());
+        solve_as(rows, b, false)
+    }
+
+    fn solve_as(rows: &[&[f64]], b: &[f64], symmetric: bool) -> Result<Vec<f64>, usize> {
+        let mut lu = Lu::new(b.len(), symmetric);
         lu.matrix().copy_from_slice(&rows.concat());
         lu.factor()?;
         let mut x = b.to_vec();
@@ -160,9 +238,37 @@ mod tests {
     }
 
     #[test]
+    fn symmetric_matrices_have_the_same_solutions() {
+        let mut seed = 1.0f64;
+        let mut next = || {
+            seed = (seed * 16807.0) % 2147483647.0;
+            seed / 2147483647.0 - 0.5
+        };
+        for n in 2..12 {
+            for definite in [true, false] {
+                let half: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| next()).collect()).collect();
+                let entry = |i: usize, j: usize| match definite {
+                    true => (0..n).map(|k| half[i][k] * half[j][k]).sum::<f64>() + f64::from(u8::from(i == j)),
+                    false => half[i.min(j)][i.max(j)],
+                };
+                let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
+                let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+                let b: Vec<f64> = (0..n).map(|_| next()).collect();
+                let (here, there) = (solve_as(&rows, &b, true).unwrap(), solve(&rows, &b).unwrap());
+                let most = there.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+                let off = here.iter().zip(&there).fold(0.0f64, |off, (a, b)| off.max((a - b).abs()));
+                assert!(off <= 1e-13 * most * if definite { 1.0 } else { 1e3 }, "{n} {definite}: {off}");
+            }
+        }
+        assert_eq!(solve_as(&[&[1.0, 2.0], &[2.0, 4.0]], &[1.0, 1.0], true), Err(1));
+        assert_eq!(solve_as(&[&[0.0, 1.0], &[1.0, 0.0]], &[2.0, 3.0], true), Ok(vec![3.0, 2.0]));
+        assert_eq!(solve_as(&[&[f64::NAN, 0.0], &[0.0, 1.0]], &[1.0, 1.0], true), Err(0));
+    }
+
+    #[test]
     fn knows_the_sign_of_the_determinant() {
         let sign = |rows: &[&[f64]]| {
-            let mut lu = Lu::new(rows.len());
+            let mut lu = Lu::new(rows.len(), false);
             lu.matrix().copy_from_slice(&rows.concat());
             lu.factor().unwrap();
             lu.is_positive()

@@ -5,6 +5,6 @@ mod frame;
 mod lu;
 mod newton;
 
-pub(crate) use conditions::{Hold, piece_of};
-pub(crate) use frame::{Frame, Trouble};
+pub(crate) use conditions::{Hold, piece_of, table_on};
+pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble, slope_of_power};
 pub(crate) use lu::Lu;

@@ -548,7 +548,7 @@ impl Frame {
         let newton = &self.solvers[solve.block.0 as usize].newton;
         let point = if trial { &newton.trial } else { &newton.x };
         solve.guess.iter().zip(point).for_each(|(&g, &x)| self.r[g as usize] = x);
-        self.plain::<false>(&solve.code);
+        self.inner::<false>(solve);
         solve.right.iter().chain(&solve.matrix).all(|&v| self.r[v as usize].is_finite())
     }
 

@@ -116,7 +116,7 @@ impl Model {
 
 /// An implicit Euler step of length `pull` along the motion.
 fn damped_motion(jacobian: &[f64], rates: &[f64], pull: f64, n: usize) -> Option<Vec<f64>> {
-    let mut lu = crate::bytecode::Lu::new(n);
+    let mut lu = crate::bytecode::Lu::new(n, false);
     lu.matrix().iter_mut().zip(jacobian).for_each(|(a, j)| *a = -j);
     (0..n).for_each(|i| lu.matrix()[i * n + i] += 1.0 / pull);
     lu.factor().ok()?;

@@ -8,6 +8,7 @@ mod history;
 mod implicit;
 mod inputs;
 mod jacobian;
+mod machine;
 mod minimum_norm;
 mod start;
 mod system;
@@ -24,6 +25,7 @@ use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
 use jacobian::Slopes;
+use machine::Codes;
 
 /// A model that runs: a program, the values of its parameters, what is connected to its inputs, and its memory.
 ///
@@ -39,6 +41,7 @@ pub struct Model {
     switching: Routine,
     sources: Routine,
     frame: Frame,
+    codes: Codes,
     recorded: Vec<usize>,
     /// Conditions of the state that are offered as switching functions.
     switches: Vec<ConditionId>,
@@ -126,6 +129,7 @@ impl Model {
             switching,
             sources,
             frame,
+            codes: Codes::default(),
             switches,
             clock,
             program,
@@ -272,6 +276,7 @@ impl Model {
         let wanted: Vec<Value> = self.recorded.iter().filter_map(value).collect();
         self.observe = self.program.watched_routine(&self.layout, &wanted);
         self.frame.reserve(&self.observe);
+        self.recorded_changed();
         let of_rates = |block: BlockId| self.rates.solves.iter().any(|s| s.block == block);
         let newton = self.observe.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
         self.shown_blocks = newton.filter(|&block| !of_rates(block)).collect();

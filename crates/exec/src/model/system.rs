@@ -22,9 +22,10 @@ impl Model {
             What::Switches => &self.switching,
             What::Slopes => &self.slopes.as_ref().expect("asked for only where they are").routine,
         };
-        match along {
-            false => self.frame.run(routine)?,
-            true => self.frame.run_along(routine)?,
+        match (self.codes.of(what, along), along) {
+            (Some(code), _) => code.run(&mut self.frame, routine)?,
+            (None, false) => self.frame.run(routine)?,
+            (None, true) => self.frame.run_along(routine)?,
         }
         let registers = if along { &self.frame.d } else { &self.frame.r };
         Ok(routine.outputs.iter().all(|&out| registers[out as usize].is_finite()))

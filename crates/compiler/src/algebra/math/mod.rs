@@ -13,7 +13,8 @@
 //! [`C_SOURCE`] holds the same functions in C99, line by line, with the same bits.
 
 mod arc;
-mod constants;
+#[rustfmt::skip]
+pub mod constants;
 mod double;
 mod exponential;
 mod lanes;

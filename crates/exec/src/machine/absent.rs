@@ -1,0 +1,42 @@
+//! What stands in the place of machine code where it is left out.
+
+use crate::bytecode::{Frame, Trouble};
+use halfarrow_compiler::program::{Layout, Program, Routine};
+use std::fmt;
+
+/// Why there is no machine code; the bytecode runs all the same.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MachineError {
+    /// The program was built without it.
+    LeftOut,
+}
+
+impl fmt::Display for MachineError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("this program was built without machine code")
+    }
+}
+
+impl std::error::Error for MachineError {}
+
+/// There is none.
+#[derive(Debug)]
+pub(crate) enum Code {}
+
+impl Code {
+    pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), Trouble> {
+        match *self {}
+    }
+}
+
+/// Makes none.
+pub(crate) struct Generator;
+
+impl Generator {
+    pub fn new() -> Result<Generator, MachineError> {
+        Err(MachineError::LeftOut)
+    }
+    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<Code, MachineError> {
+        Err(MachineError::LeftOut)
+    }
+}

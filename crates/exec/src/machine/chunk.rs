@@ -1,0 +1,532 @@
+//! One chunk of a routine as a function: loads, arithmetic without branches, and stores if all went well.
+
+use super::arithmetic::Writer;
+use super::{RARE, STATUS_OF_WATCH, kernels};
+use crate::bytecode::PIVOT_BELOW;
+use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
+use cranelift_codegen::ir::{InstBuilder, Value, types};
+use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::ids::Table;
+use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Instruction, Register, Solve};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What is the same for all chunks of a model.
+pub(super) struct Setting<'a> {
+    pub conditions: &'a Table<ConditionId, Condition>,
+    /// Registers below this one never move: constants and parameters.
+    pub resting: Register,
+}
+
+/// What a chunk consists of.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Item<'a> {
+    Plain(&'a Instruction),
+    /// A small linear block, written out.
+    Solve(&'a Solve),
+}
+
+/// Translates items, then stores what is read later.
+pub(super) struct Chunk<'a, 'b> {
+    w: Writer<'a>,
+    setting: &'b Setting<'b>,
+    along: bool,
+    inline: bool,
+    values: Value,
+    slopes: Value,
+    held: Value,
+    tables: Value,
+    keep: Value,
+    r: BTreeMap<Register, Value>,
+    d: BTreeMap<Register, Value>,
+    /// Registers that are only read: loaded again after a call rather than saved over it.
+    loaded: BTreeSet<Register>,
+    /// 0, or the first thing that is wrong.
+    status: Option<Value>,
+    /// Whether all usual ways hold.
+    good: Option<Value>,
+    /// Truth values that stand in registers as 0 and 1.
+    truth: BTreeMap<Value, Value>,
+    turns: BTreeMap<Value, (Value, Value)>,
+    kept: [Option<Value>; 2],
+}
+
+impl<'a, 'b> Chunk<'a, 'b> {
+    /// `parameters` are those of the function, as in [`memory`](super::memory).
+    pub fn new(w: Writer<'a>, parameters: [Value; 5], setting: &'b Setting<'b>, along: bool, inline: bool) -> Self {
+        let [values, slopes, held, tables, keep] = parameters;
+        Chunk {
+            w,
+            setting,
+            along,
+            inline,
+            values,
+            slopes,
+            held,
+            tables,
+            keep,
+            r: BTreeMap::new(),
+            d: BTreeMap::new(),
+            loaded: BTreeSet::new(),
+            status: None,
+            good: None,
+            truth: BTreeMap::new(),
+            turns: BTreeMap::new(),
+            kept: [None; 2],
+        }
+    }
+
+    pub fn item(&mut self, item: Item) {
+        match item {
+            Item::Plain(instruction) => self.instruction(instruction),
+            Item::Solve(solve) => self.solve(solve),
+        }
+    }
+
+    /// Stores what is read later, unless something is wrong or unusual, and returns the status.
+    pub fn end(mut self, live: impl Iterator<Item = Register>) -> Writer<'a> {
+        let fine = self.w.integer(0);
+        let mut status = self.status.unwrap_or(fine);
+        if let Some(good) = self.good {
+            let rare = self.w.integer(RARE);
+            status = self.w.choose(good, status, rare);
+        }
+        if self.status.is_some() || self.good.is_some() {
+            let (store, stop) = (self.w.builder.create_block(), self.w.builder.create_block());
+            self.w.builder.ins().brif(status, stop, &[], store, &[]);
+            self.w.builder.set_cold_block(stop);
+            self.w.builder.switch_to_block(stop);
+            self.w.builder.ins().return_(&[status]);
+            self.w.builder.switch_to_block(store);
+        }
+        for register in live {
+            if let Some(&value) = self.r.get(&register).filter(|_| !self.loaded.contains(&register)) {
+                self.w.store(self.values, register, value);
+            }
+            if let Some(&slope) = self.d.get(&register).filter(|_| self.along && !self.loaded.contains(&register)) {
+                self.w.store(self.slopes, register, slope);
+            }
+        }
+        let fine = self.w.builder.ins().iconst(types::I64, 0);
+        self.w.builder.ins().return_(&[fine]);
+        self.w
+    }
+
+    fn value(&mut self, register: Register) -> Value {
+        if let Some(&known) = self.r.get(&register) {
+            return known;
+        }
+        let value = self.w.load(self.values, register);
+        self.r.insert(register, value);
+        self.loaded.insert(register);
+        value
+    }
+
+    fn slope(&mut self, register: Register) -> Value {
+        if !self.along || register < self.setting.resting {
+            return self.w.number(0.0);
+        }
+        if let Some(&known) = self.d.get(&register) {
+            return known;
+        }
+        let slope = self.w.load(self.slopes, register);
+        self.d.insert(register, slope);
+        self.loaded.insert(register);
+        slope
+    }
+
+    fn put(&mut self, register: Register, value: Value, slope: impl FnOnce(&mut Self) -> Value) {
+        let slope = self.along.then(|| slope(self));
+        self.loaded.remove(&register);
+        self.r.insert(register, value);
+        if let Some(slope) = slope {
+            self.d.insert(register, slope);
+        }
+    }
+
+    fn call(&mut self, function: usize, arguments: &[Value]) -> Value {
+        let result = self.w.call(function, arguments);
+        for register in std::mem::take(&mut self.loaded) {
+            self.r.remove(&register);
+            self.d.remove(&register);
+        }
+        result
+    }
+
+    fn zero(&mut self) -> Value {
+        self.w.number(0.0)
+    }
+
+    /// `slope · rate`, 0 where nothing moves.
+    fn along(&mut self, slope: impl FnOnce(&mut Self) -> Value, rate: Value) -> Value {
+        let zero = self.zero();
+        if rate == zero {
+            return zero;
+        }
+        let slope = slope(self);
+        let product = self.w.mul(slope, rate);
+        let rests = self.w.is(FloatCC::Equal, rate, zero);
+        self.w.choose(rests, zero, product)
+    }
+
+    /// Truth as a number.
+    fn truth(&mut self, register: Register, condition: Value) {
+        let (one, zero) = (self.w.number(1.0), self.zero());
+        let value = self.w.choose(condition, one, zero);
+        self.truth.insert(value, condition);
+        self.put(register, value, |this| this.zero());
+    }
+
+    /// Whether a number is not 0.
+    fn holds(&mut self, value: Value) -> Value {
+        if let Some(&known) = self.truth.get(&value) {
+            return known;
+        }
+        let zero = self.zero();
+        self.w.is(FloatCC::NotEqual, value, zero)
+    }
+
+    fn instruction(&mut self, instruction: &Instruction) {
+        use Instruction::*;
+        match *instruction {
+            Add { out, a, b } => self.sum(out, a, b, Writer::add),
+            Sub { out, a, b } => self.sum(out, a, b, Writer::sub),
+            Mul { out, a, b } => {
+                let (va, vb) = (self.value(a), self.value(b));
+                let value = self.w.mul(va, vb);
+                self.put(out, value, |this| {
+                    let (da, db) = (this.slope(a), this.slope(b));
+                    let (left, right) = (this.along(|_| vb, da), this.along(|_| va, db));
+                    this.w.add(left, right)
+                });
+            }
+            Div { out, a, b } => {
+                let (va, vb) = (self.value(a), self.value(b));
+                let value = self.w.div(va, vb);
+                self.put(out, value, |this| {
+                    let (da, db) = (this.slope(a), this.slope(b));
+                    let moved = this.along(|_| value, db);
+                    let rest = this.w.sub(da, moved);
+                    this.w.div(rest, vb)
+                });
+            }
+            Neg { out, a } => {
+                let va = self.value(a);
+                let value = self.w.neg(va);
+                self.put(out, value, |this| {
+                    let da = this.slope(a);
+                    this.w.neg(da)
+                });
+            }
+            Powi { out, a, n } => {
+                let va = self.value(a);
+                let value = self.power(va, n);
+                self.put(out, value, |this| {
+                    let da = this.slope(a);
+                    this.along(
+                        |this| {
+                            let (less, factor) = (this.power(va, n - 1), this.w.number(f64::from(n)));
+                            this.w.mul(factor, less)
+                        },
+                        da,
+                    )
+                });
+            }
+            Pow { out, a, b } => self.pow(out, a, b),
+            Call { f, out, a } => self.function(f, out, a),
+            Call2 { f, out, a, b } => {
+                let (va, vb) = (self.value(a), self.value(b));
+                let slope = self.along.then(|| {
+                    let (da, db) = (self.slope(a), self.slope(b));
+                    self.call(kernels::slope_of_two(f), &[va, da, vb, db])
+                });
+                let value = self.call(kernels::two(f), &[va, vb]);
+                self.put(out, value, |_| slope.unwrap_or(value));
+            }
+            Positive { out, a } => {
+                let (va, zero) = (self.value(a), self.zero());
+                let above = self.w.is(FloatCC::GreaterThan, va, zero);
+                self.truth(out, above);
+            }
+            Side { out, a, condition } | Floor { out, a, condition } => {
+                let va = self.value(a);
+                let value = self.condition(condition, va);
+                self.put(out, value, |this| this.zero());
+            }
+            And { out, a, b } => {
+                let (va, vb) = (self.value(a), self.value(b));
+                let (ha, hb) = (self.holds(va), self.holds(vb));
+                let both = self.w.both(ha, hb);
+                self.truth(out, both);
+            }
+            Or { out, a, b } => {
+                let (va, vb) = (self.value(a), self.value(b));
+                let (ha, hb) = (self.holds(va), self.holds(vb));
+                let either = self.w.either(ha, hb);
+                self.truth(out, either);
+            }
+            Not { out, a } => {
+                let va = self.value(a);
+                let zero = self.zero();
+                let fails = self.w.is(FloatCC::Equal, va, zero);
+                self.truth(out, fails);
+            }
+            Select { out, c, a, b } => {
+                let (vc, va, vb) = (self.value(c), self.value(a), self.value(b));
+                let holds = self.holds(vc);
+                let value = self.w.choose(holds, va, vb);
+                self.put(out, value, |this| {
+                    let (da, db) = (this.slope(a), this.slope(b));
+                    this.w.choose(holds, da, db)
+                });
+            }
+            Table { out, a, table, piece } => self.table(out, a, (table, 0), piece),
+            TableSlope { out, a, table, piece } => self.table(out, a, (table, 1), piece),
+            TableCurvature { out, a, table, piece } => self.table(out, a, (table, 2), piece),
+            Watch { pivot, scale, watch } => {
+                let (pivot, scale) = (self.value(pivot), self.value(scale));
+                let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
+                let least = self.w.mul(factor, scale);
+                let size = self.w.abs(pivot);
+                let above = self.w.is(FloatCC::GreaterThan, size, least);
+                let some = self.w.is(FloatCC::NotEqual, pivot, zero);
+                let stands = self.w.both(above, some);
+                self.require(stands, STATUS_OF_WATCH + u64::from(watch));
+            }
+            Parameter { .. } | Solve { .. } => unreachable!("neither parameters nor large blocks stand in a chunk"),
+        }
+    }
+
+    fn sum(&mut self, out: Register, a: Register, b: Register, how: fn(&mut Writer<'a>, Value, Value) -> Value) {
+        let (va, vb) = (self.value(a), self.value(b));
+        let value = how(&mut self.w, va, vb);
+        self.put(out, value, |this| {
+            let (da, db) = (this.slope(a), this.slope(b));
+            how(&mut this.w, da, db)
+        });
+    }
+
+    /// `a^n` by repeated squaring, as `math::powi` does it.
+    fn power(&mut self, a: Value, n: u32) -> Value {
+        let (mut result, mut square, mut left) = (None, a, n);
+        while left > 0 {
+            if left & 1 == 1 {
+                result = Some(match result {
+                    Some(result) => self.w.mul(result, square),
+                    None => square,
+                });
+            }
+            left >>= 1;
+            if left > 0 {
+                square = self.w.mul(square, square);
+            }
+        }
+        result.unwrap_or_else(|| self.w.number(1.0))
+    }
+
+    fn pow(&mut self, out: Register, a: Register, b: Register) {
+        let (va, vb) = (self.value(a), self.value(b));
+        let slopes = self.along.then(|| (self.slope(a), self.slope(b)));
+        let value = self.call(kernels::power(), &[va, vb]);
+        let slope = slopes.map(|(da, db)| self.call(kernels::slope_of_pow(), &[value, va, da, vb, db]));
+        self.put(out, value, |_| slope.unwrap_or(value));
+    }
+
+    fn function(&mut self, f: Function, out: Register, a: Register) {
+        let va = self.value(a);
+        let da = if self.along { Some(self.slope(a)) } else { None };
+        let value = self.call_one(f, va);
+        let slope = da.map(|da| self.along(|this| this.slope_of_one(f, va, value), da));
+        self.put(out, value, |_| slope.unwrap_or(value));
+    }
+
+    fn call_one(&mut self, f: Function, a: Value) -> Value {
+        match f {
+            Function::Sqrt => self.w.builder.ins().sqrt(a),
+            Function::Abs => self.w.abs(a),
+            Function::Sin if self.inline => self.turn(a).0,
+            Function::Cos if self.inline => self.turn(a).1,
+            Function::Exp if self.inline => {
+                let (value, good) = self.w.exponential(a);
+                self.usual(good);
+                value
+            }
+            Function::Log if self.inline => {
+                let (value, good) = self.w.logarithm(a);
+                self.usual(good);
+                value
+            }
+            _ => self.call(kernels::one(f), &[a]),
+        }
+    }
+
+    /// As `math::slope`.
+    fn slope_of_one(&mut self, f: Function, a: Value, value: Value) -> Value {
+        let one = self.w.number(1.0);
+        match f {
+            Function::Sin => self.call_one(Function::Cos, a),
+            Function::Cos => {
+                let sine = self.call_one(Function::Sin, a);
+                self.w.neg(sine)
+            }
+            Function::Exp => value,
+            Function::Log => self.w.div(one, a),
+            _ => self.call(kernels::slope_of_one(f), &[a, value]),
+        }
+    }
+
+    /// Sine and cosine, shared by both.
+    fn turn(&mut self, a: Value) -> (Value, Value) {
+        if let Some(&known) = self.turns.get(&a) {
+            return known;
+        }
+        let (sine, cosine, good) = self.w.sine_cosine(a);
+        self.usual(good);
+        self.turns.insert(a, (sine, cosine));
+        (sine, cosine)
+    }
+
+    fn usual(&mut self, good: Value) {
+        self.good = Some(match self.good {
+            Some(all) => self.w.both(all, good),
+            None => good,
+        });
+    }
+
+    fn require(&mut self, stands: Value, status: u64) {
+        let (fine, wrong) = (self.w.integer(0), self.w.integer(status));
+        let mine = self.w.choose(stands, fine, wrong);
+        self.status = Some(match self.status {
+            None => mine,
+            Some(before) => {
+                let none = self.w.builder.ins().icmp_imm_s(IntCC::Equal, before, 0);
+                self.w.choose(none, mine, before)
+            }
+        });
+    }
+
+    fn condition(&mut self, condition: ConditionId, operand: Value) -> Value {
+        let Condition { kind, cause, .. } = self.setting.conditions[condition];
+        let follow = match kind {
+            ConditionKind::Sign => {
+                let (one, zero) = (self.w.number(1.0), self.zero());
+                let above = self.w.is(FloatCC::GreaterThan, operand, zero);
+                let value = self.w.choose(above, one, zero);
+                if cause == Cause::Shown {
+                    self.truth.insert(value, above);
+                }
+                value
+            }
+            ConditionKind::Floor => self.call(kernels::one(Function::Floor), &[operand]),
+            ConditionKind::Piece(table) => {
+                let table = self.w.integer(u64::from(table));
+                self.call(kernels::piece(), &[self.tables, table, operand])
+            }
+        };
+        let Some(kept) = self.kept(cause) else { return follow };
+        let held = self.w.load(self.held, condition.0);
+        self.w.choose(kept, held, follow)
+    }
+
+    /// Whether conditions of this cause are kept; `None` if they always follow.
+    fn kept(&mut self, cause: Cause) -> Option<Value> {
+        let place = match cause {
+            Cause::Clock | Cause::Curve => 0,
+            Cause::State => 1,
+            Cause::Shown => return None,
+        };
+        if self.kept[place].is_none() {
+            let bit = self.w.builder.ins().band_imm_s(self.keep, 1 << place);
+            self.kept[place] = Some(self.w.builder.ins().icmp_imm_s(IntCC::NotEqual, bit, 0));
+        }
+        self.kept[place]
+    }
+
+    fn table(&mut self, out: Register, a: Register, (table, order): (u32, u64), piece: Option<ConditionId>) {
+        let va = self.value(a);
+        let da = if self.along { Some(self.slope(a)) } else { None };
+        let piece = match piece {
+            Some(condition) => self.condition(condition, va),
+            None => self.w.number(-1.0),
+        };
+        let index = self.w.integer(u64::from(table));
+        let at = |this: &mut Self, order: u64| {
+            let order = this.w.integer(order);
+            this.call(kernels::table(), &[this.tables, index, order, piece, va])
+        };
+        let value = at(self, order);
+        let slope = da.map(|da| self.along(|this| at(this, order + 1), da));
+        self.put(out, value, |_| slope.unwrap_or(value));
+    }
+}
+
+/// Small linear blocks, as `Lu` solves them where no pivot is sought.
+impl Chunk<'_, '_> {
+    fn solve(&mut self, solve: &Solve) {
+        let n = solve.right.len();
+        let mut right: Vec<Value> = solve.right.iter().map(|&r| self.value(r)).collect();
+        if n == 1 {
+            let pivot = self.value(solve.matrix[0]);
+            self.single_pivot(pivot);
+            right[0] = self.w.div(right[0], pivot);
+        } else {
+            let matrix: Vec<Value> = solve.matrix.iter().map(|&r| self.value(r)).collect();
+            self.definite(n, &matrix, &mut right);
+        }
+        for (&out, value) in solve.unknowns.iter().zip(right) {
+            self.put(out, value, |_| unreachable!("blocks are written out for values only"));
+        }
+    }
+
+    /// The pivot against itself: neither 0 nor infinite.
+    fn single_pivot(&mut self, pivot: Value) {
+        let (size, least) = (self.w.abs(pivot), self.w.number(f64::MIN_POSITIVE));
+        let above = self.w.is(FloatCC::GreaterThan, size, least);
+        let scale = self.w.choose(above, size, least);
+        let weight = self.w.div(size, scale);
+        let (low, high) = (self.w.number(f64::EPSILON), self.w.number(f64::INFINITY));
+        let (some, finite) = (self.w.is(FloatCC::GreaterThan, weight, low), self.w.is(FloatCC::LessThan, weight, high));
+        let good = self.w.both(some, finite);
+        self.usual(good);
+    }
+
+    /// `Uᵀ D U x = b`.
+    fn definite(&mut self, n: usize, matrix: &[Value], b: &mut [Value]) {
+        let mut u = matrix.to_vec();
+        let mut inverses = Vec::with_capacity(n);
+        let (zero, one) = (self.w.number(0.0), self.w.number(1.0));
+        let (high, rounding) = (self.w.number(f64::INFINITY), self.w.number(f64::EPSILON * n as f64));
+        for k in 0..n {
+            let pivot = u[k * n + k];
+            let least = self.w.mul(rounding, matrix[k * n + k]);
+            for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)]
+            {
+                let good = self.w.is(how, pivot, bound);
+                self.usual(good);
+            }
+            let inverse = self.w.div(one, pivot);
+            let row: Vec<Value> = (k + 1..n).map(|j| u[k * n + j]).collect();
+            for j in k + 1..n {
+                let factor = self.w.mul(row[j - k - 1], inverse);
+                for i in j..n {
+                    let product = self.w.mul(factor, row[i - k - 1]);
+                    u[j * n + i] = self.w.sub(u[j * n + i], product);
+                }
+                u[k * n + j] = factor;
+            }
+            inverses.push(inverse);
+        }
+        for k in 0..n {
+            for j in k + 1..n {
+                let product = self.w.mul(u[k * n + j], b[k]);
+                b[j] = self.w.sub(b[j], product);
+            }
+        }
+        b.iter_mut().zip(inverses).for_each(|(b, inverse)| *b = self.w.mul(*b, inverse));
+        for k in (0..n).rev() {
+            for j in k + 1..n {
+                let product = self.w.mul(u[k * n + j], b[j]);
+                b[k] = self.w.sub(b[k], product);
+            }
+        }
+    }
+}
