@@ -10,7 +10,7 @@ const THRESHOLD: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(crate) struct Lu {
     size: usize,
-    /// Whether the matrix is symmetric whatever its values.
+    /// Whether the matrix is known to be symmetric whatever its values; if not, it is looked at.
     symmetric: bool,
     /// Whether the factors are those of a symmetric matrix: `U` above the diagonal, the inverse of `D` in `scale`.
     definite: bool,
@@ -30,7 +30,7 @@ impl Lu {
         let line = vec![0.0; size];
         Lu {
             size,
-            symmetric: symmetric && size > 1,
+            symmetric,
             definite: false,
             matrix: square.clone(),
             factors: square,
@@ -48,7 +48,8 @@ impl Lu {
 
     /// Factors the matrix; `Err(column)` if no pivot is left for it, or if an entry is not finite.
     pub fn factor(&mut self) -> Result<(), usize> {
-        self.definite = self.symmetric && self.factor_definite();
+        let symmetric = self.size > 1 && (self.symmetric || self.looks_symmetric());
+        self.definite = symmetric && self.factor_definite();
         if self.definite { Ok(()) } else { self.factor_general() }
     }
 
@@ -72,6 +73,11 @@ impl Lu {
             self.scale[k] = inverse;
         }
         true
+    }
+
+    fn looks_symmetric(&self) -> bool {
+        let (n, a) = (self.size, &self.matrix);
+        (0..n).all(|i| (0..i).all(|j| a[i * n + j] == a[j * n + i]))
     }
 
     fn factor_general(&mut self) -> Result<(), usize> {
@@ -254,7 +260,12 @@ mod tests {
                 let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
                 let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
                 let b: Vec<f64> = (0..n).map(|_| next()).collect();
-                let (here, there) = (solve_as(&rows, &b, true).unwrap(), solve(&rows, &b).unwrap());
+                // Rows exchanged are the same equations, and no longer symmetric.
+                let (mut turned, mut b_turned) = (rows.clone(), b.clone());
+                turned.rotate_left(1);
+                b_turned.rotate_left(1);
+                let (here, there) = (solve_as(&rows, &b, true).unwrap(), solve(&turned, &b_turned).unwrap());
+                assert_eq!(here, solve(&rows, &b).unwrap(), "symmetric matrices are seen to be so");
                 let most = there.iter().fold(0.0f64, |most, x| most.max(x.abs()));
                 let off = here.iter().zip(&there).fold(0.0f64, |off, (a, b)| off.max((a - b).abs()));
                 assert!(off <= 1e-13 * most * if definite { 1.0 } else { 1e3 }, "{n} {definite}: {off}");

@@ -27,6 +27,9 @@ impl Code {
     pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), Trouble> {
         match *self {}
     }
+    pub fn rates(&self, _: &mut Frame, _: f64, _: &[f64], _: &mut [f64]) -> bool {
+        match *self {}
+    }
 }
 
 /// Makes none.

@@ -13,8 +13,17 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What is the same for all chunks of a model.
 pub(super) struct Setting<'a> {
     pub conditions: &'a Table<ConditionId, Condition>,
-    /// Registers below this one never move: constants and parameters.
-    pub resting: Register,
+    /// The register of time: those below never move, constants and parameters.
+    pub time: Register,
+    pub states: std::ops::Range<Register>,
+}
+
+/// Where a function of rates finds time and states, and where it puts the rates.
+#[derive(Debug, Clone)]
+pub(super) struct Direct {
+    pub time: (Register, Value),
+    pub states: (std::ops::Range<Register>, Value),
+    pub rates: Value,
 }
 
 /// What a chunk consists of.
@@ -48,6 +57,7 @@ pub(super) struct Chunk<'a, 'b> {
     truth: BTreeMap<Value, Value>,
     turns: BTreeMap<Value, (Value, Value)>,
     kept: [Option<Value>; 2],
+    direct: Option<Direct>,
 }
 
 impl<'a, 'b> Chunk<'a, 'b> {
@@ -72,7 +82,13 @@ impl<'a, 'b> Chunk<'a, 'b> {
             truth: BTreeMap::new(),
             turns: BTreeMap::new(),
             kept: [None; 2],
+            direct: None,
         }
+    }
+
+    /// From now on time and states are read where they are given.
+    pub fn reads_directly(&mut self, direct: Direct) {
+        self.direct = Some(direct);
     }
 
     pub fn item(&mut self, item: Item) {
@@ -84,28 +100,48 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     /// Stores what is read later, unless something is wrong or unusual, and returns the status.
     pub fn end(mut self, live: impl Iterator<Item = Register>) -> Writer<'a> {
+        self.stop_unless_fine();
+        for register in live.filter(|r| !self.loaded.contains(r)).collect::<Vec<_>>() {
+            if let Some(&value) = self.r.get(&register) {
+                self.w.store(self.values, register, value);
+            }
+            if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
+                self.w.store(self.slopes, register, slope);
+            }
+        }
+        self.fine()
+    }
+
+    /// The same for a function of rates.
+    pub fn end_with_rates(mut self, outputs: &[Register]) -> Writer<'a> {
+        let values: Vec<Value> = outputs.iter().map(|&r| self.value(r)).collect();
+        self.stop_unless_fine();
+        let rates = self.direct.as_ref().expect("a function of rates reads directly").rates;
+        for (i, value) in values.into_iter().enumerate() {
+            self.w.store(rates, i as u32, value);
+        }
+        self.fine()
+    }
+
+    fn stop_unless_fine(&mut self) {
+        if self.status.is_none() && self.good.is_none() {
+            return;
+        }
         let fine = self.w.integer(0);
         let mut status = self.status.unwrap_or(fine);
         if let Some(good) = self.good {
             let rare = self.w.integer(RARE);
             status = self.w.choose(good, status, rare);
         }
-        if self.status.is_some() || self.good.is_some() {
-            let (store, stop) = (self.w.builder.create_block(), self.w.builder.create_block());
-            self.w.builder.ins().brif(status, stop, &[], store, &[]);
-            self.w.builder.set_cold_block(stop);
-            self.w.builder.switch_to_block(stop);
-            self.w.builder.ins().return_(&[status]);
-            self.w.builder.switch_to_block(store);
-        }
-        for register in live {
-            if let Some(&value) = self.r.get(&register).filter(|_| !self.loaded.contains(&register)) {
-                self.w.store(self.values, register, value);
-            }
-            if let Some(&slope) = self.d.get(&register).filter(|_| self.along && !self.loaded.contains(&register)) {
-                self.w.store(self.slopes, register, slope);
-            }
-        }
+        let (store, stop) = (self.w.builder.create_block(), self.w.builder.create_block());
+        self.w.builder.ins().brif(status, stop, &[], store, &[]);
+        self.w.builder.set_cold_block(stop);
+        self.w.builder.switch_to_block(stop);
+        self.w.builder.ins().return_(&[status]);
+        self.w.builder.switch_to_block(store);
+    }
+
+    fn fine(mut self) -> Writer<'a> {
         let fine = self.w.builder.ins().iconst(types::I64, 0);
         self.w.builder.ins().return_(&[fine]);
         self.w
@@ -115,14 +151,21 @@ impl<'a, 'b> Chunk<'a, 'b> {
         if let Some(&known) = self.r.get(&register) {
             return known;
         }
-        let value = self.w.load(self.values, register);
+        let value = match &self.direct {
+            Some(direct) if register == direct.time.0 => direct.time.1,
+            Some(direct) if direct.states.0.contains(&register) => {
+                let (base, index) = (direct.states.1, register - direct.states.0.start);
+                self.w.load(base, index)
+            }
+            _ => self.w.load(self.values, register),
+        };
         self.r.insert(register, value);
         self.loaded.insert(register);
         value
     }
 
     fn slope(&mut self, register: Register) -> Value {
-        if !self.along || register < self.setting.resting {
+        if !self.along || register < self.setting.time {
             return self.w.number(0.0);
         }
         if let Some(&known) = self.d.get(&register) {

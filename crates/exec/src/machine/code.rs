@@ -35,6 +35,8 @@ pub(crate) struct Code {
     /// Inner code of each Newton block.
     inner: Vec<Option<Arc<Inner>>>,
     along: bool,
+    /// All of it from time and states to rates, if it is one chunk.
+    direct: Option<Start>,
 }
 
 /// The machine code inside a Newton block.
@@ -58,7 +60,8 @@ impl Generator {
         routine: &Routine,
         along: bool,
     ) -> Result<Code, MachineError> {
-        let setting = Setting { conditions: &program.conditions, resting: layout.time };
+        let states = layout.states..layout.states + program.states.len() as u32;
+        let setting = Setting { conditions: &program.conditions, time: layout.time, states };
         let mut gathered = Gathered::default();
         let written_out: Vec<bool> =
             (0..routine.solves.len()).map(|solve| !along && is_written_out(program, layout, routine, solve)).collect();
@@ -83,6 +86,13 @@ impl Generator {
             steps.push(Step::Piece(Piece { start, code: cut }));
         }
         steps.reverse();
+        let single = matches!(steps[..], [Step::Piece(_)]) && routine.outputs.len() == program.states.len();
+        let direct = if single && !along {
+            let items: Vec<Item> = routine.code.iter().map(|i| item(routine, i)).collect();
+            Some(self.rates(&mut gathered, &setting, &items, &routine.outputs, inline)?)
+        } else {
+            None
+        };
         let mut inner = Vec::with_capacity(routine.solves.len());
         for solve in &routine.solves {
             let value = self.inner(&mut gathered, &setting, solve, false)?;
@@ -94,13 +104,14 @@ impl Generator {
             registers: layout.size.max(routine.registers) as usize,
             conditions: program.conditions.len(),
             tables: program.tables.len(),
+            states: program.states.len(),
         };
         let inner = inner.into_iter().map(|pieces| {
             let memory = memory.clone();
             pieces.map(|pieces| Arc::new(Inner { memory, reach, pieces }))
         });
         let inner = inner.collect();
-        Ok(Code { memory, reach, steps, inner, along })
+        Ok(Code { memory, reach, steps, inner, along, direct })
     }
 
     /// The code inside a Newton block: what its matrix and right side read is wanted.
@@ -190,6 +201,15 @@ impl Code {
         if self.along { self.steps::<true>(frame, routine) } else { self.steps::<false>(frame, routine) }
     }
 
+    /// Rates from time and states given here, all else as it was placed last; false if the routine has to be run.
+    pub fn rates(&self, frame: &mut Frame, t: f64, x: &[f64], dx: &mut [f64]) -> bool {
+        let Some(start) = self.direct else { return false };
+        if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
+            return false;
+        }
+        self.memory.enter_rates(start, self.reach, arrays(frame), (t, x, dx)) == 0
+    }
+
     fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), Trouble> {
         // Conditions that are taken anew are for the bytecode.
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
@@ -226,8 +246,12 @@ impl InnerCode for Inner {
 }
 
 fn enter(memory: &Memory, reach: Reach, start: Start, frame: &mut Frame) -> u64 {
+    memory.enter(start, reach, arrays(frame))
+}
+
+fn arrays(frame: &mut Frame) -> Arrays<'_> {
     let keeps = |hold: Hold| u64::from(hold == Hold::Keep);
     let keep = keeps(frame.conditions.clock) | keeps(frame.conditions.state) << 1;
     let held = &frame.conditions.held[..];
-    memory.enter(start, reach, Arrays { values: &mut frame.r, slopes: &mut frame.d, held, tables: &frame.tables, keep })
+    Arrays { values: &mut frame.r, slopes: &mut frame.d, held, tables: &frame.tables, keep }
 }

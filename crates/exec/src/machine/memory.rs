@@ -9,6 +9,9 @@ use std::sync::Arc;
 /// lengths that the code was made for. 0 if all went well, else a [status](super::chunk).
 type Function = extern "C" fn(*mut f64, *mut f64, *const f64, *const Table1d, u64) -> u64;
 
+/// The same for rates: values, held conditions, tables, which are kept, states, rates, time.
+type Rates = extern "C" fn(*const f64, *const f64, *const Table1d, u64, *const f64, *mut f64, f64) -> u64;
+
 /// Functions start at multiples of this many bytes: constants beside them are aligned.
 const ALIGNMENT: usize = 64;
 
@@ -57,6 +60,7 @@ pub(super) struct Reach {
     pub registers: usize,
     pub conditions: usize,
     pub tables: usize,
+    pub states: usize,
 }
 
 impl Memory {
@@ -71,6 +75,25 @@ impl Memory {
         // The function reads and writes registers, conditions and tables below the numbers in `reach`, which the arrays
         // have; it keeps no pointer.
         function(on.values.as_mut_ptr(), on.slopes.as_mut_ptr(), on.held.as_ptr(), on.tables.as_ptr(), on.keep)
+    }
+}
+
+impl Memory {
+    /// The same for a function of rates, from `t` and `x` to `dx`.
+    pub fn enter_rates(
+        &self,
+        start: Start,
+        reach: Reach,
+        on: Arrays<'_>,
+        (t, x, dx): (f64, &[f64], &mut [f64]),
+    ) -> u64 {
+        assert!(on.values.len() >= reach.registers && x.len() >= reach.states && dx.len() >= reach.states);
+        assert!(on.held.len() >= reach.conditions && on.tables.len() >= reach.tables && start.0 < self.0.len());
+        // SAFETY: as in `enter`; `start` is that of a function of rates.
+        let function: Rates = unsafe { std::mem::transmute::<*const u8, Rates>(self.0.as_ptr().add(start.0)) };
+        // It reads what `reach` says, writes `dx`, and keeps no pointer.
+        let (values, held, tables) = (on.values.as_ptr(), on.held.as_ptr(), on.tables.as_ptr());
+        function(values, held, tables, on.keep, x.as_ptr(), dx.as_mut_ptr(), t)
     }
 }
 

@@ -19,9 +19,9 @@ mod memory;
 pub(crate) use code::Code;
 
 use arithmetic::Writer;
-use chunk::{Chunk, Item, Setting};
+use chunk::{Chunk, Direct, Item, Setting};
 use cranelift_codegen::control::ControlPlane;
-use cranelift_codegen::ir::{AbiParam, Function, Signature, UserFuncName, types};
+use cranelift_codegen::ir::{AbiParam, Function, Signature, Type, UserFuncName, Value, types};
 use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::Configurable;
 use cranelift_codegen::{Context, settings};
@@ -98,8 +98,44 @@ impl Generator {
         live: &[Register],
         (along, inline): (bool, bool),
     ) -> Result<Start, MachineError> {
-        let mut signature = Signature::new(self.isa.default_call_conv());
-        signature.params.extend([AbiParam::new(types::I64); 5]);
+        self.function(into, &[types::I64; 5], |writer, arguments| {
+            let arguments = std::array::from_fn(|i| arguments[i]);
+            let mut chunk = Chunk::new(writer, arguments, setting, along, inline);
+            items.iter().for_each(|&item| chunk.item(item));
+            chunk.end(live.iter().copied())
+        })
+    }
+
+    /// The function of a routine of one chunk that reads time and states, and writes what is wanted, where it is told.
+    fn rates(
+        &mut self,
+        into: &mut Gathered,
+        setting: &Setting,
+        items: &[Item],
+        outputs: &[Register],
+        inline: bool,
+    ) -> Result<Start, MachineError> {
+        let mut kinds = [types::I64; 7];
+        kinds[6] = types::F64;
+        self.function(into, &kinds, |writer, arguments| {
+            let [values, held, tables, keep, x, dx, t] = std::array::from_fn(|i| arguments[i]);
+            let mut chunk = Chunk::new(writer, [values, values, held, tables, keep], setting, false, inline);
+            let (time, states) = ((setting.time, t), (setting.states.clone(), x));
+            chunk.reads_directly(Direct { time, states, rates: dx });
+            items.iter().for_each(|&item| chunk.item(item));
+            chunk.end_with_rates(outputs)
+        })
+    }
+
+    fn function(
+        &mut self,
+        into: &mut Gathered,
+        kinds: &[Type],
+        body: impl for<'f> FnOnce(Writer<'f>, &[Value]) -> Writer<'f>,
+    ) -> Result<Start, MachineError> {
+        let convention = self.isa.default_call_conv();
+        let mut signature = Signature::new(convention);
+        signature.params.extend(kinds.iter().map(|&kind| AbiParam::new(kind)));
         signature.returns.push(AbiParam::new(types::I64));
         self.context.clear();
         self.context.func = Function::with_name_signature(UserFuncName::default(), signature);
@@ -107,11 +143,8 @@ impl Generator {
         let entry = builder.create_block();
         builder.append_block_params_for_function_params(entry);
         builder.switch_to_block(entry);
-        let parameters = std::array::from_fn(|i| builder.block_params(entry)[i]);
-        let writer = Writer::new(builder, self.isa.default_call_conv());
-        let mut chunk = Chunk::new(writer, parameters, setting, along, inline);
-        items.iter().for_each(|&item| chunk.item(item));
-        let mut writer = chunk.end(live.iter().copied());
+        let arguments = builder.block_params(entry).to_vec();
+        let mut writer = body(Writer::new(builder, convention), &arguments);
         writer.builder.seal_all_blocks();
         writer.builder.finalize(self.isa.frontend_config());
         let compiled = self.context.compile(&*self.isa, &mut ControlPlane::default());

@@ -29,6 +29,28 @@ impl Codes {
 }
 
 impl Model {
+    /// Rates by machine code from where time and states are given; false if that does not do.
+    pub(super) fn rates_directly(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> bool {
+        if self.codes.rates.is_none() {
+            return false;
+        }
+        self.place_time(t);
+        let Model { codes, frame, layout, conserved, .. } = self;
+        frame.r[layout.conserved as usize..][..conserved.len()].copy_from_slice(conserved);
+        let Some(code) = &codes.rates else { return false };
+        code.rates(frame, t, x, dx) && dx.iter().all(|rate| rate.is_finite())
+    }
+
+    /// Rates alone as machine code, as [`compile_machine`](Model::compile_machine) makes them.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn compile_rates(&mut self) -> Result<(), MachineError> {
+        let code = Generator::new()?.compile(&self.program, &self.layout, &self.rates, false)?;
+        self.codes.rates = Some(Arc::new(code));
+        Ok(())
+    }
+
     /// From now on rates, recorded values and switching functions run as machine code: the same bits, sooner. It takes some
     /// 4 µs an instruction once; a model that is evaluated thousands of times gains.
     ///
@@ -72,8 +94,7 @@ impl Model {
 
     /// What is recorded has changed.
     pub(super) fn recorded_changed(&mut self) {
-        self.codes.recorded = None;
-        if self.runs_machine_code() {
+        if self.codes.recorded.take().is_some() {
             // Without it the bytecode goes on recording.
             let _ = Generator::new().and_then(|mut generator| self.compile_recorded(&mut generator));
         }

@@ -1,5 +1,6 @@
 
-/* ---- linear equations: rows scaled, threshold pivoting, one refinement ---- */
+/* ---- linear equations: a symmetric matrix that is positive definite as U'DU; all others with rows scaled, threshold
+ * pivoting and one refinement ---- */
 
 typedef struct {
     int n;
@@ -67,6 +68,91 @@ static void ha_lu_swap(ha_lu *l, int a, int b)
     l->order[b] = order;
 }
 
+/* start - a.b: the sum of groups of four products, each of the four places apart, then the products that are left. */
+static double ha_less_products(double start, const double *a, const double *b, int n)
+{
+    double result = start;
+    int i = 0;
+    int j;
+    if (n >= 4) {
+        double sums[4] = {0.0, 0.0, 0.0, 0.0};
+        for (; i + 4 <= n; i += 4) {
+            for (j = 0; j < 4; ++j) {
+                const double product = a[i + j] * b[i + j];
+                sums[j] += product;
+            }
+        }
+        result -= (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    }
+    for (; i < n; ++i) {
+        const double product = a[i] * b[i];
+        result -= product;
+    }
+    return result;
+}
+
+/* Factors a symmetric matrix that is positive definite: U above the diagonal, the inverse of D in scale, -1 as the first
+ * of the order. 0 if it is not such a matrix. */
+static int ha_lu_factor_definite(ha_lu *l)
+{
+    const int n = l->n;
+    int i;
+    int j;
+    int k;
+    if (n < 2) {
+        return 0;
+    }
+    for (i = 0; i < n; ++i) {
+        for (j = 0; j < i; ++j) {
+            if (l->matrix[i * n + j] != l->matrix[j * n + i]) {
+                return 0;
+            }
+        }
+    }
+    ha_copy(l->factors, l->matrix, n * n);
+    for (k = 0; k < n; ++k) {
+        const double *row = l->factors + k * n;
+        const double pivot = row[k];
+        double inverse;
+        if (!(pivot > 0.0 && pivot > DBL_EPSILON * (double)n * l->matrix[k * n + k] && ha_finite(pivot))) {
+            return 0;
+        }
+        inverse = 1.0 / pivot;
+        for (j = k + 1; j < n; ++j) {
+            const double factor = row[j] * inverse;
+            for (i = j; i < n; ++i) {
+                const double product = factor * row[i];
+                l->factors[j * n + i] -= product;
+            }
+        }
+        for (j = k + 1; j < n; ++j) {
+            l->factors[k * n + j] *= inverse;
+        }
+        l->scale[k] = inverse;
+    }
+    l->order[0] = -1;
+    return 1;
+}
+
+static void ha_lu_solve_definite(const ha_lu *l, double *b)
+{
+    const int n = l->n;
+    int j;
+    int k;
+    for (k = 0; k < n; ++k) {
+        for (j = k + 1; j < n; ++j) {
+            const double product = l->factors[k * n + j] * b[k];
+            b[j] -= product;
+        }
+    }
+    for (k = 0; k < n; ++k) {
+        b[k] *= l->scale[k];
+    }
+    for (k = n - 1; k >= 0; --k) {
+        b[k] = ha_less_products(b[k], l->factors + k * n + k + 1, b + k + 1, n - k - 1);
+    }
+}
+
 /* Factors the matrix; 0 if no pivot is left, or if an entry is not finite. */
 static int ha_lu_factor(ha_lu *l)
 {
@@ -74,6 +160,9 @@ static int ha_lu_factor(ha_lu *l)
     int row;
     int j;
     int k;
+    if (ha_lu_factor_definite(l)) {
+        return 1;
+    }
     for (row = 0; row < n; ++row) {
         double most = DBL_MIN;
         for (j = 0; j < n; ++j) {
@@ -110,26 +199,17 @@ static void ha_lu_substitute(ha_lu *l, double *b)
 {
     const int n = l->n;
     int row;
-    int j;
     for (row = 0; row < n; ++row) {
-        double sum = -0.0;
-        for (j = 0; j < row; ++j) {
-            const double product = l->factors[row * n + j] * l->work[j];
-            sum += product;
-        }
-        l->work[row] = b[l->order[row]] - sum;
+        l->work[row] = ha_less_products(b[l->order[row]], l->factors + row * n, l->work, row);
     }
     for (row = n - 1; row >= 0; --row) {
-        double sum = -0.0;
-        for (j = row + 1; j < n; ++j) {
-            const double product = l->factors[row * n + j] * b[j];
-            sum += product;
-        }
-        b[row] = (l->work[row] - sum) / l->factors[row * n + row];
+        const double *factors = l->factors + row * n;
+        const double left = ha_less_products(l->work[row], factors + row + 1, b + row + 1, n - row - 1);
+        b[row] = left / factors[row];
     }
 }
 
-/* Replaces b by the solution, refined once. */
+/* Replaces b by the solution. */
 static void ha_lu_solve(ha_lu *l, double *b)
 {
     const int n = l->n;
@@ -137,6 +217,10 @@ static void ha_lu_solve(ha_lu *l, double *b)
     int j;
     if (n == 1) {
         b[0] /= l->factors[0];
+        return;
+    }
+    if (l->order[0] < 0) {
+        ha_lu_solve_definite(l, b);
         return;
     }
     ha_copy(l->rest, b, n);
@@ -163,6 +247,9 @@ static int ha_lu_is_positive(const ha_lu *l)
     int changes = 0;
     int j;
     int k;
+    if (l->order[0] < 0) {
+        return 1;
+    }
     for (k = 0; k < n; ++k) {
         if (l->factors[k * n + k] < 0.0) {
             ++changes;
