@@ -46,6 +46,19 @@ Examples:
   halfarrow equations car.bond
   halfarrow equations car.bond --form inverted --format latex > car.tex")]
     Equations(Equations),
+    /// Put all formulations beside each other: size, cost, time at equal error, agreement
+    #[command(after_help = "\
+Examples:
+  halfarrow compare car.bond
+  halfarrow compare car.bond --to 10 --error 1e-8 --plot work.svg")]
+    Compare(Compare),
+    /// Linearise: matrices A B C D, poles, zeros, frequency response, controllability, observability
+    #[command(after_help = "\
+Examples:
+  halfarrow linearize car.bond --at equilibrium --plot bode.svg
+  halfarrow linearize car.bond --at 2.5 --inputs road --outputs travel,body.f --nyquist nyquist.svg
+  halfarrow linearize car.bond --symbolic")]
+    Linearize(Linearize),
     /// Compute a trajectory
     #[command(after_help = "\
 Examples:
@@ -54,6 +67,12 @@ Examples:
   halfarrow simulate car.bond --to 10 --set k=20e3 --input road=road.csv --record body.f,damper.e
   halfarrow simulate car.bond --to 10 --solver rk4 --step 1e-3 --out -")]
     Simulate(Box<Simulate>),
+    /// Write one page with everything: drawing, causality, paths, equations, comparison, plots, audit
+    #[command(after_help = "\
+Examples:
+  halfarrow report car.bond --out car.html
+  halfarrow report car.bond --to 10 --without-comparison --out car.html")]
+    Report(Report),
     /// Draw the bond graph with its causal strokes and paths
     #[command(after_help = "Example:\n  halfarrow draw car.bond --out car.svg")]
     Draw(Draw),
@@ -269,6 +288,93 @@ pub struct Simulate {
     pub draw: Vec<PathBuf>,
 }
 
+/// `compare`.
+#[derive(Debug, Args)]
+pub struct Compare {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// End of the runs, in s [default: ten times the slowest time of the motion near the start]
+    #[arg(long, value_name = "TIME")]
+    pub to: Option<f64>,
+    /// Error at which times are compared, relative to the greatest magnitude of each variable
+    #[arg(long, default_value_t = 1e-6)]
+    pub error: f64,
+    /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Runs whose median counts as the time
+    #[arg(long, default_value_t = 7)]
+    pub repeats: usize,
+    /// Time of a run, in s, beyond which no tighter tolerance is tried
+    #[arg(long, value_name = "TIME", default_value_t = 20.0)]
+    pub patience: f64,
+    /// Where to plot work against error: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub plot: Vec<PathBuf>,
+}
+
+/// `linearize`.
+#[derive(Debug, Args)]
+pub struct Linearize {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Where: `start`, `equilibrium` (near the start) or the time in s that a run has reached
+    #[arg(long, default_value = "start", value_parser = point)]
+    pub at: Point,
+    /// Inputs: declared ones, and sources by their names, to whose value the input is added [default: the declared ones, else
+    /// all sources]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub inputs: Vec<String>,
+    /// Outputs: anything that can be recorded [default: the declared ones, else the states]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub outputs: Vec<String>,
+    /// Tell matrices and transfer functions as expressions too
+    #[arg(long)]
+    pub symbolic: bool,
+    /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Where to draw the Bode plot: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub plot: Vec<PathBuf>,
+    /// Where to draw the Nyquist plot: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub nyquist: Vec<PathBuf>,
+}
+
+/// Where to linearise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Point {
+    /// At the start.
+    Start,
+    /// At rest.
+    Equilibrium,
+    /// Where a run is at this time, in s.
+    Time(f64),
+}
+
+/// `report`.
+#[derive(Debug, Args)]
+pub struct Report {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Where to write the page: a .html file
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// End of the runs, in s [default: ten times the slowest time of the motion near the start]
+    #[arg(long, value_name = "TIME")]
+    pub to: Option<f64>,
+    /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Error at which forms are compared, relative to the greatest magnitude of each variable
+    #[arg(long, default_value_t = 1e-6)]
+    pub error: f64,
+    /// Leave out the comparison of forms, which takes time
+    #[arg(long)]
+    pub without_comparison: bool,
+}
+
 /// `draw`.
 #[derive(Debug, Args)]
 pub struct Draw {
@@ -321,6 +427,17 @@ pub struct Export {
     /// The length of a step, in s
     #[arg(long, value_name = "TIME", default_value_t = 1e-3)]
     pub step: f64,
+}
+
+/// Reads `start`, `equilibrium` or a time.
+fn point(text: &str) -> Result<Point, String> {
+    match text {
+        "start" => Ok(Point::Start),
+        "equilibrium" => Ok(Point::Equilibrium),
+        _ => {
+            text.parse().map(Point::Time).map_err(|_| format!("`{text}` is neither start, equilibrium nor a time in s"))
+        }
+    }
 }
 
 /// Reads `name=value`.

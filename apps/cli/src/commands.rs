@@ -1,15 +1,21 @@
 //! The commands: each gives its exit status.
 
 mod analyse;
+mod compare;
 mod export;
 mod files;
+mod linearize;
 mod picture;
+mod report;
 mod run;
 
 pub use analyse::{check, equations, loops, show};
+pub use compare::compare;
 pub use export::export;
 pub use files::{fmt, new};
+pub use linearize::linearize;
 pub use picture::draw;
+pub use report::report;
 pub use run::simulate;
 
 use halfarrow::{Error, Model, Override};

@@ -22,7 +22,10 @@ fn main() -> ExitCode {
         Command::Show(a) => commands::show(&a),
         Command::Loops(a) => commands::loops(&a),
         Command::Equations(a) => commands::equations(&a),
+        Command::Compare(a) => commands::compare(&a),
+        Command::Linearize(a) => commands::linearize(&a),
         Command::Simulate(a) => commands::simulate(&a),
+        Command::Report(a) => commands::report(&a),
         Command::Draw(a) => commands::draw(&a),
         Command::Export(a) => commands::export(&a),
     };

@@ -57,6 +57,15 @@ pub fn table<const N: usize>(header: [&str; N], rows: impl IntoIterator<Item = [
     format!("{table}\n")
 }
 
+/// A table with as many columns as its header.
+pub fn wide_table(header: Vec<String>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(header);
+    rows.into_iter().for_each(|row| _ = table.add_row(row));
+    format!("{table}\n")
+}
+
 /// A number with six digits.
 pub fn short(x: f64) -> String {
     let size = x.abs();
@@ -101,6 +110,14 @@ impl Progress {
         }
         bar.set_position((t / self.to * 1000.0) as u64);
         bar.set_message(format!("t = {} s of {} s", short(t), short(self.to)));
+    }
+
+    /// A part of the work is done, and this is being done.
+    pub fn part(&mut self, part: f64, what: &str) {
+        self.reach(part * self.to);
+        if let Some(bar) = &self.bar {
+            bar.set_message(what.to_string());
+        }
     }
 
     /// The run is over.

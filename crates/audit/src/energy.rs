@@ -83,9 +83,13 @@ fn compare(times: &[f64], x: &[f64], rate: &[f64], name: &str, greatest: &mut Op
     }
 }
 
+/// Relative to the greatest magnitude of its kind.
+const ROUNDING: f64 = 1e-14;
+
 /// Keeps the finding that stands out most above what the samples resolve.
 fn judge(greatest: &mut Option<Finding>, value: f64, resolution: f64, time: f64, place: impl Fn() -> String) {
-    let excess = |value: f64, resolution: f64| (value - resolution).max(0.0);
+    // What stands out by less than rounding does not.
+    let excess = |value: f64, resolution: f64| Some(value - resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
     let above = |g: &Finding| {
         let (new, old) = (excess(value, resolution), excess(g.value, g.resolution));
         value.is_nan() || new > old || (new == old && value > g.value)

@@ -15,6 +15,6 @@ mod model;
 pub use halfarrow_compiler::algebra::math;
 pub use machine::MachineError;
 pub use model::{
-    Equilibrium, EquilibriumError, ImplicitModel, InputError, Model, ParameterError, RecordError, StartConflict,
-    StartError, StartValue,
+    Equilibrium, EquilibriumError, ImplicitModel, InputError, Linearised, Model, Operations, ParameterError,
+    RecordError, StartConflict, StartError, StartValue,
 };

@@ -84,6 +84,11 @@ pub enum Problem {
         /// The endings that are known.
         known: Vec<&'static str>,
     },
+    /// Matrices of a model near a point that do not exist.
+    NoMatrices {
+        /// Why.
+        reason: String,
+    },
     /// A start at rest where there is none.
     NoEquilibrium {
         /// Why there is none.
@@ -180,6 +185,7 @@ impl fmt::Display for Problem {
                     known.join(" or ")
                 )
             }
+            Problem::NoMatrices { reason } => write!(f, "the model cannot be linearised: {reason}"),
             Problem::NoEquilibrium { reason } => write!(f, "no start at rest: {reason}"),
             Problem::NoStep => f.write_str("this solver has a fixed step: give it with --step, as in `--step 1e-3`"),
         }

@@ -13,18 +13,23 @@
 
 mod audited;
 mod check;
+mod compare;
 mod disk;
 mod draw;
 mod equations;
 mod error;
 mod export;
+mod linear_algebra;
+mod linearize;
 mod loops;
 mod model;
+mod report;
 mod run;
 mod stage;
 
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;
+pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
 pub use draw::Picture;
 pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
 pub use error::{Error, Problem};
@@ -36,7 +41,11 @@ pub use halfarrow_emit::File;
 pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::{Failure, Method};
 pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
+pub use linearize::{
+    Linearize, LinearizeReport, Mode, Point, ReachReport, Response, StateAt, SymbolicReport, Terminal, TransferFunction,
+};
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text};
+pub use report::Report;
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;

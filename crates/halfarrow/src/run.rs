@@ -204,19 +204,19 @@ impl Model {
         notes: Vec<String>,
     ) -> Result<Simulated, Error> {
         match outcome {
-            Ok(summary) => Ok(Simulated { trace, report: self.report(&summary, options.to, audit, notes) }),
+            Ok(summary) => Ok(Simulated { trace, report: self.run_report(&summary, options.to, audit, notes) }),
             Err(stopped) if matches!(stopped.failure, Failure::BadOption { .. }) => {
                 Err(Problem::BadOption { reason: stopped.failure.to_string() }.into())
             }
             Err(stopped) => {
-                let report = self.report(&stopped.summary, stopped.time, audit, notes);
+                let report = self.run_report(&stopped.summary, stopped.time, audit, notes);
                 Err(Error::Run(Box::new(Stopped { failure: stopped.failure, trace, report })))
             }
         }
     }
 
     /// A form beside the minimal one, with inputs connected and springs as asked.
-    fn implicit_system(&self, equations: &Equations, run: &Run) -> Result<exec::ImplicitModel, Error> {
+    pub(crate) fn implicit_system(&self, equations: &Equations, run: &Run) -> Result<exec::ImplicitModel, Error> {
         let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
         let made = exec::ImplicitModel::new(schedule(equations), minimal);
         let mut system = made.map_err(|failure| self.stopped(failure))?;
@@ -238,7 +238,7 @@ impl Model {
         Ok(system)
     }
 
-    fn report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
+    fn run_report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
         RunReport {
             model: self.graph.name.clone(),
             reached,
@@ -260,7 +260,7 @@ impl Model {
 
     /// A run that never began.
     pub(crate) fn stopped(&self, failure: Failure) -> Error {
-        let report = self.report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
+        let report = self.run_report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
         Error::Run(Box::new(Stopped { failure, trace: Trace::default(), report }))
     }
 
@@ -414,7 +414,7 @@ fn options(run: &Run) -> Result<Options, Problem> {
 
 /// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does
 /// not tell: a pendulum swings without a spring.
-fn quicken(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
+pub(crate) fn quicken(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
     let Some(rate) = system.program().parameters.iter().position(|p| p.name == "form.rate") else { return Ok(()) };
     let (Some(fastest), Some(own)) = (system.fastest_rate(0.0, x), system.parameter(rate)) else { return Ok(()) };
     if fastest <= own {
@@ -437,7 +437,7 @@ fn implicit_options(run: &Run) -> Result<Options, Problem> {
 }
 
 /// Connects the files of a run to the inputs.
-fn connect(
+pub(crate) fn connect(
     inputs: &[Input],
     run: &Run,
     mut put: impl FnMut(&str, &[f64], &[f64]) -> Result<(), exec::InputError>,
@@ -484,7 +484,7 @@ fn left_out(system: &impl Recording, only_default: bool) -> Vec<String> {
     without.collect()
 }
 
-fn refused(system: &impl Recording, error: exec::RecordError) -> Problem {
+pub(crate) fn refused(system: &impl Recording, error: exec::RecordError) -> Problem {
     match error {
         exec::RecordError::Unknown(name) => {
             let known = system.program().observed.iter().map(|o| o.name.as_str());

@@ -2,6 +2,7 @@
 //! read from CSV.
 #![forbid(unsafe_code)]
 
+mod chart;
 mod csv;
 mod input;
 #[cfg(feature = "parquet")]
@@ -9,9 +10,11 @@ mod parquet;
 mod plot;
 #[cfg(feature = "png")]
 mod png;
+mod svg;
 mod trace;
 mod whole;
 
+pub use chart::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
 pub use csv::{csv_text, write_csv};
 pub use input::{InputError, parse_inputs, read_inputs};
 #[cfg(feature = "parquet")]

@@ -5,8 +5,9 @@ mod decimate;
 
 use std::fmt::Write;
 
+use crate::svg::{COLOURS, FAMILIES, escape, n, shorten};
 use crate::{Column, Trace};
-use axis::Axis;
+pub(crate) use axis::Axis;
 use decimate::decimate;
 
 /// Size of the area of one panel, in px.
@@ -20,14 +21,9 @@ const MARGIN: f64 = 22.0;
 const HEAD: f64 = 34.0;
 /// Panels drawn in all, and curves in each.
 const PANELS: usize = 12;
-const CURVES: usize = 10;
+const CURVES: usize = COLOURS.len();
 /// Longest name in the legend, in characters.
 const NAME: usize = 28;
-
-const FAMILIES: &str = "DejaVu Sans, Verdana, Noto Sans, Segoe UI, Helvetica, Arial, sans-serif";
-/// Colours that people who see few colours can tell apart, after Okabe and Ito.
-const COLOURS: [&str; CURVES] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a3e9d", "#8c8c2b", "#444444", "#b22222"];
 
 /// Draws a trace over time as SVG on a white ground.
 ///
@@ -181,35 +177,6 @@ impl Page {
     fn text(&mut self, at: [f64; 2], attributes: &str, text: &str) {
         _ = write!(self.out, "<text x=\"{}\" y=\"{}\" {attributes}>{}</text>", n(at[0]), n(at[1]), escape(text));
     }
-}
-
-/// A number for SVG: two decimals at most, the shortest way.
-fn n(x: f64) -> String {
-    let text = format!("{x:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_string() } else { text.to_string() }
-}
-
-/// At most `most` characters; a longer text ends in an ellipsis.
-fn shorten(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
-        return text.to_string();
-    }
-    let kept: String = text.chars().take(most - 1).collect();
-    format!("{}…", kept.trim_end())
-}
-
-/// The text with what XML reserves written out, and without characters that XML forbids.
-fn escape(text: &str) -> String {
-    let written = |c: char| match c {
-        '&' => "&amp;".to_string(),
-        '<' => "&lt;".to_string(),
-        '>' => "&gt;".to_string(),
-        '"' => "&quot;".to_string(),
-        c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => " ".to_string(),
-        c => c.to_string(),
-    };
-    text.chars().map(written).collect()
 }
 
 #[cfg(test)]

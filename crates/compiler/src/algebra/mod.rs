@@ -38,7 +38,9 @@ pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;
 pub use symbol_sets::Symbols;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
-pub use text::{Names, Place, PlainNames, Sort, ascii, latex, latex_name, unicode, unicode_name};
+pub use text::{
+    Names, Place, PlainNames, Sort, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode, unicode_name,
+};
 
 #[cfg(test)]
 mod tests;

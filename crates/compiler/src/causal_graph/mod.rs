@@ -25,7 +25,7 @@ pub use contradiction::warnings;
 pub use drawn::{as_drawn, resistors_first, without_constraints};
 pub use ports::Virtual;
 pub(crate) use ports::{circuits, imposes_effort, rank_given};
-pub use rank::{StateRank, state_rank};
+pub use rank::{Reach, StateRank, control_reach, observe_reach, state_rank};
 
 /// Where the causal stroke of a bond sits: at the end that the effort runs towards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,9 +8,10 @@ use super::dependent::gives_flow;
 use super::inverted::{Inverted, Turner};
 use super::{CausalPaths, find_paths};
 use crate::algebra::Symbol;
-use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortRef};
-use crate::causal_graph::CausalGraph;
+use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortRef, ResistorLaw};
 use crate::causal_graph::signals::{EdgeKind, NodeId, SignalGraph, signal_graph};
+use crate::causal_graph::{CausalGraph, Stroke};
+use crate::ids::Table;
 
 /// What was inverted for what, and what could not be.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -39,6 +40,10 @@ pub struct Opened {
 pub enum Refusal {
     /// No way from it to a resistor can be turned: a junction would have two setters or none.
     NoWay,
+    /// The law of this element cannot be written for the other variable, which it would have to set.
+    LawNotInvertible(ElementId),
+    /// The paths that are left would have no unique solution: their determinant is zero.
+    DeterminantZero,
     /// It can be turned, but as many break variables and equations are left as before.
     NoGain,
     /// The modulus of this element would read its rate.
@@ -51,6 +56,8 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Refusal::NoWay => "no way from it to a resistor can be turned",
+            Refusal::LawNotInvertible(_) => "a law that it would turn cannot be inverted",
+            Refusal::DeterminantZero => "the paths left would have the determinant zero",
             Refusal::NoGain => "its inversion leaves as many break variables",
             Refusal::ModulusOfRate(_) => "a modulus would be a function of its rate",
             Refusal::Dependent => "it follows from others already",
@@ -131,11 +138,47 @@ fn refusals(causal: &CausalGraph, inverted: &Inverted, eliminated: &BTreeSet<Por
         let reason = match modulus_reading(graph, &signals, port) {
             Some(element) => Refusal::ModulusOfRate(element),
             None if !turner.turn(port, |end, turner| turner.is_resistor(end)) => Refusal::NoWay,
-            None => Refusal::NoGain,
+            None => match bent_law(graph, &inverted.strokes, &turner.strokes) {
+                Some(element) => Refusal::LawNotInvertible(element),
+                None if is_singular(causal, turner.strokes) => Refusal::DeterminantZero,
+                None => Refusal::NoGain,
+            },
         };
         refused.push((port, reason));
     }
     refused
+}
+
+/// A resistor whose port turns, with a law that cannot be written for what it would set then.
+fn bent_law(graph: &BondGraph, before: &Table<BondId, Stroke>, after: &Table<BondId, Stroke>) -> Option<ElementId> {
+    let mut x = graph.exprs.clone();
+    graph.outer_ports().into_iter().filter(|&port| before[graph.bond_of(port)] != after[graph.bond_of(port)]).find_map(
+        |port| {
+            let Kind::Resistor(laws) = &graph.elements[port.element].kind else { return None };
+            let bond = &graph.bonds[graph.bond_of(port)];
+            let sets_flow = gives_flow(graph, after, port)?;
+            let wanted = if sets_flow { bond.flow } else { bond.effort };
+            let zero = match (*laws.get(port.port as usize)?, sets_flow) {
+                (ResistorLaw::Resistive(_), false) | (ResistorLaw::Conductive(_), true) => return None,
+                (ResistorLaw::Resistive(effort), true) => {
+                    let own = x.sym(bond.effort);
+                    x.sub(effort, own)
+                }
+                (ResistorLaw::Conductive(flow), false) => {
+                    let own = x.sym(bond.flow);
+                    x.sub(flow, own)
+                }
+                (ResistorLaw::Implicit(zero), _) => zero,
+            };
+            x.solve_for(zero, wanted).is_none().then_some(port.element)
+        },
+    )
+}
+
+/// Whether a component of paths with these strokes has the determinant zero.
+fn is_singular(causal: &CausalGraph, strokes: Table<BondId, Stroke>) -> bool {
+    let turned = CausalGraph { graph: causal.graph.clone(), strokes, ports: causal.ports.clone() };
+    find_paths(&turned).components.iter().any(|component| component.singular)
 }
 
 /// The transformer or gyrator whose modulus reads a variable of this storage at once.

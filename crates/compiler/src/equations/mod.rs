@@ -31,7 +31,7 @@ pub use derive::derive_equations;
 pub use display::{Dependent, DisplayEquation, Shown, show};
 pub use form::Form;
 pub use text::{
-    Style, print, print_certificate, print_dependent, print_expr, print_form, print_meanings, print_symbol,
+    Style, print, print_certificate, print_dependent, print_expr, print_form, print_meanings, print_sides, print_symbol,
 };
 
 /// Equations in evaluation order.

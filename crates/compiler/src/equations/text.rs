@@ -1,12 +1,16 @@
-//! Equations as text: the model language (for programs), Unicode (for people), LaTeX (for papers).
+//! Equations as text: the model language (for programs), Unicode (for people), LaTeX (for papers), MathML (for
+//! pages).
 
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
 use super::{Cause, Dependent, DisplayEquation, Shown, Step, places};
-use crate::algebra::{Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, unicode, unicode_name};
+use crate::algebra::{
+    Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
+    unicode_name,
+};
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
-use crate::causal_paths::port_name;
+use crate::causal_paths::{Refusal, port_name};
 
 /// A way of writing equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,15 +21,21 @@ pub enum Style {
     Unicode,
     /// LaTeX.
     Latex,
+    /// MathML, the elements without the `math` around them.
+    MathMl,
 }
 
 /// The equations, one a line. For people, sources that vary in time stand by name; [`print_meanings`] has their values.
 pub fn print(shown: &Shown, style: Style) -> Vec<String> {
+    print_sides(shown, style).into_iter().map(|(left, right)| equal(&left, &right, style)).collect()
+}
+
+/// The same, left and right sides apart.
+pub fn print_sides(shown: &Shown, style: Style) -> Vec<(String, String)> {
     let names = Written::of(shown);
     let side = |e: Expr| expression(e, &names, style);
     let sides = |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
-    let line = |(left, right)| format!("{} = {}", side(left), side(right));
-    shown.display.iter().map(sides).map(line).collect()
+    shown.display.iter().map(sides).map(|(left, right)| (side(left), side(right))).collect()
 }
 
 /// What stands behind the names in the equations: sources that vary in time, states that are sums of stored quantities,
@@ -96,7 +106,13 @@ pub fn print_certificate(shown: &Shown) -> Vec<String> {
         lines.push(format!("{name}: no storage removes this break variable"));
     }
     for (port, why) in &certificate.refused {
-        lines.push(format!("{} stays as it is: {why}", port_name(graph, *port)));
+        let element = match why {
+            Refusal::LawNotInvertible(element) | Refusal::ModulusOfRate(element) => {
+                format!(" ({})", graph.elements[*element].name)
+            }
+            _ => String::new(),
+        };
+        lines.push(format!("{} stays as it is: {why}{element}", port_name(graph, *port)));
     }
     lines
 }
@@ -116,7 +132,14 @@ pub fn print_symbol(shown: &Shown, symbol: Symbol, style: Style) -> String {
 }
 
 fn definition(symbol: Symbol, value: Expr, names: &Written, style: Style) -> String {
-    format!("{} = {}", name(symbol, names, style), expression(value, names, style))
+    equal(&name(symbol, names, style), &expression(value, names, style), style)
+}
+
+fn equal(left: &str, right: &str, style: Style) -> String {
+    match style {
+        Style::MathMl => format!("{left}<mo>=</mo>{right}"),
+        _ => format!("{left} = {right}"),
+    }
 }
 
 fn name(symbol: Symbol, names: &Written, style: Style) -> String {
@@ -124,6 +147,7 @@ fn name(symbol: Symbol, names: &Written, style: Style) -> String {
         Style::Ascii => names.ascii(symbol),
         Style::Unicode => names.unicode(symbol),
         Style::Latex => names.latex(symbol),
+        Style::MathMl => names.mathml(symbol),
     }
 }
 
@@ -132,6 +156,7 @@ fn expression(e: Expr, names: &Written, style: Style) -> String {
         Style::Ascii => ascii(names.x, e, names),
         Style::Unicode => unicode(names.x, e, names),
         Style::Latex => latex(names.x, e, names),
+        Style::MathMl => mathml(names.x, e, names),
     }
 }
 
@@ -207,6 +232,18 @@ impl Names for Written<'_> {
             }
             None if rate => latex_name(&format!("{name}'")),
             None => latex_name(&name),
+        }
+    }
+
+    fn mathml(&self, symbol: Symbol) -> String {
+        let (name, rate) = self.name(symbol);
+        let mark = if rate { "'" } else { "" };
+        match subscripted(&name) {
+            Some((variable, element)) => {
+                let variable = mathml_name(&format!("{variable}{mark}"));
+                format!("<msub>{variable}{}</msub>", mathml_owner(element))
+            }
+            None => mathml_name(&format!("{name}{mark}")),
         }
     }
 

@@ -7,6 +7,9 @@ use halfarrow_sim::{Failure, System};
 const ITERATIONS: usize = 200;
 /// Rates below this fraction of the terms they are made of count as zero.
 const AT_REST: f64 = 1e-9;
+/// Strides along a curve of equilibria, and states up to which one is followed.
+const STRIDES: usize = 400;
+const MOST_FOLLOWED: usize = 200;
 /// More states than this are not searched: the equations are dense.
 const LARGEST: usize = 2000;
 
@@ -24,12 +27,111 @@ pub struct Equilibrium {
 
 impl Model {
     /// The equilibrium nearest to `x` at time `t`, with inputs and conditions as they are then: Newton with the exact
-    /// Jacobian, by way of a damped motion where Newton alone does not get there.
+    /// Jacobian, by way of a damped motion where Newton alone does not get there; where that fails as well, the loads
+    /// that would hold `x` at rest are taken away little by little, and the equilibrium is followed, round folds too.
     ///
     /// # Errors
     /// There is none near, or the model has no value on the way.
     pub fn equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         self.restart();
+        let refused = match self.settle(t, x) {
+            Err(EquilibriumError::None(left)) => EquilibriumError::None(left),
+            settled => return settled,
+        };
+        let released = self.release_loads(t, x);
+        released.and_then(|near| self.settle(t, &near).ok()).ok_or(refused)
+    }
+
+    /// A point near the equilibrium that the start `x` is joined to by equilibria under smaller and smaller loads:
+    /// `f(x) = (1 - λ) f(start)` from `λ = 0` to 1, along the curve. `None` if the curve does not lead there.
+    fn release_loads(&mut self, t: f64, start: &[f64]) -> Option<Vec<f64>> {
+        let n = start.len();
+        if n > MOST_FOLLOWED {
+            return None;
+        }
+        let (load, _) = self.at_rest(t, start).ok()?;
+        // States in parts of their magnitude, so that a length along the curve means something.
+        let size: Vec<f64> = start.iter().zip(&self.scales).map(|(x, s)| x.abs().max(*s)).collect();
+        let least = size.iter().copied().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
+        let size: Vec<f64> = size.into_iter().map(|s| if s > 0.0 { s } else { least.min(1.0) }).collect();
+        let (mut z, mut part) = (vec![0.0; n], 0.0);
+        let mut along: Vec<f64> = (0..=n).map(|i| f64::from(u8::from(i == n))).collect();
+        let mut stride = 0.05;
+        for _ in 0..STRIDES {
+            let slopes = self.held(t, start, &size, &load, &z, part)?.1;
+            along = tangent(&slopes, &along, n)?;
+            let trial = |stride: f64| -> (Vec<f64>, f64) {
+                let moved = z.iter().zip(&along).map(|(z, a)| z + stride * a).collect();
+                (moved, part + stride * along[n])
+            };
+            // Not beyond the end.
+            let reach = if part + stride * along[n] > 1.0 { (1.0 - part) / along[n] } else { stride };
+            let (mut at, mut lambda) = trial(reach);
+            match self.correct(t, start, &size, &load, &mut at, &mut lambda) {
+                Some(iterations) => {
+                    (z, part) = (at, lambda);
+                    if part >= 1.0 - 1e-9 {
+                        return Some(start.iter().zip(&size).zip(&z).map(|((x, s), z)| x + s * z).collect());
+                    }
+                    stride = if iterations <= 3 { (1.6 * stride).min(5.0) } else { stride };
+                }
+                None if stride > 1e-7 => stride *= 0.4,
+                None => return None,
+            }
+        }
+        None
+    }
+
+    /// Newton of least steps back to the curve; how many iterations it took.
+    fn correct(
+        &mut self,
+        t: f64,
+        start: &[f64],
+        size: &[f64],
+        load: &[f64],
+        z: &mut [f64],
+        part: &mut f64,
+    ) -> Option<usize> {
+        let n = start.len();
+        let mut last = f64::INFINITY;
+        for iteration in 1..=8 {
+            let (miss, slopes) = self.held(t, start, size, load, z, *part)?;
+            let step = minimum_norm::step(&slopes, &miss, n + 1)?.step;
+            z.iter_mut().zip(&step).for_each(|(z, s)| *z += s);
+            *part += step[n];
+            let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+            if length < 1e-10 {
+                return Some(iteration);
+            }
+            if !length.is_finite() || length > 2.0 * last {
+                return None;
+            }
+            last = length;
+        }
+        None
+    }
+
+    /// `f(x) - (1 - λ) load` and its derivatives by the scaled states and `λ`, row by row.
+    fn held(
+        &mut self,
+        t: f64,
+        start: &[f64],
+        size: &[f64],
+        load: &[f64],
+        z: &[f64],
+        part: f64,
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let n = start.len();
+        let x: Vec<f64> = start.iter().zip(size).zip(z).map(|((x, s), z)| x + s * z).collect();
+        let (rates, jacobian) = self.at_rest(t, &x).ok()?;
+        let miss = rates.iter().zip(load).map(|(r, l)| r - (1.0 - part) * l).collect();
+        let entry = |i: usize, j: usize| if j < n { jacobian[i * n + j] * size[j] } else { load[i] };
+        let slopes = (0..n).flat_map(|i| (0..=n).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect();
+        Some((miss, slopes))
+    }
+
+    /// Newton from `x`, by way of a damped motion.
+    fn settle(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let n = x.len();
         if n > LARGEST {
             return Err(EquilibriumError::TooLarge(n));
@@ -48,7 +150,10 @@ impl Model {
             let settled = newton.step.iter().zip(&x).all(|(s, x)| s.abs() <= 1e-13 * x.abs())
                 || rates.iter().all(|&rate| rate == 0.0);
             if settled || rates.iter().zip(&scale).all(|(r, s)| r.abs() <= 1e-15 * s) {
-                if rates.iter().zip(&scale).all(|(r, s)| r.abs() <= AT_REST * s) {
+                // A rate that changes nothing in the shortest time that the model knows is none.
+                let fastest = (0..n).map(|i| jacobian[i * n + i].abs()).fold(fastest_pair(&jacobian, n), f64::max);
+                let idle = |i: usize| rates[i].abs() <= AT_REST * AT_REST.sqrt() * x[i].abs() * fastest;
+                if (0..n).all(|i| rates[i].abs() <= AT_REST * scale[i] || idle(i)) {
                     return Ok(Equilibrium { x, free: n - newton.rank, iterations: iteration });
                 }
                 if pull.is_infinite() {
@@ -112,6 +217,23 @@ impl Model {
         }
         Ok((rates, jacobian))
     }
+}
+
+/// The fastest rate at which two states exchange what they hold.
+fn fastest_pair(jacobian: &[f64], n: usize) -> f64 {
+    let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+    (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)))
+}
+
+/// The direction in which the curve goes on from where it went along `before`: what is left of that when all is taken away
+/// that the slopes see.
+fn tangent(slopes: &[f64], before: &[f64], n: usize) -> Option<Vec<f64>> {
+    let seen: Vec<f64> =
+        slopes.chunks(n + 1).map(|row| row.iter().zip(before).map(|(s, b)| s * b).sum::<f64>()).collect();
+    let back = minimum_norm::step(slopes, &seen, n + 1)?.step;
+    let along: Vec<f64> = before.iter().zip(&back).map(|(a, b)| a + b).collect();
+    let length = along.iter().map(|a| a * a).sum::<f64>().sqrt();
+    (length > 1e-12 && length.is_finite()).then(|| along.iter().map(|a| a / length).collect())
 }
 
 /// An implicit Euler step of length `pull` along the motion.

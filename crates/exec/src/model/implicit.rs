@@ -1,6 +1,6 @@
 //! Any form of a graph as a system `F(t, y, y') = 0`, with the minimal form beside it: that knows what is consistent.
 
-use super::{InputError, Model, ParameterError, RecordError, StartError};
+use super::{InputError, Model, Operations, ParameterError, RecordError, StartError};
 use crate::bytecode::Trouble;
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{Implicit, Program, Routine, Value};
@@ -42,6 +42,8 @@ pub struct ImplicitModel {
     carried_there: Routine,
     /// The form is the minimal one itself: its unknowns are the states of the reference.
     twin: bool,
+    /// Algebraic unknowns of a higher index, whose errors nothing controls while running.
+    uncontrolled: Vec<usize>,
     begun: bool,
 }
 
@@ -88,7 +90,10 @@ impl ImplicitModel {
             && form.program.tracked == reference.program.tracked
             && form.program.conserved == reference.program.conserved
             && names(&form.program) == names(&reference.program);
+        let algebraic = |i: &usize| !equations.differential[*i] && equations.indices[*i] > 1;
+        let all_told = pairs.len() == reference.program.states.len();
         let mut model = ImplicitModel {
+            uncontrolled: (0..n).filter(|i| all_told && algebraic(i)).collect(),
             seen: form.routine_for(&seen),
             mirrored: reference.routine_for(&mirrored),
             states: pairs.iter().map(|p| p.0).collect(),
@@ -117,6 +122,13 @@ impl ImplicitModel {
     /// The program of the form.
     pub fn program(&self) -> &Program {
         &self.form.program
+    }
+
+    /// What one evaluation of the residuals takes.
+    pub fn operations(&self) -> Operations {
+        let mut counted = self.form.operations();
+        counted.additions += self.equations.explicit.iter().filter(|explicit| **explicit).count();
+        counted
     }
 
     /// The minimal form beside it.
@@ -345,6 +357,19 @@ impl ImplicitModel {
         Ok(())
     }
 
+    /// The unknowns and their rates with those that nothing controls computed from the others: errors of a multiplier of
+    /// a higher index do not act back on the motion, so that no step is made shorter for them.
+    fn controlled(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        self.follow_back(t, y, yp)?;
+        let (mut whole, mut rates) = (y.to_vec(), yp.to_vec());
+        self.take_over(t, &mut whole)?;
+        for i in (0..y.len()).filter(|i| !self.uncontrolled.contains(i)) {
+            whole[i] = y[i];
+        }
+        self.take_rates(t, &whole, &mut rates)?;
+        Ok((whole, rates))
+    }
+
     /// The state of the reference from the unknowns, both in the mode that ends here.
     fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place(t, y, yp);
@@ -508,8 +533,13 @@ impl ImplicitSystem for ImplicitModel {
     }
 
     fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.place_rates(yp);
-        self.form.observe(t, y, out)
+        if self.uncontrolled.is_empty() || self.form.recorded.is_empty() {
+            self.place_rates(yp);
+            return self.form.observe(t, y, out);
+        }
+        let (y, yp) = self.controlled(t, y, yp)?;
+        self.place_rates(&yp);
+        self.form.observe(t, &y, out)
     }
 
     fn observed(&self) -> usize {
@@ -540,7 +570,13 @@ impl ImplicitSystem for ImplicitModel {
 
     fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place_rates(yp);
-        self.form.accept(t, y)
+        self.form.accept(t, y)?;
+        let observed = !self.uncontrolled.is_empty() && !self.form.recorded.is_empty();
+        if self.reference.has_delays() || observed && self.reference.follows_solutions_at_all() {
+            self.follow_back(t, y, yp)?;
+            self.reference.accept(t, &self.x)?;
+        }
+        Ok(())
     }
 
     fn switches(&self) -> usize {

@@ -9,13 +9,17 @@ mod implicit;
 mod inputs;
 mod jacobian;
 mod machine;
+mod linear;
 mod minimum_norm;
+mod operations;
 mod start;
 mod system;
 
 pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
 pub use implicit::ImplicitModel;
+pub use linear::Linearised;
+pub use operations::Operations;
 
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;

@@ -167,7 +167,12 @@ impl Model {
         Ok(())
     }
 
-    fn has_delays(&self) -> bool {
+    /// Whether there are laws solved by Newton, whose last solution decides which one comes next.
+    pub(super) fn follows_solutions_at_all(&self) -> bool {
+        !self.shown_blocks.is_empty() || self.rates.solves.iter().any(|solve| !solve.guess.is_empty())
+    }
+
+    pub(super) fn has_delays(&self) -> bool {
         self.held.iter().any(|h| matches!(h, Held::Delay(_)))
     }
 }

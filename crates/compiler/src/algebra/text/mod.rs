@@ -1,11 +1,12 @@
-//! Expressions as people write them: in the model language, as Unicode text, as LaTeX.
+//! Expressions as people write them: in the model language, as Unicode text, as LaTeX, as MathML.
 
+mod mathml;
 mod names;
 mod numbers;
 mod render;
 mod shape;
 
-pub use names::{Names, Place, PlainNames, Sort, latex_name, unicode_name};
+pub use names::{Names, Place, PlainNames, Sort, latex_name, mathml_name, mathml_owner, unicode_name};
 
 use super::exprs::Exprs;
 use super::node::Expr;
@@ -37,6 +38,20 @@ pub fn unicode(x: &Exprs, e: Expr, names: &dyn Names) -> String {
 /// The expression in LaTeX, for math mode.
 pub fn latex(x: &Exprs, e: Expr, names: &dyn Names) -> String {
     print(x, e, names, Style::Latex)
+}
+
+/// The expression in MathML Core, for pages: elements without the `math` around them.
+///
+/// ```
+/// use halfarrow_compiler::algebra::{Exprs, Facts, PlainNames, mathml};
+/// let mut x = Exprs::default();
+/// let [a, b] = ["a", "omega"].map(|name| x.symbol(name, Facts::default()));
+/// let [a, b] = [a, b].map(|s| x.sym(s));
+/// let e = x.div(a, b);
+/// assert_eq!(mathml(&x, e, &PlainNames(&x)), "<mfrac><mrow><mi>a</mi></mrow><mrow><mi>ω</mi></mrow></mfrac>");
+/// ```
+pub fn mathml(x: &Exprs, e: Expr, names: &dyn Names) -> String {
+    mathml::mathml(&shape::shape(x, e, names), names)
 }
 
 fn print(x: &Exprs, e: Expr, names: &dyn Names, style: Style) -> String {

@@ -19,6 +19,11 @@ pub trait Names {
         latex_name(&self.ascii(symbol))
     }
 
+    /// In MathML.
+    fn mathml(&self, symbol: Symbol) -> String {
+        mathml_name(&self.ascii(symbol))
+    }
+
     /// Where it stands among others.
     fn place(&self, symbol: Symbol) -> Place;
 
@@ -139,6 +144,53 @@ pub fn latex_name(name: &str) -> String {
         n => format!("{base}^{{({n})}}"),
     };
     if below.is_empty() { base } else { format!("{base}_{{{}}}", below.join(",")) }
+}
+
+/// A name of the model language in MathML: `phi_1'` is φ with a dot and the subscript 1, `w.f` is f with the subscript w.
+pub fn mathml_name(name: &str) -> String {
+    let (name, marks) = split_marks(name);
+    let (owner, own) = match name.rsplit_once('.') {
+        Some((owner, own)) => (Some(owner), own),
+        None => (None, name),
+    };
+    let mut parts = own.split('_').filter(|p| !p.is_empty());
+    let (letters, digits) = split_digits(parts.next().unwrap_or(own));
+    let mut below: Vec<String> = Vec::new();
+    below.extend(Some(digits).filter(|d| !d.is_empty()).map(|digits| format!("<mn>{digits}</mn>")));
+    below.extend(parts.map(mathml_subscript));
+    below.extend(owner.map(mathml_owner));
+    let base = mathml_word(letters);
+    let base = match marks.len() {
+        0 => base,
+        n => format!("<mover accent=\"true\">{base}<mo>{}</mo></mover>", "˙".repeat(n)),
+    };
+    match below.len() {
+        0 => base,
+        _ => format!("<msub>{base}<mrow>{}</mrow></msub>", below.join("<mo>,</mo>")),
+    }
+}
+
+/// The name of an element as a subscript.
+pub fn mathml_owner(owner: &str) -> String {
+    format!("<mi mathvariant=\"normal\">{}</mi>", super::mathml::escape(owner))
+}
+
+fn mathml_word(word: &str) -> String {
+    match GREEK.iter().find(|g| g.0 == word) {
+        Some(greek) => format!("<mi>{}</mi>", greek.1),
+        None if word.chars().count() == 1 => format!("<mi>{}</mi>", super::mathml::escape(word)),
+        None => format!("<mi class=\"word\">{}</mi>", super::mathml::escape(word)),
+    }
+}
+
+fn mathml_subscript(word: &str) -> String {
+    if word.bytes().all(|b| b.is_ascii_digit()) {
+        return format!("<mn>{word}</mn>");
+    }
+    match GREEK.iter().any(|g| g.0 == word) || word.chars().count() == 1 {
+        true => mathml_word(word),
+        false => mathml_owner(word),
+    }
 }
 
 fn split_marks(name: &str) -> (&str, &str) {

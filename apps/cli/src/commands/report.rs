@@ -1,0 +1,39 @@
+//! `report`.
+
+use halfarrow::{Problem, Report, write_whole};
+use serde_json::json;
+
+use super::with_model;
+use crate::arguments;
+use crate::screen::{self, Progress};
+
+/// Everything about a model in one page.
+pub fn report(arguments: &arguments::Report) -> u8 {
+    with_model(&arguments.model, |model| {
+        let path = &arguments.out;
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        if !matches!(extension.as_deref(), Some("html" | "htm")) {
+            return Err(Problem::UnknownKind { path: path.clone(), known: vec!["html"] }.into());
+        }
+        let wanted = Report {
+            to: arguments.to,
+            inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
+            compare: !arguments.without_comparison,
+            error: arguments.error,
+        };
+        let mut bar = Progress::new(1.0);
+        let page = model.report(&wanted, &mut |part, what| {
+            bar.part(part, what);
+            true
+        });
+        bar.finish();
+        let page = page?;
+        write_whole(path, |out| out.write_all(page.as_bytes()))
+            .map_err(|why| Problem::Unwritable { path: path.clone(), why: why.source.to_string() })?;
+        match arguments.model.model.json {
+            true => screen::print_json(&json!({"written": [path]})),
+            false => screen::print(&format!("{} is written\n", path.display())),
+        }
+        Ok(0)
+    })
+}

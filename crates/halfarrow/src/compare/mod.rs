@@ -1,0 +1,494 @@
+//! All forms of a model beside each other: size, cost of an evaluation, time at equal error, agreement.
+
+mod ladder;
+mod picture;
+mod reference;
+mod subject;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use halfarrow_compiler::equations::Form;
+use halfarrow_sim::Method;
+use serde::Serialize;
+
+use crate::error::{Error, Problem};
+use crate::model::Model;
+use crate::run::{Run, Start};
+use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
+use reference::{Apart, POINTS, Reference};
+use subject::{Settings, Subject};
+
+/// Tolerance of the runs whose agreement is told.
+const TIGHT: f64 = 1e-11;
+/// Powers of ten of the stiffness, the square of the ratio of frequencies.
+const STIFFNESSES: std::ops::RangeInclusive<i32> = 2..=12;
+/// Why a form has no times.
+const STOPS: &str = "its runs stop before their end";
+/// Errors of the form `stiff` from which its order is read: above rounding, below where springs are soft.
+const ORDERLY: std::ops::Range<f64> = 1e-9..3e-2;
+
+/// What to compare and how exactly. Times in s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compare {
+    /// End of the runs; `None`: ten times the slowest time that the motion near the start knows, within bounds.
+    pub to: Option<f64>,
+    /// Error of the motion at which times are compared, relative to the greatest magnitude of each variable.
+    pub error: f64,
+    /// Inputs given by CSV files: their names and the files.
+    pub inputs: Vec<(String, PathBuf)>,
+    /// Runs whose median counts as the time.
+    pub repeats: usize,
+    /// Processor time of a run, in s, beyond which no tighter tolerance is tried.
+    pub patience: f64,
+}
+
+impl Default for Compare {
+    /// At an error of 1e-6, medians of 7 runs, of at most 20 s.
+    fn default() -> Compare {
+        Compare { to: None, error: 1e-6, inputs: Vec::new(), repeats: 7, patience: 20.0 }
+    }
+}
+
+/// What `halfarrow compare` tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompareReport {
+    /// Name of the model.
+    pub model: String,
+    /// End of the runs, in s.
+    pub to: f64,
+    /// Error at which times are compared.
+    pub error: f64,
+    /// What errors are measured against.
+    pub reference: ReferenceReport,
+    /// One for each form, those that do not apply with the reason.
+    pub rows: Vec<Row>,
+    /// What is to be known.
+    pub notes: Vec<String>,
+}
+
+/// What errors are measured against: the minimal form at a relative tolerance of 1e-12.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReferenceReport {
+    /// The form that confirms it.
+    pub confirmed_by: &'static str,
+    /// Greatest difference of the motion between the two.
+    pub confirmed_to: f64,
+}
+
+/// A form.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Row {
+    /// The form, as on the command line.
+    pub form: &'static str,
+    /// Why it does not apply, or did not come to the end.
+    pub reason: Option<String>,
+    /// Number of differential equations; integrated signals are not counted.
+    pub differential: Option<usize>,
+    /// Number of algebraic equations.
+    pub algebraic: Option<usize>,
+    /// Index.
+    pub index: Option<u8>,
+    /// Operations of one evaluation of rates or residuals.
+    pub flops: Option<usize>,
+    /// The same by kind.
+    pub operations: Option<OperationsReport>,
+    /// The method that serves it best at the error asked for.
+    pub solver: Option<&'static str>,
+    /// Steps of the run at that error.
+    pub steps: Option<usize>,
+    /// Evaluations of rates or residuals in it.
+    pub evaluations: Option<usize>,
+    /// Processor time for each simulated second at that error, in s; `None` if no run is as exact.
+    pub seconds_per_second: Option<f64>,
+    /// The same with the method Radau IIA, which takes every form.
+    pub seconds_by_radau: Option<f64>,
+    /// How much longer it takes than the form `minimal`.
+    pub times_minimal: Option<f64>,
+    /// Greatest difference of any variable from the reference at a relative tolerance of 1e-11, relative to the greatest
+    /// magnitude of the variable.
+    pub max_error: Option<f64>,
+    /// The variable concerned.
+    pub max_error_in: Option<String>,
+    /// The same for the motion alone.
+    pub motion_error: Option<f64>,
+    /// Stored less initial, supplied plus dissipated energy in the run at the error asked for, relative.
+    pub energy_error: Option<f64>,
+    /// Below this it says nothing: energies are integrated from the ends of steps, which may be far apart.
+    pub energy_resolution: Option<f64>,
+    /// Form `stiff`: measured order of convergence in the stiffness.
+    pub order: Option<f64>,
+    /// Form `stiff`: stiffness and the error of the motion that it causes.
+    pub convergence: Vec<Convergence>,
+    /// All runs that were timed.
+    pub runs: Vec<TimedRun>,
+}
+
+/// Operations of one evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct OperationsReport {
+    /// Additions, subtractions, comparisons.
+    pub additions: usize,
+    /// Multiplications.
+    pub multiplications: usize,
+    /// Divisions.
+    pub divisions: usize,
+    /// Functions and tables.
+    pub calls: usize,
+    /// Blocks solved by Newton, of which one iteration is counted.
+    pub iterated: usize,
+}
+
+/// Stiffness of the springs of the form `stiff`, and what it causes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Convergence {
+    /// Square of the ratio between the frequency of the springs and the fastest rate of the model.
+    pub stiffness: f64,
+    /// Error of the motion at a tight tolerance.
+    pub error: f64,
+}
+
+/// A run that was timed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TimedRun {
+    /// The method.
+    pub solver: &'static str,
+    /// Relative tolerance.
+    pub rtol: f64,
+    /// Form `stiff`: its stiffness.
+    pub stiffness: Option<f64>,
+    /// Greatest error of the motion.
+    pub error: f64,
+    /// Processor time for each simulated second, in s.
+    pub seconds_per_second: f64,
+    /// Accepted steps.
+    pub steps: usize,
+    /// Evaluations of rates or residuals.
+    pub evaluations: usize,
+}
+
+/// Is told what part is done and what is being measured; says whether to go on.
+pub type Progress<'p> = &'p mut dyn FnMut(f64, &str) -> bool;
+
+impl Model {
+    /// Puts all forms beside each other.
+    ///
+    /// Errors are those of the *motion*: states, stored quantities; each relative to its greatest magnitude in the run.
+    /// Every form runs with the same evaluator and exact Jacobians, by each method that can take it; the one that costs
+    /// least at the error asked for counts.
+    ///
+    /// # Errors
+    /// The model has errors, options make no sense, or the reference run stops.
+    pub fn compare(&self, compare: &Compare, progress: Progress) -> Result<CompareReport, Error> {
+        check(compare)?;
+        let mut run = Run { inputs: compare.inputs.clone(), start: Start::Given, ..Run::default() };
+        let minimal = self.subject(&run)?;
+        let to = compare.to.unwrap_or_else(|| typical_time(&minimal));
+        run.to = to;
+        let made = |form: Form| (form, self.subject(&Run { form, ..run.clone() }));
+        let subjects: Vec<(Form, Result<Subject, Error>)> = Form::ALL.into_iter().map(made).collect();
+        progress(0.0, "reference");
+        let motion = motion(&minimal);
+        let confirming = [Form::Lagrange, Form::Break, Form::Inverted, Form::Kane, Form::Relaxed];
+        let usable = |form: &Form| {
+            let found = subjects.iter().find(|s| s.0 == *form)?;
+            Some((*form, found.1.as_ref().ok()?))
+        };
+        let mut others: Vec<(Form, &Subject)> = confirming.iter().filter_map(usable).collect();
+        // What is integrated in another way confirms more.
+        others.sort_by_key(|(_, subject)| subject.is_explicit());
+        let reference =
+            Reference::new(&minimal, &others, &motion, to).map_err(|stopped| self.stopped(stopped.failure))?;
+        let patience = Duration::from_secs_f64(compare.patience.clamp(1e-3, 1e6));
+        let effort = Effort { error: compare.error, patience };
+        let mut forms: Vec<Measured> = Vec::with_capacity(subjects.len());
+        let count = subjects.len() as f64;
+        for (i, (form, subject)) in subjects.into_iter().enumerate() {
+            let mut go_on = || progress(0.05 + 0.45 * i as f64 / count, form.name());
+            let mut measured = Measured { row: Row { form: form.name(), ..Row::default() }, ..Measured::default() };
+            match subject {
+                Err(error) => measured.row.reason = Some(short(&error)),
+                Ok(subject) if form == Form::Stiff && subject.has_springs() => {
+                    self.climb_stiff(&mut measured, &run, &reference, effort, &mut go_on)?;
+                    self.describe(&mut measured.row, form)?;
+                }
+                Ok(subject) => {
+                    for method in subject.methods() {
+                        measured.rungs.extend(
+                            ladder(&subject, &reference, method, effort, &mut go_on).into_iter().map(|r| (r, 0)),
+                        );
+                    }
+                    measured.subjects.push(subject);
+                    self.describe(&mut measured.row, form)?;
+                }
+            }
+            forms.push(measured);
+        }
+        measure(&mut forms, to, compare.repeats.max(1), &mut |part| progress(0.5 + 0.45 * part, "times"));
+        progress(0.95, "agreement");
+        let mut rows: Vec<Row> = forms.into_iter().map(|form| form.finish(&reference, effort)).collect();
+        relate(&mut rows);
+        let mut report = CompareReport {
+            model: self.name().to_string(),
+            to,
+            error: compare.error,
+            reference: ReferenceReport { confirmed_by: reference.by.0.name(), confirmed_to: reference.confirmed },
+            rows,
+            notes: Vec::new(),
+        };
+        report.notes = notes(&report);
+        Ok(report)
+    }
+
+    /// Ten times the slowest time of the motion near the start, in s, within bounds.
+    ///
+    /// # Errors
+    /// The model has no start.
+    pub(crate) fn typical_time(&self) -> Result<f64, Error> {
+        Ok(typical_time(&self.subject(&Run::default())?))
+    }
+
+    /// Counts and index.
+    fn describe(&self, row: &mut Row, form: Form) -> Result<(), Error> {
+        let equations = self.equations_in(form)?;
+        row.differential = Some(equations.counts.differential);
+        row.algebraic = Some(equations.counts.algebraic + equations.implicit.len());
+        row.index = Some(equations.index);
+        Ok(())
+    }
+
+    /// The form `stiff`: its springs get stiffer as the error gets less.
+    fn climb_stiff<'m>(
+        &'m self,
+        measured: &mut Measured<'m>,
+        run: &Run,
+        reference: &Reference,
+        effort: Effort,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Error> {
+        let mut methods = vec![(Method::Radau, 0.3), (Method::Radau, 0.03), (Method::Bdf, 0.03)];
+        for power in STIFFNESSES {
+            if !go_on() {
+                break;
+            }
+            let stiffness = ten_to(power);
+            let subject = self.subject(&Run { form: Form::Stiff, stiffness: Some(stiffness), ..run.clone() })?;
+            let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to };
+            let Some(error) = error_of(&subject, reference, exact) else { continue };
+            let mut rungs: Vec<Rung> = Vec::new();
+            for &(method, part) in &methods {
+                let settings = Settings { method, rtol: (part * error).clamp(1e-11, 1e-3), to: reference.to };
+                if rungs.iter().all(|r| (r.method, r.rtol) != (method, settings.rtol))
+                    && let Some(found) = rung(&subject, reference, settings)
+                {
+                    rungs.push(Rung { stiffness: Some(stiffness), ..found });
+                }
+            }
+            let least = |method| rungs.iter().filter(|r| r.method == method).map(|r| r.single).min();
+            // What has fallen behind does not catch up as springs get stiffer.
+            if least(Method::Bdf).is_none_or(|bdf| least(Method::Radau).is_some_and(|radau| bdf > 2 * radau)) {
+                methods.retain(|m| m.0 != Method::Bdf);
+            }
+            let slow = rungs.iter().any(|r| r.single > effort.patience);
+            let convergence = &mut measured.row.convergence;
+            let no_better = convergence.last().is_some_and(|last| power > 4 && last.error < error);
+            convergence.push(Convergence { stiffness, error });
+            measured.rungs.extend(rungs.into_iter().map(|r| (r, measured.subjects.len())));
+            measured.subjects.push(subject);
+            if error < 0.1 * effort.error || no_better || slow {
+                break;
+            }
+        }
+        let floor = 30.0 * reference.confirmed;
+        let orderly = measured.row.convergence.iter().filter(|c| ORDERLY.contains(&c.error) && c.error > floor);
+        measured.row.order = order(&orderly.map(|c| (c.stiffness, c.error)).collect::<Vec<_>>());
+        Ok(())
+    }
+}
+
+/// A form with its runs; `stiff` has a subject for each stiffness.
+#[derive(Default)]
+struct Measured<'m> {
+    row: Row,
+    rungs: Vec<(Rung, usize)>,
+    subjects: Vec<Subject<'m>>,
+}
+
+/// Times the runs of all forms.
+fn measure(forms: &mut [Measured], to: f64, repeats: usize, go_on: &mut dyn FnMut(f64) -> bool) {
+    let of = |form: &Measured| form.rungs.len();
+    let counts: Vec<usize> = forms.iter().map(of).collect();
+    let all = forms.iter().flat_map(|form| form.rungs.iter().map(|(rung, at)| (rung.clone(), &form.subjects[*at])));
+    let mut all: Vec<(Rung, &Subject)> = all.collect();
+    ladder::time(&mut all, to, repeats, go_on);
+    let mut timed = all.into_iter().map(|(rung, _)| rung).collect::<Vec<_>>().into_iter();
+    for (form, count) in forms.iter_mut().zip(counts) {
+        form.rungs.iter_mut().zip(timed.by_ref().take(count)).for_each(|((rung, _), timed)| *rung = timed);
+    }
+}
+
+impl Measured<'_> {
+    /// What follows from the runs.
+    fn finish(self, reference: &Reference, effort: Effort) -> Row {
+        let Measured { mut row, rungs, subjects } = self;
+        let Some(last) = subjects.last() else {
+            row.reason = row.reason.or(Some(STOPS.into()));
+            return row;
+        };
+        row.take_operations(last);
+        if rungs.is_empty() {
+            row.reason = Some(STOPS.into());
+            return row;
+        }
+        let of = |method: Method| -> Vec<Rung> {
+            rungs.iter().map(|r| &r.0).filter(|r| r.method == method).cloned().collect()
+        };
+        let methods = [Method::Explicit, Method::Bdf, Method::Radau];
+        let best = methods.into_iter().filter_map(|m| cost_at(&of(m), effort.error)).min_by(|a, b| a.0.total_cmp(&b.0));
+        row.seconds_by_radau = cost_at(&of(Method::Radau), effort.error).map(|cost| cost.0);
+        let exactest = rungs.iter().map(|r| &r.0).min_by(|a, b| a.error.total_cmp(&b.error));
+        let chosen = best.as_ref().map_or(exactest.cloned(), |b| Some(b.1.clone()));
+        if let Some(chosen) = &chosen {
+            let subject = rungs.iter().find(|r| r.0 == *chosen).map_or(last, |r| &subjects[r.1]);
+            let settings = Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to };
+            if let Some(miss) = subject.audited(settings).energy {
+                (row.energy_error, row.energy_resolution) = (Some(miss.value), Some(miss.resolution));
+            }
+            row.solver = Some(solver(chosen.method));
+        }
+        match best {
+            Some((seconds, rung)) => {
+                row.seconds_per_second = Some(seconds);
+                (row.steps, row.evaluations) = (Some(rung.steps), Some(rung.evaluations));
+            }
+            None => row.reason = chosen.map(|r| format!("no run comes nearer than {:.0e}", r.error)),
+        }
+        agreement(&mut row, last, reference);
+        row.runs = rungs.iter().map(|r| timed(&r.0)).collect();
+        row
+    }
+}
+
+/// How far all variables are off at a tight tolerance.
+fn agreement(row: &mut Row, subject: &Subject, reference: &Reference) {
+    let variables = subject.variables();
+    let names = reference.common(&variables);
+    let tried = [Method::Radau, Method::Auto].into_iter().take(if subject.methods().len() > 2 { 2 } else { 1 });
+    let found: Vec<(Apart, f64)> = tried
+        .filter_map(|method| {
+            let settings = Settings { method, rtol: TIGHT, to: reference.to };
+            let trace = subject.sampled(settings, reference.to / POINTS, &names).ok()?;
+            Some((reference.apart(&trace, false), reference.apart(&trace, true).value))
+        })
+        .collect();
+    if let Some((apart, motion)) = found.into_iter().min_by(|a, b| a.0.value.total_cmp(&b.0.value)) {
+        row.max_error = Some(apart.value);
+        row.max_error_in = Some(apart.variable);
+        row.motion_error = Some(motion);
+    }
+}
+
+fn timed(rung: &Rung) -> TimedRun {
+    TimedRun {
+        solver: solver(rung.method),
+        rtol: rung.rtol,
+        stiffness: rung.stiffness,
+        error: rung.error,
+        seconds_per_second: rung.seconds,
+        steps: rung.steps,
+        evaluations: rung.evaluations,
+    }
+}
+
+/// Times as multiples of that of the minimal form.
+fn relate(rows: &mut [Row]) {
+    let minimal = rows.iter().find(|row| row.form == Form::Minimal.name()).and_then(|row| row.seconds_per_second);
+    for row in rows {
+        row.times_minimal = row.seconds_per_second.zip(minimal).map(|(own, minimal)| own / minimal);
+    }
+}
+
+fn notes(report: &CompareReport) -> Vec<String> {
+    let mut notes = Vec::new();
+    let confirmed = report.reference.confirmed_to;
+    if !(confirmed <= 0.1 * report.error) {
+        let by = report.reference.confirmed_by;
+        notes.push(format!(
+            "the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little"
+        ));
+    }
+    let higher = |row: &&Row| row.index.is_some_and(|index| index > 1) && row.reason.is_none() && row.form != "stiff";
+    let higher: Vec<&str> = report.rows.iter().filter(higher).map(|row| row.form).collect();
+    if !higher.is_empty() {
+        let forms = higher.join(", ");
+        notes.push(format!(
+            "{forms}: no step is made for the sake of multipliers of index 2 and 3, whose errors do not act back on the \
+             motion; what is told of them is computed from the other unknowns"
+        ));
+    }
+    notes
+}
+
+/// The variables that the motion is: states and stored quantities.
+fn motion(minimal: &Subject) -> Vec<String> {
+    let stored = |name: &String| name.ends_with(".q") || name.ends_with(".p");
+    let mut motion = minimal.states();
+    motion.extend(minimal.variables().into_iter().map(|v| v.0).filter(stored));
+    motion.sort();
+    motion.dedup();
+    motion
+}
+
+/// Ten times the slowest time of the motion near the start, but at most a thousand times the fastest; 1 s if nothing
+/// moves. Rounded to 1, 2 or 5 times a power of ten.
+fn typical_time(minimal: &Subject) -> f64 {
+    let Some((slowest, fastest)) = minimal.rates() else { return 1.0 };
+    let time = (10.0 / slowest).min(1000.0 / fastest);
+    let power = libm::floor(libm::log10(time));
+    let unit = ten_to(power as i32);
+    let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|d| d * unit >= 0.999 * time).unwrap_or(10.0);
+    digit * unit
+}
+
+fn check(compare: &Compare) -> Result<(), Problem> {
+    let bad = |reason: String| Err(Problem::BadOption { reason });
+    if let Some(to) = compare.to.filter(|to| !(to.is_finite() && *to > 0.0)) {
+        return bad(format!("to is {to}: it has to be a time above zero, in s"));
+    }
+    if !(1e-10..=1e-1).contains(&compare.error) {
+        return bad(format!("error is {}: it has to be from 1e-10 to 0.1", compare.error));
+    }
+    Ok(())
+}
+
+/// The title of the first fault.
+pub(crate) fn short(error: &Error) -> String {
+    match error {
+        Error::Model(found) => found.diagnostics.0.first().map_or_else(String::new, |d| d.title.clone()),
+        other => other.to_string(),
+    }
+}
+
+fn solver(method: Method) -> &'static str {
+    match method {
+        Method::Explicit => "explicit",
+        Method::Bdf => "bdf",
+        Method::Radau => "radau",
+        Method::Auto => "auto",
+        Method::Fixed(_) => "fixed",
+    }
+}
+
+impl Row {
+    fn take_operations(&mut self, subject: &Subject) {
+        let operations = subject.operations();
+        self.flops = Some(operations.total());
+        self.operations = Some(OperationsReport {
+            additions: operations.additions,
+            multiplications: operations.multiplications,
+            divisions: operations.divisions,
+            calls: operations.calls,
+            iterated: operations.iterated,
+        });
+    }
+}

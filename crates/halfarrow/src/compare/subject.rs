@@ -1,0 +1,203 @@
+//! A form of a model, ready to run as often as it takes.
+
+use std::time::Duration;
+
+use cpu_time::ThreadTime;
+use halfarrow_compiler::bond_graph::BondGraph;
+use halfarrow_compiler::equations::Form;
+use halfarrow_exec::{self as exec, Operations};
+use halfarrow_sim::{ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit};
+use halfarrow_trace::Trace;
+
+use crate::audited::{AuditReport, Audited};
+use crate::error::Error;
+use crate::model::Model;
+use crate::run::{Run, Start, connect, quicken};
+
+/// A form at its start.
+#[derive(Clone)]
+pub(super) struct Subject<'m> {
+    graph: &'m BondGraph,
+    system: Ready,
+}
+
+/// How a form is integrated.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "there are few of them")]
+enum Ready {
+    /// Rates, and the state at the start.
+    Explicit(exec::Model, Vec<f64>),
+    /// Residuals, unknowns and their rates at the start.
+    Implicit(exec::ImplicitModel, Vec<f64>, Vec<f64>),
+}
+
+/// What to run it with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Settings {
+    pub method: Method,
+    pub rtol: f64,
+    pub to: f64,
+}
+
+impl Settings {
+    fn options(self, every: Option<f64>) -> Options {
+        Options { method: self.method, to: self.to, every, rtol: self.rtol, ..Options::default() }
+    }
+}
+
+/// Takes no samples.
+struct Nobody;
+
+impl Sink for Nobody {
+    fn sample(&mut self, _: f64, _: &[f64]) {}
+}
+
+impl Model {
+    /// A form at the start of a run.
+    pub(super) fn subject(&self, run: &Run) -> Result<Subject<'_>, Error> {
+        let equations = self.equations_in(run.form)?;
+        let graph = &self.graph;
+        if matches!(run.form, Form::Minimal | Form::Kane) {
+            let mut system = self.system(&equations)?;
+            connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
+            let x = self.start(&mut system, run.start)?;
+            return Ok(Subject { graph, system: Ready::Explicit(system, x) });
+        }
+        let explicit = equations.residuals.is_empty();
+        let mut system = self.implicit_system(&equations, run)?;
+        let x = self.start(system.reference_mut(), Start::Given)?;
+        quicken(&mut system, &x)?;
+        let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
+        let system = match explicit {
+            true => Ready::Explicit(system.into_form(), y),
+            false => Ready::Implicit(system, y, yp),
+        };
+        Ok(Subject { graph, system })
+    }
+}
+
+impl Subject<'_> {
+    /// The methods that can integrate it.
+    pub(super) fn methods(&self) -> Vec<Method> {
+        match &self.system {
+            Ready::Explicit(..) => vec![Method::Explicit, Method::Bdf, Method::Radau],
+            Ready::Implicit(system, ..) => {
+                let index_1 = (0..system.unknowns()).all(|unknown| system.index(unknown) == 1);
+                let bdf = index_1 && system.semi_explicit().is_some();
+                if bdf { vec![Method::Radau, Method::Bdf] } else { vec![Method::Radau] }
+            }
+        }
+    }
+
+    /// Whether it is an explicit equation.
+    pub(super) fn is_explicit(&self) -> bool {
+        matches!(self.system, Ready::Explicit(..))
+    }
+
+    /// Whether there are springs in place of constraints.
+    pub(super) fn has_springs(&self) -> bool {
+        let program = match &self.system {
+            Ready::Explicit(system, _) => system.program(),
+            Ready::Implicit(system, ..) => system.program(),
+        };
+        program.parameters.iter().any(|p| p.name == "form.stiffness")
+    }
+
+    /// Operations of one evaluation.
+    pub(super) fn operations(&self) -> Operations {
+        match &self.system {
+            Ready::Explicit(system, _) => system.operations(),
+            Ready::Implicit(system, ..) => system.operations(),
+        }
+    }
+
+    /// Everything that can be recorded: name, SI unit.
+    pub(super) fn variables(&self) -> Vec<(String, String)> {
+        let program = match &self.system {
+            Ready::Explicit(system, _) => system.program(),
+            Ready::Implicit(system, ..) => system.program(),
+        };
+        let unit =
+            |o: &halfarrow_compiler::program::Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
+        program.observed.iter().filter(|o| o.value.is_ok()).map(|o| (o.name.clone(), unit(o))).collect()
+    }
+
+    /// Names of the states.
+    pub(super) fn states(&self) -> Vec<String> {
+        let program = match &self.system {
+            Ready::Explicit(system, _) => system.program(),
+            Ready::Implicit(system, ..) => system.program(),
+        };
+        program.states.iter().map(|s| s.name.clone()).collect()
+    }
+
+    /// Runs it and records these variables, in SI units.
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub(super) fn sampled(&self, settings: Settings, every: f64, names: &[&str]) -> Result<Trace, Stopped> {
+        let mut trace = Trace::new(names.iter().map(|name| (*name, "")));
+        let options = settings.options(Some(every));
+        // All names are known to have values, so that recording them cannot fail.
+        match self.system.clone() {
+            Ready::Explicit(mut system, mut x) => {
+                let _ = system.record(names);
+                simulate(&mut system, &options, &mut x, &mut trace)?;
+            }
+            Ready::Implicit(mut system, mut y, mut yp) => {
+                let _ = system.record(names);
+                simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut trace)?;
+            }
+        }
+        Ok(trace)
+    }
+
+    /// Runs it and records nothing: the processor time that took.
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub(super) fn timed(&self, settings: Settings) -> Result<(Duration, Summary), Stopped> {
+        let options = settings.options(None);
+        match self.system.clone() {
+            Ready::Explicit(mut system, mut x) => {
+                let _ = system.record(&[]);
+                let begun = ThreadTime::now();
+                let summary = simulate(&mut system, &options, &mut x, &mut Nobody)?;
+                Ok((begun.elapsed(), summary))
+            }
+            Ready::Implicit(mut system, mut y, mut yp) => {
+                let _ = system.record(&[]);
+                let begun = ThreadTime::now();
+                let summary = simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Nobody)?;
+                Ok((begun.elapsed(), summary))
+            }
+        }
+    }
+
+    /// Runs it and audits every step.
+    pub(super) fn audited(&self, settings: Settings) -> AuditReport {
+        let options = settings.options(None);
+        match self.system.clone() {
+            Ready::Explicit(mut system, mut x) => {
+                let _ = system.record(&[]);
+                let mut audited = Audited::new(&mut system, self.graph);
+                let _ = simulate(&mut audited, &options, &mut x, &mut Nobody);
+                audited.finish()
+            }
+            Ready::Implicit(mut system, mut y, mut yp) => {
+                let _ = system.record(&[]);
+                let mut audited = Audited::new(&mut system, self.graph);
+                let _ = simulate_implicit(&mut audited, &options, &mut y, &mut yp, &mut Nobody);
+                audited.finish()
+            }
+        }
+    }
+
+    /// Rates of the motion near the start, in 1/s: the slowest and the fastest that are not zero.
+    pub(super) fn rates(&self) -> Option<(f64, f64)> {
+        let Ready::Explicit(mut system, mut x) = self.system.clone() else { return None };
+        let _ = system.record(&[]);
+        system.cross_jump(0.0, &mut x).ok()?;
+        let linear = system.linearise(0.0, &x, &[]).ok()?;
+        let sizes: Vec<f64> = crate::linear_algebra::eigenvalues(&linear.a)?.iter().map(|z| z[0].hypot(z[1])).collect();
+        let fastest = sizes.iter().copied().fold(0.0f64, f64::max);
+        let slowest = sizes.into_iter().filter(|s| *s > 1e-6 * fastest).fold(f64::INFINITY, f64::min);
+        (fastest > 0.0 && fastest.is_finite()).then_some((slowest, fastest))
+    }
+}

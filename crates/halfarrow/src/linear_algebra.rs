@@ -1,0 +1,65 @@
+//! Eigenvalues, by the library; complex numbers as pairs of real and imaginary part.
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
+
+/// A complex number: real and imaginary part.
+pub(crate) type Complex = [f64; 2];
+
+/// Eigenvalues of a square matrix, by imaginary parts within real ones, ascending; `None` if it is not finite, or they
+/// are not found.
+///
+/// The matrix is balanced first: its scales range over many decades in one model.
+pub(crate) fn eigenvalues(rows: &[Vec<f64>]) -> Option<Vec<Complex>> {
+    let n = rows.len();
+    if rows.iter().flatten().any(|entry| !entry.is_finite()) {
+        return None;
+    }
+    let mut balanced = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+    balance_parlett_reinsch(&mut balanced);
+    let found = Mat::from_fn(n, n, |i, j| balanced[(i, j)]).eigenvalues().ok()?;
+    Some(sorted(found.into_iter().map(|z| [z.re, z.im]).collect()))
+}
+
+/// Singular values, descending; `None` if they are not found.
+pub(crate) fn singular_values(rows: &[Vec<f64>], columns: usize) -> Option<Vec<f64>> {
+    if rows.is_empty() || columns == 0 {
+        return Some(Vec::new());
+    }
+    Mat::from_fn(rows.len(), columns, |i, j| rows[i][j]).singular_values().ok()
+}
+
+/// By real, then imaginary part; equal up to rounding counts as equal, so that pairs stay together.
+fn sorted(mut values: Vec<Complex>) -> Vec<Complex> {
+    let size = values.iter().map(|z| z[0].hypot(z[1])).fold(0.0f64, f64::max);
+    let step = (1e-9 * size).max(f64::MIN_POSITIVE);
+    let place = |x: f64| (x / step).round();
+    values.sort_by(|a, b| place(a[0]).total_cmp(&place(b[0])).then(a[1].total_cmp(&b[1])));
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(found: &[Complex], wanted: &[Complex], tolerance: f64) {
+        assert_eq!(found.len(), wanted.len(), "{found:?}");
+        for (a, b) in found.iter().zip(wanted) {
+            let apart = (a[0] - b[0]).hypot(a[1] - b[1]);
+            assert!(apart <= tolerance * b[0].hypot(b[1]).max(1e-300), "{found:?} is not {wanted:?}");
+        }
+    }
+
+    #[test]
+    fn known_spectra() {
+        near(&eigenvalues(&[vec![3.0]]).unwrap(), &[[3.0, 0.0]], 1e-15);
+        near(&eigenvalues(&[vec![0.0, 1.0], vec![-4.0, 0.0]]).unwrap(), &[[0.0, -2.0], [0.0, 2.0]], 1e-15);
+        // Scales nine decades apart.
+        let stiff = [vec![-1.0, 1e9], vec![-1e-9, -2.0]];
+        let root = libm::sqrt(0.75);
+        near(&eigenvalues(&stiff).unwrap(), &[[-1.5, -root], [-1.5, root]], 1e-12);
+        assert_eq!(eigenvalues(&[]).unwrap(), Vec::<Complex>::new());
+        assert!(eigenvalues(&[vec![f64::NAN]]).is_none());
+    }
+}

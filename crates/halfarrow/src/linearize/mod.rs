@@ -1,0 +1,389 @@
+//! A model near a point: matrices, poles, zeros, what inputs reach and outputs see.
+
+mod picture;
+mod response;
+mod structure;
+mod symbolic;
+mod zeros;
+
+use std::path::PathBuf;
+
+use halfarrow_compiler::bond_graph::{BondGraph, Input, InputId, Kind, Meaning, Variable};
+use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::program::{Observed, Program};
+use halfarrow_exec::{self as exec, Linearised};
+use halfarrow_sim::{Options, Sink, System, simulate};
+use serde::Serialize;
+
+use crate::error::{Error, Problem};
+use crate::linear_algebra::{Complex, eigenvalues};
+use crate::model::Model;
+use crate::run::{Run, Start, connect};
+
+pub use response::Response;
+pub use structure::ReachReport;
+pub use symbolic::{SymbolicReport, TransferFunction};
+
+/// Tolerance of the run to the time at which is linearised.
+const RTOL: f64 = 1e-10;
+
+/// Where to linearise, and between what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linearize {
+    /// Where.
+    pub at: Point,
+    /// Inputs: declared ones, and sources, to whose value the input is added. `None`: the declared ones; if there are
+    /// none, all sources.
+    pub inputs: Option<Vec<String>>,
+    /// Outputs: anything that can be recorded. `None`: the declared ones; if there are none, the states.
+    pub outputs: Option<Vec<String>>,
+    /// Whether matrices and transfer functions are to be told as expressions too.
+    pub symbolic: bool,
+    /// Inputs given by CSV files: their names and the files.
+    pub series: Vec<(String, PathBuf)>,
+}
+
+impl Default for Linearize {
+    /// At the start, between declared inputs and outputs, in numbers.
+    fn default() -> Linearize {
+        Linearize { at: Point::Start, inputs: None, outputs: None, symbolic: false, series: Vec::new() }
+    }
+}
+
+/// A point of the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Point {
+    /// The start.
+    Start,
+    /// Where a run is at this time, in s.
+    Time(f64),
+    /// At rest, near the start.
+    Equilibrium,
+}
+
+/// What `halfarrow linearize` tells: `x' = f + A dx + B du`, `y = g + C dx + D du`. SI units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LinearizeReport {
+    /// Name of the model.
+    pub model: String,
+    /// `start`, `time` or `equilibrium`.
+    pub at: &'static str,
+    /// The time, in s.
+    pub t: f64,
+    /// States, with their values and rates at the point.
+    pub states: Vec<StateAt>,
+    /// Inputs.
+    pub inputs: Vec<Terminal>,
+    /// Outputs.
+    pub outputs: Vec<Terminal>,
+    /// Derivatives of rates by states.
+    pub a: Vec<Vec<f64>>,
+    /// Derivatives of rates by inputs.
+    pub b: Vec<Vec<f64>>,
+    /// Derivatives of outputs by states.
+    pub c: Vec<Vec<f64>>,
+    /// Derivatives of outputs by inputs.
+    pub d: Vec<Vec<f64>>,
+    /// Eigenvalues of `a`: real and imaginary part.
+    pub poles: Vec<Complex>,
+    /// What the poles mean; a pair counts once.
+    pub modes: Vec<Mode>,
+    /// Invariant zeros, in 1/s: where inputs can move the states and no output sees it, or states move that no input
+    /// reaches; `None` if they do not come out.
+    pub zeros: Option<Vec<Complex>>,
+    /// Whether all poles are left of the imaginary axis.
+    pub stable: bool,
+    /// What the inputs reach.
+    pub controllability: ReachReport,
+    /// What the outputs see.
+    pub observability: ReachReport,
+    /// Matrices and transfer functions as expressions, if asked for.
+    pub symbolic: Option<SymbolicReport>,
+    /// What is to be known.
+    pub notes: Vec<String>,
+}
+
+/// A state at the point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateAt {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its rate.
+    pub rate: f64,
+    /// SI unit, where known.
+    pub unit: Option<String>,
+}
+
+/// An input or output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Terminal {
+    /// Its name.
+    pub name: String,
+    /// SI unit, where known.
+    pub unit: Option<String>,
+}
+
+/// A real pole or a pair of complex ones.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mode {
+    /// Real and imaginary part, the latter at least 0.
+    pub pole: Complex,
+    /// Its magnitude, in rad/s.
+    pub natural_frequency: f64,
+    /// Part of critical damping: 1 for a pole on the negative real axis, negative if it grows; 0 for a pole at 0.
+    pub damping: f64,
+    /// Time in which it falls to 1/e, in s; `None` if it does not fall.
+    pub time_constant: Option<f64>,
+}
+
+impl Model {
+    /// Linearises with exact derivatives.
+    ///
+    /// # Errors
+    /// The model has errors, an input or output does not exist, there is no such point, or the model holds a delay, which
+    /// has no matrices.
+    pub fn linearize(&self, wanted: &Linearize) -> Result<LinearizeReport, Error> {
+        if let Some(delayed) =
+            self.graph.held.values().find(|h| h.kind == halfarrow_compiler::bond_graph::HeldKind::Delay)
+        {
+            return Err(Problem::NoMatrices { reason: delay(&delayed.name) }.into());
+        }
+        let (names, model) = self.with_inputs(wanted.inputs.as_deref())?;
+        model.linearize_between(wanted, &names)
+    }
+
+    /// The names of the inputs, and the model in which they are all declared.
+    fn with_inputs(&self, wanted: Option<&[String]>) -> Result<(Vec<String>, Model), Error> {
+        let declared = || self.graph.inputs.values().map(|i| i.name.clone()).collect::<Vec<_>>();
+        let sources = || {
+            let source = |e: &&halfarrow_compiler::bond_graph::Element| is_source(&e.kind);
+            self.graph.elements.values().filter(source).map(|e| e.name.clone()).collect::<Vec<_>>()
+        };
+        let names = match wanted {
+            Some(names) => names.to_vec(),
+            None if self.graph.inputs.is_empty() => sources(),
+            None => declared(),
+        };
+        let mut model = self.clone();
+        for name in names.iter().filter(|name| !declared().contains(*name)) {
+            if !add_input(&mut model.graph, name) {
+                let known = declared().into_iter().chain(sources()).collect();
+                return Err(Problem::UnknownInput { name: name.clone(), known }.into());
+            }
+        }
+        Ok((names, model))
+    }
+
+    fn linearize_between(&self, wanted: &Linearize, inputs: &[String]) -> Result<LinearizeReport, Error> {
+        let equations = self.equations_in(Form::Minimal)?;
+        let mut system = self.system(&equations)?;
+        let run = Run { inputs: wanted.series.clone(), ..Run::default() };
+        connect(&system.program().inputs.clone(), &run, |name, t, v| system.connect(name, t, v))?;
+        let outputs = wanted.outputs.clone().unwrap_or_else(|| default_outputs(&self.graph, system.program()));
+        let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
+        system.record(&names).map_err(|error| crate::run::refused(&system, error))?;
+        let mut notes = Vec::new();
+        let (at, t, x) = self.go_to(&mut system, wanted.at, &mut notes)?;
+        let of = |name: &String| system.program().inputs.iter().position(|i| i.name == *name);
+        let places: Vec<usize> = inputs.iter().filter_map(of).collect();
+        let linear = system.linearise(t, &x, &places).map_err(|failure| self.stopped(failure))?;
+        let Some(poles) = eigenvalues(&linear.a) else {
+            return Err(Problem::NoMatrices { reason: "the eigenvalues do not come out".into() }.into());
+        };
+        notes.extend(self.what_holds(&system, &linear, at));
+        let symbolic =
+            if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
+        let program = system.program();
+        let (controllability, observability) = self.reaches(&linear, inputs, &outputs)?;
+        Ok(LinearizeReport {
+            model: self.name().to_string(),
+            at,
+            t,
+            states: states(program, &x, &linear.rates),
+            inputs: inputs.iter().map(|name| terminal(name, input_unit(program, name))).collect(),
+            outputs: outputs
+                .iter()
+                .map(|name| terminal(name, observed(program, name).and_then(|o| unit(&o.unit))))
+                .collect(),
+            modes: modes(&poles),
+            zeros: zeros::zeros(&linear),
+            stable: poles.iter().all(|p| p[0] < 0.0),
+            poles,
+            controllability,
+            observability,
+            symbolic,
+            notes,
+            a: linear.a,
+            b: linear.b,
+            c: linear.c,
+            d: linear.d,
+        })
+    }
+
+    /// Brings the system to the point: what it is called, time and state. The system is in the mode of that point.
+    fn go_to(
+        &self,
+        system: &mut exec::Model,
+        at: Point,
+        notes: &mut Vec<String>,
+    ) -> Result<(&'static str, f64, Vec<f64>), Error> {
+        let mut x = self.start(system, Start::Given)?;
+        match at {
+            Point::Start => {
+                system.cross_jump(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
+                Ok(("start", 0.0, x))
+            }
+            Point::Equilibrium => {
+                let found = system.equilibrium(0.0, &x).map_err(|error| match error {
+                    exec::EquilibriumError::Failure(failure) => self.stopped(failure),
+                    error => Problem::NoEquilibrium { reason: error.to_string() }.into(),
+                })?;
+                x = found.x;
+                system.cross_jump(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
+                if found.free > 0 {
+                    notes.push(format!(
+                        "the equilibrium is one of many: {} combinations of states are free",
+                        found.free
+                    ));
+                }
+                Ok(("equilibrium", 0.0, x))
+            }
+            Point::Time(t) if t.is_finite() && t >= 0.0 => {
+                if t == 0.0 {
+                    return self.go_to(system, Point::Start, notes).map(|(_, t, x)| ("time", t, x));
+                }
+                let options = Options { to: t, rtol: RTOL, every: Some(t), ..Options::default() };
+                let run = simulate(system, &options, &mut x, &mut Nobody);
+                run.map_err(|stopped| self.stopped(stopped.failure))?;
+                Ok(("time", t, x))
+            }
+            Point::Time(t) => {
+                Err(Problem::BadOption { reason: format!("at is {t}: it has to be a time of 0 or above") }.into())
+            }
+        }
+    }
+
+    /// What the matrices are true of.
+    fn what_holds(&self, system: &exec::Model, linear: &Linearised, at: &str) -> Vec<String> {
+        let mut notes = Vec::new();
+        let program = system.program();
+        if at != "equilibrium" && linear.rates.iter().any(|&rate| rate != 0.0) {
+            notes.push(
+                "the model is not at rest there: the matrices tell how motions near this one part from it".into(),
+            );
+        }
+        if !program.conserved.is_empty() {
+            let names = program.conserved.join(", ");
+            notes.push(format!("{names} keep their value: each stands for one more pole at 0"));
+        }
+        if system.switches() > 0 {
+            notes
+                .push(format!("conditions of the state keep the side they have there ({} of them)", system.switches()));
+        }
+        if !program.held.is_empty() {
+            notes.push("sampled signals keep their value: the matrices hold between two samples".into());
+        }
+        notes
+    }
+}
+
+/// Takes no samples.
+struct Nobody;
+
+impl Sink for Nobody {
+    fn sample(&mut self, _: f64, _: &[f64]) {}
+}
+
+fn delay(name: &str) -> String {
+    format!(
+        "`{name}` is delayed, and a delay has no matrices of finite size: put a transfer function in its place, as in `tf(u, [-T/2, 1], [T/2, 1])`"
+    )
+}
+
+fn is_source(kind: &Kind) -> bool {
+    matches!(kind, Kind::EffortSource { .. } | Kind::FlowSource { .. })
+}
+
+/// Adds an input to the value of a source; whether there is such a source.
+fn add_input(graph: &mut BondGraph, name: &str) -> bool {
+    let Some(element) = graph.elements.iter().find(|(_, e)| e.name == name && is_source(&e.kind)).map(|(id, _)| id)
+    else {
+        return false;
+    };
+    let symbol = graph.exprs.symbol(&format!("{name}.input"), Default::default());
+    let (own, default) = (graph.exprs.sym(symbol), graph.exprs.int(0));
+    let bond = &graph.bonds[graph.elements[element].ports[0].bond];
+    let (effort, flow) = (bond.effort, bond.flow);
+    let span = graph.elements[element].span;
+    let conjugate = match &mut graph.elements[element].kind {
+        Kind::EffortSource { value } => {
+            *value = graph.exprs.add(&[*value, own]);
+            effort
+        }
+        Kind::FlowSource { value } => {
+            *value = graph.exprs.add(&[*value, own]);
+            flow
+        }
+        _ => return false,
+    };
+    let unit = graph.variables.get(&conjugate).and_then(|v| v.unit.clone());
+    let id: InputId = graph.inputs.push(Input {
+        name: name.to_string(),
+        symbol,
+        default,
+        unit: unit.clone(),
+        doc: String::new(),
+        span,
+    });
+    graph.variables.insert(symbol, Variable { meaning: Meaning::Input(id), unit });
+    true
+}
+
+/// The declared outputs; without any the states.
+fn default_outputs(graph: &BondGraph, program: &Program) -> Vec<String> {
+    match graph.outputs.is_empty() {
+        true => program.states.iter().map(|s| s.name.clone()).collect(),
+        false => graph.outputs.iter().map(|o| o.name.clone()).collect(),
+    }
+}
+
+fn observed<'p>(program: &'p Program, name: &str) -> Option<&'p Observed> {
+    program.observed.iter().find(|o| o.name == name)
+}
+
+fn unit(unit: &Option<halfarrow_compiler::unit::Unit>) -> Option<String> {
+    unit.as_ref().map(|unit| unit.to_si_unit().to_string()).filter(|unit| !unit.is_empty())
+}
+
+fn input_unit(program: &Program, name: &str) -> Option<String> {
+    program.inputs.iter().find(|i| i.name == name).and_then(|i| unit(&i.unit))
+}
+
+fn terminal(name: &str, unit: Option<String>) -> Terminal {
+    Terminal { name: name.to_string(), unit }
+}
+
+fn states(program: &Program, x: &[f64], rates: &[f64]) -> Vec<StateAt> {
+    let state = |((state, value), rate): ((&halfarrow_compiler::program::State, &f64), &f64)| StateAt {
+        name: state.name.clone(),
+        value: *value,
+        rate: *rate,
+        unit: unit(&state.unit),
+    };
+    program.states.iter().zip(x).zip(rates).map(state).collect()
+}
+
+fn modes(poles: &[Complex]) -> Vec<Mode> {
+    let mode = |&pole: &Complex| {
+        let size = pole[0].hypot(pole[1]);
+        Mode {
+            pole,
+            natural_frequency: size,
+            damping: if size > 0.0 { -pole[0] / size } else { 0.0 },
+            time_constant: (pole[0] < 0.0).then(|| -1.0 / pole[0]),
+        }
+    };
+    poles.iter().filter(|pole| pole[1] >= 0.0).map(mode).collect()
+}

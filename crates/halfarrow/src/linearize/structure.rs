@@ -1,0 +1,188 @@
+//! Controllability and observability: by the rank of matrices, and by causal paths.
+
+use halfarrow_compiler::algebra::{Node, Symbol};
+use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, Meaning};
+use halfarrow_compiler::causal_graph::{CausalGraph, Reach, control_reach, observe_reach};
+use halfarrow_compiler::causal_paths::port_name;
+use halfarrow_exec::Linearised;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::linear_algebra::singular_values;
+use crate::model::Model;
+
+/// Singular values below this part of the greatest count as zero.
+const RANK: f64 = 1e-10;
+
+/// Controllability or observability.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReachReport {
+    /// Number of states.
+    pub order: usize,
+    /// Rank of the matrices at the given parameters: how many combinations of states are reached or seen.
+    pub rank: Option<usize>,
+    /// What causal paths say, for nearly all parameters: bond-graph rank.
+    pub structural_rank: Option<usize>,
+    /// Independent storages, the order that the structural rank refers to.
+    pub structural_order: Option<usize>,
+    /// Storages that stay in integral causality.
+    pub integral: Vec<String>,
+    /// Storages that no causal path joins to an input (or output).
+    pub unattained: Vec<String>,
+    /// Why causal paths say nothing, or why the two ranks differ.
+    pub note: Option<String>,
+}
+
+impl Model {
+    /// What inputs reach and what outputs see.
+    pub(super) fn reaches(
+        &self,
+        linear: &Linearised,
+        inputs: &[String],
+        outputs: &[String],
+    ) -> Result<(ReachReport, ReachReport), Error> {
+        let causal = self.causal_graph()?;
+        let transposed = |m: &[Vec<f64>], columns: usize| -> Vec<Vec<f64>> {
+            (0..columns).map(|j| m.iter().map(|row| row[j]).collect()).collect()
+        };
+        let n = linear.a.len();
+        let control = rank(&linear.a, &linear.b, inputs.len());
+        let observe = rank(&transposed(&linear.a, n), &transposed(&linear.c, n), outputs.len());
+        let sources = sources_of(&causal.graph, inputs);
+        let by_paths = sources.as_ref().and_then(|sources| control_reach(&causal, sources));
+        let seen = variables_of(&causal.graph, outputs);
+        let by_views = seen.as_ref().and_then(|seen| observe_reach(&causal, seen));
+        let why = |found: bool, what: &str| match found {
+            false => format!("causal paths say nothing: {what}"),
+            true => {
+                "causal paths say nothing: the graph is not linear, or a modulus or source reads its variables".into()
+            }
+        };
+        let control_why = why(sources.is_some(), "an input acts elsewhere than through the value of a source");
+        let observe_why = why(seen.is_some(), "an output is no single effort, flow or stored quantity");
+        Ok((report(&causal, n, control, by_paths, control_why), report(&causal, n, observe, by_views, observe_why)))
+    }
+}
+
+fn report(causal: &CausalGraph, order: usize, rank: Option<usize>, reach: Option<Reach>, why: String) -> ReachReport {
+    let names = |ports: &[_]| ports.iter().map(|&port| port_name(&causal.graph, port)).collect();
+    let Some(reach) = reach else {
+        let nothing = ReachReport {
+            order,
+            rank,
+            structural_rank: None,
+            structural_order: None,
+            integral: Vec::new(),
+            unattained: Vec::new(),
+            note: Some(why),
+        };
+        return nothing;
+    };
+    let structural = reach.rank.min(reach.order - reach.unattained.len().min(reach.order));
+    let note = match rank {
+        _ if reach.order != order => Some(format!(
+            "{} independent storages, {order} states: integrated signals and conserved quantities make the difference",
+            reach.order
+        )),
+        Some(rank) if rank < structural => {
+            Some("the rank is lower than the structure allows: the given parameters are special".into())
+        }
+        Some(rank) if rank > structural => Some(
+            "the rank is higher than causal paths promise: their condition is sufficient, not necessary, here".into(),
+        ),
+        _ => None,
+    };
+    ReachReport {
+        order,
+        rank,
+        structural_rank: Some(structural),
+        structural_order: Some(reach.order),
+        integral: names(&reach.integral),
+        unattained: names(&reach.unattained),
+        note,
+    }
+}
+
+/// Dimension of the space that `b` reaches through `a`: a basis is widened by what `a` makes of it, each direction of length 1,
+/// until nothing new comes.
+fn rank(a: &[Vec<f64>], b: &[Vec<f64>], columns: usize) -> Option<usize> {
+    let n = a.len();
+    if n == 0 || columns == 0 {
+        return Some(0);
+    }
+    let mut a_balanced = nalgebra::DMatrix::from_fn(n, n, |i, j| a[i][j]);
+    let scale = nalgebra::linalg::balancing::balance_parlett_reinsch(&mut a_balanced);
+    let size = a_balanced.amax().max(f64::MIN_POSITIVE);
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let mut fresh: Vec<Vec<f64>> = (0..columns).map(|j| (0..n).map(|i| b[i][j] / scale[i]).collect()).collect();
+    while !fresh.is_empty() && basis.len() < n {
+        let mut next = Vec::new();
+        for vector in fresh.drain(..) {
+            if let Some(new) = beyond(&basis, vector) {
+                let moved = (0..n).map(|i| (0..n).map(|j| a_balanced[(i, j)] * new[j]).sum::<f64>() / size).collect();
+                next.push(moved);
+                basis.push(new);
+            }
+        }
+        fresh = next;
+    }
+    let values = singular_values(&basis, n)?;
+    Some(values.iter().filter(|v| **v > RANK).count())
+}
+
+/// What a vector adds to an orthonormal basis, of length 1; `None` if that is rounding.
+fn beyond(basis: &[Vec<f64>], mut vector: Vec<f64>) -> Option<Vec<f64>> {
+    let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let before = length(&vector);
+    for _ in 0..2 {
+        for own in basis {
+            let part: f64 = own.iter().zip(&vector).map(|(a, b)| a * b).sum();
+            vector.iter_mut().zip(own).for_each(|(v, own)| *v -= part * own);
+        }
+    }
+    let after = length(&vector);
+    (after > RANK * before && after > 0.0).then(|| vector.iter().map(|v| v / after).collect())
+}
+
+/// The sources whose values read the inputs; `None` if an input acts elsewhere as well.
+fn sources_of(graph: &BondGraph, inputs: &[String]) -> Option<Vec<ElementId>> {
+    let symbols: Vec<Symbol> = graph.inputs.values().filter(|i| inputs.contains(&i.name)).map(|i| i.symbol).collect();
+    let reads = |e| graph.exprs.symbols_of(e).iter().any(|s| symbols.contains(s));
+    let mut sources = Vec::new();
+    for (id, element) in graph.elements.iter() {
+        match &element.kind {
+            Kind::EffortSource { value } | Kind::FlowSource { value } if reads(*value) => sources.push(id),
+            Kind::ZeroCompliance { flow } if reads(*flow) => return None,
+            Kind::Transformer { modulus } | Kind::Gyrator { modulus } if reads(*modulus) => return None,
+            _ => {}
+        }
+    }
+    let elsewhere = graph.signals.values().any(|s| reads(s.rate));
+    (!elsewhere && !sources.is_empty()).then_some(sources)
+}
+
+/// The efforts and flows that the outputs are, up to a factor; `None` if one is something else.
+fn variables_of(graph: &BondGraph, outputs: &[String]) -> Option<Vec<Symbol>> {
+    outputs.iter().map(|name| variable_of(graph, name)).collect()
+}
+
+fn variable_of(graph: &BondGraph, name: &str) -> Option<Symbol> {
+    let declared = graph.outputs.iter().chain(&graph.lets).find(|o| o.name == name);
+    let symbol = match declared {
+        Some(output) => match graph.exprs.node(output.value) {
+            Node::Symbol(symbol) => *symbol,
+            _ => *graph
+                .exprs
+                .symbols_of(output.value)
+                .first()
+                .filter(|_| graph.exprs.symbols_of(output.value).len() == 1)?,
+        },
+        None => graph.exprs.find_symbol(name)?,
+    };
+    match graph.variables.get(&symbol)?.meaning {
+        Meaning::Effort(_) | Meaning::Flow(_) => Some(symbol),
+        // What is stored is seen where its co-energy variable is.
+        Meaning::Stored(port) => graph.storage_symbols(port).map(|pair| pair.0),
+        _ => None,
+    }
+}

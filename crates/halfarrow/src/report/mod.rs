@@ -1,0 +1,215 @@
+//! Everything about a model in one page that opens anywhere: self-contained, offline, printable.
+
+mod causality;
+mod page;
+
+use std::path::PathBuf;
+
+use halfarrow_compiler::algebra::{PlainNames, mathml};
+use halfarrow_compiler::causal_graph::CausalGraph;
+use halfarrow_compiler::causal_paths::find_paths;
+use halfarrow_compiler::equations::{
+    Cause, Form, StateKind, Style, print_certificate, print_dependent, print_meanings, print_sides, print_symbol, show,
+};
+
+use crate::compare::{Compare, CompareReport};
+use crate::error::Error;
+use crate::model::Model;
+use crate::run::{Run, Simulated};
+use causality::Decided;
+
+/// Equations of a form that are set; more are counted.
+const MOST: usize = 80;
+
+/// What stands in the report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// End of the run that is plotted and audited, in s; `None`: as `compare` chooses it.
+    pub to: Option<f64>,
+    /// Inputs given by CSV files: their names and the files.
+    pub inputs: Vec<(String, PathBuf)>,
+    /// Whether forms are run beside each other, which takes time.
+    pub compare: bool,
+    /// The error at which they are compared.
+    pub error: f64,
+}
+
+impl Default for Report {
+    /// With a comparison at an error of 1e-6.
+    fn default() -> Report {
+        Report { to: None, inputs: Vec::new(), compare: true, error: 1e-6 }
+    }
+}
+
+/// What the page is made of.
+struct Content {
+    title: String,
+    name: String,
+    facts: Vec<(&'static str, String)>,
+    drawing: String,
+    decided: Vec<Decided>,
+    paths: Vec<PathRow>,
+    paths_complete: bool,
+    dependent: Vec<String>,
+    conserved: Vec<String>,
+    forms: Vec<FormPart>,
+    comparison: Option<(CompareReport, String)>,
+    run: Result<(Simulated, String), String>,
+    to: f64,
+    warnings: Vec<String>,
+}
+
+/// A zero-order causal path.
+struct PathRow {
+    class: u8,
+    between: String,
+    route: String,
+    bonds: String,
+    gain: String,
+    value: Option<f64>,
+    breaks: String,
+    fate: String,
+}
+
+/// The equations of a form, or why there are none.
+struct FormPart {
+    form: Form,
+    content: Result<FormText, String>,
+}
+
+struct FormText {
+    counts: String,
+    /// Unknowns, with what each is there for.
+    unknowns: Vec<(String, &'static str)>,
+    equations: Vec<(String, String)>,
+    left_out: usize,
+    meanings: Vec<String>,
+    certificate: Vec<String>,
+}
+
+impl Model {
+    /// The report as the text of an HTML page. `progress` is told what is done and what is being done.
+    ///
+    /// # Errors
+    /// The model has errors, or an input does not fit. A run that stops is no error: the page says so.
+    pub fn report(&self, report: &Report, progress: &mut dyn FnMut(f64, &str) -> bool) -> Result<String, Error> {
+        progress(0.0, "equations");
+        let causal = self.causal_graph()?;
+        let loops = self.loops()?;
+        let minimal = show(self.equations_in(Form::Minimal)?);
+        let to = match report.to {
+            Some(to) => to,
+            None => self.typical_time()?,
+        };
+        let comparison = match report.compare {
+            true => {
+                let wanted = Compare {
+                    to: Some(to),
+                    error: report.error,
+                    inputs: report.inputs.clone(),
+                    repeats: 3,
+                    patience: 2.0,
+                };
+                let compared = self.compare(&wanted, &mut |part, what| progress(0.05 + 0.85 * part, what));
+                // A model that does not come to its end has no comparison; the run below says why.
+                compared.ok().map(|report| {
+                    let svg = report.plot().svg;
+                    (report, svg)
+                })
+            }
+            false => None,
+        };
+        progress(0.9, "run");
+        let run = Run { to, every: Some(to / 500.0), inputs: report.inputs.clone(), rtol: 1e-8, ..Run::default() };
+        let run = match self.simulate(&run, &mut |_| true) {
+            Ok(done) => {
+                let svg = self.plot(&done.trace).svg;
+                Ok((done, svg))
+            }
+            Err(Error::Run(stopped)) => Err(stopped.to_string()),
+            Err(error) => return Err(error),
+        };
+        let content = Content {
+            title: if self.graph.doc.is_empty() { self.graph.name.clone() } else { self.graph.doc.clone() },
+            name: self.graph.name.clone(),
+            facts: self.facts(&loops, minimal.equations.states.len()),
+            drawing: self.draw()?.svg,
+            decided: causality::decided(&causal, &loops),
+            paths: path_rows(&causal, &loops),
+            paths_complete: loops.complete,
+            dependent: print_dependent(&minimal, Style::MathMl),
+            conserved: loops.conserved.iter().map(|c| format!("{} = {}", c.name, c.value)).collect(),
+            forms: Form::ALL.into_iter().map(|form| self.form_part(form)).collect(),
+            comparison,
+            run,
+            to,
+            warnings: self.check()?.diagnostics.0.iter().map(|d| d.title.clone()).collect(),
+        };
+        progress(1.0, "page");
+        Ok(page::page(&content))
+    }
+
+    fn facts(&self, loops: &crate::loops::LoopsReport, states: usize) -> Vec<(&'static str, String)> {
+        let inner = self.graph.elements.values().filter(|e| e.kind.is_inner()).count();
+        let outer = self.graph.elements.values().count() - inner;
+        vec![
+            ("elements", outer.to_string()),
+            ("junctions and two-ports", inner.to_string()),
+            ("bonds", self.graph.bonds.iter().count().to_string()),
+            ("zero-order causal paths", format!("{}{}", loops.paths.len(), if loops.complete { "" } else { "+" })),
+            ("independent storages", loops.dof.to_string()),
+            ("states", states.to_string()),
+        ]
+    }
+
+    fn form_part(&self, form: Form) -> FormPart {
+        let content = self.equations_in(form).map_err(|error| crate::compare::short(&error)).map(|equations| {
+            let shown = show(equations);
+            let equations = &shown.equations;
+            let counts = equations.counts;
+            let storage = |kind| if kind == StateKind::Signal { "integrated signal" } else { "storage" };
+            let states =
+                equations.states.iter().map(|s| (print_symbol(&shown, s.symbol, Style::MathMl), storage(s.kind)));
+            let algebraic = equations.algebraic.iter().map(|a| {
+                let cause = match a.cause {
+                    Cause::Break => "break variable",
+                    Cause::Law(_) => "law",
+                    Cause::Multiplier(_) => "multiplier",
+                };
+                (print_symbol(&shown, a.symbol, Style::MathMl), cause)
+            });
+            let mut lines = print_sides(&shown, Style::MathMl);
+            let left_out = lines.len().saturating_sub(MOST);
+            lines.truncate(MOST);
+            let algebraic_count = counts.algebraic + equations.implicit.len();
+            FormText {
+                counts: format!(
+                    "{} differential, {algebraic_count} algebraic, index {}",
+                    counts.differential, equations.index
+                ),
+                unknowns: states.chain(algebraic).take(MOST).collect(),
+                equations: lines,
+                left_out,
+                meanings: print_meanings(&shown, Style::MathMl).into_iter().take(MOST).collect(),
+                certificate: print_certificate(&shown),
+            }
+        });
+        FormPart { form, content }
+    }
+}
+
+fn path_rows(causal: &CausalGraph, loops: &crate::loops::LoopsReport) -> Vec<PathRow> {
+    let paths = find_paths(causal);
+    let x = &paths.exprs;
+    let row = |(path, told): (&halfarrow_compiler::causal_paths::Path, &crate::loops::LoopReport)| PathRow {
+        class: told.class,
+        between: told.elements.join(" – "),
+        route: told.route.join(" → "),
+        bonds: told.bonds.iter().map(u32::to_string).collect::<Vec<_>>().join(" "),
+        gain: mathml(x, path.gain, &PlainNames(x)),
+        value: told.gain_value,
+        breaks: told.breaks.join(", "),
+        fate: told.resolution.clone(),
+    };
+    paths.paths.iter().zip(&loops.paths).map(row).collect()
+}
