@@ -32,7 +32,7 @@ pub(crate) fn singular_values(rows: &[Vec<f64>], columns: usize) -> Option<Vec<f
 
 /// By real, then imaginary part; equal up to rounding counts as equal, so that pairs stay together.
 fn sorted(mut values: Vec<Complex>) -> Vec<Complex> {
-    let size = values.iter().map(|z| z[0].hypot(z[1])).fold(0.0f64, f64::max);
+    let size = values.iter().map(|z| libm::hypot(z[0], z[1])).fold(0.0f64, f64::max);
     let step = (1e-9 * size).max(f64::MIN_POSITIVE);
     let place = |x: f64| (x / step).round();
     values.sort_by(|a, b| place(a[0]).total_cmp(&place(b[0])).then(a[1].total_cmp(&b[1])));
@@ -46,8 +46,8 @@ mod tests {
     fn near(found: &[Complex], wanted: &[Complex], tolerance: f64) {
         assert_eq!(found.len(), wanted.len(), "{found:?}");
         for (a, b) in found.iter().zip(wanted) {
-            let apart = (a[0] - b[0]).hypot(a[1] - b[1]);
-            assert!(apart <= tolerance * b[0].hypot(b[1]).max(1e-300), "{found:?} is not {wanted:?}");
+            let apart = libm::hypot(a[0] - b[0], a[1] - b[1]);
+            assert!(apart <= tolerance * libm::hypot(b[0], b[1]).max(1e-300), "{found:?} is not {wanted:?}");
         }
     }
 

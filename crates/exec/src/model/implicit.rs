@@ -8,6 +8,9 @@ use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 
 /// Passes of Newton on states of the minimal form.
 const ITERATIONS: usize = 30;
+/// Passes of Newton on what is recorded, and unknowns up to which there are any.
+const REFINEMENTS: usize = 4;
+const MOST_REFINED: usize = 60;
 
 /// A form of a graph as a system in implicit form.
 ///
@@ -44,6 +47,8 @@ pub struct ImplicitModel {
     twin: bool,
     /// Algebraic unknowns of a higher index, whose errors nothing controls while running.
     uncontrolled: Vec<usize>,
+    /// Whether the form tells every state of the reference.
+    all_told: bool,
     begun: bool,
 }
 
@@ -93,6 +98,7 @@ impl ImplicitModel {
         let algebraic = |i: &usize| !equations.differential[*i] && equations.indices[*i] > 1;
         let all_told = pairs.len() == reference.program.states.len();
         let mut model = ImplicitModel {
+            all_told,
             uncontrolled: (0..n).filter(|i| all_told && algebraic(i)).collect(),
             seen: form.routine_for(&seen),
             mirrored: reference.routine_for(&mirrored),
@@ -370,6 +376,54 @@ impl ImplicitModel {
         Ok((whole, rates))
     }
 
+    /// The unknowns and their rates with free rates and algebraic unknowns made to fit the states: the integrator leaves of
+    /// its Newton what its tolerance allows, divided by the step for rates. By the equations of this form alone, of
+    /// index 1; as they are where Newton does not make them better.
+    fn consistent(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        let n = y.len();
+        let (mut whole, mut rates) = (y.to_vec(), yp.to_vec());
+        let rows: Vec<usize> = (0..n).filter(|&i| !self.equations.explicit[i]).collect();
+        let higher = self.equations.indices.iter().any(|index| *index > 1);
+        if rows.is_empty() || rows.len() > MOST_REFINED || higher {
+            return Ok((whole, rates));
+        }
+        let (mut out, mut along, mut slope) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let mut before = f64::INFINITY;
+        for _ in 0..REFINEMENTS {
+            self.run_rates(t, &whole, &rates, &mut out)?;
+            let miss: Vec<f64> = rows.iter().map(|&row| out[row]).collect();
+            let k = rows.len();
+            let mut matrix = vec![0.0; k * k];
+            for (column, &unknown) in rows.iter().enumerate() {
+                along[unknown] = 1.0;
+                match self.equations.differential[unknown] {
+                    true => self.form.tangent_by_rates(t, &whole, &along, &mut slope)?,
+                    false => self.form.tangent(t, &whole, &along, &mut slope)?,
+                }
+                along[unknown] = 0.0;
+                (0..k).for_each(|row| matrix[row * k + column] = slope[rows[row]]);
+            }
+            let Some(step) = super::minimum_norm::step(&matrix, &miss, k) else { break };
+            let length = step.step.iter().map(|s| s.abs()).fold(0.0, f64::max);
+            if step.rank < k {
+                // Rates that the equations hold only differentiated.
+                return if self.all_told { self.controlled(t, y, yp) } else { Ok((y.to_vec(), yp.to_vec())) };
+            }
+            if !length.is_finite() || length >= before {
+                break;
+            }
+            before = length;
+            for (&unknown, s) in rows.iter().zip(&step.step) {
+                let value = if self.equations.differential[unknown] { &mut rates } else { &mut whole };
+                value[unknown] += s;
+            }
+            if length == 0.0 {
+                break;
+            }
+        }
+        Ok((whole, rates))
+    }
+
     /// The state of the reference from the unknowns, both in the mode that ends here.
     fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place(t, y, yp);
@@ -533,11 +587,11 @@ impl ImplicitSystem for ImplicitModel {
     }
 
     fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        if self.uncontrolled.is_empty() || self.form.recorded.is_empty() {
-            self.place_rates(yp);
-            return self.form.observe(t, y, out);
-        }
-        let (y, yp) = self.controlled(t, y, yp)?;
+        let (y, yp) = match (self.form.recorded.is_empty(), self.uncontrolled.is_empty()) {
+            (true, _) => (y.to_vec(), yp.to_vec()),
+            (false, true) => self.consistent(t, y, yp)?,
+            (false, false) => self.controlled(t, y, yp)?,
+        };
         self.place_rates(&yp);
         self.form.observe(t, &y, out)
     }

@@ -411,7 +411,7 @@ fn relate(rows: &mut [Row]) {
 fn notes(report: &CompareReport) -> Vec<String> {
     let mut notes = Vec::new();
     let confirmed = report.reference.confirmed_to;
-    if !(confirmed <= 0.1 * report.error) {
+    if confirmed > 0.1 * report.error || confirmed.is_nan() {
         let by = report.reference.confirmed_by;
         notes.push(format!(
             "the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little"

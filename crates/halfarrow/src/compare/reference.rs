@@ -51,9 +51,11 @@ impl Reference {
         let known = minimal.variables();
         let names: Vec<&str> = known.iter().map(|v| v.0.as_str()).collect();
         let settings = |method| Settings { method, rtol: TIGHTEST, to };
-        let run = |subject: &Subject, method, names: &[&str]| subject.sampled(settings(method), to / POINTS, names);
-        let auto = run(minimal, Method::Auto, &names).map_err(Box::new);
-        let radau = run(minimal, Method::Radau, &names).map_err(Box::new);
+        let run = |subject: &Subject, method, names: &[&str]| {
+            subject.sampled(settings(method), to / POINTS, names).map_err(Box::new)
+        };
+        let auto = run(minimal, Method::Auto, &names);
+        let radau = run(minimal, Method::Radau, &names);
         let confirming = others.iter().find_map(|(form, subject)| {
             let theirs = subject.variables();
             let common: Vec<&str> = names

@@ -195,7 +195,8 @@ impl Subject<'_> {
         let _ = system.record(&[]);
         system.cross_jump(0.0, &mut x).ok()?;
         let linear = system.linearise(0.0, &x, &[]).ok()?;
-        let sizes: Vec<f64> = crate::linear_algebra::eigenvalues(&linear.a)?.iter().map(|z| z[0].hypot(z[1])).collect();
+        let sizes: Vec<f64> =
+            crate::linear_algebra::eigenvalues(&linear.a)?.iter().map(|z| libm::hypot(z[0], z[1])).collect();
         let fastest = sizes.iter().copied().fold(0.0f64, f64::max);
         let slowest = sizes.into_iter().filter(|s| *s > 1e-6 * fastest).fold(f64::INFINITY, f64::min);
         (fastest > 0.0 && fastest.is_finite()).then_some((slowest, fastest))

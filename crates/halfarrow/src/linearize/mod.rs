@@ -377,7 +377,7 @@ fn states(program: &Program, x: &[f64], rates: &[f64]) -> Vec<StateAt> {
 
 fn modes(poles: &[Complex]) -> Vec<Mode> {
     let mode = |&pole: &Complex| {
-        let size = pole[0].hypot(pole[1]);
+        let size = libm::hypot(pole[0], pole[1]);
         Mode {
             pole,
             natural_frequency: size,

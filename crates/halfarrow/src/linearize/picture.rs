@@ -42,7 +42,7 @@ impl LinearizeReport {
         let far = FAR * median(&responses);
         let mut curves = Vec::new();
         for response in &responses {
-            let near = |v: &[f64; 2]| if v[0].hypot(v[1]) <= far { *v } else { [f64::NAN; 2] };
+            let near = |v: &[f64; 2]| if libm::hypot(v[0], v[1]) <= far { *v } else { [f64::NAN; 2] };
             let upper: Vec<[f64; 2]> = response.values.iter().map(near).collect();
             let lower = upper.iter().map(|v| [v[0], -v[1]]).collect();
             let name = self.curve_name(response);

@@ -63,7 +63,7 @@ impl LinearizeReport {
     /// From below the slowest to above the fastest pole or zero, equal ratios apart.
     fn frequencies(&self) -> Vec<f64> {
         let known = self.poles.iter().chain(self.zeros.iter().flatten());
-        let sizes: Vec<f64> = known.map(|z| z[0].hypot(z[1])).filter(|size| *size > 0.0).collect();
+        let sizes: Vec<f64> = known.map(|z| libm::hypot(z[0], z[1])).filter(|size| *size > 0.0).collect();
         let most = sizes.iter().copied().fold(0.0f64, f64::max);
         let least = sizes.into_iter().filter(|size| *size > 1e-8 * most).fold(f64::INFINITY, f64::min);
         let (low, high) = if most > 0.0 { (libm::log10(least), libm::log10(most)) } else { (0.0, 0.0) };
@@ -83,7 +83,7 @@ impl LinearizeReport {
 impl Response {
     /// Magnitudes.
     pub fn magnitudes(&self) -> Vec<f64> {
-        self.values.iter().map(|v| v[0].hypot(v[1])).collect()
+        self.values.iter().map(|v| libm::hypot(v[0], v[1])).collect()
     }
 
     /// Phases in degrees, without leaps of a whole turn.
