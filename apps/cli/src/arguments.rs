@@ -225,6 +225,10 @@ pub enum Solver {
     Rk4,
     /// Order 2, implicit, fixed step
     ImplicitMidpoint,
+    /// Order 1, linearly implicit, fixed step, for stiff models
+    LinearlyImplicitEuler,
+    /// Order 3, linearly implicit, fixed step, for stiff models
+    Rosenbrock,
 }
 
 /// How to find the start.

@@ -193,6 +193,12 @@ impl System for Audited<'_, exec::Model> {
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.model.tangent(t, x, v, jv)
     }
+    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        self.model.jacobian(t, x, values)
+    }
+    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.model.drift(t, x, out)
+    }
     fn sparsity(&self) -> &Sparsity {
         self.model.sparsity()
     }

@@ -92,6 +92,12 @@ impl System for Counted<'_> {
         self.tangents += 1;
         self.system.tangent(t, x, v, jv)
     }
+    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        self.system.jacobian(t, x, values)
+    }
+    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.system.drift(t, x, out)
+    }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }

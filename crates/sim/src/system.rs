@@ -57,6 +57,13 @@ pub trait System {
     /// As [`rates`](System::rates).
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure>;
 
+    /// Derivative of the rates by time alone, `out = (∂f/∂t)(t, x)`, exact, in the present mode: what sources, inputs and
+    /// held signals do to them.
+    ///
+    /// # Errors
+    /// As [`rates`](System::rates).
+    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure>;
+
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 

@@ -63,6 +63,8 @@ fn run(arguments: &Simulate) -> Run {
             Solver::Heun => Method::Fixed(FixedMethod::Heun),
             Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),
             Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
+            Solver::LinearlyImplicitEuler => Method::Fixed(FixedMethod::LinearlyImplicitEuler),
+            Solver::Rosenbrock => Method::Fixed(FixedMethod::Rosenbrock),
         },
         step: arguments.step,
         rtol: arguments.rtol,

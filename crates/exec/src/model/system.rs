@@ -80,16 +80,22 @@ impl Model {
     fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.rates_at(t, x)?;
         self.still();
-        let Model { frame, layout, inputs, held, dx, crossed, .. } = self;
+        self.let_time_pass(t);
+        let Model { frame, layout, dx, .. } = self;
+        frame.d[layout.states as usize..][..dx.len()].copy_from_slice(dx);
+        let run = self.frame.run_along(&self.sources);
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    /// Sets the direction of derivatives to that of time: inputs and held signals move, states do not.
+    fn let_time_pass(&mut self, t: f64) {
+        let Model { frame, layout, inputs, held, crossed, .. } = self;
         frame.d[layout.time as usize] = 1.0;
         inputs.iter().enumerate().for_each(|(i, s)| frame.d[layout.inputs as usize + i] = s.at(t).1);
         for (i, held) in held.iter().enumerate() {
             let slope = if let Held::Delay(delay) = held { delay.at(t, *crossed).1 } else { 0.0 };
             frame.d[layout.held as usize + i] = slope;
         }
-        frame.d[layout.states as usize..][..dx.len()].copy_from_slice(dx);
-        let run = self.frame.run_along(&self.sources);
-        run.map_err(|trouble| self.failure(t, trouble))
     }
 
     fn source(&self, i: usize) -> (f64, f64) {
@@ -156,6 +162,11 @@ impl Model {
     /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
     fn along(&mut self, t: f64, first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.frame.d[first as usize..][..v.len()].copy_from_slice(v);
+        self.slopes_along(t, jv)
+    }
+
+    /// Derivative of the rates along the direction that is set.
+    fn slopes_along(&mut self, t: f64, jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;
         for (state, (jv, &register)) in jv.iter_mut().zip(&self.rates.outputs).enumerate() {
             *jv = self.frame.d[register as usize];
@@ -218,6 +229,13 @@ impl System for Model {
         self.place(t, x);
         self.still();
         self.along(t, self.layout.states, v, jv)
+    }
+
+    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.still();
+        self.let_time_pass(t);
+        self.slopes_along(t, out)
     }
 
     fn sparsity(&self) -> &Sparsity {

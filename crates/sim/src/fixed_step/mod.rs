@@ -5,9 +5,12 @@
 //! error of the order of the step where the rates jump, of its square where they only bend.
 
 mod implicit_midpoint;
+mod matrix;
+mod rosenbrock;
 
 use crate::{Failure, Sparsity, System};
 use implicit_midpoint::ImplicitMidpoint;
+use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 
 /// A method of fixed step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +24,11 @@ pub enum FixedMethod {
     /// Implicit midpoint rule: order 2, A-stable, symplectic; keeps every quadratic invariant, so also the energy of a
     /// linear conservative machine. Newton with the exact Jacobian, at most 20 iterations a step.
     ImplicitMidpoint,
+    /// Linearly implicit Euler: order 1, L-stable. 1 evaluation, 1 Jacobian, 1 factorisation a step, no iteration.
+    LinearlyImplicitEuler,
+    /// The Rosenbrock method RODAS3: order 3, L-stable, for stiff systems in real time. 3 evaluations, 1 Jacobian,
+    /// 1 factorisation and 4 solutions a step, no iteration.
+    Rosenbrock,
 }
 
 /// Takes steps; all memory is taken in [`new`](FixedStep::new).
@@ -29,7 +37,12 @@ pub struct FixedStep {
     /// Rates of each stage, one after the other.
     stages: Vec<f64>,
     trial: Vec<f64>,
-    midpoint: Option<ImplicitMidpoint>,
+    implicit: Option<Implicit>,
+}
+
+enum Implicit {
+    Midpoint(ImplicitMidpoint),
+    Linearly(LinearlyImplicit),
 }
 
 /// An explicit Runge-Kutta method without needless stages.
@@ -56,7 +69,17 @@ impl FixedMethod {
             FixedMethod::Euler => Some(&EULER),
             FixedMethod::Heun => Some(&HEUN),
             FixedMethod::Rk4 => Some(&RK4),
-            FixedMethod::ImplicitMidpoint => None,
+            FixedMethod::ImplicitMidpoint | FixedMethod::LinearlyImplicitEuler | FixedMethod::Rosenbrock => None,
+        }
+    }
+
+    fn implicit(self, sparsity: &Sparsity) -> Option<Implicit> {
+        let linearly = |method: &'static Rosenbrock| Implicit::Linearly(LinearlyImplicit::new(method, sparsity));
+        match self {
+            FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4 => None,
+            FixedMethod::ImplicitMidpoint => Some(Implicit::Midpoint(ImplicitMidpoint::new(sparsity))),
+            FixedMethod::LinearlyImplicitEuler => Some(linearly(&LINEARLY_IMPLICIT_EULER)),
+            FixedMethod::Rosenbrock => Some(linearly(&RODAS3)),
         }
     }
 }
@@ -69,7 +92,7 @@ impl FixedStep {
             tableau,
             stages: vec![0.0; tableau.map_or(0, |tableau| tableau.nodes.len()) * sparsity.states()],
             trial: vec![0.0; sparsity.states()],
-            midpoint: tableau.is_none().then(|| ImplicitMidpoint::new(sparsity)),
+            implicit: method.implicit(sparsity),
         }
     }
 
@@ -79,9 +102,10 @@ impl FixedStep {
     /// # Errors
     /// What the system reports, a state that is no longer finite, or Newton without convergence. `x` is then unchanged.
     pub fn step(&mut self, system: &mut dyn System, t: f64, h: f64, x: &mut [f64]) -> Result<(), Failure> {
-        match (self.tableau, &mut self.midpoint) {
+        match (self.tableau, &mut self.implicit) {
             (Some(tableau), _) => self.explicit(tableau, system, t, h, x)?,
-            (None, Some(midpoint)) => midpoint.step(system, t, h, x, &mut self.trial)?,
+            (None, Some(Implicit::Midpoint(midpoint))) => midpoint.step(system, t, h, x, &mut self.trial)?,
+            (None, Some(Implicit::Linearly(method))) => method.step(system, t, h, x, &mut self.trial)?,
             (None, None) => {}
         }
         if let Some(state) = self.trial.iter().position(|value| !value.is_finite()) {

@@ -87,6 +87,10 @@ impl System for SemiExplicit<'_> {
         entries.for_each(|((row, column), dy)| jv[row] -= dy * v[column]);
         Ok(())
     }
+    fn drift(&mut self, t: f64, _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
+        // Only methods of fixed step ask for it, which no implicit form has.
+        Err(Failure::NotFinite { time: t, what: "the derivative by time of an implicit form".into() })
+    }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }

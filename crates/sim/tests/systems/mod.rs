@@ -25,6 +25,8 @@ pub struct Known {
     pub rates: Function,
     /// `(t, x, v, mode, out)`.
     pub tangent: fn(f64, &[f64], &[f64], &Mode, &mut [f64]),
+    /// Derivative of the rates by time: `(t, x, out)`.
+    pub drift: fn(f64, &[f64], &mut [f64]),
     pub solution: fn(f64) -> Vec<f64>,
     pub jumps: Vec<f64>,
     pub switches: Function,
@@ -50,6 +52,7 @@ impl Known {
             sparsity: Sparsity::dense(start.len()),
             rates,
             tangent,
+            drift: |_, _, out| out.fill(0.0),
             solution,
             jumps: vec![],
             switches: |_, _, _, _| {},
@@ -105,6 +108,10 @@ impl System for Known {
     }
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         (self.tangent)(t, x, v, &self.mode, jv);
+        Ok(())
+    }
+    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        (self.drift)(t, x, out);
         Ok(())
     }
     fn sparsity(&self) -> &Sparsity {
@@ -180,6 +187,34 @@ pub fn hyperbola() -> Known {
         |_, x, v, _, jv| jv[0] = -2.0 * x[0] * v[0],
         |t| vec![1.0 / (1.0 + t)],
     )
+}
+
+/// `x' = cos t - k (x - sin t)`: stiff, driven, and still exactly `sin t`; `y' = -y²` beside it.
+pub fn driven() -> Known {
+    const K: f64 = 1e4;
+    let mut system = Known::new(
+        &[0.0, 1.0],
+        |t, x, _, dx| (dx[0], dx[1]) = (t.cos() - K * (x[0] - t.sin()), -x[1] * x[1]),
+        |_, x, v, _, jv| (jv[0], jv[1]) = (-K * v[0], -2.0 * x[1] * v[1]),
+        |t| vec![t.sin(), 1.0 / (1.0 + t)],
+    );
+    system.drift = |t, _, out| (out[0], out[1]) = (-t.sin() + K * t.cos(), 0.0);
+    system
+}
+
+/// `x' = x cos t`, in which everything depends on time.
+pub fn swinging() -> Known {
+    let mut system = Known::new(
+        &[1.0],
+        |t, x, _, dx| dx[0] = x[0] * t.cos() * (1.0 + 0.1 * x[0]),
+        |t, x, v, _, jv| jv[0] = t.cos() * (1.0 + 0.2 * x[0]) * v[0],
+        |t| {
+            let grown = t.sin().exp();
+            vec![grown / (1.1 - 0.1 * grown)]
+        },
+    );
+    system.drift = |t, x, out| out[0] = -x[0] * t.sin() * (1.0 + 0.1 * x[0]);
+    system
 }
 
 /// `x' = a - x`, `a` steps from 0 to 1 at 0.3 s and to -2 at 0.77 s; exactly linear in between.
