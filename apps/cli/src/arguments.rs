@@ -73,6 +73,15 @@ Examples:
   halfarrow report car.bond --out car.html
   halfarrow report car.bond --to 10 --without-comparison --out car.html")]
     Report(Report),
+    /// Run against the wall clock: a step of fixed length each tick
+    #[command(after_help = "\
+Inputs and outputs are text with commas between the values: inputs in the order of the model or as name=value, outputs
+after the time. The last input before a tick counts. A tick that ends after the next is due is a miss.
+Examples:
+  halfarrow run car.bond --rate 1kHz --for 60
+  halfarrow run car.bond --rate 1kHz --input udp://127.0.0.1:5000 --output udp://127.0.0.1:5001 --record body.f
+  halfarrow run car.bond --rate 500Hz --input road=road.csv --solver rosenbrock --json")]
+    Run(Box<RunArguments>),
     /// Draw the bond graph with its causal strokes and paths
     #[command(after_help = "Example:\n  halfarrow draw car.bond --out car.svg")]
     Draw(Draw),
@@ -377,6 +386,50 @@ pub struct Report {
     /// Leave out the comparison of forms, which takes time
     #[arg(long)]
     pub without_comparison: bool,
+}
+
+/// What to do when a tick takes too long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum OnMiss {
+    /// Run the late ticks without a pause
+    CatchUp,
+    /// Leave the late ticks out: the model falls behind the clock
+    Skip,
+}
+
+/// `run`.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Ticks a second, as in `1kHz`, `500 Hz` or `500`
+    #[arg(long, value_name = "FREQUENCY")]
+    pub rate: String,
+    /// Length of the run in s of the model; without it, until it is interrupted
+    #[arg(long = "for", value_name = "TIME")]
+    pub length: Option<f64>,
+    /// Where inputs come from: `udp://ADDRESS:PORT`, `stdin`, NAME=FILE, or a .csv file with columns called as inputs; may
+    /// be repeated
+    #[arg(long, value_name = "SOURCE")]
+    pub input: Vec<String>,
+    /// Where values are sent after every tick: `udp://ADDRESS:PORT`
+    #[arg(long, value_name = "TARGET")]
+    pub output: Option<String>,
+    /// What to send instead of states and outputs: names with commas between them, or `all`
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub record: Vec<String>,
+    /// The method, one with fixed step
+    #[arg(long, default_value = "heun")]
+    pub solver: Solver,
+    /// Where to start
+    #[arg(long, default_value = "given")]
+    pub start: Start,
+    /// What to do when a tick takes too long
+    #[arg(long, default_value = "catch-up")]
+    pub on_miss: OnMiss,
+    /// Evaluations at most each time nonlinear equations are solved; more stop the run
+    #[arg(long, default_value_t = 50)]
+    pub bound: usize,
 }
 
 /// `draw`.

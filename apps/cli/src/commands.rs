@@ -6,6 +6,7 @@ mod export;
 mod files;
 mod linearize;
 mod picture;
+mod real_time;
 mod report;
 mod run;
 
@@ -15,6 +16,7 @@ pub use export::export;
 pub use files::{fmt, new};
 pub use linearize::linearize;
 pub use picture::draw;
+pub use real_time::run;
 pub use report::report;
 pub use run::simulate;
 

@@ -23,6 +23,7 @@ mod linear_algebra;
 mod linearize;
 mod loops;
 mod model;
+mod real_time;
 mod report;
 mod run;
 mod stage;
@@ -39,6 +40,7 @@ pub use halfarrow_compiler::compile::Found;
 pub use halfarrow_compiler::equations::Form;
 pub use halfarrow_emit::File;
 pub use halfarrow_sim::fixed_step::FixedMethod;
+pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
 pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
 pub use linearize::{
@@ -46,6 +48,7 @@ pub use linearize::{
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text};
+pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, frequency};
 pub use report::Report;
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;

@@ -258,6 +258,12 @@ impl Model {
         exec::Model::new(schedule(equations)).map_err(|failure| self.stopped(failure))
     }
 
+    /// A run that stopped with nothing recorded.
+    pub(crate) fn stopped_at(&self, stopped: halfarrow_sim::Stopped) -> Error {
+        let report = self.report(&stopped.summary, stopped.time, AuditReport::default(), Vec::new());
+        Error::Run(Box::new(Stopped { failure: stopped.failure, trace: Trace::default(), report }))
+    }
+
     /// A run that never began.
     pub(crate) fn stopped(&self, failure: Failure) -> Error {
         let report = self.run_report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
@@ -392,7 +398,7 @@ fn empty_trace(system: &impl Recording) -> Trace {
 }
 
 /// The declared units of the recorded variables, where they are not SI units.
-fn units(system: &impl Recording) -> Vec<Option<Unit>> {
+pub(crate) fn units(system: &impl Recording) -> Vec<Option<Unit>> {
     let observed = &system.program().observed;
     system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
@@ -463,7 +469,7 @@ pub(crate) fn connect(
 }
 
 /// Chooses what is recorded; tells what was left out.
-fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec<String>, Problem> {
+pub(crate) fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec<String>, Problem> {
     match record {
         Record::Default => Ok(left_out(system, true)),
         Record::All => {

@@ -13,6 +13,7 @@ mod jacobian;
 mod lu;
 mod options;
 mod radau;
+pub mod real_time;
 mod scene;
 mod shared;
 mod signal;

@@ -15,11 +15,7 @@ pub(crate) struct Shared<'a> {
 
 impl<'a> Shared<'a> {
     pub(crate) fn new(system: &'a mut dyn System) -> Shared<'a> {
-        Shared {
-            system: RefCell::new(Counted { system, rates: 0, tangents: 0 }),
-            failure: RefCell::new(None),
-            differential: None,
-        }
+        Shared { system: RefCell::new(Counted::new(system)), failure: RefCell::new(None), differential: None }
     }
 
     /// A system of which only the states marked have rates; those of the others have to be 0.
@@ -66,6 +62,12 @@ pub(crate) struct Counted<'a> {
     system: &'a mut dyn System,
     pub(crate) rates: usize,
     pub(crate) tangents: usize,
+}
+
+impl<'a> Counted<'a> {
+    pub(crate) fn new(system: &'a mut dyn System) -> Counted<'a> {
+        Counted { system, rates: 0, tangents: 0 }
+    }
 }
 
 impl System for Counted<'_> {

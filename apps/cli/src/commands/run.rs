@@ -54,31 +54,46 @@ fn run(arguments: &Simulate) -> Run {
         form: form(arguments.form),
         stiffness: arguments.stiffness,
         damping: arguments.damping,
-        method: match arguments.solver {
-            Solver::Auto => Method::Auto,
-            Solver::Explicit => Method::Explicit,
-            Solver::Bdf => Method::Bdf,
-            Solver::Radau => Method::Radau,
-            Solver::Euler => Method::Fixed(FixedMethod::Euler),
-            Solver::Heun => Method::Fixed(FixedMethod::Heun),
-            Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),
-            Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
-            Solver::LinearlyImplicitEuler => Method::Fixed(FixedMethod::LinearlyImplicitEuler),
-            Solver::Rosenbrock => Method::Fixed(FixedMethod::Rosenbrock),
-        },
+        method: method(arguments.solver),
         step: arguments.step,
         rtol: arguments.rtol,
         atol: arguments.atol,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
-        start: match arguments.start {
-            arguments::Start::Given => Start::Given,
-            arguments::Start::Equilibrium => Start::Equilibrium,
-        },
-        record: match &arguments.record[..] {
-            [] => Record::Default,
-            [all] if all == "all" => Record::All,
-            names => Record::Names(names.iter().map(|name| name.trim().to_string()).collect()),
-        },
+        start: start(arguments.start),
+        record: record(&arguments.record),
+    }
+}
+
+/// The method that an option names.
+pub(super) fn method(solver: Solver) -> Method {
+    match solver {
+        Solver::Auto => Method::Auto,
+        Solver::Explicit => Method::Explicit,
+        Solver::Bdf => Method::Bdf,
+        Solver::Radau => Method::Radau,
+        Solver::Euler => Method::Fixed(FixedMethod::Euler),
+        Solver::Heun => Method::Fixed(FixedMethod::Heun),
+        Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),
+        Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
+        Solver::LinearlyImplicitEuler => Method::Fixed(FixedMethod::LinearlyImplicitEuler),
+        Solver::Rosenbrock => Method::Fixed(FixedMethod::Rosenbrock),
+    }
+}
+
+/// What an option asks to record.
+pub(super) fn record(names: &[String]) -> Record {
+    match names {
+        [] => Record::Default,
+        [all] if all == "all" => Record::All,
+        names => Record::Names(names.iter().map(|name| name.trim().to_string()).collect()),
+    }
+}
+
+/// Where an option says to start.
+pub(super) fn start(start: arguments::Start) -> Start {
+    match start {
+        arguments::Start::Given => Start::Given,
+        arguments::Start::Equilibrium => Start::Equilibrium,
     }
 }
 

@@ -8,8 +8,8 @@ mod history;
 mod implicit;
 mod inputs;
 mod jacobian;
-mod machine;
 mod linear;
+mod machine;
 mod minimum_norm;
 mod operations;
 mod start;
@@ -195,6 +195,12 @@ impl Model {
         self.inputs[index] = Signal::table(times, values).map_err(|why| InputError::Points(input.to_string(), why))?;
         self.restart();
         Ok(())
+    }
+
+    /// Sets an input to which nothing is connected, by its number in the program, in SI units: from now on it has this
+    /// value. For runs in real time, between steps; takes no memory.
+    pub fn set_input(&mut self, input: usize, value: f64) {
+        self.inputs[input].set_default(value);
     }
 
     /// Chooses what is recorded, in this order.

@@ -43,13 +43,7 @@ impl StepMatrix {
     ///
     /// # Errors
     /// What the system reports, or no pivot is left.
-    pub(super) fn factor(
-        &mut self,
-        system: &mut dyn System,
-        t: f64,
-        x: &[f64],
-        factor: f64,
-    ) -> Result<(), Failure> {
+    pub(super) fn factor(&mut self, system: &mut dyn System, t: f64, x: &[f64], factor: f64) -> Result<(), Failure> {
         let singular = |state: Option<usize>, system: &dyn System| Failure::Singular {
             time: t,
             what: state.map_or("the step".into(), |state| format!("the step of {}", system.state_name(state))),

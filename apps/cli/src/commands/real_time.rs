@@ -1,0 +1,173 @@
+//! `run`.
+
+use std::io::{self, IsTerminal};
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::Duration;
+
+use halfarrow::{Durations, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Source, Statistics, frequency};
+use serde_json::json;
+
+use super::run::{method, record, start};
+use super::with_model;
+use crate::arguments::{self, RunArguments};
+use crate::screen;
+
+/// Time from one look at a run to the next.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// A run against the wall clock.
+pub fn run(arguments: &RunArguments) -> u8 {
+    with_model(&arguments.model, |model| {
+        let run = asked(arguments)?;
+        let (statistics, over) = (Statistics::default(), AtomicBool::new(false));
+        let outcome = std::thread::scope(|scope| {
+            if io::stderr().is_terminal() && !arguments.model.model.json {
+                scope.spawn(|| watch(&statistics, &over));
+            }
+            let outcome = model.run_real_time(&run, &statistics);
+            over.store(true, Relaxed);
+            outcome
+        });
+        let report = match outcome {
+            Ok(report) => report,
+            Err(error) => {
+                if statistics.ticks() > 0 && !arguments.model.model.json {
+                    screen::note(&line(&statistics));
+                }
+                return Err(error);
+            }
+        };
+        match arguments.model.model.json {
+            true => screen::print_json(&json!(report)),
+            false => screen::print(&text(&report)),
+        }
+        Ok(0)
+    })
+}
+
+fn asked(arguments: &RunArguments) -> Result<RealTimeRun, Problem> {
+    let bad = |reason: String| Problem::BadOption { reason };
+    let Method::Fixed(method) = method(arguments.solver) else {
+        return Err(bad("a run against the clock needs a method with fixed step: euler, heun, rk4, implicit_midpoint, linearly_implicit_euler or rosenbrock".into()));
+    };
+    let rate = frequency(&arguments.rate)
+        .ok_or_else(|| bad(format!("`{}` is no frequency: write `1kHz`, `500 Hz` or `500`", arguments.rate)))?;
+    Ok(RealTimeRun {
+        rate,
+        length: arguments.length,
+        method,
+        inputs: arguments.input.iter().map(|text| source(text)).collect::<Result<_, _>>()?,
+        output: arguments.output.as_deref().map(address).transpose()?,
+        record: record(&arguments.record),
+        start: start(arguments.start),
+        on_miss: match arguments.on_miss {
+            arguments::OnMiss::CatchUp => OnMiss::CatchUp,
+            arguments::OnMiss::Skip => OnMiss::Skip,
+        },
+        bound: Some(arguments.bound),
+    })
+}
+
+fn source(text: &str) -> Result<Source, Problem> {
+    match text.split_once('=') {
+        _ if text == "stdin" || text == "-" => Ok(Source::Stdin),
+        _ if text.contains("://") => address(text).map(Source::Udp),
+        Some((name, path)) => Ok(Source::File(name.trim().to_string(), path.trim().into())),
+        None => Ok(Source::Table(text.into())),
+    }
+}
+
+/// The address of `udp://host:port`.
+fn address(text: &str) -> Result<SocketAddr, Problem> {
+    let found = text.strip_prefix("udp://").and_then(|host| host.to_socket_addrs().ok()?.next());
+    let reason = || format!("`{text}` is no address: write `udp://127.0.0.1:5000`");
+    found.ok_or_else(|| Problem::BadOption { reason: reason() })
+}
+
+/// Shows how a run goes on, on one line that is written anew.
+fn watch(statistics: &Statistics, over: &AtomicBool) {
+    let bar = indicatif::ProgressBar::new_spinner();
+    while !over.load(Relaxed) {
+        bar.set_message(line(statistics));
+        bar.tick();
+        std::thread::sleep(LOOK);
+    }
+    bar.finish_and_clear();
+}
+
+fn line(statistics: &Statistics) -> String {
+    format!(
+        "t = {:.1} s, {} misses; step {} (median), {} (longest); late by {} (median), {} (most)",
+        statistics.time(),
+        statistics.misses(),
+        duration(statistics.step.quantile(0.5)),
+        duration(statistics.step.most()),
+        duration(statistics.jitter.quantile(0.5)),
+        duration(statistics.jitter.most()),
+    )
+}
+
+fn text(report: &RealTimeReport) -> String {
+    let row = |name: &str, d: &Durations| {
+        [name.into(), duration(d.median), duration(d.p99), duration(d.p999), duration(d.max)]
+    };
+    let rows = [row("step", &report.step), row("late by", &report.jitter)];
+    let mut text = screen::table(["", "median", "99 %", "99.9 %", "longest"], rows);
+    text += &bars("how long steps took", &report.step);
+    text += &bars("how late ticks began", &report.jitter);
+    text += &format!(
+        "{} to t = {} s at {} Hz: {} ticks, {} misses",
+        report.model,
+        screen::short(report.reached),
+        screen::short(report.rate),
+        report.ticks,
+        report.misses
+    );
+    text += match (report.misses, report.on_miss) {
+        (0, _) => "",
+        (_, "skip") => ", late ticks left out",
+        _ => ", late ticks caught up",
+    };
+    if report.skipped > 0 {
+        text += &format!(" ({} left out)", report.skipped);
+    }
+    text += "\n";
+    if report.received + report.rejected > 0 {
+        text += &format!("inputs: {} taken, {} could not be read\n", report.received, report.rejected);
+    }
+    if report.sent + report.lost > 0 {
+        text += &format!("outputs: {} sent, {} lost: t,{}\n", report.sent, report.lost, report.outputs.join(","));
+    }
+    text
+}
+
+/// A histogram with a line for each factor of 2.
+fn bars(title: &str, durations: &Durations) -> String {
+    let mut lines: Vec<(f64, u64)> = Vec::new();
+    for &(upper, count) in &durations.histogram {
+        let end = libm::exp2(libm::ceil(libm::log2(upper * 1e9) - 1e-9)) * 1e-9;
+        match lines.last_mut() {
+            Some((last, sum)) if *last == end => *sum += count,
+            _ => lines.push((end, count)),
+        }
+    }
+    let most = lines.iter().map(|l| l.1).max().unwrap_or(1) as f64;
+    let mut text = format!("{title}\n");
+    for (end, count) in lines {
+        let length = libm::ceil(count as f64 / most * 40.0) as usize;
+        text += &format!("  below {:>9} {:>9}  {}\n", duration(end), count, "█".repeat(length));
+    }
+    text
+}
+
+/// A duration in the unit that fits.
+fn duration(seconds: f64) -> String {
+    let (factor, unit) = match seconds {
+        s if s < 1e-6 => (1e9, "ns"),
+        s if s < 1e-3 => (1e6, "µs"),
+        s if s < 1.0 => (1e3, "ms"),
+        _ => (1.0, "s"),
+    };
+    format!("{:.3} {unit}", seconds * factor)
+}

@@ -1,0 +1,422 @@
+//! A run against the wall clock.
+
+use std::io::{BufRead, Write};
+use std::net::{SocketAddr, UdpSocket};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::unit::Unit;
+use halfarrow_exec as exec;
+use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, WallClock, run_real_time};
+use halfarrow_trace::read_inputs;
+use serde::Serialize;
+
+use crate::error::{Error, Problem};
+use crate::model::Model;
+use crate::run::{Record, Run, Start, choose, connect, units};
+
+/// Evaluations of a block of nonlinear equations at most in one solution, where none are given.
+const MOST_EVALUATIONS: usize = 50;
+/// The clock spins for this long before a tick.
+const SPIN: Duration = Duration::from_micros(200);
+/// Bytes of a datagram at most.
+const DATAGRAM: usize = 1472;
+
+/// A run against the wall clock. Inputs and outputs are in the units that their declarations give.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RealTimeRun {
+    /// Ticks a second; above 0. Each is one step of the method.
+    pub rate: f64,
+    /// How long, in s of the model; `None`: until it is interrupted.
+    pub length: Option<f64>,
+    /// The method.
+    pub method: FixedMethod,
+    /// Where inputs come from. What none of these gives keeps its default.
+    pub inputs: Vec<Source>,
+    /// Where recorded values are sent after every tick: one datagram of text, `t` and the values with commas between.
+    pub output: Option<SocketAddr>,
+    /// What is recorded.
+    pub record: Record,
+    /// Where to start.
+    pub start: Start,
+    /// What to do when a tick takes too long.
+    pub on_miss: OnMiss,
+    /// Evaluations of a block of nonlinear equations at most in one solution; `None`: 50.
+    pub bound: Option<usize>,
+}
+
+/// Where inputs come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// Datagrams of text: values in the order of the model's inputs, or `name=value`, with commas between. The last one
+    /// before a tick counts.
+    Udp(SocketAddr),
+    /// The same in lines of stdin.
+    Stdin,
+    /// A CSV file for one input, against the time of the model.
+    File(String, PathBuf),
+    /// A CSV file with columns called as inputs.
+    Table(PathBuf),
+}
+
+/// What a run against the wall clock has shown. Times in s.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RealTimeReport {
+    /// Name of the model.
+    pub model: String,
+    /// Ticks a second asked for.
+    pub rate: f64,
+    /// The time that the model reached.
+    pub reached: f64,
+    /// Ticks that are over.
+    pub ticks: u64,
+    /// Ticks that ended after the next one was due.
+    pub misses: u64,
+    /// What was done then: `catch_up` or `skip`.
+    pub on_miss: &'static str,
+    /// Ticks left out.
+    pub skipped: u64,
+    /// Time from when a tick was due to its begin.
+    pub jitter: Durations,
+    /// Time that a step took.
+    pub step: Durations,
+    /// Inputs taken.
+    pub received: u64,
+    /// Datagrams or lines that could not be read.
+    pub rejected: u64,
+    /// Datagrams sent.
+    pub sent: u64,
+    /// Datagrams that could not be sent.
+    pub lost: u64,
+    /// Names of the values sent, after `t`.
+    pub outputs: Vec<String>,
+}
+
+/// How long something took, in s.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Durations {
+    /// Half of all took at most this long.
+    pub median: f64,
+    /// 99 of 100.
+    pub p99: f64,
+    /// 999 of 1000.
+    pub p999: f64,
+    /// All.
+    pub max: f64,
+    /// Upper ends of classes, and how many are in each.
+    pub histogram: Vec<(f64, u64)>,
+}
+
+impl Durations {
+    fn of(histogram: &Histogram) -> Durations {
+        Durations {
+            median: histogram.quantile(0.5),
+            p99: histogram.quantile(0.99),
+            p999: histogram.quantile(0.999),
+            max: histogram.most(),
+            histogram: histogram.buckets(),
+        }
+    }
+}
+
+impl Model {
+    /// Runs the model against the wall clock. `statistics` can be read from another thread meanwhile.
+    ///
+    /// # Errors
+    /// The model has errors, something is asked that cannot be, or the run stops, with time, element and reason.
+    pub fn run_real_time(&self, run: &RealTimeRun, statistics: &Statistics) -> Result<RealTimeReport, Error> {
+        let pace = pace(run)?;
+        let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
+        connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
+        choose(&mut system, &run.record)?;
+        let mut x = self.start(&mut system, run.start)?;
+        system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
+        let mut ports = Ports::open(run, &system)?;
+        let mut clock = WallClock::new(SPIN);
+        let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
+        end.map_err(|stopped| self.stopped_at(stopped))?;
+        Ok(RealTimeReport {
+            model: self.name().to_string(),
+            rate: run.rate,
+            reached: statistics.time(),
+            ticks: statistics.ticks(),
+            misses: statistics.misses(),
+            on_miss: match run.on_miss {
+                OnMiss::CatchUp => "catch_up",
+                OnMiss::Skip => "skip",
+            },
+            skipped: statistics.skipped(),
+            jitter: Durations::of(&statistics.jitter),
+            step: Durations::of(&statistics.step),
+            received: ports.received,
+            rejected: ports.rejected,
+            sent: ports.sent,
+            lost: ports.lost,
+            outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
+        })
+    }
+}
+
+/// A frequency in Hz from text such as `1kHz`, `500 Hz` or `500`; `None` if it is none.
+///
+/// ```
+/// assert_eq!(halfarrow::frequency("1kHz"), Some(1000.0));
+/// assert_eq!(halfarrow::frequency("2.5"), Some(2.5));
+/// assert_eq!(halfarrow::frequency("3 m"), None);
+/// ```
+pub fn frequency(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let end = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
+    let number: f64 = text[..end].trim().parse().ok()?;
+    let unit = text[end..].trim();
+    if unit.is_empty() {
+        return Some(number);
+    }
+    let unit = Unit::parse(unit).ok()?;
+    (unit.dimension == Unit::parse("Hz").ok()?.dimension).then(|| unit.to_si_f64(number))
+}
+
+fn pace(run: &RealTimeRun) -> Result<Pace, Problem> {
+    let bad = |reason: String| Err(Problem::BadOption { reason });
+    if !(run.rate.is_finite() && run.rate > 0.0) {
+        return bad(format!("the rate is {} Hz: it has to be above 0", run.rate));
+    }
+    if run.length.is_some_and(|length| !(length.is_finite() && length > 0.0)) {
+        return bad("the length of the run has to be above 0 s".into());
+    }
+    let ticks = run.length.map(|length| (length * run.rate).round().max(1.0) as u64);
+    Ok(Pace { step: 1.0 / run.rate, ticks, on_miss: run.on_miss })
+}
+
+/// The files among the sources, an input each.
+fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Run, Problem> {
+    let mut inputs = Vec::new();
+    for source in &run.inputs {
+        match source {
+            Source::File(name, path) => inputs.push((name.clone(), path.clone())),
+            Source::Table(path) => {
+                let bad = |faults| Problem::BadInput { path: path.clone(), faults };
+                let columns = read_inputs(path).map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
+                let known = |name: &String| system.program().inputs.iter().any(|i| i.name == *name);
+                let found: Vec<String> = columns.into_keys().filter(known).collect();
+                if found.is_empty() {
+                    return Err(bad(vec!["no column is called as an input of the model".into()]));
+                }
+                inputs.extend(found.into_iter().map(|name| (name, path.clone())));
+            }
+            Source::Udp(_) | Source::Stdin => {}
+        }
+    }
+    Ok(Run { inputs, ..Run::default() })
+}
+
+/// A number in a declared unit, to SI or back: `factor · value + offset`.
+#[derive(Clone, Copy)]
+struct Scale {
+    factor: f64,
+    offset: f64,
+}
+
+impl Scale {
+    fn to_si(unit: Option<&Unit>) -> Scale {
+        let at = |value: f64| unit.map_or(value, |unit| unit.to_si_f64(value));
+        Scale { factor: at(1.0) - at(0.0), offset: at(0.0) }
+    }
+    fn from_si(unit: Option<&Unit>) -> Scale {
+        let at = |value: f64| unit.map_or(value, |unit| unit.from_si_f64(value));
+        Scale { factor: at(1.0) - at(0.0), offset: at(0.0) }
+    }
+    fn of(self, value: f64) -> f64 {
+        self.factor * value + self.offset
+    }
+}
+
+/// What stands between a run and the outside. All memory is taken when it is opened.
+struct Ports {
+    names: Vec<String>,
+    scales: Vec<Scale>,
+    from: Option<UdpSocket>,
+    stdin: Option<Arc<Lines>>,
+    to: Option<UdpSocket>,
+    shown: Vec<Scale>,
+    buffer: Box<[u8; DATAGRAM]>,
+    values: Vec<f64>,
+    received: u64,
+    rejected: u64,
+    sent: u64,
+    lost: u64,
+}
+
+/// The values of the last line of stdin, shared with the thread that reads it.
+struct Lines {
+    /// Bits of the values; those of NaN where none came yet.
+    values: Vec<AtomicU64>,
+    received: AtomicU64,
+    rejected: AtomicU64,
+}
+
+impl Ports {
+    fn open(run: &RealTimeRun, system: &exec::Model) -> Result<Ports, Problem> {
+        let program = system.program();
+        let names: Vec<String> = program.inputs.iter().map(|i| i.name.clone()).collect();
+        let wants = |wanted: &Source| matches!(wanted, Source::Udp(_) | Source::Stdin);
+        if names.is_empty() && run.inputs.iter().any(wants) {
+            return Err(Problem::BadOption { reason: "the model has no inputs to feed".into() });
+        }
+        let refused = |what: &str, at: SocketAddr, why: std::io::Error| Problem::BadOption {
+            reason: format!("{what} udp://{at} cannot be opened: {why}"),
+        };
+        let mut ports = Ports {
+            scales: program.inputs.iter().map(|i| Scale::to_si(i.unit.as_ref())).collect(),
+            from: None,
+            stdin: None,
+            to: None,
+            shown: units(system).iter().map(|unit| Scale::from_si(unit.as_ref())).collect(),
+            buffer: Box::new([0; DATAGRAM]),
+            values: vec![f64::NAN; names.len()],
+            names,
+            received: 0,
+            rejected: 0,
+            sent: 0,
+            lost: 0,
+        };
+        for source in &run.inputs {
+            match *source {
+                Source::Udp(at) => {
+                    let socket = UdpSocket::bind(at).map_err(|why| refused("the input", at, why))?;
+                    socket.set_nonblocking(true).map_err(|why| refused("the input", at, why))?;
+                    ports.from = Some(socket);
+                }
+                Source::Stdin => ports.stdin = Some(Lines::read(ports.names.clone())),
+                _ => {}
+            }
+        }
+        if let Some(at) = run.output {
+            let any = if at.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+            let socket = UdpSocket::bind(any).and_then(|socket| {
+                socket.connect(at)?;
+                socket.set_nonblocking(true)?;
+                Ok(socket)
+            });
+            ports.to = Some(socket.map_err(|why| refused("the output", at, why))?);
+        }
+        Ok(ports)
+    }
+
+    /// Takes the last datagram that has come.
+    fn take_datagrams(&mut self) {
+        let Some(socket) = &self.from else { return };
+        while let Ok(size) = socket.recv(&mut self.buffer[..]) {
+            let text = std::str::from_utf8(&self.buffer[..size]).unwrap_or("?");
+            match parse(text, &self.names, &mut |i, value| self.values[i] = value) {
+                true => self.received += 1,
+                false => self.rejected += 1,
+            }
+        }
+    }
+
+    fn take_lines(&mut self) {
+        let Some(lines) = &self.stdin else { return };
+        for (value, bits) in self.values.iter_mut().zip(&lines.values) {
+            let new = f64::from_bits(bits.load(Relaxed));
+            if !new.is_nan() {
+                *value = new;
+            }
+        }
+        self.received = lines.received.load(Relaxed);
+        self.rejected = lines.rejected.load(Relaxed);
+    }
+}
+
+impl Exchange<exec::Model> for Ports {
+    fn input(&mut self, _: f64, system: &mut exec::Model) -> bool {
+        self.take_datagrams();
+        self.take_lines();
+        for (i, (value, scale)) in self.values.iter_mut().zip(&self.scales).enumerate() {
+            if !value.is_nan() {
+                system.set_input(i, scale.of(*value));
+            }
+        }
+        true
+    }
+
+    fn output(&mut self, t: f64, values: &[f64]) {
+        let Some(socket) = &self.to else { return };
+        let mut rest = &mut self.buffer[..];
+        let mut whole = write!(rest, "{t:?}").is_ok();
+        for (value, scale) in values.iter().zip(&self.shown) {
+            whole &= write!(rest, ",{:?}", scale.of(*value)).is_ok();
+        }
+        whole &= rest.write_all(b"\n").is_ok();
+        let size = DATAGRAM - rest.len();
+        match whole && socket.send(&self.buffer[..size]).is_ok() {
+            true => self.sent += 1,
+            false => self.lost += 1,
+        }
+    }
+}
+
+impl Lines {
+    /// Starts a thread that reads stdin to its end.
+    fn read(names: Vec<String>) -> Arc<Lines> {
+        let lines = Arc::new(Lines {
+            values: names.iter().map(|_| AtomicU64::new(f64::NAN.to_bits())).collect(),
+            received: AtomicU64::new(0),
+            rejected: AtomicU64::new(0),
+        });
+        let shared = Arc::clone(&lines);
+        std::thread::spawn(move || {
+            for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+                let good = parse(&line, &names, &mut |i, value| shared.values[i].store(value.to_bits(), Relaxed));
+                let count = if good { &shared.received } else { &shared.rejected };
+                count.fetch_add(1, Relaxed);
+            }
+        });
+        lines
+    }
+}
+
+/// Reads values in order, or by name, with commas between; tells whether all of it could be read. Nothing is put if not.
+fn parse(text: &str, names: &[String], put: &mut dyn FnMut(usize, f64)) -> bool {
+    let read = |put: &mut dyn FnMut(usize, f64)| {
+        text.trim().split(',').enumerate().all(|(place, field)| {
+            let (index, number) = match field.split_once('=') {
+                Some((name, number)) => (names.iter().position(|known| known == name.trim()), number),
+                None => (Some(place).filter(|&place| place < names.len()), field),
+            };
+            match (index, number.trim().parse::<f64>()) {
+                (Some(index), Ok(value)) if value.is_finite() => {
+                    put(index, value);
+                    true
+                }
+                _ => false,
+            }
+        })
+    };
+    read(&mut |_, _| {}) && read(put)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Option<Vec<(usize, f64)>> {
+        let names = ["road".to_string(), "brake".to_string()];
+        let mut found = Vec::new();
+        parse(text, &names, &mut |i, value| found.push((i, value))).then_some(found)
+    }
+
+    #[test]
+    fn inputs_in_order_or_by_name() {
+        assert_eq!(read("0.5, 2e3\n"), Some(vec![(0, 0.5), (1, 2000.0)]));
+        assert_eq!(read("0.5"), Some(vec![(0, 0.5)]));
+        assert_eq!(read("brake = -1"), Some(vec![(1, -1.0)]));
+        for bad in ["", "x", "1,2,3", "clutch=1", "nan", "inf", "1,,2", "brake="] {
+            assert_eq!(read(bad), None, "{bad}");
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The clock of a run in real time.
+
+use std::time::{Duration, Instant};
+
+/// A clock in s, whose zero is anywhere.
+pub trait Clock {
+    /// The time.
+    fn now(&mut self) -> f64;
+    /// Returns at that time, or at once if it is over.
+    fn wait(&mut self, until: f64);
+}
+
+/// The clock on the wall. It sleeps while there is time, and spins before a tick is due, since sleepers wake late.
+#[derive(Clone, Copy, Debug)]
+pub struct WallClock {
+    zero: Instant,
+    spin: Duration,
+}
+
+impl WallClock {
+    /// A clock that spins for the last `spin` before a tick.
+    pub fn new(spin: Duration) -> WallClock {
+        WallClock { zero: Instant::now(), spin }
+    }
+}
+
+impl Clock for WallClock {
+    fn now(&mut self) -> f64 {
+        self.zero.elapsed().as_secs_f64()
+    }
+
+    fn wait(&mut self, until: f64) {
+        let Ok(until) = Duration::try_from_secs_f64(until) else { return };
+        if let Some(pause) = until.checked_sub(self.zero.elapsed() + self.spin) {
+            std::thread::sleep(pause);
+        }
+        while self.zero.elapsed() < until {
+            std::hint::spin_loop();
+        }
+    }
+}
