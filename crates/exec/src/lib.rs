@@ -16,5 +16,5 @@ pub use halfarrow_compiler::algebra::math;
 pub use machine::MachineError;
 pub use model::{
     Equilibrium, EquilibriumError, ImplicitModel, InputError, Linearised, Model, Operations, ParameterError,
-    RecordError, StartConflict, StartError, StartValue,
+    RecordError, StartConflict, StartError, StartValue, WideModel,
 };

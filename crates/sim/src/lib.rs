@@ -21,6 +21,7 @@ mod simulate;
 mod sparsity;
 mod system;
 mod variable_step;
+pub mod wide;
 
 pub use failure::{Failure, Leap};
 pub use implicit::simulate_implicit;

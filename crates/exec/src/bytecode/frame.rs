@@ -133,8 +133,7 @@ impl Frame {
                 Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
                 Instruction::Watch { pivot, scale, watch } => {
                     let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
-                    let stands = pivot != 0.0 && pivot.abs() > PIVOT_BELOW * scale;
-                    if !stands {
+                    if !Frame::stands(pivot, scale) {
                         return Err(Trouble::Vanished { watch });
                     }
                 }
@@ -142,6 +141,12 @@ impl Frame {
             }
         }
         Ok(())
+    }
+
+    /// Whether a divisor is clearly not 0.
+    #[inline]
+    pub(super) fn stands(pivot: f64, scale: f64) -> bool {
+        pivot != 0.0 && pivot.abs() > PIVOT_BELOW * scale
     }
 
     /// The inner code of a Newton block.
@@ -226,6 +231,20 @@ impl Frame {
             None => piece_of(&self.tables[table as usize], self.r[a as usize]),
         };
         table_on(&self.tables[table as usize], piece, self.r[a as usize])
+    }
+
+    /// The value of a condition at an operand.
+    pub(super) fn condition_at(&mut self, condition: ConditionId, operand: f64) -> f64 {
+        self.conditions.value(condition, operand, &self.tables)
+    }
+
+    /// Value and derivatives of a table at an operand.
+    pub(super) fn table_at(&mut self, operand: f64, table: u32, piece: Option<ConditionId>) -> [f64; 4] {
+        let piece = match piece {
+            Some(condition) => self.condition_at(condition, operand) as usize,
+            None => piece_of(&self.tables[table as usize], operand),
+        };
+        table_on(&self.tables[table as usize], piece, operand)
     }
 
     #[inline]

@@ -14,12 +14,14 @@ mod minimum_norm;
 mod operations;
 mod start;
 mod system;
+mod wide;
 
 pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
 pub use implicit::ImplicitModel;
 pub use linear::Linearised;
 pub use operations::Operations;
+pub use wide::WideModel;
 
 use crate::bytecode::{Frame, Hold, Trouble};
 use clock::Clock;

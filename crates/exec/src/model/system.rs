@@ -62,7 +62,7 @@ impl Model {
 
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
     fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if !self.rates.solves.is_empty() {
+        if self.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
             self.rates_at(t, x)?;
             let blocks = self.rates.solves.iter().map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());

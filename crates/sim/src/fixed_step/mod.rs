@@ -46,13 +46,13 @@ enum Implicit {
 }
 
 /// An explicit Runge-Kutta method without needless stages.
-struct Tableau {
+pub(crate) struct Tableau {
     /// Where in the step each stage stands.
-    nodes: &'static [f64],
+    pub nodes: &'static [f64],
     /// Weights of the earlier rates in each stage.
-    stages: &'static [&'static [f64]],
+    pub stages: &'static [&'static [f64]],
     /// Weights of the rates in the step.
-    weights: &'static [f64],
+    pub weights: &'static [f64],
 }
 
 const EULER: Tableau = Tableau { nodes: &[0.0], stages: &[&[]], weights: &[1.0] };
@@ -64,7 +64,7 @@ const RK4: Tableau = Tableau {
 };
 
 impl FixedMethod {
-    fn tableau(self) -> Option<&'static Tableau> {
+    pub(crate) fn tableau(self) -> Option<&'static Tableau> {
         match self {
             FixedMethod::Euler => Some(&EULER),
             FixedMethod::Heun => Some(&HEUN),

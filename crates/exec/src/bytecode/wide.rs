@@ -1,0 +1,171 @@
+//! A routine for several sets of parameters at once: each instruction works on a lane for every set.
+//!
+//! The same operations in the same order as one at a time, hence the same bits. Solve blocks, conditions and tables go
+//! through the frame of each lane.
+
+use super::frame::Frame;
+use crate::math;
+use halfarrow_compiler::program::{ConditionId, Instruction, Routine, Solve};
+use halfarrow_sim::wide::{LANES, Wide};
+
+/// What has a frame of its own.
+pub(crate) trait Lane {
+    /// The frame.
+    fn frame(&mut self) -> &mut Frame;
+}
+
+/// The registers of all lanes.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct WideFrame {
+    pub r: Vec<Wide>,
+}
+
+impl WideFrame {
+    /// Makes room for a routine.
+    pub fn reserve(&mut self, registers: usize) {
+        self.r.resize(self.r.len().max(registers), [0.0; LANES]);
+    }
+
+    /// Runs a routine for all lanes, in order; `good` loses those that run into trouble. The fixed registers have been
+    /// filled.
+    pub fn run<L: Lane>(&mut self, routine: &Routine, frames: &mut [L], good: &mut [bool; LANES]) {
+        // The widest vectors that the machine has; they round as narrow ones do.
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || self.all(routine, frames, good),
+        );
+    }
+
+    #[inline(always)]
+    fn all<L: Lane>(&mut self, routine: &Routine, frames: &mut [L], good: &mut [bool; LANES]) {
+        for instruction in &routine.code {
+            match *instruction {
+                Instruction::Solve { solve } => self.solve(&routine.solves[solve as usize], frames, good),
+                Instruction::Watch { pivot, scale, .. } => {
+                    let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
+                    (0..LANES).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
+                }
+                ref plain => self.step(plain, frames),
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn solve<L: Lane>(&mut self, solve: &Solve, frames: &mut [L], good: &mut [bool; LANES]) {
+        for lane in 0..LANES {
+            if !good[lane] {
+                continue;
+            }
+            let frame = frames[lane].frame();
+            let reads = solve.outer.iter().chain(if solve.guess.is_empty() { &solve.matrix[..] } else { &[] });
+            let right = if solve.guess.is_empty() { &solve.right[..] } else { &[] };
+            reads.chain(right).for_each(|&i| frame.r[i as usize] = self.r[i as usize][lane]);
+            good[lane] = frame.solve::<false>(solve).is_ok();
+            solve.unknowns.iter().for_each(|&i| self.r[i as usize][lane] = frame.r[i as usize]);
+        }
+    }
+
+    #[inline(always)]
+    fn each(&mut self, out: u32, value: impl Fn(usize) -> f64) {
+        self.r[out as usize] = std::array::from_fn(value);
+    }
+
+    #[inline(always)]
+    fn step<L: Lane>(&mut self, instruction: &Instruction, frames: &mut [L]) {
+        use Instruction::*;
+        let r = |i: u32| self.r[i as usize];
+        let truth = f64::from;
+        match *instruction {
+            Add { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| a[l] + b[l]);
+            }
+            Sub { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| a[l] - b[l]);
+            }
+            Mul { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| a[l] * b[l]);
+            }
+            Div { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| a[l] / b[l]);
+            }
+            Neg { out, a } => {
+                let a = r(a);
+                self.each(out, |l| -a[l]);
+            }
+            Powi { out, a, n } => {
+                let a = r(a);
+                self.r[out as usize] = powers(a, n);
+            }
+            Pow { out, a, b } => self.r[out as usize] = math::pow_lanes(&r(a), &r(b)),
+            Call { f, out, a } => self.r[out as usize] = math::call_lanes(f, &r(a)),
+            Call2 { f, out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| math::call2(f, a[l], b[l]));
+            }
+            Positive { out, a } => {
+                let a = r(a);
+                self.each(out, |l| truth(a[l] > 0.0));
+            }
+            Side { out, a, condition } | Floor { out, a, condition } => {
+                let a = r(a);
+                for (lane, frame) in frames.iter_mut().enumerate() {
+                    self.r[out as usize][lane] = frame.frame().condition_at(condition, a[lane]);
+                }
+            }
+            And { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| truth(a[l] != 0.0 && b[l] != 0.0));
+            }
+            Or { out, a, b } => {
+                let (a, b) = (r(a), r(b));
+                self.each(out, |l| truth(a[l] != 0.0 || b[l] != 0.0));
+            }
+            Not { out, a } => {
+                let a = r(a);
+                self.each(out, |l| truth(a[l] == 0.0));
+            }
+            Select { out, c, a, b } => {
+                let (c, a, b) = (r(c), r(a), r(b));
+                self.each(out, |l| if c[l] != 0.0 { a[l] } else { b[l] });
+            }
+            Table { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 0),
+            TableSlope { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 1),
+            TableCurvature { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 2),
+            Parameter { .. } => unreachable!("parameters are set lane by lane"),
+            Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
+        }
+    }
+
+    /// A table, or its derivative of some order.
+    #[inline(never)]
+    fn table<L: Lane>(
+        &mut self,
+        frames: &mut [L],
+        (out, a): (u32, u32),
+        (table, piece): (u32, Option<ConditionId>),
+        order: usize,
+    ) {
+        let a = self.r[a as usize];
+        for (lane, frame) in frames.iter_mut().enumerate() {
+            self.r[out as usize][lane] = frame.frame().table_at(a[lane], table, piece)[order];
+        }
+    }
+}
+
+/// [`math::powi`] for each lane.
+#[inline(always)]
+fn powers(x: Wide, n: u32) -> Wide {
+    let (mut result, mut square, mut left) = ([1.0; LANES], x, n);
+    while left > 0 {
+        if left & 1 == 1 {
+            (0..LANES).for_each(|l| result[l] *= square[l]);
+        }
+        (0..LANES).for_each(|l| square[l] *= square[l]);
+        left >>= 1;
+    }
+    result
+}

@@ -1,0 +1,147 @@
+//! Several sets of parameters at once.
+
+use super::Model;
+use super::system::What;
+use crate::bytecode::{Frame, Lane, WideFrame};
+use halfarrow_compiler::program::Routine;
+use halfarrow_sim::wide::{LANES, Wide, WideSystem};
+use halfarrow_sim::{Failure, System};
+
+/// A model in as many copies as there are lanes, each with parameters, inputs, start and memory of its own, whose rates
+/// and recorded values are computed together.
+///
+/// Every lane does what its model does alone, to the last bit.
+#[derive(Debug, Clone)]
+pub struct WideModel {
+    models: Vec<Model>,
+    frame: WideFrame,
+    rates: Routine,
+    observe: Routine,
+    /// State and values of one lane.
+    state: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl WideModel {
+    /// The same model in every lane, recording what it records.
+    pub fn new(model: &Model) -> WideModel {
+        let mut frame = WideFrame::default();
+        frame.reserve(model.rates.registers.max(model.observe.registers).max(model.layout.size) as usize);
+        let mut wide = WideModel {
+            models: vec![model.clone(); LANES],
+            frame,
+            rates: model.rates.clone(),
+            observe: model.observe.clone(),
+            state: vec![0.0; model.states()],
+            values: Vec::new(),
+        };
+        wide.begin();
+        wide
+    }
+
+    /// The model of a lane, to set its parameters and inputs and to find its start, not to choose what is recorded. Call
+    /// [`begin`](WideModel::begin) after it.
+    pub fn model(&mut self, lane: usize) -> &mut Model {
+        &mut self.models[lane]
+    }
+
+    /// Takes up what the models of the lanes have been set to: parameters, constants and what follows from them.
+    pub fn begin(&mut self) {
+        let first = &self.models[0];
+        for register in 0..first.layout.size as usize {
+            self.frame.r[register] = std::array::from_fn(|lane| self.models[lane].frame.r[register]);
+        }
+    }
+
+    /// Puts time, inputs, held signals, constants and states where routines read them.
+    fn place(&mut self, t: &Wide, x: &[Wide]) {
+        let WideModel { models, frame, .. } = self;
+        let (states, time) = (models[0].layout.states as usize, models[0].layout.time as usize);
+        frame.r[states..states + x.len()].copy_from_slice(x);
+        frame.r[time] = *t;
+        if states == time + 1 {
+            return; // no inputs, held signals or constants
+        }
+        for (lane, model) in models.iter_mut().enumerate() {
+            model.place_time(t[lane]);
+            let conserved = model.layout.conserved as usize;
+            for register in time + 1..conserved {
+                frame.r[register][lane] = model.frame.r[register];
+            }
+            for (i, value) in model.conserved.iter().enumerate() {
+                frame.r[conserved + i][lane] = *value;
+            }
+        }
+    }
+
+    /// The lane as it would do it alone: what it gives, or why it fails. Beyond a switch it may take the other side.
+    fn alone(
+        &mut self,
+        lane: usize,
+        what: What,
+        t: f64,
+        x: &[Wide],
+        out: &mut [Wide],
+        failures: &mut [Option<Failure>; LANES],
+    ) {
+        let WideModel { models, state, values, .. } = self;
+        state.iter_mut().zip(x).for_each(|(state, x)| *state = x[lane]);
+        values.resize(out.len(), 0.0);
+        let done = match what {
+            What::Rates => models[lane].rates(t, state, values),
+            _ => models[lane].observe(t, state, values),
+        };
+        match done {
+            Ok(()) => out.iter_mut().zip(values).for_each(|(out, value)| out[lane] = *value),
+            Err(failure) => failures[lane] = Some(failure),
+        }
+    }
+
+    fn together(
+        &mut self,
+        what: What,
+        t: &Wide,
+        x: &[Wide],
+        out: &mut [Wide],
+        failures: &mut [Option<Failure>; LANES],
+    ) {
+        self.place(t, x);
+        let mut good: [bool; LANES] = std::array::from_fn(|lane| failures[lane].is_none());
+        let wanted = good;
+        let routine = if let What::Rates = what { &self.rates } else { &self.observe };
+        self.frame.run(routine, &mut self.models, &mut good);
+        for (out, &register) in out.iter_mut().zip(&routine.outputs) {
+            *out = self.frame.r[register as usize];
+            (0..LANES).for_each(|lane| good[lane] &= out[lane].is_finite());
+        }
+        for lane in (0..LANES).filter(|&lane| wanted[lane] && !good[lane]) {
+            self.alone(lane, what, t[lane], x, out, failures);
+        }
+    }
+}
+
+impl Lane for Model {
+    #[inline]
+    fn frame(&mut self) -> &mut Frame {
+        &mut self.frame
+    }
+}
+
+impl WideSystem for WideModel {
+    fn lane(&mut self, lane: usize) -> &mut dyn System {
+        &mut self.models[lane]
+    }
+
+    fn rates(&mut self, t: &Wide, x: &[Wide], dx: &mut [Wide], failures: &mut [Option<Failure>; LANES]) {
+        self.together(What::Rates, t, x, dx, failures);
+    }
+
+    fn observe(&mut self, t: &Wide, x: &[Wide], out: &mut [Wide], failures: &mut [Option<Failure>; LANES]) {
+        self.together(What::Recorded, t, x, out, failures);
+    }
+
+    fn remembers(&self) -> bool {
+        let newton = |routine: &Routine| routine.solves.iter().any(|solve| !solve.guess.is_empty());
+        newton(&self.rates) || newton(&self.observe) || !self.models[0].held.is_empty()
+    }
+}
