@@ -73,6 +73,16 @@ Examples:
   halfarrow report car.bond --out car.html
   halfarrow report car.bond --to 10 --without-comparison --out car.html")]
     Report(Report),
+    /// Run a model with many sets of parameters, on all cores
+    #[command(after_help = "\
+Writes a row for each set: its number, its parameters, what is kept of the run, and failed = 1 where it did not come to
+its end. With euler, heun or rk4 eight sets run at once. A sweep that was interrupted goes on where it stopped.
+What can be kept: initial, final, min, max, max_abs, mean, rms, time_of_max.
+Examples:
+  halfarrow sweep car.bond --vary ks=lin(10 kN/m,30 kN/m,100) --vary b=log(100,3000,20) --to 10 --step 1e-3 \\
+      --reduce \"max_abs(body.f),final(spring.q)\" --out sweep.parquet
+  halfarrow sweep car.bond --samples sets.csv --to 10 --solver auto --out sweep.csv")]
+    Sweep(Box<Sweep>),
     /// Run against the wall clock: a step of fixed length each tick
     #[command(after_help = "\
 Inputs and outputs are text with commas between the values: inputs in the order of the model or as name=value, outputs
@@ -386,6 +396,50 @@ pub struct Report {
     /// Leave out the comparison of forms, which takes time
     #[arg(long)]
     pub without_comparison: bool,
+}
+
+/// `sweep`.
+#[derive(Debug, Args)]
+pub struct Sweep {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// Values of a parameter: `k=lin(FROM,TO,NUMBER)`, `k=log(FROM,TO,NUMBER)` or `k=list(A,B,..)`; may be repeated: every
+    /// value with every value of the others
+    #[arg(long, value_name = "NAME=VALUES")]
+    pub vary: Vec<String>,
+    /// Sets of parameters: a .csv file whose columns are called as they
+    #[arg(long, value_name = "FILE")]
+    pub samples: Option<PathBuf>,
+    /// What to keep of each run, as in `max(body.f),final(spring.q)` [default: the last value of states and outputs]
+    #[arg(long, value_name = "REDUCTIONS", value_delimiter = ',')]
+    pub reduce: Vec<String>,
+    /// End of each run, in s
+    #[arg(long, value_name = "TIME")]
+    pub to: f64,
+    /// Time between the samples that are kept or reduced, in s; without it every step is one
+    #[arg(long, value_name = "TIME")]
+    pub every: Option<f64>,
+    /// The method
+    #[arg(long, default_value = "rk4")]
+    pub solver: Solver,
+    /// Step of a method with fixed step, longest step of the others, in s
+    #[arg(long, value_name = "TIME")]
+    pub step: Option<f64>,
+    /// Relative error allowed in a step of a method with variable step
+    #[arg(long, default_value_t = 1e-6)]
+    pub rtol: f64,
+    /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Where to start
+    #[arg(long, default_value = "given")]
+    pub start: Start,
+    /// Where to write the rows: a .parquet or .csv file
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Begin anew, whatever an interrupted sweep has left
+    #[arg(long)]
+    pub restart: bool,
 }
 
 /// What to do when a tick takes too long.

@@ -9,6 +9,7 @@ mod picture;
 mod real_time;
 mod report;
 mod run;
+mod sweep;
 
 pub use analyse::{check, equations, loops, show};
 pub use compare::compare;
@@ -19,6 +20,7 @@ pub use picture::draw;
 pub use real_time::run;
 pub use report::report;
 pub use run::simulate;
+pub use sweep::sweep;
 
 use halfarrow::{Error, Model, Override};
 

@@ -85,21 +85,32 @@ pub fn short(x: f64) -> String {
 pub struct Progress {
     bar: Option<ProgressBar>,
     to: f64,
+    /// What is told, from how far it has come and how far it goes.
+    told: fn(f64, f64) -> String,
     begun: Instant,
 }
 
 impl Progress {
     /// Of a run to `to`, in s.
     pub fn new(to: f64) -> Progress {
+        Progress::telling(to, |t, to| format!("t = {} s of {} s", short(t), short(to)))
+    }
+
+    /// Of so many sets of parameters.
+    pub fn of_sets(sets: usize) -> Progress {
+        Progress::telling(sets as f64, |done, sets| format!("{done} of {sets} sets"))
+    }
+
+    fn telling(to: f64, told: fn(f64, f64) -> String) -> Progress {
         let bar = io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
             let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
-        Progress { bar, to, begun: Instant::now() }
+        Progress { bar, to, told, begun: Instant::now() }
     }
 
-    /// The run has come to `t`, in s.
+    /// It has come to `t`.
     pub fn reach(&mut self, t: f64) {
         let Some(bar) = &self.bar else { return };
         if bar.is_hidden() {
@@ -109,7 +120,7 @@ impl Progress {
             bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         bar.set_position((t / self.to * 1000.0) as u64);
-        bar.set_message(format!("t = {} s of {} s", short(t), short(self.to)));
+        bar.set_message((self.told)(t, self.to));
     }
 
     /// A part of the work is done, and this is being done.

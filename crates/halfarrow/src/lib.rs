@@ -27,6 +27,7 @@ mod real_time;
 mod report;
 mod run;
 mod stage;
+mod sweep;
 
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;
@@ -52,3 +53,4 @@ pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, frequency};
 pub use report::Report;
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;
+pub use sweep::{Reduce, Reduction, Samples, SetFailure, Sweep, SweepReport, Vary};

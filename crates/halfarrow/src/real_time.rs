@@ -92,6 +92,8 @@ pub struct RealTimeReport {
     pub sent: u64,
     /// Datagrams that could not be sent.
     pub lost: u64,
+    /// Whether the model ran as machine code.
+    pub machine: bool,
     /// Names of the values sent, after `t`.
     pub outputs: Vec<String>,
 }
@@ -135,6 +137,8 @@ impl Model {
         choose(&mut system, &run.record)?;
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
+        // Without machine code for this processor the bytecode runs on.
+        let machine = system.compile_machine().is_ok();
         let mut ports = Ports::open(run, &system)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
@@ -156,6 +160,7 @@ impl Model {
             rejected: ports.rejected,
             sent: ports.sent,
             lost: ports.lost,
+            machine,
             outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
         })
     }

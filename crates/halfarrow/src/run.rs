@@ -260,7 +260,7 @@ impl Model {
 
     /// A run that stopped with nothing recorded.
     pub(crate) fn stopped_at(&self, stopped: halfarrow_sim::Stopped) -> Error {
-        let report = self.report(&stopped.summary, stopped.time, AuditReport::default(), Vec::new());
+        let report = self.run_report(&stopped.summary, stopped.time, AuditReport::default(), Vec::new());
         Error::Run(Box::new(Stopped { failure: stopped.failure, trace: Trace::default(), report }))
     }
 
@@ -403,7 +403,7 @@ pub(crate) fn units(system: &impl Recording) -> Vec<Option<Unit>> {
     system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
 
-fn options(run: &Run) -> Result<Options, Problem> {
+pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
     if matches!(run.method, Method::Fixed(_)) && run.step.is_none() {
         return Err(Problem::NoStep);
     }

@@ -1,0 +1,397 @@
+//! Many runs of one model, each with parameters of its own.
+
+mod journal;
+mod plan;
+mod reduce;
+
+pub use plan::{Samples, Vary};
+pub use reduce::{Reduce, Reduction};
+
+use std::io;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use halfarrow_compiler::diagnostic::nearest;
+use halfarrow_compiler::unit::Unit;
+use halfarrow_exec as exec;
+use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
+use halfarrow_sim::{Options, simulate};
+use halfarrow_trace::{ParquetTable, write_whole};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Problem};
+use crate::model::Model;
+use crate::run::{Record, Run, choose, connect, options, units};
+use journal::{Entry, Journal};
+use plan::Plan;
+use reduce::Reducers;
+
+/// Sets of a chunk: what is computed in one go, written at once, and lost when the program is killed.
+const CHUNK: usize = 8 * LANES;
+
+/// Many runs, and what is kept of each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// What each run does. With an explicit method of fixed step several sets run at once on vectors.
+    pub run: Run,
+    /// Parameters that vary, every value with every value of the others, the last one fastest.
+    pub vary: Vec<Vary>,
+    /// Sets of parameters from a table, each with all that `vary` gives.
+    pub samples: Option<Samples>,
+    /// What is kept of each run; empty: the last value of everything that is recorded.
+    pub reduce: Vec<Reduce>,
+    /// Begins anew, whatever an interrupted sweep has left.
+    pub restart: bool,
+}
+
+/// What came of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SweepReport {
+    /// Name of the model.
+    pub model: String,
+    /// Number of sets.
+    pub sets: usize,
+    /// Sets that were there from an interrupted sweep.
+    pub resumed: usize,
+    /// Names of the columns, after the number of the set: parameters, what is kept, and whether the run failed.
+    pub columns: Vec<String>,
+    /// Sets that could not be run to the end, with why: at most the first 100.
+    pub failures: Vec<SetFailure>,
+    /// Number of such sets.
+    pub failed: usize,
+}
+
+/// A set that could not be run to the end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetFailure {
+    /// Its number, from 1.
+    pub set: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// Failures that are told; all are counted.
+const TOLD: usize = 100;
+
+impl Model {
+    /// Runs a sweep on all cores and writes a row for each set to `out`, `.parquet` or `.csv`: the number of the set from 1,
+    /// its parameters, what is kept of the run, and `failed`, 1 if the run did not come to its end (what is kept is then
+    /// not a number). Rows stand in the order of the sets. `progress` is told how many sets are done and says whether to
+    /// go on.
+    ///
+    /// What is done stands in a file beside `out`, of its name with `.partial` behind; a sweep that was interrupted goes
+    /// on from there. It is taken away in the end.
+    ///
+    /// # Errors
+    /// The model has errors, something is asked that cannot be, a file cannot be written, or `progress` stops it. Sets that
+    /// fail are no error.
+    pub fn sweep(
+        &self,
+        sweep: &Sweep,
+        out: &Path,
+        progress: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> Result<SweepReport, Error> {
+        let kind = Kind::of(out)?;
+        let mut system = self.system(&self.equations_in(sweep.run.form)?)?;
+        connect(&system.program().inputs.clone(), &sweep.run, |name, t, v| system.connect(name, t, v))?;
+        let plan = Plan::new(sweep, &system)?;
+        let reducers = reducers(sweep, &mut system)?;
+        let options = options(&sweep.run)?;
+        options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+        let columns = columns(&plan, &reducers, &system);
+        let identity = self.identity(sweep, &plan, &columns);
+        let unwritable = |why: io::Error| Error::from(Problem::Unwritable { path: out.into(), why: why.to_string() });
+        let mut journal = Journal::open(out, &identity, columns.len(), sweep.restart)?;
+        let resumed = journal.sets();
+        let work = Work { plan: &plan, reducers: &reducers, options: &options, system: &system };
+        self.compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)?;
+        let failures = kind.write(out, &columns, &mut journal).map_err(unwritable)?;
+        journal.remove();
+        Ok(SweepReport {
+            model: self.name().to_string(),
+            sets: plan.sets(),
+            resumed,
+            columns: columns.into_iter().map(|c| c.0).collect(),
+            failed: failures.0,
+            failures: failures.1,
+        })
+    }
+
+    fn compute(
+        &self,
+        work: &Work<'_>,
+        start: crate::run::Start,
+        journal: &mut Journal,
+        progress: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> io::Result<()> {
+        let chunks = work.plan.sets().div_ceil(CHUNK);
+        let open: Vec<usize> = (0..chunks).filter(|chunk| !journal.has(*chunk)).collect();
+        let mut done = journal.sets();
+        if open.is_empty() || !progress(done, work.plan.sets()) {
+            return interrupted(open.is_empty());
+        }
+        // Few results wait to be written: memory stays bounded however many sets there are.
+        let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                // An end of the other side stops the work.
+                let _ = open.into_par_iter().try_for_each_init(
+                    || Worker::new(work),
+                    |worker, chunk| sender.send(worker.chunk(self, chunk, start)).map_err(drop),
+                );
+            });
+            for entry in receiver {
+                done += entry.rows;
+                journal.add(&entry)?;
+                if !progress(done, work.plan.sets()) {
+                    return interrupted(false);
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// What tells one sweep from another.
+    fn identity(&self, sweep: &Sweep, plan: &Plan, columns: &[(String, String)]) -> String {
+        // Everything that the rows depend on, as text.
+        let graph = format!("{:?}", self.graph);
+        format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(&graph), sweep.run)
+    }
+}
+
+fn interrupted(fine: bool) -> io::Result<()> {
+    if fine {
+        Ok(())
+    } else {
+        Err(io::Error::new(io::ErrorKind::Interrupted, "stopped; the same command goes on from here"))
+    }
+}
+
+/// A number that tells texts apart (FNV-1a).
+fn fingerprint(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// What all workers read.
+struct Work<'a> {
+    plan: &'a Plan,
+    reducers: &'a [Reducers],
+    options: &'a Options,
+    system: &'a exec::Model,
+}
+
+/// A core's own copies of the model.
+struct Worker<'a> {
+    work: &'a Work<'a>,
+    wide: Option<exec::WideModel>,
+    system: exec::Model,
+}
+
+impl<'a> Worker<'a> {
+    fn new(work: &'a Work<'a>) -> Worker<'a> {
+        let wide = is_wide(work.options.method).then(|| exec::WideModel::new(work.system));
+        Worker { work, wide, system: work.system.clone() }
+    }
+
+    fn chunk(&mut self, model: &Model, chunk: usize, start: crate::run::Start) -> Entry {
+        let sets: Vec<usize> = (chunk * CHUNK..self.work.plan.sets().min((chunk + 1) * CHUNK)).collect();
+        let mut entry = Entry { chunk, rows: sets.len(), values: Vec::new(), failures: Vec::new() };
+        for group in sets.chunks(LANES) {
+            let outcomes = match self.wide.take() {
+                Some(mut wide) => {
+                    let outcomes = self.together(&mut wide, model, group, start);
+                    self.wide = Some(wide);
+                    outcomes
+                }
+                None => group.iter().map(|&set| self.alone(model, set, start)).collect(),
+            };
+            for (&set, outcome) in group.iter().zip(outcomes) {
+                self.row(set, outcome, &mut entry);
+            }
+        }
+        entry
+    }
+
+    fn row(&self, set: usize, outcome: Result<Vec<f64>, String>, entry: &mut Entry) {
+        entry.values.push((set + 1) as f64);
+        entry.values.extend(self.work.plan.values(set));
+        let failed = outcome.is_err();
+        match outcome {
+            Ok(kept) => entry.values.extend(kept),
+            Err(reason) => {
+                let kept = self.work.reducers.iter().map(|r| r.reductions()).sum();
+                entry.values.extend(std::iter::repeat_n(f64::NAN, kept));
+                entry.failures.push(SetFailure { set: set + 1, reason });
+            }
+        }
+        entry.values.push(f64::from(failed));
+    }
+
+    /// One set by itself, with any method.
+    fn alone(&mut self, model: &Model, set: usize, start: crate::run::Start) -> Result<Vec<f64>, String> {
+        let mut x = prepare(&mut self.system, model, self.work.plan, set, start)?;
+        let mut sink = Reducers::begin(self.work.reducers);
+        simulate(&mut self.system, self.work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
+        Ok(sink.finish())
+    }
+
+    /// Several sets on vectors.
+    fn together(
+        &mut self,
+        wide: &mut exec::WideModel,
+        model: &Model,
+        sets: &[usize],
+        start: crate::run::Start,
+    ) -> Vec<Result<Vec<f64>, String>> {
+        let states = self.system.program().states.len();
+        let mut x = vec![[0.0; LANES]; states];
+        let mut prepared: Vec<Result<(), String>> = Vec::with_capacity(sets.len());
+        let mut wanted = [false; LANES];
+        for (lane, &set) in sets.iter().enumerate() {
+            let found = prepare(wide.model(lane), model, self.work.plan, set, start);
+            wanted[lane] = found.is_ok();
+            prepared.push(found.map(|state| x.iter_mut().zip(state).for_each(|(x, state)| x[lane] = state)));
+        }
+        wide.begin();
+        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(self.work.reducers));
+        let ends = simulate_wide(wide, self.work.options, &mut x, &mut sinks, wanted);
+        let outcome = |((prepared, end), sink): ((Result<(), String>, Result<_, halfarrow_sim::Stopped>), _)| {
+            prepared?;
+            end.map_err(|stopped| stopped.to_string())?;
+            Ok(reduce::Reducing::finish(sink))
+        };
+        prepared.into_iter().zip(ends).zip(sinks).map(outcome).collect()
+    }
+}
+
+/// Sets the parameters of a set and finds its start.
+fn prepare(
+    system: &mut exec::Model,
+    model: &Model,
+    plan: &Plan,
+    set: usize,
+    start: crate::run::Start,
+) -> Result<Vec<f64>, String> {
+    for (name, value) in plan.names().iter().zip(plan.values(set)) {
+        system.set_parameter(name, value).map_err(|why| format!("{name} = {value}: {why}"))?;
+    }
+    model.start(system, start).map_err(|error| error.to_string())
+}
+
+/// Names and units of the columns.
+fn columns(plan: &Plan, reducers: &[Reducers], system: &exec::Model) -> Vec<(String, String)> {
+    let unit = |unit: Option<&Unit>| unit.map(ToString::to_string).unwrap_or_default();
+    let mut all = vec![("set".to_string(), String::new())];
+    all.extend(plan.names().iter().zip(plan.units()).map(|(name, u)| (name.clone(), unit(u.as_ref()))));
+    for (reducer, &i) in reducers.iter().zip(system.recorded()) {
+        all.extend(reducer.columns(&unit(system.program().observed[i].unit.as_ref())));
+    }
+    all.push(("failed".to_string(), String::new()));
+    all
+}
+
+/// What is kept of each recorded variable, in the order in which they are recorded.
+fn reducers(sweep: &Sweep, system: &mut exec::Model) -> Result<Vec<Reducers>, Problem> {
+    if sweep.reduce.is_empty() {
+        choose(system, &sweep.run.record)?;
+    } else {
+        let mut names: Vec<String> = Vec::new();
+        for wanted in &sweep.reduce {
+            if !names.contains(&wanted.variable) {
+                names.push(wanted.variable.clone());
+            }
+        }
+        choose(system, &Record::Names(names))?;
+    }
+    let units = units(system);
+    let of = |(&i, unit): (&usize, Option<Unit>)| {
+        let name = &system.program().observed[i].name;
+        let wanted = sweep.reduce.iter().filter(|r| r.variable == *name).map(|r| r.reduction).collect();
+        Reducers::new(name, unit, if sweep.reduce.is_empty() { vec![Reduction::Final] } else { wanted })
+    };
+    Ok(system.recorded().iter().zip(units).map(of).collect())
+}
+
+/// What a file of results is.
+#[derive(Clone, Copy)]
+enum Kind {
+    Csv,
+    Parquet,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Result<Kind, Problem> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match extension.as_str() {
+            "csv" => Ok(Kind::Csv),
+            "parquet" => Ok(Kind::Parquet),
+            _ => Err(Problem::UnknownKind { path: path.into(), known: vec!["csv", "parquet"] }),
+        }
+    }
+
+    /// Writes all rows in the order of the sets, a chunk at a time. Gives how many failed, and the first of them.
+    fn write(
+        self,
+        path: &Path,
+        columns: &[(String, String)],
+        journal: &mut Journal,
+    ) -> io::Result<(usize, Vec<SetFailure>)> {
+        let mut failures = (0, Vec::new());
+        let mut note = |entry: &Entry| {
+            failures.0 += entry.failures.len();
+            let room = TOLD.saturating_sub(failures.1.len());
+            failures.1.extend(entry.failures.iter().take(room).cloned());
+        };
+        let written = write_whole(path, |out| {
+            let names: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), unit.as_str())).collect();
+            match self {
+                Kind::Parquet => {
+                    let mut table = ParquetTable::new(out, &names)?;
+                    for chunk in 0..journal.chunks() {
+                        let entry = journal.entry(chunk)?;
+                        note(&entry);
+                        let column = |c: usize| entry.values.iter().skip(c).step_by(names.len()).copied().collect();
+                        let columns: Vec<Vec<f64>> = (0..names.len()).map(column).collect();
+                        table.rows(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
+                    }
+                    table.finish()
+                }
+                Kind::Csv => {
+                    let quoted = |name: &&str| match name.contains([',', '"']) {
+                        true => format!("\"{}\"", name.replace('"', "\"\"")),
+                        false => name.to_string(),
+                    };
+                    writeln!(out, "{}", names.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(","))?;
+                    for chunk in 0..journal.chunks() {
+                        let entry = journal.entry(chunk)?;
+                        note(&entry);
+                        for row in entry.values.chunks(names.len()) {
+                            let fields: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
+                            writeln!(out, "{}", fields.join(","))?;
+                        }
+                    }
+                    Ok(())
+                }
+            }
+        });
+        written.map_err(|error| error.source)?;
+        Ok(failures)
+    }
+}
+
+/// That a model has this parameter, and that it can be set.
+fn known_parameter(system: &exec::Model, name: &str) -> Result<(), Problem> {
+    let parameters = &system.program().parameters;
+    match parameters.iter().find(|p| p.name == name) {
+        Some(parameter) if parameter.constant => {
+            Err(Problem::BadOption { reason: format!("`{name}` is a constant: declare it as a param to vary it") })
+        }
+        Some(_) => Ok(()),
+        None => {
+            let known = parameters.iter().filter(|p| !p.constant).map(|p| p.name.as_str());
+            let hint = nearest(name, known).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            Err(Problem::BadOption { reason: format!("the model has no parameter `{name}`{hint}") })
+        }
+    }
+}

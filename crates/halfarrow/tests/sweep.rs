@@ -1,0 +1,109 @@
+//! Sweeps: rows in order, the same as runs alone, kept over an interruption, failures by row.
+
+use std::path::Path;
+
+use halfarrow::{FixedMethod, Method, Model, Override, Record, Reduce, Run, Samples, Sweep, SweepReport, Vary};
+
+const MODEL: &str = "model Oscillator\nparam k = 4 N/m, m = 1 kg, b = 0.1 N.s/m\nconst g = 9.81 m/s2\n1:a -> I:mass(m)\na -> C:spring(k = k, q0 = 10 cm)\na -> R:damper(b)\noutput x = spring.q : mm\n";
+
+fn model() -> Model {
+    Model::from_text("oscillator.bond", MODEL, &[]).expect("a model")
+}
+
+fn sweep(method: Method) -> Sweep {
+    let reduce = ["max(x)", "final(mass.f)", "rms(x)"].map(|text| Reduce::parse(text).expect("a reduction"));
+    Sweep {
+        run: Run { to: 1.0, method, step: Some(0.01), ..Run::default() },
+        vary: vec![Vary::parse("k=lin(1,9,9)").unwrap(), Vary::parse("b=log(0.01,1,10)").unwrap()],
+        samples: None,
+        reduce: reduce.to_vec(),
+        restart: false,
+    }
+}
+
+fn run(model: &Model, sweep: &Sweep, out: &Path) -> SweepReport {
+    model.sweep(sweep, out, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+fn rows(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = std::fs::read_to_string(path).expect("a file");
+    let mut lines = text.lines();
+    let header = lines.next().expect("a header").split(',').map(str::to_string).collect();
+    (header, lines.map(|line| line.split(',').map(|f| f.parse().expect("a number")).collect()).collect())
+}
+
+#[test]
+fn rows_are_those_of_runs_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    for method in [Method::Fixed(FixedMethod::Rk4), Method::Fixed(FixedMethod::ImplicitMidpoint), Method::Auto] {
+        let (model, sweep, out) = (model(), sweep(method), folder.path().join("r.csv"));
+        let report = run(&model, &sweep, &out);
+        assert_eq!((report.sets, report.failed, report.resumed), (90, 0, 0));
+        let (header, rows) = rows(&out);
+        assert_eq!(header, ["set", "k", "b", "max(x)", "rms(x)", "final(mass.f)", "failed"]);
+        assert_eq!(header, report.columns);
+        for (i, row) in rows.iter().enumerate() {
+            assert_eq!((row[0], row[6]), ((i + 1) as f64, 0.0));
+        }
+        assert_eq!((rows[0][1], rows[9][1], rows[10][1], rows[89][1]), (1.0, 1.0, 2.0, 9.0));
+        assert_eq!((rows[0][2], rows[9][2]), (0.01, 1.0));
+        let row = &rows[47];
+        let set = |name: &str, value: f64| Override { name: name.into(), value: format!("{value:?}") };
+        let alone = Model::from_text("oscillator.bond", MODEL, &[set("k", row[1]), set("b", row[2])]).unwrap();
+        let record = Record::Names(vec!["x".into(), "mass.f".into()]);
+        let trace = alone.simulate(&Run { record, ..sweep.run.clone() }, &mut |_| true).unwrap().trace;
+        let greatest = trace.columns[0].values.iter().copied().fold(f64::MIN, f64::max);
+        let last = *trace.columns[1].values.last().unwrap();
+        // Values in the declared unit, mm, are rounded once more.
+        assert!((row[3] - greatest).abs() <= 1e-13 * greatest && (row[5] - last).abs() <= 1e-12, "{row:?} {last}");
+    }
+}
+
+#[test]
+fn an_interrupted_sweep_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, sweep) = (model(), sweep(Method::Fixed(FixedMethod::Heun)));
+    let (whole, parts) = (folder.path().join("whole.parquet"), folder.path().join("parts.parquet"));
+    run(&model, &sweep, &whole);
+    let stopped = model.sweep(&sweep, &parts, &mut |done, _| done == 0);
+    assert!(stopped.is_err() && !parts.exists());
+    assert!(folder.path().join("parts.parquet.partial").exists());
+    let report = run(&model, &sweep, &parts);
+    assert!(report.resumed > 0 && report.resumed < 90, "{}", report.resumed);
+    assert_eq!(std::fs::read(&whole).unwrap(), std::fs::read(&parts).unwrap(), "to the last byte");
+    assert!(!folder.path().join("parts.parquet.partial").exists());
+}
+
+#[test]
+fn sets_that_fail_are_told_by_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, out) = (model(), folder.path().join("r.csv"));
+    let table = folder.path().join("sets.csv");
+    std::fs::write(&table, "m,k\n1 kg,4\n0,4\n500 g,-4\n").unwrap();
+    let sweep =
+        Sweep { samples: Some(Samples::read(&table).unwrap()), vary: vec![], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
+    let report = run(&model, &sweep, &out);
+    let (_, rows) = rows(&out);
+    assert_eq!(rows.iter().map(|row| row[1]).collect::<Vec<_>>(), [1.0, 0.0, 0.5]);
+    assert_eq!(rows.iter().map(|row| row[6]).collect::<Vec<_>>(), [0.0, 1.0, 0.0]);
+    assert!(rows[1][3].is_nan());
+    assert_eq!((report.failed, report.failures[0].set), (1, 2));
+    assert!(report.failures[0].reason.contains("mass"), "{}", report.failures[0].reason);
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, out) = (model(), folder.path().join("r.csv"));
+    let with = |vary: &str| Sweep { vary: vec![Vary::parse(vary).unwrap()], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
+    for (sweep, says) in [
+        (with("q=lin(1,2,3)"), "no parameter `q`"),
+        (with("g=lin(1,2,3)"), "constant"),
+        (Sweep { vary: vec![], ..with("k=list(1)") }, "nothing varies"),
+        (Sweep { reduce: vec![Reduce::parse("max(mas.f)").unwrap()], ..with("k=list(1)") }, "mas.f"),
+        (Sweep { run: Run { to: -1.0, ..with("k=list(1)").run }, ..with("k=list(1)") }, "to"),
+    ] {
+        let error = model.sweep(&sweep, &out, &mut |_, _| true).expect_err(says).to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}
