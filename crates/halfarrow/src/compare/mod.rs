@@ -209,7 +209,7 @@ impl Model {
             let mut measured = Measured { row: Row { form: form.name(), ..Row::default() }, ..Measured::default() };
             match subject {
                 Err(error) => measured.row.reason = Some(short(&error)),
-                Ok(subject) if form == Form::Stiff && self.has_springs()? => {
+                Ok(_) if form == Form::Stiff && self.has_springs()? => {
                     self.climb_stiff(&mut measured, &run, &reference, effort, &mut go_on)?;
                     self.describe(&mut measured.row, form)?;
                 }
