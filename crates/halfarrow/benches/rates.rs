@@ -17,14 +17,14 @@ use halfarrow_exec::Model;
 use halfarrow_sim::System;
 
 const MODELS: [&str; 5] = ["pendulum", "double_pendulum", "slider_crank", "quarter_car", "dc_motor_pid"];
-/// Batches of each.
-const BATCHES: usize = 201;
+/// Batches of each, short enough to run undisturbed.
+const BATCHES: usize = 1001;
 /// Evaluations of a batch.
-const COUNT: usize = 20_000;
+const COUNT: usize = 2_000;
 
 fn main() {
-    // `cargo test --benches` only wants to know that it starts.
-    if std::env::args().any(|a| a == "--test") {
+    // `cargo test --benches` only wants to know that it builds.
+    if !std::env::args().any(|a| a == "--bench") {
         return;
     }
     println!("{:16} {:>9} {:>16} {:>16} {:>16}", "", "C by hand", "machine code", "exported C", "bytecode");
@@ -42,7 +42,7 @@ fn compare(name: &str) {
     let mut hand = Peer::by_hand(&folder.join("benches/hand"), name, states);
     let mut bytecode = Model::new(program).expect("parameters that fit");
     bytecode.initialise(0.0).expect("a start");
-    let mut exported = Peer::exported(&bytecode, name);
+    let mut exported = Peer::exported(&folder.join("benches/hand"), name, states);
     let mut machine = bytecode.clone();
     machine.compile_machine().expect("machine code");
     let start = hand.run(0).1;
@@ -59,9 +59,7 @@ fn compare(name: &str) {
     for _ in 0..BATCHES {
         times[0].push(hand.run(COUNT).0);
         times[1].push(ours(&mut machine, &start, COUNT).0);
-        if let Some(exported) = &mut exported {
-            times[2].push(exported.run(COUNT).0);
-        }
+        times[2].push(exported.run(COUNT).0);
         times[3].push(ours(&mut bytecode, &start, COUNT).0);
     }
     let median = |all: &mut Vec<f64>| {
@@ -95,18 +93,33 @@ struct Peer {
 impl Peer {
     fn by_hand(folder: &Path, name: &str, states: usize) -> Peer {
         let sources = [folder.join("timing.c"), folder.join(format!("{name}.c"))];
-        Peer::compiled(&format!("by_hand_{name}"), folder, &sources, states)
+        Peer::compiled(&format!("by_hand_{name}"), folder, &sources, &[format!("-DSTATES={states}")])
     }
 
-    /// C as it is exported; `None` where that is not built in.
-    fn exported(_: &Model, _: &str) -> Option<Peer> {
-        None
+    /// C as it is exported.
+    fn exported(folder: &Path, name: &str, states: usize) -> Peer {
+        let file = folder.join("../../../../models").join(name).join("model.bond");
+        let model = halfarrow::Model::load(&file, &[]).expect("a model without errors");
+        let exported = model.export(&halfarrow::Export::default()).expect("an explicit model");
+        let place = std::env::temp_dir().join(format!("halfarrow_bench_c_{name}_{}", std::process::id()));
+        std::fs::create_dir_all(&place).expect("a folder to work in");
+        for file in &exported.files {
+            std::fs::write(place.join(&file.path), &file.bytes).expect("a file");
+        }
+        let c = &exported.report.name;
+        let sources = [folder.join("timing.c"), folder.join("exported.c"), place.join(format!("{c}.c"))];
+        let header = place.join(format!("{c}.h"));
+        let words =
+            [format!("-DSTATES={states}"), format!("-DMODEL={c}"), format!("-DHEADER=\"{}\"", header.display())];
+        let peer = Peer::compiled(&format!("exported_{name}"), folder, &sources, &words);
+        let _ = std::fs::remove_dir_all(&place);
+        peer
     }
 
-    fn compiled(name: &str, include: &Path, sources: &[PathBuf], states: usize) -> Peer {
+    fn compiled(name: &str, include: &Path, sources: &[PathBuf], words: &[String]) -> Peer {
         let program = std::env::temp_dir().join(format!("halfarrow_bench_{name}_{}", std::process::id()));
         let mut compiler = Command::new("cc");
-        compiler.args(["-std=c99", "-O2", "-o"]).arg(&program).arg(format!("-DSTATES={states}"));
+        compiler.args(["-std=c99", "-O2", "-o"]).arg(&program).args(words);
         let status = compiler.arg("-I").arg(include).args(sources).arg("-lm").status();
         assert!(status.expect("a C compiler named cc is needed").success(), "{name} does not compile");
         let mut child = Command::new(&program).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");

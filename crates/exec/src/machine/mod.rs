@@ -38,8 +38,8 @@ const STATUS_OF_WATCH: u64 = 1;
 const CHUNK: usize = 250;
 /// Linear blocks of up to this many unknowns are written out.
 const WRITTEN_OUT: usize = 6;
-/// Arguments of functions that are written out in a routine, at most.
-const INLINE: usize = 24;
+/// Calls of functions that are written out in a routine, at most: many take long to compile.
+const INLINE: usize = 48;
 
 /// Why there is no machine code; the bytecode runs all the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
