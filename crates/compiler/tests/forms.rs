@@ -297,3 +297,64 @@ fn an_inversion_says_what_it_opens_and_what_it_cannot() {
         assert!(!storage || !certificate.inverted.is_empty(), "{}", paper["name"]);
     }
 }
+
+#[test]
+fn an_inversion_tells_its_reasons_apart() {
+    use halfarrow_compiler::causal_paths::Refusal;
+    let refusals = |text: &str| -> Vec<(String, Refusal)> {
+        let equations = of_text(text, Form::Inverted);
+        let certificate = equations.certificate.clone().expect("the inverted form has one");
+        let name = |port: halfarrow_compiler::bond_graph::PortRef| equations.graph.elements[port.element].name.clone();
+        certificate.refused.iter().map(|&(port, why)| (name(port), why)).collect()
+    };
+    for (text, wanted) in [(UNINVERTIBLE, "law"), (RATE_IN_MODULUS, "modulus"), (SINGULAR_RING, "determinant")] {
+        let found = refusals(text);
+        let right = found.iter().any(|(_, why)| match wanted {
+            "law" => matches!(why, Refusal::LawNotInvertible(_)),
+            "determinant" => matches!(why, Refusal::DeterminantZero),
+            _ => matches!(why, Refusal::ModulusOfRate(_)),
+        });
+        assert!(right, "{wanted}: {found:?}");
+    }
+}
+
+/// Three resistors in two loops, one inertance: it opens one loop at most, and all resistors have laws in one direction.
+const UNINVERTIBLE: &str = "model U
+Sf:s(1) -> 0:a
+a -> R:r1(e = f + f^3 + sin(f))
+a -> 1:b
+b -> R:r2(e = f + f^5)
+b -> 0:c
+c -> R:r3(e = f + f^3)
+c -> 1:d
+d -> R:r4(e = 2*f + f^3)
+d -> I:m(1)
+";
+
+/// The modulus of a transformer on the loop reads the inertance that would open it.
+const RATE_IN_MODULUS: &str = "model M
+Sf:s(1) -> 0:a
+a -> R:r1(2)
+a -> TF:t(2 + m.f)
+t -> 1:b
+b -> R:r2(3)
+b -> 0:c
+c -> R:r3(4)
+c -> 1:d
+d -> R:r4(5)
+d -> I:m(1)
+";
+
+/// A ring of two 0-junctions and one 1-junction: with the inertance turned its loops alone have no unique solution.
+const SINGULAR_RING: &str = "model S
+0:a
+0:b
+1:c
+a -> b
+b -> c
+c -> a
+a -> R:r1(3)
+b -> R:r2(3)
+c -> I:m(3)
+Sf:s(1) -> a
+";

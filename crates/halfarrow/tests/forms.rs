@@ -31,6 +31,12 @@ type Values = BTreeMap<String, Vec<f64>>;
 
 fn run(model: &Model, run: &Run) -> Result<Values, Error> {
     let done: Simulated = model.simulate(run, &mut |_| true)?;
+    // Every law of the graph holds, whatever the form.
+    if run.form != Form::Stiff {
+        for miss in [&done.report.audit.residual, &done.report.audit.power].into_iter().flatten() {
+            assert!(miss.value <= AGREES, "{} {}: {miss:?}", model.name(), run.form.name());
+        }
+    }
     Ok(done.trace.columns.into_iter().map(|c| (c.name, c.values)).collect())
 }
 

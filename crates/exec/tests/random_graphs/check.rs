@@ -157,7 +157,8 @@ fn check_all(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
         check_polynomial(&mut built, &count, t, &x, &mut random, seen)?;
     }
     check_point(graph, &mut built.model, t, &x, seen)?;
-    if graph.has_constant_structure() {
+    // With moduli that read states some forms still differ; see docs/TESTING.md.
+    if graph.has_constant_structure() || std::env::var_os("FORMS").is_some() {
         check_forms(&built.causal, &built.model, t, &x, seen)?;
     }
     check_run(graph, &mut built.model, &x, seen)?;

@@ -94,15 +94,6 @@ impl Subject<'_> {
         matches!(self.system, Ready::Explicit(..))
     }
 
-    /// Whether there are springs in place of constraints.
-    pub(super) fn has_springs(&self) -> bool {
-        let program = match &self.system {
-            Ready::Explicit(system, _) => system.program(),
-            Ready::Implicit(system, ..) => system.program(),
-        };
-        program.parameters.iter().any(|p| p.name == "form.stiffness")
-    }
-
     /// Operations of one evaluation.
     pub(super) fn operations(&self) -> Operations {
         match &self.system {

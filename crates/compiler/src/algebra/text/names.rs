@@ -162,7 +162,7 @@ pub fn mathml_name(name: &str) -> String {
     let base = mathml_word(letters);
     let base = match marks.len() {
         0 => base,
-        n => format!("<mover accent=\"true\">{base}<mo>{}</mo></mover>", "˙".repeat(n)),
+        n => format!("<mover>{base}<mo stretchy=\"false\">{}</mo></mover>", "˙".repeat(n)),
     };
     match below.len() {
         0 => base,
