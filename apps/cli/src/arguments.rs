@@ -100,6 +100,8 @@ Examples:
 Examples:
   halfarrow export c car.bond --out car                C99 into the folder car, with a CMake file
   halfarrow export c car.bond --out car --method heun --step 0.5e-3
+  halfarrow export fmu3 car.bond --out car.fmu         with a binary by the C compiler cc, or what CC names
+  halfarrow export fmu2 car.bond --out car.fmu --source-only
   halfarrow export latex car.bond --out car.tex        the equations as a document")]
     Export(Export),
 }
@@ -501,6 +503,10 @@ pub struct Draw {
 pub enum Target {
     /// C99: header, source, main.c and CMakeLists.txt in a folder
     C,
+    /// A Functional Mock-up Unit 2.0: model exchange and co-simulation
+    Fmu2,
+    /// A Functional Mock-up Unit 3.0: model exchange and co-simulation
+    Fmu3,
     /// The equations as a LaTeX document
     Latex,
 }
@@ -538,6 +544,9 @@ pub struct Export {
     /// The length of a step, in s
     #[arg(long, value_name = "TIME", default_value_t = 1e-3)]
     pub step: f64,
+    /// FMUs: no binary for this machine, sources alone
+    #[arg(long)]
+    pub source_only: bool,
 }
 
 /// Reads `start`, `equilibrium` or a time.

@@ -306,3 +306,32 @@ fn a_model_is_exported_as_c() {
     }
     assert_eq!(status(&halfarrow(&here, &["export", "latex", &car, "--out", "car.txt"])), 2);
 }
+
+#[test]
+fn a_model_is_exported_as_fmu() {
+    let here = folder("fmu");
+    let car = model("quarter_car");
+    for version in ["fmu2", "fmu3"] {
+        let report = json(&halfarrow(&here, &["export", version, &car, "--out", "car.fmu", "--json"]));
+        let files: Vec<&str> = report["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert!(
+            files.contains(&"modelDescription.xml") && files.iter().any(|f| f.starts_with("binaries/")),
+            "{files:?}"
+        );
+        assert!(fs::read(here.join("car.fmu")).unwrap().starts_with(b"PK"));
+        let alone = json(&halfarrow(&here, &["export", version, &car, "--out", "car.fmu", "--json", "--source-only"]));
+        let files: Vec<&str> = alone["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert!(!files.iter().any(|f| f.starts_with("binaries/")), "{files:?}");
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
+    command.current_dir(&here).env("CC", "no-such-compiler").args(["export", "fmu3", &car, "--out", "other.fmu"]);
+    let without = command.output().expect("the program starts");
+    assert_eq!(status(&without), 2);
+    assert!(
+        stderr(&without).contains("no-such-compiler") && stderr(&without).contains("--source-only"),
+        "{}",
+        stderr(&without)
+    );
+    assert!(!here.join("other.fmu").exists());
+    assert_eq!(status(&halfarrow(&here, &["export", "fmu2", &car, "--out", "car.zip"])), 2);
+}

@@ -1,9 +1,11 @@
-//! Programs as files for elsewhere, in memory: [`c`] writes C99, [`latex`] a document of the equations.
+//! Programs as files for elsewhere, in memory: [`c`] writes C99, [`fmu`] Functional Mock-up
+//! Units around it, [`latex`] a document of the equations.
 //!
 //! What is written computes what the interpreter computes, to the last bit: the same operations in the same order.
 #![forbid(unsafe_code)]
 
 pub mod c;
+pub mod fmu;
 pub mod latex;
 mod names;
 

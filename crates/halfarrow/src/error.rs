@@ -77,6 +77,11 @@ pub enum Problem {
         /// Why.
         why: String,
     },
+    /// An FMU without its binary.
+    NoLibrary {
+        /// Why.
+        why: String,
+    },
     /// A file to be written whose ending says nothing.
     UnknownKind {
         /// Which file.
@@ -176,6 +181,9 @@ impl fmt::Display for Problem {
             }
             Problem::BadOption { reason } => f.write_str(reason),
             Problem::NoPng { why } => write!(f, "no PNG can be made: {why}"),
+            Problem::NoLibrary { why } => {
+                write!(f, "no binary can be made for the FMU: {why}; `--source-only` writes it with its sources alone")
+            }
             Problem::UnknownKind { path, known } => {
                 let known: Vec<String> = known.iter().map(|k| format!(".{k}")).collect();
                 write!(

@@ -2,6 +2,7 @@
 
 use halfarrow_compiler::equations::{Form, show};
 use halfarrow_compiler::program::Program;
+use halfarrow_emit::fmu::{self, Version};
 use halfarrow_emit::{self as emit, EmitError, File, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::System;
@@ -9,6 +10,7 @@ use halfarrow_sim::fixed_step::FixedMethod;
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
+use crate::library::library;
 use crate::model::Model;
 use crate::run::Start;
 
@@ -17,6 +19,10 @@ use crate::run::Start;
 pub enum Target {
     /// C99: header, source, a program that steps it, a CMake file.
     C,
+    /// A Functional Mock-up Unit 2.0, for model exchange and co-simulation.
+    Fmu2,
+    /// A Functional Mock-up Unit 3.0, for both too.
+    Fmu3,
     /// The equations as a LaTeX document.
     Latex,
 }
@@ -26,6 +32,8 @@ impl Target {
     pub fn name(self) -> &'static str {
         match self {
             Target::C => "c",
+            Target::Fmu2 => "fmu2",
+            Target::Fmu3 => "fmu3",
             Target::Latex => "latex",
         }
     }
@@ -42,12 +50,14 @@ pub struct Export {
     pub method: FixedMethod,
     /// The length of a step, in s.
     pub step: f64,
+    /// FMUs: whether a binary for this machine stands in it, made by its C compiler; sources always do.
+    pub binary: bool,
 }
 
 impl Default for Export {
     /// C with the minimal form, the classical Runge-Kutta method and steps of 1 ms.
     fn default() -> Export {
-        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3 }
+        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3, binary: true }
     }
 }
 
@@ -65,7 +75,7 @@ pub struct Exported {
 pub struct ExportReport {
     /// Name of the model.
     pub model: String,
-    /// `c` or `latex`.
+    /// `c`, `fmu2`, `fmu3` or `latex`.
     pub target: &'static str,
     /// The name before all functions in C; empty without code.
     pub name: String,
@@ -115,6 +125,8 @@ impl Model {
     pub fn export(&self, export: &Export) -> Result<Exported, Error> {
         match export.target {
             Target::C => self.export_c(export),
+            Target::Fmu2 => self.export_fmu(export, Version::V2),
+            Target::Fmu3 => self.export_fmu(export, Version::V3),
             Target::Latex => self.export_latex(export),
         }
     }
@@ -146,7 +158,7 @@ impl Model {
 
     fn export_c(&self, export: &Export) -> Result<Exported, Error> {
         let code = Code::new(self, export)?;
-        let written = code.write(false)?;
+        let written = emit::c::write(&code.asked(false)?).map_err(refused)?;
         let w = &written;
         let files = vec![
             File::text(format!("{}.h", w.name), &*w.header),
@@ -154,7 +166,19 @@ impl Model {
             File::text("main.c", &*w.main),
             File::text("CMakeLists.txt", &*w.cmake),
         ];
-        Ok(Exported { report: code.report(w, &files), files })
+        let names: Vec<String> = files.iter().map(|f| f.path.clone()).collect();
+        Ok(Exported { report: code.report(&w.name, &w.cost, code.recorded.clone(), names), files })
+    }
+
+    fn export_fmu(&self, export: &Export, version: Version) -> Result<Exported, Error> {
+        let code = Code::new(self, export)?;
+        let written = fmu::write(&code.asked(true)?, version).map_err(refused)?;
+        let binary = if export.binary { Some(library(&written, version)?) } else { None };
+        let mut names: Vec<String> = written.files.iter().map(|f| f.path.clone()).collect();
+        names.extend(binary.iter().map(|f| f.path.clone()));
+        let file = File { path: format!("{}.fmu", written.name), bytes: fmu::package(&written, binary) };
+        let report = code.report(&written.name, &written.cost, written.recorded, names);
+        Ok(Exported { files: vec![file], report })
     }
 }
 
@@ -178,21 +202,19 @@ impl<'a> Code<'a> {
         Ok(Code { export, program: system.program().clone(), start, recorded })
     }
 
-    fn write(&self, derivatives: bool) -> Result<emit::c::Written, Error> {
-        let export = emit::c::Export {
+    fn asked(&self, derivatives: bool) -> Result<emit::c::Export<'_>, Problem> {
+        Ok(emit::c::Export {
             program: &self.program,
             start: &self.start,
             method: method(self.export.method)?,
             step: self.export.step,
             recorded: &self.recorded,
             derivatives,
-        };
-        emit::c::write(&export).map_err(refused)
+        })
     }
 
-    fn report(&self, written: &emit::c::Written, files: &[File]) -> ExportReport {
+    fn report(&self, name: &str, c: &emit::c::Cost, recorded: Vec<usize>, files: Vec<String>) -> ExportReport {
         let p = &self.program;
-        let c = &written.cost;
         let cost = CostReport {
             operations: c.operations,
             divisions: c.divisions,
@@ -210,16 +232,16 @@ impl<'a> Code<'a> {
         ExportReport {
             model: p.name.clone(),
             target: self.export.target.name(),
-            name: written.name.clone(),
+            name: name.to_string(),
             method: method(self.export.method).ok().map(emit::Method::name),
             step: Some(self.export.step),
             states: p.states.iter().map(|s| s.name.clone()).collect(),
             inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
             parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
-            outputs: self.recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
+            outputs: recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
             cost: Some(cost),
             cost_text: c.lines(),
-            files: files.iter().map(|f| f.path.clone()).collect(),
+            files,
         }
     }
 }

@@ -19,6 +19,7 @@ mod draw;
 mod equations;
 mod error;
 mod export;
+mod library;
 mod linear_algebra;
 mod linearize;
 mod loops;

@@ -33,6 +33,8 @@ fn asked(arguments: &arguments::Export) -> Export {
     Export {
         target: match arguments.target {
             arguments::Target::C => Target::C,
+            arguments::Target::Fmu2 => Target::Fmu2,
+            arguments::Target::Fmu3 => Target::Fmu3,
             arguments::Target::Latex => Target::Latex,
         },
         form: form(arguments.form),
@@ -43,6 +45,7 @@ fn asked(arguments: &arguments::Export) -> Export {
             FixedSolver::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
         },
         step: arguments.step,
+        binary: !arguments.source_only,
     }
 }
 
@@ -50,6 +53,7 @@ fn asked(arguments: &arguments::Export) -> Export {
 fn ending(target: arguments::Target) -> Option<&'static str> {
     match target {
         arguments::Target::C => None,
+        arguments::Target::Fmu2 | arguments::Target::Fmu3 => Some("fmu"),
         arguments::Target::Latex => Some("tex"),
     }
 }

@@ -29,7 +29,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ("SINGULAR", block(&singular)),
         (
             "NO_CONVERGENCE",
-            block(&|what| format!("the iteration for {what} did not converge; the law may have no solution there, or the step may be too long")),
+            block(&|what| format!("the iteration for {what} did not converge; a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the unknowns any more")),
         ),
         (
             "BRANCH",

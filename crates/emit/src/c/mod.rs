@@ -10,7 +10,7 @@ mod plan;
 mod project;
 mod ssa;
 mod start;
-mod template;
+pub(crate) mod template;
 mod write;
 
 pub use cost::Cost;

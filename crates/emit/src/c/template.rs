@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The lines whose conditions hold: `//if word`, `//else` and `//end` stand on lines of their own.
-pub(super) fn choose(text: &str, flags: &BTreeSet<&str>) -> String {
+pub(crate) fn choose(text: &str, flags: &BTreeSet<&str>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut open: Vec<bool> = Vec::new();
     for line in text.lines() {
@@ -25,7 +25,7 @@ pub(super) fn choose(text: &str, flags: &BTreeSet<&str>) -> String {
 }
 
 /// Puts texts in the place of words.
-pub(super) fn fill(text: &str, words: &BTreeMap<String, String>) -> String {
+pub(crate) fn fill(text: &str, words: &BTreeMap<String, String>) -> String {
     let mut out = String::with_capacity(text.len());
     for (word, is_word) in pieces(text) {
         match words.get(word).filter(|_| is_word) {
@@ -37,7 +37,7 @@ pub(super) fn fill(text: &str, words: &BTreeMap<String, String>) -> String {
 }
 
 /// `MODEL_rates` and `MODEL` become names of the model, `MODEL_OK` one in capitals.
-pub(super) fn name(text: &str, lower: &str) -> String {
+pub(crate) fn name(text: &str, lower: &str) -> String {
     let upper = lower.to_ascii_uppercase();
     let mut out = String::with_capacity(text.len());
     for (word, is_word) in pieces(text) {

@@ -29,6 +29,7 @@ impl Files for Disk {
 pub struct Exported {
     pub model: Model,
     pub start: Vec<f64>,
+    pub at_start: Start,
     pub written: Written,
     pub method: Method,
     pub step: f64,
@@ -54,11 +55,16 @@ pub fn own(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(format!("{name}.bond"))
 }
 
-pub fn export(path: &Path, method: Method, step: f64) -> Exported {
+/// The program of a model.
+pub fn read_program(path: &Path) -> halfarrow_compiler::program::Program {
     let text = fs::read_to_string(path).expect("a model");
     let name = path.to_string_lossy();
     let reached = compile(Text { name: &name, text: &text, files: &Disk, overrides: &[] }, Form::Minimal);
-    let mut program = reached.unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+    reached.unwrap_or_else(|found| panic!("{}", found.render(false))).ir
+}
+
+pub fn export(path: &Path, method: Method, step: f64) -> Exported {
+    let mut program = read_program(path);
     program.name = format!("{}_{}", program.name, method.name());
     export_program(program, method, step, false)
 }
@@ -85,7 +91,7 @@ pub fn export_program(
     let written = write(&export).expect("an explicit program");
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());
-    Exported { model, start: x, written, method, step, outputs }
+    Exported { model, start: x, at_start: start, written, method, step, outputs }
 }
 
 struct Collect(Rows);
@@ -183,7 +189,7 @@ pub fn build_by(compiler: &str, name: &str, all: &[Exported], driver: &str, more
 }
 
 /// Runs the C compiler.
-fn cc(compiler: &str, folder: &Path, arguments: impl FnOnce(&mut Command) -> &mut Command) {
+pub fn cc(compiler: &str, folder: &Path, arguments: impl FnOnce(&mut Command) -> &mut Command) {
     let mut command = Command::new(compiler);
     let out = arguments(command.current_dir(folder)).output().expect("a C compiler: cc, or what CC names");
     let errors: String = String::from_utf8_lossy(&out.stderr).lines().take(40).map(|l| format!("{l}\n")).collect();

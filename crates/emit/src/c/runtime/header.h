@@ -124,6 +124,9 @@ int MODEL_step(MODEL *m);
 /* One step that ends at another time than the next one: not more than m.step away. */
 int MODEL_step_until(MODEL *m, double end);
 
+/* Counts steps from the present time on. */
+void MODEL_align(MODEL *m);
+
 /* What the last failure means. */
 const char *MODEL_message(const MODEL *m);
 

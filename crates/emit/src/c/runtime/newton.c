@@ -287,7 +287,7 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
 static int ha_attempt(ha_model *m, ha_newton *w, int trust)
 {
     const int n = w->n;
-    const int most = trust == HA_KINK ? 10 : 100;
+    const int most = trust == HA_KINK ? 10 : (w->following ? 100 : 2000);
     const int last = w->evaluations + w->limit / 4;
     int iteration;
     int i;

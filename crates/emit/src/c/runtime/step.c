@@ -93,3 +93,8 @@ int MODEL_step(MODEL *m)
     ha_ticks_pass(m, m->t);
     return MODEL_step_until(m, m->tick_next);
 }
+
+void MODEL_align(MODEL *m)
+{
+    ha_ticks_from(m, m->t);
+}

@@ -1,0 +1,113 @@
+//! What values depend on, exactly: from the operations that compute them.
+
+use std::collections::BTreeSet;
+
+use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::ids::Id;
+use halfarrow_compiler::program::{Op, Program, Value};
+
+/// What values read, through everything between.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Knowns {
+    pub time: bool,
+    pub states: BTreeSet<u32>,
+    pub inputs: BTreeSet<u32>,
+    pub parameters: BTreeSet<u32>,
+    pub conserved: BTreeSet<u32>,
+}
+
+impl Knowns {
+    fn add(&mut self, other: &Knowns) {
+        self.time |= other.time;
+        self.states.extend(&other.states);
+        self.inputs.extend(&other.inputs);
+        self.parameters.extend(&other.parameters);
+        self.conserved.extend(&other.conserved);
+    }
+}
+
+/// What some values read together. A delayed or sampled signal comes from an earlier time: of it only time is read.
+pub(super) fn knowns_of(p: &Program, wanted: &[Value]) -> Knowns {
+    let mut knowns = Knowns::default();
+    let mut seen = vec![false; p.values.len()];
+    let mut open: Vec<Value> = wanted.to_vec();
+    while let Some(v) = open.pop() {
+        if std::mem::replace(&mut seen[v.index()], true) {
+            continue;
+        }
+        match p.values.op(v) {
+            Op::Time => knowns.time = true,
+            Op::State(i) => {
+                knowns.states.insert(i);
+            }
+            Op::Input(i) => {
+                knowns.inputs.insert(i);
+            }
+            Op::Conserved(i) => {
+                knowns.conserved.insert(i);
+            }
+            Op::Parameter(i) => {
+                knowns.parameters.insert(i);
+                open.push(p.parameters[i as usize].default);
+            }
+            Op::Held(i) => knowns.time |= p.held[i as usize].kind == HeldKind::Delay,
+            Op::Solution(block, _) => open.extend(p.blocks[block].reads()),
+            Op::Guess(..) | Op::Constant(_) | Op::Rate(_) => {}
+            op => op.for_each_operand(|v| open.push(v)),
+        }
+    }
+    knowns
+}
+
+/// What each unknown of the start (states, then conserved constants) follows from: the start conditions that it shares
+/// with others.
+pub(super) fn starts(p: &Program) -> Vec<Knowns> {
+    let n = p.states.len() + p.conserved.len();
+    let mut leader: Vec<usize> = (0..n).collect();
+    fn find(leader: &[usize], mut u: usize) -> usize {
+        while leader[u] != u {
+            u = leader[u];
+        }
+        u
+    }
+    for pair in p.start.iter().flat_map(|c| c.reads.windows(2)) {
+        let (a, b) = (find(&leader, pair[0] as usize), find(&leader, pair[1] as usize));
+        leader[a.max(b)] = a.min(b);
+    }
+    let mut groups = vec![Knowns::default(); n];
+    for condition in &p.start {
+        if let Some(&first) = condition.reads.first() {
+            let knowns = knowns_of(p, &[condition.residual, condition.asked]);
+            groups[find(&leader, first as usize)].add(&knowns);
+        }
+    }
+    // Held signals start with what the start makes of them: all of it.
+    if !p.held.is_empty() {
+        let sources: Vec<Value> = p.held.iter().map(|h| h.source).collect();
+        let reads_held = |g: &Knowns| g.time;
+        let held = knowns_of(p, &sources);
+        groups.iter_mut().filter(|g| reads_held(g)).for_each(|g| g.add(&held));
+    }
+    let at_start = |u: usize| {
+        let mut knowns = groups[find(&leader, u)].clone();
+        (knowns.states, knowns.conserved) = Default::default();
+        knowns
+    };
+    (0..n).map(at_start).collect()
+}
+
+/// What values depend on at the start: inputs, parameters, time, with what states and held signals start from.
+pub(super) fn at_start(p: &Program, starts: &[Knowns], wanted: &[Value]) -> Knowns {
+    let mut knowns = knowns_of(p, wanted);
+    if !p.held.is_empty() {
+        let sources: Vec<Value> = p.held.iter().map(|h| h.source).collect();
+        let held = knowns_of(p, &sources);
+        knowns.add(&held);
+    }
+    let (states, conserved) = (std::mem::take(&mut knowns.states), std::mem::take(&mut knowns.conserved));
+    let first = p.states.len();
+    for u in states.iter().map(|&i| i as usize).chain(conserved.iter().map(|&i| first + i as usize)) {
+        knowns.add(&starts[u]);
+    }
+    knowns
+}

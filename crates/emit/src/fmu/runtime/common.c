@@ -1,0 +1,446 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- what both versions of the interface share ---- */
+
+enum {
+    HA_NX = MODEL_STATES,
+    HA_NU = MODEL_INPUTS,
+    HA_NP = MODEL_PARAMETERS,
+    HA_NY = MODEL_OUTPUTS,
+    HA_NG = MODEL_INDICATORS,
+    /* Value references: time, states, their derivatives, inputs, parameters, outputs, event indicators. */
+    HA_FIRST_STATE = 1,
+    HA_FIRST_DERIVATIVE = HA_FIRST_STATE + HA_NX,
+    HA_FIRST_INPUT = HA_FIRST_DERIVATIVE + HA_NX,
+    HA_FIRST_PARAMETER = HA_FIRST_INPUT + HA_NU,
+    HA_FIRST_OUTPUT = HA_FIRST_PARAMETER + HA_NP,
+    HA_FIRST_INDICATOR = HA_FIRST_OUTPUT + HA_NY,
+    HA_REFERENCES = HA_FIRST_INDICATOR + HA_NG
+};
+
+/* Modes; a failure of the model leaves it in HA_FAILED. */
+enum { HA_INSTANTIATED, HA_INITIALISING, HA_EVENT, HA_CONTINUOUS, HA_STEPPING, HA_TERMINATED, HA_FAILED };
+
+/* What may be done with a parameter: 0 nothing, 1 set before the start, 2 set at any time. */
+static const unsigned char ha_settable[] = {
+SETTABLE
+};
+
+/* Everything that a run consists of: saved and restored as a whole. */
+typedef struct {
+    MODEL m;
+    int mode;
+    /* Whether the start has to be found. */
+    int start_due;
+    /* Whether it has just been found or a jump been crossed here. */
+    int fresh;
+    double start_time;
+    int rates_due;
+    int outputs_due;
+    double dx[HA_NX > 0 ? HA_NX : 1];
+    double y[HA_NY > 0 ? HA_NY : 1];
+    /* Greatest magnitude of each event indicator so far. */
+    double scales[HA_NG > 0 ? HA_NG : 1];
+} ha_state;
+
+typedef struct ha_fmu {
+    ha_state s;
+    int exchange;
+    int logging;
+    char name[128];
+    void *environment;
+    void (*log)(struct ha_fmu *f, const char *message);
+    void *logger;
+    void *(*allocate)(size_t count, size_t size);
+    void (*release)(void *place);
+} ha_fmu;
+
+static void ha_say(ha_fmu *f, const char *message)
+{
+    if (f->log != NULL) {
+        f->log(f, message);
+    }
+}
+
+/* A failure of the model, in words. */
+static int ha_failed(ha_fmu *f)
+{
+    char text[1024];
+    const double time = f->s.m.failure.time;
+    if (time == time) {
+        (void)snprintf(text, sizeof text, "at t = %g s: %s", time, MODEL_message(&f->s.m));
+    } else {
+        (void)snprintf(text, sizeof text, "with these parameters: %s", MODEL_message(&f->s.m));
+    }
+    ha_say(f, text);
+    f->s.mode = HA_FAILED;
+    return 0;
+}
+
+static int ha_refuse(ha_fmu *f, const char *what)
+{
+    ha_say(f, what);
+    return 0;
+}
+
+/* Whether the model is in one of the modes, given as bits. */
+static int ha_is_in(ha_fmu *f, int modes, const char *function)
+{
+    static const char *const names[] = {
+        "instantiated", "initialization", "event", "continuous-time", "step", "terminated", "failed"
+    };
+    char text[256];
+    if ((modes >> f->s.mode) & 1) {
+        return 1;
+    }
+    (void)snprintf(text, sizeof text, "%s cannot be called in the mode: %s", function, names[f->s.mode]);
+    ha_say(f, text);
+    return 0;
+}
+
+#define HA_IN(mode) (1 << (mode))
+#define HA_RUNNING (HA_IN(HA_EVENT) | HA_IN(HA_CONTINUOUS) | HA_IN(HA_STEPPING))
+#define HA_ANY (HA_IN(HA_INSTANTIATED) | HA_IN(HA_INITIALISING) | HA_RUNNING | HA_IN(HA_TERMINATED))
+
+static void ha_changed(ha_fmu *f)
+{
+    f->s.rates_due = 1;
+    f->s.outputs_due = 1;
+}
+
+static int ha_begin(ha_fmu *f)
+{
+    f->s.mode = HA_INSTANTIATED;
+    f->s.start_due = 1;
+    f->s.fresh = 0;
+    f->s.start_time = 0.0;
+    memset(f->s.scales, 0, sizeof f->s.scales);
+    ha_changed(f);
+    return MODEL_reset(&f->s.m) == MODEL_OK;
+}
+
+/* Finds the start, if that is due. */
+static int ha_started(ha_fmu *f)
+{
+    if (f->s.start_due && f->s.mode <= HA_INITIALISING) {
+        if (MODEL_start(&f->s.m, f->s.start_time) != MODEL_OK) {
+            return ha_failed(f);
+        }
+        f->s.start_due = 0;
+        f->s.fresh = 1;
+        ha_changed(f);
+    }
+    return 1;
+}
+
+static int ha_rates(ha_fmu *f)
+{
+    if (f->s.rates_due) {
+        if (MODEL_rates(&f->s.m, f->s.m.t, f->s.m.x, f->s.dx) != MODEL_OK) {
+            return ha_failed(f);
+        }
+        f->s.rates_due = 0;
+    }
+    return 1;
+}
+
+static int ha_outputs(ha_fmu *f)
+{
+    if (f->s.outputs_due) {
+        if (MODEL_observe(&f->s.m, f->s.m.t, f->s.m.x, f->s.y) != MODEL_OK) {
+            return ha_failed(f);
+        }
+        f->s.outputs_due = 0;
+    }
+    return 1;
+}
+
+/* Event indicators. Each changes its sign a rounding error behind the border, so that an importer that stands exactly on
+ * its root stands clearly on the new side. */
+static int ha_indicators(ha_fmu *f, double *values)
+{
+//if switches
+    int i;
+    if (MODEL_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != MODEL_OK) {
+        return ha_failed(f);
+    }
+    for (i = 0; i < HA_NG; ++i) {
+        const double behind = 1e-12 * f->s.scales[i] + 1e-300;
+        values[i] += f->s.m.sides[i] ? behind : -behind;
+    }
+//else
+    (void)f;
+    (void)values;
+//end
+    return 1;
+}
+
+/* Takes note of how great the indicators are. */
+static int ha_scale(ha_fmu *f)
+{
+//if switches
+    double values[HA_NG];
+    int i;
+    if (MODEL_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != MODEL_OK) {
+        return ha_failed(f);
+    }
+    for (i = 0; i < HA_NG; ++i) {
+        const double size = values[i] < 0.0 ? -values[i] : values[i];
+        if (size - size == 0.0 && size > f->s.scales[i]) {
+            f->s.scales[i] = size;
+        }
+    }
+//else
+    (void)f;
+//end
+    return 1;
+}
+
+static int ha_get(ha_fmu *f, unsigned reference, double *value)
+{
+    const int r = reference < HA_REFERENCES ? (int)reference : -1;
+    if (r < 0) {
+        return ha_refuse(f, "there is no variable with this value reference");
+    }
+    if (r >= HA_FIRST_INPUT && r < HA_FIRST_OUTPUT) {
+        *value = r < HA_FIRST_PARAMETER ? f->s.m.u[r - HA_FIRST_INPUT] : f->s.m.p[r - HA_FIRST_PARAMETER];
+        return 1;
+    }
+    if (!ha_started(f)) {
+        return 0;
+    }
+    if (r < HA_FIRST_STATE) {
+        *value = f->s.m.t;
+    } else if (r < HA_FIRST_DERIVATIVE) {
+        *value = f->s.m.x[r - HA_FIRST_STATE];
+    } else if (r < HA_FIRST_INPUT) {
+        if (!ha_rates(f)) {
+            return 0;
+        }
+        *value = f->s.dx[r - HA_FIRST_DERIVATIVE];
+    } else if (r < HA_FIRST_INDICATOR) {
+        if (!ha_outputs(f)) {
+            return 0;
+        }
+        *value = f->s.y[r - HA_FIRST_OUTPUT];
+    } else {
+        double indicators[HA_NG > 0 ? HA_NG : 1];
+        if (!ha_indicators(f, indicators)) {
+            return 0;
+        }
+        *value = indicators[r - HA_FIRST_INDICATOR];
+    }
+    return 1;
+}
+
+static int ha_set(ha_fmu *f, unsigned reference, double value)
+{
+    const int r = reference < HA_REFERENCES ? (int)reference : -1;
+    const int before = f->s.mode <= HA_INITIALISING;
+    if (!(value - value == 0.0)) {
+        return ha_refuse(f, "a variable is to be set to a value that is not finite");
+    }
+    if (r >= HA_FIRST_INPUT && r < HA_FIRST_PARAMETER) {
+        f->s.m.u[r - HA_FIRST_INPUT] = value;
+    } else if (r >= HA_FIRST_PARAMETER && r < HA_FIRST_OUTPUT) {
+        const int parameter = r - HA_FIRST_PARAMETER;
+        if (ha_settable[parameter] < (before ? 1 : 2)) {
+            return ha_refuse(f, before ? "this variable cannot be set" : "this parameter is fixed once the run has begun");
+        }
+        if (MODEL_set_parameter(&f->s.m, parameter, value) != MODEL_OK) {
+            return ha_failed(f);
+        }
+    } else {
+        return ha_refuse(f, "only inputs and parameters can be set");
+    }
+    if (before) {
+        f->s.start_due = 1;
+    }
+    f->s.fresh = 0;
+    ha_changed(f);
+    return 1;
+}
+
+/* The end of the initialization. */
+static int ha_initialised(ha_fmu *f)
+{
+    if (!ha_started(f)) {
+        return 0;
+    }
+    f->s.mode = f->exchange ? HA_EVENT : HA_STEPPING;
+    return 1;
+}
+
+/* A jump at the present point, and the time of the next one. */
+static int ha_event(ha_fmu *f, double *next)
+{
+    if (!f->s.fresh) {
+        if (MODEL_cross(&f->s.m, f->s.m.t, f->s.m.x) != MODEL_OK) {
+            return ha_failed(f);
+        }
+        f->s.fresh = 1;
+        ha_changed(f);
+    }
+    if (!ha_scale(f)) {
+        return 0;
+    }
+    *next = MODEL_next_jump(&f->s.m, f->s.m.t);
+    return 1;
+}
+
+/* An integrator has made a step. */
+static int ha_stepped(ha_fmu *f)
+{
+    return MODEL_accept(&f->s.m, f->s.m.t, f->s.m.x) == MODEL_OK ? ha_scale(f) : ha_failed(f);
+}
+
+/* Steps of the fixed method from one communication point to the next; one that is no multiple of them ends in a shorter
+ * one. */
+static int ha_advance_to(ha_fmu *f, double from, double length)
+{
+    MODEL *m = &f->s.m;
+    const double slack = 1e-9 * m->step;
+    const double end = from + length;
+    if (!(length >= 0.0 && length - length == 0.0)) {
+        return ha_refuse(f, "the communication step is not a finite number of seconds, or below zero");
+    }
+    if (!(from - m->t <= 1e-6 * m->step && m->t - from <= 1e-6 * m->step)) {
+        char text[256];
+        (void)snprintf(text, sizeof text, "the step is to begin at %.17g s, but the model stands at %.17g s", from, m->t);
+        return ha_refuse(f, text);
+    }
+    ha_changed(f);
+    while (m->t + slack < end) {
+        int status;
+        if (end - m->t < m->step - slack) {
+            status = MODEL_step_until(m, end);
+            MODEL_align(m);
+        } else {
+            status = MODEL_step(m);
+        }
+        if (status != MODEL_OK) {
+            return ha_failed(f);
+        }
+    }
+    return 1;
+}
+
+/* Derivatives of rates and outputs along a direction of states and inputs. */
+static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const unsigned *knowns, size_t columns, const double *seed, double *result)
+{
+    double v[HA_NX > 0 ? HA_NX : 1];
+    double w[HA_NU > 0 ? HA_NU : 1];
+    double dv[HA_NX > 0 ? HA_NX : 1];
+    double dy[HA_NY > 0 ? HA_NY : 1];
+    size_t i;
+    memset(v, 0, sizeof v);
+    memset(w, 0, sizeof w);
+    memset(dv, 0, sizeof dv);
+    memset(dy, 0, sizeof dy);
+    if (!ha_started(f)) {
+        return 0;
+    }
+    for (i = 0; i < columns; ++i) {
+        const int r = knowns[i] < HA_REFERENCES ? (int)knowns[i] : -1;
+        if (r >= HA_FIRST_STATE && r < HA_FIRST_DERIVATIVE) {
+            v[r - HA_FIRST_STATE] = seed[i];
+        } else if (r >= HA_FIRST_INPUT && r < HA_FIRST_PARAMETER) {
+            w[r - HA_FIRST_INPUT] = seed[i];
+        } else {
+            return ha_refuse(f, "directional derivatives are taken by states and inputs");
+        }
+    }
+    if (MODEL_directional(&f->s.m, f->s.m.t, f->s.m.x, v, w, dv, dy) != MODEL_OK) {
+        return ha_failed(f);
+    }
+    for (i = 0; i < rows; ++i) {
+        const int r = unknowns[i] < HA_REFERENCES ? (int)unknowns[i] : -1;
+        if (r >= HA_FIRST_DERIVATIVE && r < HA_FIRST_INPUT) {
+            result[i] = dv[r - HA_FIRST_DERIVATIVE];
+        } else if (r >= HA_FIRST_OUTPUT && r < HA_FIRST_INDICATOR) {
+            result[i] = dy[r - HA_FIRST_OUTPUT];
+        } else {
+            return ha_refuse(f, "directional derivatives are those of outputs and of derivatives of states");
+        }
+    }
+    return 1;
+}
+
+/* A copy of the whole state. */
+static int ha_save(ha_fmu *f, void **saved)
+{
+    if (*saved == NULL) {
+        *saved = f->allocate(1, sizeof f->s);
+    }
+    if (*saved == NULL) {
+        return ha_refuse(f, "there is no memory for the state");
+    }
+    memcpy(*saved, &f->s, sizeof f->s);
+    return 1;
+}
+
+/* Serialised: its size, then the state. */
+static size_t ha_size(void)
+{
+    return sizeof(size_t) + sizeof(ha_state);
+}
+
+static int ha_serialise(ha_fmu *f, const void *saved, void *bytes, size_t size)
+{
+    const size_t length = sizeof(ha_state);
+    if (saved == NULL || size < ha_size()) {
+        return ha_refuse(f, "there is no state to serialise, or too little room for it");
+    }
+    memcpy(bytes, &length, sizeof length);
+    memcpy((char *)bytes + sizeof length, saved, sizeof(ha_state));
+    return 1;
+}
+
+static int ha_deserialise(ha_fmu *f, const void *bytes, size_t size, void **saved)
+{
+    size_t length = 0;
+    if (size >= sizeof length) {
+        memcpy(&length, bytes, sizeof length);
+    }
+    if (size != ha_size() || length != sizeof(ha_state)) {
+        return ha_refuse(f, "this is no state of this model");
+    }
+    if (*saved == NULL) {
+        *saved = f->allocate(1, sizeof(ha_state));
+    }
+    if (*saved == NULL) {
+        return ha_refuse(f, "there is no memory for the state");
+    }
+    memcpy(*saved, (const char *)bytes + sizeof length, sizeof(ha_state));
+    return 1;
+}
+
+static void ha_nominals(double *values)
+{
+    static const double nominals[] = {
+NOMINALS
+    };
+    int i;
+    for (i = 0; i < HA_NX; ++i) {
+        values[i] = nominals[i];
+    }
+}
+
+static ha_fmu *ha_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *))
+{
+    ha_fmu *f;
+    if (token == NULL || strcmp(token, "TOKEN") != 0) {
+        return NULL;
+    }
+    f = (ha_fmu *)allocate(1, sizeof *f);
+    if (f == NULL) {
+        return NULL;
+    }
+    memset(f, 0, sizeof *f);
+    (void)snprintf(f->name, sizeof f->name, "%s", name == NULL ? "" : name);
+    f->allocate = allocate;
+    f->release = release;
+    return f;
+}

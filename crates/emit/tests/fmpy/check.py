@@ -1,0 +1,398 @@
+"""Checks FMUs with FMPy: python check.py PATH/TO/halfarrow
+
+Each model is exported as FMI 2.0 and 3.0, validated against the schemas and the rules of the standard, and run:
+co-simulation must give what `halfarrow simulate` gives with the same method, bit for bit; model exchange with CVODE what
+it gives with tight tolerances. States are saved, restored and serialised in the middle, derivatives are compared with
+differences, parameters are set, errors are provoked, sources are built again.
+"""
+
+import csv
+import ctypes
+import io
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import fmpy
+from fmpy import fmi2, fmi3
+from fmpy.build import build_platform_binary
+from fmpy.validation import validate_fmu
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[3]
+STEP, EVERY, POINTS = 1e-3, 0.01, 40
+FAULTS = []
+# Models at rest at the start: their magnitudes are not known, so CVODE takes its tolerance for an absolute one.
+AT_REST = {"bridge": 1e-11}
+# CMake stands beside this Python.
+os.environ["PATH"] = str(Path(sys.executable).parent) + os.pathsep + os.environ["PATH"]
+
+# Model, tolerance of model exchange relative to the greatest value of a variable (a delay or a contact costs digits).
+MODELS = [
+    (ROOT / "models/quarter_car/model.bond", 1e-5),
+    (ROOT / "models/slider_crank/model.bond", 1e-5),
+    (ROOT / "models/rc_bridge_diode/model.bond", 1e-5),
+    (ROOT / "models/gearbox_ratio/model.bond", 1e-5),
+    (ROOT / "models/source_jumps/model.bond", 1e-5),
+    (ROOT / "models/series_springs/model.bond", 1e-5),
+    (HERE.parent / "models/contact.bond", 5e-4),
+    (HERE.parent / "models/clock.bond", 1e-5),
+    (HERE.parent / "models/sampled.bond", 1e-5),
+    (HERE.parent / "models/delay.bond", 1e-4),
+    (HERE.parent / "models/tables.bond", 1e-4),
+    (HERE.parent / "models/bridge.bond", 1e-4),
+    (HERE.parent / "models/mesh.bond", 1e-5),
+    (HERE.parent / "models/names.bond", 1e-5),
+    (HERE / "tuned.bond", 1e-5),
+]
+
+
+def fault(where, what):
+    FAULTS.append(f"{where}: {what}")
+    print(f"FAULT {where}: {what}")
+
+
+def halfarrow(*arguments):
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"halfarrow {' '.join(map(str, arguments))}\n{done.stderr}")
+    return done.stdout
+
+
+def trajectory(model, *arguments):
+    text = halfarrow("simulate", model, "--to", POINTS / 100, "--every", EVERY, "--out", "-", *arguments)
+    rows = list(csv.reader(io.StringIO(text)))
+    return {name: [float(row[i]) for row in rows[1:]] for i, name in enumerate(rows[0])}
+
+
+class Fmu:
+    """An instance of either version, with what was logged."""
+
+    def __init__(self, file, exchange=False, guid=None):
+        self.description = fmpy.read_model_description(str(file))
+        self.version = 2 if self.description.fmiVersion == "2.0" else 3
+        self.folder = fmpy.extract(str(file))
+        self.logged = []
+        kind = self.description.modelExchange if exchange else self.description.coSimulation
+        made = {
+            "guid": guid or self.description.guid,
+            "modelIdentifier": kind.modelIdentifier,
+            "unzipDirectory": self.folder,
+            "instanceName": "one",
+        }
+        classes = (fmi2.FMU2Slave, fmi2.FMU2Model) if self.version == 2 else (fmi3.FMU3Slave, fmi3.FMU3Model)
+        self.api = classes[exchange](**made)
+        if self.version == 2:
+            callbacks = fmi2.fmi2CallbackFunctions()
+            self.logger = fmi2.fmi2CallbackLoggerTYPE(lambda e, n, s, c, message: self.logged.append(message.decode()))
+            callbacks.logger = self.logger
+            callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+            callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+            self.callbacks = callbacks
+            self.api.instantiate(callbacks=callbacks)
+        else:
+            self.api.instantiate(logMessage=lambda e, s, c, message: self.logged.append(message.decode()))
+        self.variables = {v.name: v for v in self.description.modelVariables}
+
+    def begin(self, values={}):
+        if self.version == 2:
+            self.api.setupExperiment(startTime=0.0)
+        for name, value in values.items():
+            self.set(name, value)
+        self.api.enterInitializationMode()
+        self.api.exitInitializationMode()
+
+    def get(self, names):
+        vr = [self.variables[n].valueReference for n in names]
+        return list((self.api.getReal if self.version == 2 else self.api.getFloat64)(vr))
+
+    def set(self, name, value):
+        vr = [self.variables[name].valueReference]
+        (self.api.setReal if self.version == 2 else self.api.setFloat64)(vr, [value])
+
+    def save(self):
+        return self.api.getFMUstate() if self.version == 2 else self.api.getFMUState()
+
+    def restore(self, state):
+        (self.api.setFMUstate if self.version == 2 else self.api.setFMUState)(state)
+
+    def free(self, state):
+        (self.api.freeFMUstate if self.version == 2 else self.api.freeFMUState)(state)
+
+    def serialise(self, state):
+        return self.api.serializeFMUState(state)
+
+    def deserialise(self, data):
+        return self.api.deSerializeFMUstate(data) if self.version == 2 else self.api.deserializeFMUState(data)
+
+    def step(self, point):
+        self.api.doStep(currentCommunicationPoint=point / 100, communicationStepSize=EVERY)
+
+    def close(self):
+        try:
+            self.api.terminate()
+        except Exception:
+            pass  # it has not begun, or it has failed
+        self.api.freeInstance()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def recorded(fmu, reference):
+    """Columns of our own trajectory that the FMU has in the same unit."""
+    units = {name: v.displayUnit for name, v in fmu.variables.items()}
+    return [name for name in reference if name in fmu.variables and name != "t" and units[name] is None]
+
+
+def co_simulation(where, file, reference, values={}):
+    fmu = Fmu(file)
+    fmu.begin(values)
+    names = recorded(fmu, reference)
+    if not names:
+        fault(where, "nothing to compare")
+    rows = [fmu.get(names)]
+    later = []
+    for point in range(POINTS):
+        if point == POINTS // 2:
+            # A look ahead, back again, and the same through bytes.
+            state = fmu.save()
+            for ahead in range(3):
+                fmu.step(point + ahead)
+                later.append(fmu.get(names))
+            fmu.restore(state)
+            data = fmu.serialise(state)
+            fmu.step(point)
+            other = fmu.deserialise(data)
+            fmu.restore(other)
+            if fmu.serialise(other) != data:
+                fault(where, "a state that was serialised is another one")
+            fmu.free(state)
+            fmu.free(other)
+        fmu.step(point)
+        rows.append(fmu.get(names))
+    if later != rows[POINTS // 2 + 1:POINTS // 2 + 4]:
+        fault(where, "the run goes on differently from a restored state")
+    for i, name in enumerate(names):
+        wanted = reference[name]
+        differ = [k for k in range(POINTS + 1) if rows[k][i] != wanted[k]]
+        if differ:
+            k = differ[0]
+            fault(where, f"{name} is {rows[k][i]!r} at {k / 100} s, but {wanted[k]!r}")
+    fmu.close()
+
+
+def variable_steps(where, file):
+    """A communication step that is no multiple of the step: two halves are near to a whole."""
+    whole, halves = Fmu(file), Fmu(file)
+    whole.begin()
+    halves.begin()
+    names = [n for n, v in whole.variables.items() if v.causality in ("local", "output") and "der(" not in n and "indicator" not in n]
+    length = 2.5e-3
+    whole.api.doStep(0.0, 2 * length)
+    halves.api.doStep(0.0, length)
+    halves.api.doStep(length, length)
+    for name, a, b in zip(names, whole.get(names), halves.get(names)):
+        if not math.isclose(a, b, rel_tol=1e-2, abs_tol=1e-3):
+            fault(where, f"{name} is {a} after one step, {b} after two halves")
+    try:
+        halves.api.doStep(0.5, length)
+        fault(where, "a step from another time is taken")
+    except Exception:
+        if not any("0.5" in text for text in halves.logged):
+            fault(where, f"a step from another time is not explained: {halves.logged}")
+    whole.close()
+    halves.close()
+
+
+def model_exchange(where, file, reference, tolerance):
+    fmu = Fmu(file, exchange=True)
+    names = recorded(fmu, reference)
+    fmu.close()
+    result = fmpy.simulate_fmu(
+        str(file), fmi_type="ModelExchange", solver="CVode", relative_tolerance=AT_REST.get(file.stem[:-2], 1e-9), stop_time=POINTS / 100,
+        output_interval=EVERY, output=names, record_events=False)
+    for name in names:
+        wanted = reference[name]
+        scale = max(map(abs, wanted)) or 1.0
+        for t, value in zip(result["time"], result[name]):
+            k = round(t * 100)
+            if abs(t - k / 100) < 1e-9 and k <= POINTS and not abs(value - wanted[k]) <= tolerance * scale:
+                fault(where, f"{name} is {value} at {t} s, but {wanted[k]}")
+                break
+
+
+def derivatives(where, file):
+    fmu = Fmu(file, exchange=True)
+    fmu.begin()
+    if fmu.version == 2:
+        fmu.api.newDiscreteStates()
+    else:
+        fmu.api.updateDiscreteStates()
+    fmu.api.enterContinuousTimeMode()
+    states = [v for v in fmu.description.modelVariables if any(w.derivative is v for w in fmu.description.modelVariables)]
+    ders = [w for v in states for w in fmu.description.modelVariables if w.derivative is v]
+    outputs = [v for v in fmu.description.modelVariables if v.causality == "output"]
+    inputs = [v for v in fmu.description.modelVariables if v.causality == "input"]
+    unknowns = [v.valueReference for v in ders + outputs]
+    names = [v.name for v in ders + outputs]
+    # A little away from the start, where much is zero and conditions may just switch.
+    known = {v: fmu.get([v.name])[0] for v in states + inputs}
+    known = {v: at + 1e-3 * max(abs(at), 1e-3) for v, at in known.items()}
+    for v in inputs:
+        fmu.set(v.name, known[v])
+    fmu.api.setContinuousStates((ctypes.c_double * len(states))(*(known[v] for v in states)), len(states))
+
+    def place(variable, value):
+        if variable in inputs:
+            fmu.set(variable.name, value)
+        else:
+            x = [known[v] if v is not variable else value for v in states]
+            fmu.api.setContinuousStates((ctypes.c_double * len(x))(*x), len(x))
+
+    structure = {u.variable.name: {d.name for d in u.dependencies} for u in fmu.description.derivatives + fmu.description.outputs}
+    for variable, at in known.items():
+        exact = list(fmu.api.getDirectionalDerivative(unknowns, [variable.valueReference], [1.0]))
+        h = 1e-6 * max(abs(at), 1e-3)
+        place(variable, at + h)
+        above = fmu.get(names)
+        place(variable, at - h)
+        below = fmu.get(names)
+        place(variable, at)
+        for name, slope, a, b in zip(names, exact, above, below):
+            difference = (a - b) / (2 * h)
+            noise = 1e-9 * max(abs(a), abs(b)) / h
+            if not abs(slope - difference) <= 1e-5 * abs(slope) + noise + 1e-6:
+                fault(where, f"d {name} / d {variable.name} is {slope}, but by differences {difference}")
+            if slope != 0.0 and variable.name not in structure[name]:
+                fault(where, f"{name} depends on {variable.name}, which the structure does not say")
+    fmu.close()
+
+
+def initial_unknowns(where, file):
+    """What is said to follow from parameters and inputs at the start does, and nothing else does."""
+    fmu = Fmu(file)
+    free = [v for v in fmu.description.modelVariables if v.causality in ("input", "parameter")]
+    unknowns = fmu.description.initialUnknowns
+    names = [u.variable.name for u in unknowns]
+    said = {u.variable.name: {d.name for d in u.dependencies} for u in unknowns}
+
+    def at_start(values):
+        other = Fmu(file)
+        if other.version == 2:
+            other.api.setupExperiment(startTime=0.0)
+        other.api.enterInitializationMode()
+        for name, value in values.items():
+            other.set(name, value)
+        result = other.get(names)
+        other.api.exitInitializationMode()
+        if other.get(names) != result:
+            fault(where, "values change at the end of the initialization")
+        other.close()
+        return result
+
+    before = at_start({})
+    for variable in free:
+        start = float(variable.start)
+        after = at_start({variable.name: start * 1.1 + 0.01})
+        for name, a, b in zip(names, before, after):
+            if a != b and variable.name not in said[name]:
+                fault(where, f"{name} at the start follows {variable.name}, which InitialUnknowns does not say")
+    fmu.close()
+
+
+def sources(where, file, reference, scratch):
+    """The FMU built again from its sources, by CMake as importers do."""
+    folder = scratch / "again"
+    shutil.rmtree(folder, ignore_errors=True)
+    fmpy.extract(str(file), str(folder))
+    shutil.rmtree(folder / "binaries", ignore_errors=True)
+    build_platform_binary(folder, configuration="Release")
+    again = scratch / "again.fmu"
+    again.unlink(missing_ok=True)
+    shutil.make_archive(str(again.with_suffix("")), "zip", folder)
+    again.with_suffix(".zip").rename(again)
+    co_simulation(where, again, reference)
+
+
+def errors(where, file, falling):
+    try:
+        Fmu(file, guid="{other}")
+        fault(where, "an instance of another model is made")
+    except Exception:
+        pass
+    fmu = Fmu(falling)
+    fmu.begin()
+    said = ""
+    try:
+        for point in range(100):
+            fmu.step(point)
+        fault(where, "a root of a number below zero is no error")
+    except Exception:
+        said = " ".join(fmu.logged)
+    if "at t = " not in said or not ("y" in said or "root" in said):
+        fault(where, f"the error does not say where: {said!r}")
+    try:
+        fmu.set("level", 1.0)
+        fault(where, "a model that has failed takes values")
+    except Exception:
+        pass
+    fmu.close()
+
+
+def parameters(where, file, model):
+    values = {"m": 3.0, "ratio": 2.5, "stretch": -0.03}
+    given = [part for name, value in values.items() for part in ("--set", f"{name}={value}")]
+    reference = trajectory(model, "--solver", "rk4", "--step", STEP, *given)
+    co_simulation(where + " with parameters", file, reference, values)
+    fmu = Fmu(file)
+    fmu.begin()
+    for point in range(10):
+        fmu.step(point)
+    before = fmu.get(["spring.q", "stiffness", "k2"])
+    fmu.set("k", 80.0)
+    after = fmu.get(["spring.q", "stiffness", "k2"])
+    if after != [before[0], 200.0, 120.0]:
+        fault(where, f"tuning k gives {after}")
+    fmu.step(10)
+    fmu.close()
+
+
+def main():
+    scratch = Path(tempfile.mkdtemp())
+    falling = {v: scratch / f"falling_{v}.fmu" for v in (2, 3)}
+    for v, file in falling.items():
+        halfarrow("export", f"fmu{v}", HERE / "falling.bond", "--out", file, "--step", STEP)
+    for model, tolerance in MODELS:
+        name = model.parent.name if model.name == "model.bond" else model.stem
+        reference = trajectory(model, "--solver", "rk4", "--step", STEP)
+        tight = trajectory(model, "--rtol", "1e-10", "--solver", "explicit")
+        for version in (2, 3):
+            where = f"{name} (FMI {version})"
+            file = scratch / f"{name}_{version}.fmu"
+            halfarrow("export", f"fmu{version}", model, "--out", file, "--step", STEP)
+            for problem in validate_fmu(str(file)):
+                fault(where, problem)
+            co_simulation(where + " co-simulation", file, reference)
+            variable_steps(where, file)
+            model_exchange(where + " model exchange", file, tight, tolerance)
+            derivatives(where, file)
+            if name in ("tuned", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
+                initial_unknowns(where, file)
+            if name in ("contact", "quarter_car"):
+                sources(where + " from source", file, reference, scratch)
+            if name == "quarter_car":
+                errors(where, file, falling[version])
+            if name == "tuned":
+                parameters(where, file, model)
+        print(f"{name}: checked")
+    shutil.rmtree(scratch, ignore_errors=True)
+    print(f"{len(FAULTS)} faults")
+    return 1 if FAULTS else 0
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv[1]
+    sys.exit(main())
