@@ -65,6 +65,23 @@ fn c_follows_parameters_and_inputs() {
     });
 }
 
+/// What fails is said with the elements concerned, where the interpreter stops.
+#[test]
+fn c_says_what_fails() {
+    let falling = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fmpy/falling.bond");
+    let all = [export(&falling, Method::Heun, 1e-3), export(&own("ending"), Method::Heun, 1e-3)];
+    let said = ["a root of a number below zero", "the equations of fold have two solutions"];
+    let steps = 400;
+    let text = driver(&all, &|_| (-1, 0.0)).replace(&format!("({STEPS},"), &format!("({steps},"));
+    let output = build("failures", &all, &text).run(&[]);
+    for ((one, said), text) in all.iter().zip(said).zip(output.split("== ").skip(1)) {
+        let (rows, failure) = one.simulate(steps);
+        let found = text.lines().find_map(|line| line.strip_prefix("! ")).unwrap_or_default();
+        assert!(failure.is_some() && found.contains(said), "{}: {found:?}, but {failure:?}", one.written.name);
+        assert_eq!(text.lines().filter(|l| !l.starts_with('!')).count(), rows.len() + 1, "{}", one.written.name);
+    }
+}
+
 /// No undefined behaviour, nothing read that was not written; clang sees no warning and gives the same bits.
 #[test]
 fn c_is_clean() {

@@ -203,7 +203,7 @@ fn wrappers_compile_without_warnings() {
     for version in [Version::V2, Version::V3] {
         let folder = common::folder(&format!("wrappers_{version:?}"));
         let mut sources = Vec::new();
-        for name in ["contact", "sampled", "bridge"] {
+        for name in ["contact", "bridge"] {
             let one = export_program(read_program(&own(name)), Method::Rk4, 1e-3, true);
             let written = written(&one, version);
             let prefix = |text: &str| {

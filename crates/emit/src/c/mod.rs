@@ -8,6 +8,7 @@ mod header;
 mod messages;
 mod plan;
 mod project;
+mod slopes;
 mod ssa;
 mod start;
 pub(crate) mod template;

@@ -656,7 +656,16 @@ static int ha_find_root(ha_model *m, int number, const double *o, double *x)
     ha_copy(w.outer, o, w.block->reads);
     ha_copy(w.present, o, w.block->reads);
     status = ha_follow(m, &w);
-    if (status != MODEL_OK && (w.following || !ha_search(m, &w))) {
+    if (status != MODEL_OK && w.following) {
+//if newton_single
+        /* Is there a solution elsewhere, or none at all? */
+        if (status == MODEL_NO_CONVERGENCE && w.n == 1 && ha_scan(m, &w)) {
+            status = MODEL_BRANCH;
+        }
+//end
+        return status;
+    }
+    if (status != MODEL_OK && !ha_search(m, &w)) {
         return status;
     }
     ha_copy(w.jacobian, w.matrix, w.n * w.n);

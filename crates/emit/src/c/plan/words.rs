@@ -1,0 +1,204 @@
+//! What stands in the place of words in the parts that do not depend on the model: sizes, tables, lists.
+
+use std::collections::BTreeMap;
+
+use halfarrow_compiler::algebra::{Outside, math};
+use halfarrow_compiler::program::{BlockId, Cause, ConditionId, ConditionKind};
+
+use super::super::start::Group;
+use super::super::write::{number, numbers};
+use super::Plan;
+use crate::Method;
+
+impl Plan<'_> {
+    /// Each word with its text.
+    pub(super) fn words(&self) -> BTreeMap<String, String> {
+        let program = self.program;
+        let layout = &self.layout;
+        let join = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
+        let lines = |values: Vec<String>| match values.is_empty() {
+            true => "    0".to_string(),
+            false => values.chunks(20).map(|row| format!("    {}", row.join(", "))).collect::<Vec<_>>().join(",\n"),
+        };
+        let kind = |k: ConditionKind| match k {
+            ConditionKind::Sign => 0,
+            ConditionKind::Floor => 1,
+            ConditionKind::Piece(table) => table + 2,
+        };
+        let mut room = vec![0];
+        self.delays.iter().for_each(|(_, points)| room.push(room[room.len() - 1] + points));
+        let numbers_of = |ids: &[ConditionId]| ids.iter().map(|c| c.0.to_string()).collect::<Vec<_>>();
+        let block_numbers = |blocks: &[BlockId]| -> Vec<String> {
+            let place = |b: &BlockId| self.newton.iter().position(|n| n == b).unwrap_or(0).to_string();
+            blocks.iter().map(place).collect()
+        };
+        let distances: Vec<f64> =
+            std::iter::once(0.0).chain((-240..=240).map(|k| math::pow(10.0, f64::from(k) / 20.0))).collect();
+        let groups = self.column_groups();
+        let lengths = |lists: &[Vec<usize>]| {
+            let mut starts = vec![0];
+            lists.iter().for_each(|list| starts.push(starts[starts.len() - 1] + list.len()));
+            starts.iter().map(usize::to_string).collect::<Vec<_>>()
+        };
+        let flat = |lists: &[Vec<usize>]| lists.iter().flatten().map(usize::to_string).collect::<Vec<_>>();
+        let columns = self.columns();
+        let (nodes, weights) = tableau(self.export.method);
+        let constants = program.parameters.iter().map(|p| u8::from(p.constant).to_string()).collect();
+        let most =
+            |of: &dyn Fn(&Group) -> usize| self.groups.iter().filter(|g| g.together).map(of).max().unwrap_or(1).max(1);
+        let offset = |first: u32| (first - layout.time).to_string();
+        let words: Vec<(&str, String)> = vec![
+            ("TABLES", self.tables()),
+            ("KINDS", lines(self.kinds().map(|k| kind(k).to_string()).collect())),
+            ("CLOCK_CONDITIONS", lines(numbers_of(&self.clocks))),
+            (
+                "CLOCK_LINES",
+                lines(
+                    self.clocks
+                        .iter()
+                        .map(|&c| u8::from(program.conditions[c].cause == Cause::Clock).to_string())
+                        .collect(),
+                ),
+            ),
+            ("CLOCKS", self.clocks.len().to_string()),
+            ("SWITCH_CONDITIONS", join(numbers_of(&self.switches))),
+            ("SWITCHES", self.switches.len().to_string()),
+            ("DELAYS", self.delays.len().to_string()),
+            ("DELAY_PLACES", join(self.delays.iter().map(|d| d.0.to_string()).collect())),
+            ("DELAY_ROOM", lines(room.iter().map(usize::to_string).collect())),
+            ("SAMPLES", self.samples.len().to_string()),
+            ("SAMPLE_PLACES", join(self.samples.iter().map(usize::to_string).collect())),
+            ("BLOCKS", self.newton.len().to_string()),
+            ("BLOCK_TABLE", self.block_table()),
+            ("RATES_BLOCKS", join(block_numbers(&self.rates_blocks))),
+            ("RATES_BLOCK_COUNT", self.rates_blocks.len().to_string()),
+            ("SHOWN_BLOCKS", join(block_numbers(&self.shown_blocks))),
+            ("SHOWN_BLOCK_COUNT", self.shown_blocks.len().to_string()),
+            ("DISTANCES", numbers(&distances)),
+            ("DOMAINS", program.domains.len().to_string()),
+            ("MEMORY", self.sizes.memory.to_string()),
+            ("FACTORED", self.sizes.factored.to_string()),
+            ("GROUP_STARTS", lines(lengths(&groups))),
+            ("GROUP_COLUMNS", lines(flat(&groups))),
+            ("GROUPS", groups.len().to_string()),
+            ("COLUMN_STARTS", lines(lengths(&columns))),
+            ("COLUMN_ROWS", lines(flat(&columns))),
+            ("SCALES", numbers(&self.export.start.scales)),
+            ("NODES", nodes),
+            ("WEIGHTS", weights),
+            ("STAGES", self.export.method.stages().to_string()),
+            ("STEP_LENGTH", number(self.export.step)),
+            ("START_STATES", numbers(&self.export.start.states)),
+            ("START_CONSERVED", numbers(&self.export.start.conserved)),
+            ("CONSTANT_PARAMETERS", lines(constants)),
+            ("START_TABLES", self.start_tables()),
+            ("START_CONDITIONS", program.start.len().to_string()),
+            ("START_GROUPS", self.groups.len().to_string()),
+            ("PASSES", self.passes.len().to_string()),
+            ("MOST_AT_ONCE", self.passes.iter().map(|p| p.unknowns.len()).max().unwrap_or(1).to_string()),
+            ("MOST_ROWS", most(&|g| g.conditions.len()).to_string()),
+            ("MOST_COLUMNS", most(&|g| g.unknowns.len()).to_string()),
+            ("LAYOUT_DIRECTION", self.sizes.direction.to_string()),
+            ("LAYOUT_HELD", offset(layout.held)),
+            ("LAYOUT_CONSERVED", offset(layout.conserved)),
+            ("LAYOUT_STATES", offset(layout.states)),
+            ("COUNT_HELD", program.held.len().to_string()),
+            ("COUNT_CONSERVED", program.conserved.len().to_string()),
+            ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
+        ];
+        words.into_iter().map(|(word, text)| (word.to_string(), text)).collect()
+    }
+
+    fn tables(&self) -> String {
+        let mut text = String::new();
+        let mut list = String::from("static const ha_table ha_tables[] = {\n");
+        for (i, table) in self.program.tables.iter().enumerate() {
+            let pieces: Vec<String> =
+                table.pieces().iter().map(|c| format!("    {{{}}}", c.map(number).join(", "))).collect();
+            text += &format!("static const double ha_table_{i}_x[] = {{\n{}\n}};\n", numbers(table.x()));
+            text += &format!("static const double ha_table_{i}_y[] = {{\n{}\n}};\n", numbers(table.y()));
+            text += &format!("static const double ha_table_{i}_pieces[][4] = {{\n{}\n}};\n", pieces.join(",\n"));
+            let outside = match table.outside() {
+                Outside::Error => 0,
+                Outside::Clamp => 1,
+                Outside::Extrapolate => 2,
+            };
+            list += &format!(
+                "    {{{}, {outside}, ha_table_{i}_x, ha_table_{i}_y, ha_table_{i}_pieces}},\n",
+                table.x().len()
+            );
+        }
+        text + &list + "};\n"
+    }
+
+    fn block_table(&self) -> String {
+        let mut text = String::new();
+        let mut list = String::from("static const ha_block ha_blocks[] = {\n");
+        let mut memory = 0;
+        for (i, (block, reads)) in self.newton.iter().zip(&self.reads).enumerate() {
+            text += &format!(
+                "static void ha_block_{i}(ha_model *m, const double *o, const double *g, double *right, double *matrix);\n"
+            );
+            text += &format!(
+                "static void ha_block_{i}_along(ha_model *m, const double *o, const double *e, const double *g, double *rates);\n"
+            );
+            let n = self.program.blocks[*block].size();
+            list += &format!("    {{{n}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_along}},\n");
+            memory += 2 * (n + reads + n * n);
+        }
+        text + "\n" + &list + "};\n"
+    }
+
+    fn start_tables(&self) -> String {
+        let mut text = String::new();
+        let ints = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
+        let mut list = String::from("static const ha_pass ha_passes[] = {\n");
+        for (i, pass) in self.passes.iter().enumerate() {
+            let unknowns = ints(pass.unknowns.iter().map(u32::to_string).collect());
+            let conditions = ints(pass.conditions.iter().map(usize::to_string).collect());
+            text += &format!("static const int ha_pass_{i}_unknowns[] = {{{unknowns}}};\n");
+            text += &format!("static const int ha_pass_{i}_conditions[] = {{{conditions}}};\n");
+            list += &format!(
+                "    {{{}, ha_pass_{i}_unknowns, ha_pass_{i}_conditions, ha_start_pass_{i}}},\n",
+                pass.unknowns.len()
+            );
+        }
+        if self.passes.is_empty() {
+            list += "    {0, NULL, NULL, NULL}\n";
+        }
+        let mut groups = String::from("static const ha_group ha_groups[] = {\n");
+        for (i, group) in self.groups.iter().enumerate() {
+            let unknowns = ints(group.unknowns.iter().map(u32::to_string).collect());
+            let conditions = ints(group.conditions.iter().map(usize::to_string).collect());
+            text += &format!("static const int ha_group_{i}_unknowns[] = {{{unknowns}}};\n");
+            text += &format!("static const int ha_group_{i}_conditions[] = {{{conditions}}};\n");
+            let code = if group.together { format!("ha_start_group_{i}") } else { "NULL".into() };
+            groups += &format!(
+                "    {{{}, {}, ha_group_{i}_conditions, ha_group_{i}_unknowns, {code}}},\n",
+                group.conditions.len(),
+                group.unknowns.len()
+            );
+        }
+        text + &list + "};\n" + &groups + "};\n"
+    }
+}
+
+/// Nodes, and the weights of each stage and of the step.
+fn tableau(method: Method) -> (String, String) {
+    let (nodes, weights): (&[f64], Vec<Vec<f64>>) = match method {
+        Method::Euler | Method::ImplicitMidpoint => (&[0.0], vec![vec![0.0], vec![1.0]]),
+        Method::Heun => (&[0.0, 1.0], vec![vec![0.0; 2], vec![1.0, 0.0], vec![0.5, 0.5]]),
+        Method::Rk4 => (
+            &[0.0, 0.5, 0.5, 1.0],
+            vec![
+                vec![0.0; 4],
+                vec![0.5, 0.0, 0.0, 0.0],
+                vec![0.0, 0.5, 0.0, 0.0],
+                vec![0.0, 0.0, 1.0, 0.0],
+                vec![1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+            ],
+        ),
+    };
+    let list = |values: &[f64]| values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ");
+    (list(nodes), weights.iter().map(|row| format!("{{{}}}", list(row))).collect::<Vec<_>>().join(", "))
+}
