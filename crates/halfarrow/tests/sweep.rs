@@ -4,7 +4,7 @@ use std::path::Path;
 
 use halfarrow::{FixedMethod, Method, Model, Override, Record, Reduce, Run, Samples, Sweep, SweepReport, Vary};
 
-const MODEL: &str = "model Oscillator\nparam k = 4 N/m, m = 1 kg, b = 0.1 N.s/m\nconst g = 9.81 m/s2\n1:a -> I:mass(m)\na -> C:spring(k = k, q0 = 10 cm)\na -> R:damper(b)\noutput x = spring.q : mm\n";
+const MODEL: &str = "model Oscillator\nparam k = 4 N/m, load = 1 kg, b = 0.1 N.s/m\nconst g = 9.81 m/s2\n1:a -> I:mass(load)\na -> C:spring(k = k, q0 = 10 cm)\na -> R:damper(b)\noutput x = spring.q : mm\n";
 
 fn model() -> Model {
     Model::from_text("oscillator.bond", MODEL, &[]).expect("a model")
@@ -79,7 +79,7 @@ fn sets_that_fail_are_told_by_row() {
     let folder = tempfile::tempdir().unwrap();
     let (model, out) = (model(), folder.path().join("r.csv"));
     let table = folder.path().join("sets.csv");
-    std::fs::write(&table, "m,k\n1 kg,4\n0,4\n500 g,-4\n").unwrap();
+    std::fs::write(&table, "load,k\n1 kg,4\n0,4\n500 g,-4\n").unwrap();
     let sweep =
         Sweep { samples: Some(Samples::read(&table).unwrap()), vary: vec![], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
     let report = run(&model, &sweep, &out);
