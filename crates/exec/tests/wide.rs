@@ -51,15 +51,15 @@ fn outcome(end: Result<Summary, Stopped>) -> Result<(usize, usize, usize), Strin
 fn compare(name: &str, model: &Model, options: &Options) -> usize {
     let mut wide = WideModel::new(model);
     let (mut wanted, mut starts, mut alone) = ([true; LANES], Vec::new(), Vec::new());
-    for lane in 0..LANES {
+    for (lane, wanted) in wanted.iter_mut().enumerate() {
         set(wide.model(lane), lane);
         let mut own = model.clone();
         set(&mut own, lane);
         let x = wide.model(lane).initialise(0.0);
-        wanted[lane] = x.is_ok() && lane != 5;
+        *wanted = x.is_ok() && lane != 5;
         starts.push(x.unwrap_or_else(|_| vec![0.0; model.program().states.len()]));
         let mut bits = Bits::default();
-        if wanted[lane] {
+        if *wanted {
             let mut x = own.initialise(0.0).expect("as in the lane");
             let end = simulate(&mut own, options, &mut x, &mut bits);
             alone.push(Some((bits, outcome(end), x)));

@@ -84,7 +84,7 @@ fn eight(wide: &mut WideModel, options: &Options) -> Vec<f64> {
     let mut x: Vec<[f64; LANES]> = (0..starts[0].len()).map(|i| std::array::from_fn(|l| starts[l][i])).collect();
     let mut sinks: [Last; LANES] = std::array::from_fn(|_| Last(0.0));
     let ends = simulate_wide(wide, options, &mut x, &mut sinks, [true; LANES]);
-    ends.into_iter().for_each(|end| drop(end.expect("a run")));
+    ends.into_iter().for_each(|end| _ = end.expect("a run"));
     sinks.iter().map(|last| last.0).collect()
 }
 

@@ -232,6 +232,7 @@ impl<'a> All<'a> {
         self.lanes[lane].over = true;
     }
 
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
     fn outcomes(self) -> Vec<Result<Summary, Stopped>> {
         let outcome = |(lane, failure): (Lane, Option<Failure>)| match failure {
             None => Ok(lane.counts),

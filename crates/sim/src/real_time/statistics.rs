@@ -145,7 +145,8 @@ mod tests {
     fn quantiles_are_upper_bounds() {
         let all = Histogram::default();
         (1..=1000).for_each(|i| all.add(f64::from(i) * 1e-6));
-        assert_eq!((all.count(), all.most()), (1000, 1000.0 * 1e-9 * 1e3));
+        assert_eq!(all.count(), 1000);
+        assert!((all.most() - 1e-3).abs() < 2e-9, "{}", all.most());
         for part in [0.5, 0.99, 1.0] {
             let exact = part * 1e-3;
             let found = all.quantile(part);
