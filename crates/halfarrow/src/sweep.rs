@@ -16,7 +16,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
 use halfarrow_sim::{Options, simulate};
-use halfarrow_trace::{ParquetTable, write_whole};
+use halfarrow_trace::{CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -156,7 +156,7 @@ impl Model {
     fn identity(&self, sweep: &Sweep, plan: &Plan, columns: &[(String, String)]) -> String {
         // Everything that the rows depend on, as text.
         let graph = format!("{:?}", self.graph);
-        format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(&graph), sweep.run)
+        format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()), sweep.run)
     }
 }
 
@@ -168,9 +168,9 @@ fn interrupted(fine: bool) -> io::Result<()> {
     }
 }
 
-/// A number that tells texts apart (FNV-1a).
-fn fingerprint(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+/// A number that tells contents apart (FNV-1a).
+fn fingerprint(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// What all workers read.
@@ -313,6 +313,12 @@ fn reducers(sweep: &Sweep, system: &mut exec::Model) -> Result<Vec<Reducers>, Pr
     Ok(system.recorded().iter().zip(units).map(of).collect())
 }
 
+/// A file of results while it is written.
+enum Table<'a> {
+    Csv(CsvTable<&'a mut (dyn io::Write + Send)>),
+    Parquet(ParquetTable<&'a mut (dyn io::Write + Send)>),
+}
+
 /// What a file of results is.
 #[derive(Clone, Copy)]
 enum Kind {
@@ -343,36 +349,26 @@ impl Kind {
             let room = TOLD.saturating_sub(failures.1.len());
             failures.1.extend(entry.failures.iter().take(room).cloned());
         };
+        let names: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), unit.as_str())).collect();
         let written = write_whole(path, |out| {
-            let names: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), unit.as_str())).collect();
-            match self {
-                Kind::Parquet => {
-                    let mut table = ParquetTable::new(out, &names)?;
-                    for chunk in 0..journal.chunks() {
-                        let entry = journal.entry(chunk)?;
-                        note(&entry);
-                        let column = |c: usize| entry.values.iter().skip(c).step_by(names.len()).copied().collect();
-                        let columns: Vec<Vec<f64>> = (0..names.len()).map(column).collect();
-                        table.rows(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
-                    }
-                    table.finish()
+            let mut table = match self {
+                Kind::Csv => Table::Csv(CsvTable::new(out, names.iter().map(|(name, _)| *name))?),
+                Kind::Parquet => Table::Parquet(ParquetTable::new(out, &names)?),
+            };
+            for chunk in 0..journal.chunks() {
+                let entry = journal.entry(chunk)?;
+                note(&entry);
+                let column = |c: usize| entry.values.iter().skip(c).step_by(names.len()).copied().collect();
+                let columns: Vec<Vec<f64>> = (0..names.len()).map(column).collect();
+                let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+                match &mut table {
+                    Table::Csv(table) => table.rows(&columns)?,
+                    Table::Parquet(table) => table.rows(&columns)?,
                 }
-                Kind::Csv => {
-                    let quoted = |name: &&str| match name.contains([',', '"']) {
-                        true => format!("\"{}\"", name.replace('"', "\"\"")),
-                        false => name.to_string(),
-                    };
-                    writeln!(out, "{}", names.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(","))?;
-                    for chunk in 0..journal.chunks() {
-                        let entry = journal.entry(chunk)?;
-                        note(&entry);
-                        for row in entry.values.chunks(names.len()) {
-                            let fields: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
-                            writeln!(out, "{}", fields.join(","))?;
-                        }
-                    }
-                    Ok(())
-                }
+            }
+            match table {
+                Table::Csv(_) => Ok(()),
+                Table::Parquet(table) => table.finish(),
             }
         });
         written.map_err(|error| error.source)?;

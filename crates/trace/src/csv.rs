@@ -1,5 +1,6 @@
 //! A trace as comma-separated values.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -30,20 +31,50 @@ pub fn csv_text(trace: &Trace) -> String {
 }
 
 fn write(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
-    write!(out, "t")?;
-    trace.columns.iter().try_for_each(|column| write!(out, ",{}", quoted(&column.name)))?;
-    writeln!(out)?;
-    for (sample, t) in trace.times.iter().enumerate() {
-        write!(out, "{t:?}")?;
-        trace.columns.iter().try_for_each(|column| write!(out, ",{:?}", column.values[sample]))?;
-        writeln!(out)?;
+    let names = std::iter::once("t").chain(trace.columns.iter().map(|column| column.name.as_str()));
+    let mut table = CsvTable::new(out, names)?;
+    let columns = std::iter::once(&trace.times).chain(trace.columns.iter().map(|column| &column.values));
+    table.rows(&columns.map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+/// Columns of numbers as CSV while they are written, some rows at a time.
+pub struct CsvTable<W: Write> {
+    out: W,
+}
+
+impl<W: Write> CsvTable<W> {
+    /// Begins with a header of these names.
+    ///
+    /// # Errors
+    /// Nothing can be written to `out`.
+    pub fn new<'n>(mut out: W, names: impl IntoIterator<Item = &'n str>) -> io::Result<Self> {
+        let names: Vec<Cow<str>> = names.into_iter().map(quoted).collect();
+        writeln!(out, "{}", names.join(","))?;
+        Ok(CsvTable { out })
     }
-    Ok(())
+
+    /// Adds rows: the values of each column, all of one length.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub fn rows(&mut self, columns: &[&[f64]]) -> io::Result<()> {
+        for row in 0..columns.first().map_or(0, |column| column.len()) {
+            for (i, column) in columns.iter().enumerate() {
+                let comma = if i == 0 { "" } else { "," };
+                write!(self.out, "{comma}{:?}", column[row])?;
+            }
+            writeln!(self.out)?;
+        }
+        Ok(())
+    }
 }
 
 /// A name as a field: in quotes if it holds a comma, a quote or a line break.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+fn quoted(name: &str) -> Cow<'_, str> {
+    match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")).into(),
+        false => name.into(),
+    }
 }
 
 #[cfg(test)]

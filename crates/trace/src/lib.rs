@@ -15,7 +15,7 @@ mod trace;
 mod whole;
 
 pub use chart::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
-pub use csv::{csv_text, write_csv};
+pub use csv::{CsvTable, csv_text, write_csv};
 pub use input::{InputError, parse_inputs, read_inputs};
 #[cfg(feature = "parquet")]
 pub use parquet::{ParquetTable, write_parquet};

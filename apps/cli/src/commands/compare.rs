@@ -79,7 +79,7 @@ fn cells(row: &Row) -> [String; 10] {
         number(row.flops),
         row.solver.unwrap_or("-").to_string(),
         number(row.steps),
-        row.seconds_per_second.map_or("-".to_string(), time),
+        row.time_text().unwrap_or("-".to_string()),
         row.times_minimal.map_or("-".to_string(), |ratio| format!("{ratio:.1}")),
         small(row.max_error),
         energy(row),
@@ -93,14 +93,4 @@ fn energy(row: &Row) -> String {
         (Some(miss), _) => format!("{miss:.0e}"),
         _ => "-".to_string(),
     }
-}
-
-/// A time with two or three digits.
-fn time(seconds: f64) -> String {
-    let (value, unit) = match seconds {
-        s if s < 1e-3 => (1e6 * s, "µs"),
-        s if s < 1.0 => (1e3 * s, "ms"),
-        s => (s, "s"),
-    };
-    if value < 10.0 { format!("{value:.1} {unit}") } else { format!("{value:.0} {unit}") }
 }

@@ -21,11 +21,13 @@ mod operations;
 mod print;
 mod routine;
 mod schedule;
+mod start;
 mod values;
 
 pub use jacobian::{Differentiated, Entry};
 pub use routine::{Instruction, Layout, Register, Routine, Solve};
 pub use schedule::schedule;
+pub use start::StartGroup;
 pub use values::{Op, Reads, Values};
 
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use halfarrow_compiler::program::Program;
+use halfarrow_compiler::program::{Program, StartGroup};
 
 /// Conditions and unknowns of a group at most: what is solved together is dense.
 pub(super) const MOST_TOGETHER: usize = 40;
@@ -14,7 +14,6 @@ pub(super) struct Pass {
 }
 
 /// Conditions that share unknowns.
-#[derive(Default)]
 pub(super) struct Group {
     pub conditions: Vec<usize>,
     pub unknowns: Vec<u32>,
@@ -43,37 +42,11 @@ pub(super) fn plan(program: &Program) -> (Vec<Pass>, Vec<Group>) {
         let (unknowns, conditions) = chosen.into_iter().unzip();
         passes.push(Pass { unknowns, conditions });
     }
-    let mut groups = groups(program);
-    for group in &mut groups {
-        let small = group.conditions.len().max(group.unknowns.len()) <= MOST_TOGETHER;
-        group.together = small && group.conditions.iter().any(|c| !met.contains(c));
-    }
+    let group = |StartGroup { conditions, unknowns }: StartGroup| {
+        let small = conditions.len().max(unknowns.len()) <= MOST_TOGETHER;
+        let together = small && conditions.iter().any(|c| !met.contains(c));
+        Group { conditions, unknowns, together }
+    };
+    let groups = program.start_groups().into_iter().map(group).collect();
     (passes, groups)
-}
-
-fn groups(program: &Program) -> Vec<Group> {
-    let n = program.states.len() + program.conserved.len();
-    let mut leader: Vec<u32> = (0..n as u32).collect();
-    fn find(leader: &mut [u32], mut u: u32) -> u32 {
-        while leader[u as usize] != u {
-            leader[u as usize] = leader[leader[u as usize] as usize];
-            u = leader[u as usize];
-        }
-        u
-    }
-    for pair in program.start.iter().flat_map(|c| c.reads.windows(2)) {
-        let (a, b) = (find(&mut leader, pair[0]), find(&mut leader, pair[1]));
-        leader[a.max(b) as usize] = a.min(b);
-    }
-    let mut groups: BTreeMap<Option<u32>, Group> = BTreeMap::new();
-    for (index, condition) in program.start.iter().enumerate() {
-        let of = condition.reads.first().map(|&u| find(&mut leader, u));
-        groups.entry(of).or_default().conditions.push(index);
-    }
-    for u in 0..n as u32 {
-        if let Some(group) = groups.get_mut(&Some(find(&mut leader, u))) {
-            group.unknowns.push(u);
-        }
-    }
-    groups.into_values().collect()
 }

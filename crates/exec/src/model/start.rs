@@ -2,7 +2,7 @@
 
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
-use halfarrow_compiler::program::{Routine, Value};
+use halfarrow_compiler::program::{Routine, StartGroup, Value};
 use halfarrow_sim::Failure;
 use std::collections::BTreeMap;
 
@@ -24,19 +24,12 @@ struct Unknowns {
     met: Vec<bool>,
 }
 
-/// Start conditions that share unknowns.
-#[derive(Default)]
-struct Group {
-    conditions: Vec<usize>,
-    unknowns: Vec<u32>,
-}
-
 /// A group at the time of the start, with the routine that computes its residuals.
 #[derive(Clone, Copy)]
 struct Routed<'a> {
     t: f64,
     routine: &'a Routine,
-    group: &'a Group,
+    group: &'a StartGroup,
 }
 
 impl Model {
@@ -153,7 +146,7 @@ impl Model {
 
     /// Whatever is not met yet is solved together with all that shares unknowns with it.
     fn solve_groups(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
-        for group in self.groups() {
+        for group in self.program.start_groups() {
             if group.conditions.iter().all(|&c| unknowns.met[c]) {
                 continue;
             }
@@ -168,13 +161,13 @@ impl Model {
         Ok(())
     }
 
-    fn is_met(&mut self, t: f64, routine: &Routine, group: &Group, z: &[f64]) -> bool {
+    fn is_met(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> bool {
         let Some((residual, jacobian)) = self.linearised(t, routine, group, z) else { return false };
         self.missed(group, z, &residual, &jacobian).is_empty()
     }
 
     /// Conditions of a group that are missed, as indices into it.
-    fn missed(&self, group: &Group, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
+    fn missed(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
         let n = group.unknowns.len();
         let asked = |i: usize| {
             let register = self.layout.registers.get(&self.program.start[group.conditions[i]].asked);
@@ -188,7 +181,13 @@ impl Model {
     }
 
     /// Gauss-Newton of minimum norm, damped.
-    fn solve_group(&mut self, t: f64, routine: &Routine, group: &Group, all: &mut Unknowns) -> Result<(), StartError> {
+    fn solve_group(
+        &mut self,
+        t: f64,
+        routine: &Routine,
+        group: &StartGroup,
+        all: &mut Unknowns,
+    ) -> Result<(), StartError> {
         let names: Vec<String> = group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
         let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
         let not_found = StartError::NotFound(names);
@@ -324,7 +323,7 @@ impl Model {
     }
 
     /// Residuals and, row by row, their derivatives by the unknowns of the group; `None` where one has no value.
-    fn linearised(&mut self, t: f64, routine: &Routine, group: &Group, z: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    fn linearised(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let (rows, columns) = (group.conditions.len(), group.unknowns.len());
         let mut jacobian = vec![0.0; rows * columns];
         if columns == 0 {
@@ -364,36 +363,5 @@ impl Model {
         let routine = self.program.routine(&self.layout, wanted);
         self.frame.reserve(&routine);
         routine
-    }
-
-    /// Start conditions in groups that share no unknown.
-    fn groups(&self) -> Vec<Group> {
-        let n = self.program.states.len() + self.conserved.len();
-        let mut leader: Vec<u32> = (0..n as u32).collect();
-        fn find(leader: &mut [u32], u: u32) -> u32 {
-            let mut u = u;
-            while leader[u as usize] != u {
-                leader[u as usize] = leader[leader[u as usize] as usize];
-                u = leader[u as usize];
-            }
-            u
-        }
-        for condition in &self.program.start {
-            for pair in condition.reads.windows(2) {
-                let (a, b) = (find(&mut leader, pair[0]), find(&mut leader, pair[1]));
-                leader[a.max(b) as usize] = a.min(b);
-            }
-        }
-        let mut groups: BTreeMap<Option<u32>, Group> = BTreeMap::new();
-        for (index, condition) in self.program.start.iter().enumerate() {
-            let of = condition.reads.first().map(|&u| find(&mut leader, u));
-            groups.entry(of).or_default().conditions.push(index);
-        }
-        for u in 0..n as u32 {
-            if let Some(group) = groups.get_mut(&Some(find(&mut leader, u))) {
-                group.unknowns.push(u);
-            }
-        }
-        groups.into_values().collect()
     }
 }

@@ -505,6 +505,17 @@ fn solver(method: Method) -> &'static str {
 }
 
 impl Row {
+    /// The processor time for a simulated second, with two or three digits and its unit; `None` if there is none.
+    pub fn time_text(&self) -> Option<String> {
+        let seconds = self.seconds_per_second?;
+        let (value, unit) = match seconds {
+            s if s < 1e-3 => (1e6 * s, "µs"),
+            s if s < 1.0 => (1e3 * s, "ms"),
+            s => (s, "s"),
+        };
+        Some(if value < 10.0 { format!("{value:.1} {unit}") } else { format!("{value:.0} {unit}") })
+    }
+
     fn take_operations(&mut self, subject: &Subject) {
         let operations = subject.operations();
         self.flops = Some(operations.total());

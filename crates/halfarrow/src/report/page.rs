@@ -228,7 +228,7 @@ fn compared(row: &Row) -> Markup {
         td.name { (row.form) } td.number { (count(row.differential)) } td.number { (count(row.algebraic)) }
         td.number { (row.index.map_or("–".to_string(), |i| i.to_string())) } td.number { (count(row.flops)) }
         td { (row.solver.unwrap_or("–")) } td.number { (count(row.steps)) }
-        td.number { (row.seconds_per_second.map_or("–".to_string(), time)) }
+        td.number { (row.time_text().unwrap_or("–".to_string())) }
         td.number { (row.times_minimal.map_or("–".to_string(), |r| format!("{r:.1}"))) }
         td.number { (row.max_error.map_or("–".to_string(), |e| number(round(e)))) } td.number { (energy) }
     } }
@@ -339,14 +339,4 @@ fn round(x: f64) -> f64 {
 fn raised(c: char) -> char {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize])
-}
-
-/// A time with its unit.
-fn time(seconds: f64) -> String {
-    let (value, unit) = match seconds {
-        s if s < 1e-3 => (1e6 * s, "µs"),
-        s if s < 1.0 => (1e3 * s, "ms"),
-        s => (s, "s"),
-    };
-    if value < 10.0 { format!("{value:.1} {unit}") } else { format!("{value:.0} {unit}") }
 }

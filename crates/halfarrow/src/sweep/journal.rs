@@ -47,7 +47,7 @@ impl Journal {
         let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
         let mut journal =
             Journal { file: opened.map_err(unwritable)?, path: path.clone(), places: BTreeMap::new(), end: 0, columns };
-        let header = format!("halfarrow sweep 1 {:016x}\n", fingerprint(identity));
+        let header = format!("halfarrow sweep 1 {:016x}\n", fingerprint(identity.as_bytes()));
         let mut found = vec![0; header.len()];
         let there = journal.file.read_exact(&mut found).is_ok();
         if there && found != header.as_bytes() {
@@ -103,7 +103,7 @@ impl Journal {
         let mut all = Vec::with_capacity(contents.len() + 16);
         all.extend((contents.len() as u64).to_le_bytes());
         all.extend(&contents);
-        all.extend(check(&contents).to_le_bytes());
+        all.extend(fingerprint(&contents).to_le_bytes());
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&all)?;
         self.file.flush()?;
@@ -129,7 +129,7 @@ impl Journal {
         }
         let mut contents = vec![0; size as usize];
         reader.read_exact(&mut contents)?;
-        if number(&mut reader)? != check(&contents) {
+        if number(&mut reader)? != fingerprint(&contents) {
             return Err(io::ErrorKind::InvalidData.into());
         }
         from_bytes(&contents, self.columns).ok_or_else(|| io::ErrorKind::InvalidData.into())
@@ -145,10 +145,6 @@ fn number(reader: &mut impl Read) -> io::Result<u64> {
     let mut bytes = [0; 8];
     reader.read_exact(&mut bytes)?;
     Ok(u64::from_le_bytes(bytes))
-}
-
-fn check(contents: &[u8]) -> u64 {
-    contents.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 fn bytes(entry: &Entry) -> Vec<u8> {
