@@ -51,7 +51,7 @@ def row(*cells):
 
 def links_text(n):
     lines = [f'model Links "Pendulum of {n} point masses in absolute angles"', "", "param mass = 1 kg, l = 1 m, g = 9.81 m/s2"]
-    lines += [f"state phi{k}' = w{k}.f from {0.5 / k:.6g} rad" for k in range(1, n + 1)]
+    lines += [f"state phi{k}' = w{k}.f from {0.5 / k!r} rad" for k in range(1, n + 1)]
     for k in range(1, n + 1):
         for axis, turn in (("u", "cos"), ("v", "sin")):
             moved = f"1:{axis}{k}"

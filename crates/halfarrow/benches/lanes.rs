@@ -29,9 +29,9 @@ impl Sink for Last {
 
 fn main() {
     let quarter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/quarter_car/model.bond"));
-    compare("quarter car", &quarter.expect("a model"), 2.0);
-    compare("four on a chassis", &chassis(4), 2.0);
-    compare("forty on a chassis", &chassis(40), 0.2);
+    compare("quarter car", &quarter.expect("a model"), 10.0);
+    compare("four on a chassis", &chassis(4), 10.0);
+    compare("forty on a chassis", &chassis(40), 10.0);
 }
 
 fn compare(name: &str, text: &str, to: f64) {

@@ -80,9 +80,14 @@ impl Sink for Nothing {
     fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
+/// A run by bytecode and one by machine code, which takes some time to make.
 fn run(file: &str, [to, rtol, atol]: [f64; 3]) -> serde_json::Value {
-    let mut model = Model::new(program(file)).expect("parameters that fit");
-    let mut x = model.initialise(0.0).expect("a start");
+    let mut bytecode = Model::new(program(file)).expect("parameters that fit");
+    let start = bytecode.initialise(0.0).expect("a start");
+    let mut machine = bytecode.clone();
+    let from = Instant::now();
+    machine.compile_machine().and_then(|()| machine.compile_tangent()).expect("machine code");
+    let made = from.elapsed().as_secs_f64();
     let options = Options {
         method: Method::Auto,
         to,
@@ -91,11 +96,18 @@ fn run(file: &str, [to, rtol, atol]: [f64; 3]) -> serde_json::Value {
         every: Some(to),
         ..Options::default()
     };
-    let from = Instant::now();
-    // What machine code costs to make is part of the run.
-    model.compile_machine().and_then(|()| model.compile_tangent()).expect("machine code");
-    let done = simulate(&mut model, &options, &mut x, &mut Nothing).expect("a run to its end");
-    json!({ "seconds": from.elapsed().as_secs_f64(), "states": x, "work": format!("{done:?}") })
+    let mut x = Vec::new();
+    let mut once = |model: &mut Model| {
+        x.clone_from(&start);
+        model.restart();
+        let from = Instant::now();
+        let done = simulate(model, &options, &mut x, &mut Nothing).expect("a run to its end");
+        (from.elapsed().as_secs_f64(), done)
+    };
+    let (seconds, work) = once(&mut bytecode);
+    let (machine_seconds, _) = once(&mut machine);
+    json!({ "seconds": seconds, "machine_seconds": machine_seconds, "made": made, "states": x,
+        "work": format!("{work:?}") })
 }
 
 fn compiling(file: &str) -> serde_json::Value {

@@ -338,9 +338,10 @@ fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
 
 impl Part<'_> {
     /// Sequential causality assignment. `false` if it meets a contradiction; then the strokes are partial.
-    fn propagate(&self, strokes: &mut Strokes) -> bool {
+    fn propagate(&mut self, strokes: &mut Strokes) -> bool {
         let graph = self.graph;
         let ports = outer_ports(graph, self.members);
+        let leading: Vec<PortRef> = ports.iter().copied().filter(|&p| self.leads(p)).collect();
         let either = |strokes: &mut Strokes, port: PortRef, here: bool| {
             strokes.at(port).is_some() || strokes.set_at(port, here).is_ok() || strokes.set_at(port, !here).is_ok()
         };
@@ -354,9 +355,24 @@ impl Part<'_> {
         ports.iter().filter_map(imposing).all(|(p, here)| strokes.set_at(p, here).is_ok())
             && ports.iter().filter_map(storage).all(|(p, here)| either(strokes, p, here))
             && self.laws.keys().all(|&p| either(strokes, p, sits_here(self.wish(p), false)))
+            && leading.into_iter().all(|p| either(strokes, p, sits_here(self.wish(p), false)))
             && ports.iter().all(|&p| either(strokes, p, sits_here(self.wish(p), false)))
             && (strokes.is_complete(self.members)
                 || (strokes.complete(self.members).is_ok() && strokes.is_complete(self.members)))
+    }
+
+    /// Whether a curved law, the way it is written, gives its junction the common variable. Such laws come first: what
+    /// the others read is then found at their own junction, not at the end of a chain.
+    fn leads(&mut self, port: PortRef) -> bool {
+        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return false };
+        let bond = &self.graph.bonds[self.graph.bond_of(port)];
+        let other = if bond.from == port { bond.to } else { bond.from };
+        let (law, read) = match (laws[port.port as usize], &self.graph.elements[other.element].kind) {
+            (ResistorLaw::Resistive(e), Kind::Zero) => (e, bond.flow),
+            (ResistorLaw::Conductive(f), Kind::One) => (f, bond.effort),
+            _ => return false,
+        };
+        self.x.linear_in(law, &[read]).is_none()
     }
 
     /// Exact elimination, with virtual speeds where they are combinations of storages and sources.
