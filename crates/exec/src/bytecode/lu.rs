@@ -1,4 +1,4 @@
-//! Small dense linear equations without allocation. A symmetric matrix that is positive definite is factored as
+//! Small dense linear equations without allocation. A symmetric matrix that is definite is factored as
 //! `Uᵀ D U`; all others with rows scaled, threshold pivoting and one refinement.
 //!
 //! Machine code and exported C do the same operations in the same order.
@@ -53,19 +53,24 @@ impl Lu {
         if self.definite { Ok(()) } else { self.factor_general() }
     }
 
-    /// `Uᵀ D U`, `U` with ones on its diagonal; false if a pivot is not above rounding of the entry that it comes from.
+    /// `Uᵀ D U`, `U` with ones on its diagonal; false if a pivot has another sign than the first one, or is not above
+    /// rounding of the entry that it comes from.
     fn factor_definite(&mut self) -> bool {
         let n = self.size;
+        let sign = 1f64.copysign(self.matrix[0]);
         self.factors.copy_from_slice(&self.matrix);
         for k in 0..n {
             let (upper, lower) = self.factors.split_at_mut((k + 1) * n);
             let row = &mut upper[k * n + k..];
             let pivot = row[0];
-            if !is_definite(pivot, self.matrix[k * n + k], n) {
+            if !is_definite(sign * pivot, sign * self.matrix[k * n + k], n) {
                 return false;
             }
             let inverse = 1.0 / pivot;
             for (j, below) in lower.chunks_exact_mut(n).enumerate() {
+                if row[j + 1] == 0.0 {
+                    continue;
+                }
                 let factor = row[j + 1] * inverse;
                 below[k + 1 + j..].iter_mut().zip(&row[j + 1..]).for_each(|(a, u)| *a -= factor * u);
             }
@@ -140,10 +145,10 @@ impl Lu {
 
     /// Whether the determinant of the factored matrix is above zero.
     pub fn is_positive(&self) -> bool {
-        if self.definite {
-            return true;
-        }
         let n = self.size;
+        if self.definite {
+            return n.is_multiple_of(2) || self.scale[0] > 0.0;
+        }
         let minuses = (0..n).filter(|&k| self.factors[k * n + k] < 0.0).count();
         let exchanges: usize =
             (0..n).map(|k| self.order[k + 1..].iter().filter(|&&later| later < self.order[k]).count()).sum();
@@ -186,7 +191,7 @@ impl Lu {
     }
 }
 
-/// Whether a pivot of a symmetric matrix is above rounding of the diagonal entry that it comes from.
+/// Whether a pivot of a positive symmetric matrix is above rounding of the diagonal entry that it comes from.
 fn is_definite(pivot: f64, entry: f64, size: usize) -> bool {
     pivot > 0.0 && pivot > f64::EPSILON * size as f64 * entry && pivot < f64::INFINITY
 }
@@ -271,6 +276,7 @@ mod tests {
                 assert!(off <= 1e-13 * most * if definite { 1.0 } else { 1e3 }, "{n} {definite}: {off}");
             }
         }
+        assert_eq!(solve_as(&[&[-2.0, 1.0], &[1.0, -2.0]], &[-3.0, 3.0], true), Ok(vec![1.0, -1.0]));
         assert_eq!(solve_as(&[&[1.0, 2.0], &[2.0, 4.0]], &[1.0, 1.0], true), Err(1));
         assert_eq!(solve_as(&[&[0.0, 1.0], &[1.0, 0.0]], &[2.0, 3.0], true), Ok(vec![3.0, 2.0]));
         assert_eq!(solve_as(&[&[f64::NAN, 0.0], &[0.0, 1.0]], &[1.0, 1.0], true), Err(0));
@@ -285,6 +291,8 @@ mod tests {
             lu.is_positive()
         };
         assert!(sign(&[&[2.0]]) && !sign(&[&[-2.0]]));
+        assert!(sign(&[&[-2.0, 1.0], &[1.0, -2.0]]));
+        assert!(!sign(&[&[-2.0, 1.0, 0.0], &[1.0, -2.0, 1.0], &[0.0, 1.0, -2.0]]));
         assert!(!sign(&[&[0.0, 1.0], &[1.0, 0.0]]) && sign(&[&[0.0, 1.0], &[-1.0, 0.0]]));
         assert!(sign(&[&[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0], &[1.0, 0.0, 0.0]]));
     }

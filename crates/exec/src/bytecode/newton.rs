@@ -33,6 +33,9 @@ const SHORT_ITERATIONS: usize = 10;
 const SHORT_FRACTION: f64 = 0.1;
 /// Contraction of the first step below which the solution is near without doubt.
 const NEAR: f64 = 0.25;
+/// A step that shrinks as the last one did, with the same Jacobian, leaves about twice its square over the last: below
+/// this, rounding.
+const FINISHED: f64 = 0.125 * f64::EPSILON;
 /// Points at which the way to a solution that is not near is looked at.
 const LOOKS: usize = 8;
 /// The same where the way may be long.
@@ -188,6 +191,9 @@ impl Frame {
             return Err(self.trouble(solve, missed));
         }
         self.keep_jacobian(solve);
+        let Frame { r, solvers, .. } = self;
+        let root = &solvers[solve.block.0 as usize].newton.x;
+        solve.guess.iter().zip(root).for_each(|(&guess, &x)| r[guess as usize] = x);
         Ok(())
     }
 
@@ -514,6 +520,10 @@ impl Frame {
                 if next <= (1.0 - 0.25 * fraction) * size || size <= 2.0 * f64::EPSILON {
                     self.accept_trial(solve);
                     let near = fraction == 1.0 && (next <= NEAR * size || size <= SETTLED);
+                    if near && next * next <= FINISHED * size {
+                        self.take_next_step(solve);
+                        return (Damped::Done, true);
+                    }
                     return (if size <= 4.0 * f64::EPSILON { Damped::Done } else { Damped::Moved }, near);
                 }
             }
@@ -539,6 +549,15 @@ impl Frame {
         let newton = self.newton_of(solve);
         newton.x.copy_from_slice(&newton.trial);
         newton.size.iter_mut().zip(&newton.x).for_each(|(size, x)| *size = size.max(x.abs()));
+    }
+
+    /// Takes the step that would come next, with the Jacobian as it was before the last one.
+    fn take_next_step(&mut self, solve: &Solve) {
+        let newton = self.newton_of(solve);
+        for i in 0..newton.x.len() {
+            newton.x[i] += newton.next[i];
+            newton.size[i] = newton.size[i].max(newton.x[i].abs());
+        }
     }
 
     /// Runs the code at `x` (or the trial point); whether residuals and Jacobian are finite.

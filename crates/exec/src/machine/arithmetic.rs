@@ -45,6 +45,11 @@ impl<'a> Writer<'a> {
     pub fn abs(&mut self, a: Value) -> Value {
         self.builder.ins().fabs(a)
     }
+    /// 1 with the sign of `a`.
+    pub fn sign_of(&mut self, a: Value) -> Value {
+        let one = self.number(1.0);
+        self.builder.ins().fcopysign(one, a)
+    }
     pub fn is(&mut self, how: FloatCC, a: Value, b: Value) -> Value {
         self.builder.ins().fcmp(how, a, b)
     }

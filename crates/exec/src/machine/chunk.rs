@@ -538,12 +538,14 @@ impl Chunk<'_, '_> {
         let mut inverses = Vec::with_capacity(n);
         let (zero, one) = (self.w.number(0.0), self.w.number(1.0));
         let (high, rounding) = (self.w.number(f64::INFINITY), self.w.number(f64::EPSILON * n as f64));
+        let sign = self.w.sign_of(matrix[0]);
         for k in 0..n {
             let pivot = u[k * n + k];
-            let least = self.w.mul(rounding, matrix[k * n + k]);
+            let (size, entry) = (self.w.mul(sign, pivot), self.w.mul(sign, matrix[k * n + k]));
+            let least = self.w.mul(rounding, entry);
             for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)]
             {
-                let good = self.w.is(how, pivot, bound);
+                let good = self.w.is(how, size, bound);
                 self.usual(good);
             }
             let inverse = self.w.div(one, pivot);

@@ -1,5 +1,5 @@
 
-/* ---- linear equations: a symmetric matrix that is positive definite as U'DU; all others with rows scaled, threshold
+/* ---- linear equations: a symmetric matrix that is definite as U'DU; all others with rows scaled, threshold
  * pivoting and one refinement ---- */
 
 typedef struct {
@@ -91,11 +91,12 @@ static double ha_less_products(double start, const double *a, const double *b, i
     return result;
 }
 
-/* Factors a symmetric matrix that is positive definite: U above the diagonal, the inverse of D in scale, -1 as the first
+/* Factors a symmetric matrix that is definite: U above the diagonal, the inverse of D in scale, -1 as the first
  * of the order. 0 if it is not such a matrix. */
 static int ha_lu_factor_definite(ha_lu *l)
 {
     const int n = l->n;
+    const double sign = copysign(1.0, l->matrix[0]);
     int i;
     int j;
     int k;
@@ -113,13 +114,17 @@ static int ha_lu_factor_definite(ha_lu *l)
     for (k = 0; k < n; ++k) {
         const double *row = l->factors + k * n;
         const double pivot = row[k];
+        const double size = sign * pivot;
         double inverse;
-        if (!(pivot > 0.0 && pivot > DBL_EPSILON * (double)n * l->matrix[k * n + k] && ha_finite(pivot))) {
+        if (!(size > 0.0 && size > DBL_EPSILON * (double)n * (sign * l->matrix[k * n + k]) && ha_finite(size))) {
             return 0;
         }
         inverse = 1.0 / pivot;
         for (j = k + 1; j < n; ++j) {
             const double factor = row[j] * inverse;
+            if (row[j] == 0.0) {
+                continue;
+            }
             for (i = j; i < n; ++i) {
                 const double product = factor * row[i];
                 l->factors[j * n + i] -= product;
@@ -248,7 +253,7 @@ static int ha_lu_is_positive(const ha_lu *l)
     int j;
     int k;
     if (l->order[0] < 0) {
-        return 1;
+        return n % 2 == 0 || l->scale[0] > 0.0;
     }
     for (k = 0; k < n; ++k) {
         if (l->factors[k * n + k] < 0.0) {

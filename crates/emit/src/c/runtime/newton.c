@@ -200,6 +200,16 @@ static void ha_accept_trial(ha_newton *w)
     }
 }
 
+/* Takes the step that would come next, with the Jacobian as it was before the last one. */
+static void ha_take_next_step(ha_newton *w)
+{
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        w->x[i] += w->next[i];
+        w->size[i] = ha_max(w->size[i], fabs(w->x[i]));
+    }
+}
+
 /* Whether the Jacobian is the same all the way from where the attempt began to x: what differs is rounding. */
 static int ha_is_linear(ha_model *m, ha_newton *w)
 {
@@ -265,6 +275,10 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
             if (next <= (1.0 - 0.25 * fraction) * size || size <= 2.0 * DBL_EPSILON) {
                 ha_accept_trial(w);
                 *near = fraction == 1.0 && (next <= 0.25 * size || size <= 1e-9);
+                if (*near && next * next <= 0.125 * DBL_EPSILON * size) {
+                    ha_take_next_step(w);
+                    return HA_DONE;
+                }
                 return size <= 4.0 * DBL_EPSILON ? HA_DONE : HA_MOVED;
             }
         }
