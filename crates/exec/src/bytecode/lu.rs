@@ -12,8 +12,13 @@ pub(crate) struct Lu {
     size: usize,
     /// Whether the matrix is known to be symmetric whatever its values; if not, it is looked at.
     symmetric: bool,
-    /// Whether the factors are those of a symmetric matrix: `U` above the diagonal, the inverse of `D` in `scale`.
+    /// Whether the factors are those of a symmetric matrix: `U` above the diagonal, its mirror image below, the inverse of
+    /// `D` in `scale`.
     definite: bool,
+    /// Of such factors: where the zeros at the end of each row of `U`, and at the start of each row of its mirror image,
+    /// leave off.
+    ends: Vec<usize>,
+    starts: Vec<usize>,
     /// The matrix, row by row.
     matrix: Vec<f64>,
     factors: Vec<f64>,
@@ -32,6 +37,8 @@ impl Lu {
             size,
             symmetric,
             definite: false,
+            ends: vec![0; size],
+            starts: vec![0; size],
             matrix: square.clone(),
             factors: square,
             order: vec![0; size],
@@ -59,6 +66,7 @@ impl Lu {
         let n = self.size;
         let sign = 1f64.copysign(self.matrix[0]);
         self.factors.copy_from_slice(&self.matrix);
+        self.starts.iter_mut().enumerate().for_each(|(k, start)| *start = k);
         for k in 0..n {
             let (upper, lower) = self.factors.split_at_mut((k + 1) * n);
             let row = &mut upper[k * n + k..];
@@ -67,15 +75,18 @@ impl Lu {
                 return false;
             }
             let inverse = 1.0 / pivot;
+            let end = row.iter().rposition(|&u| u != 0.0).unwrap_or(0);
             for (j, below) in lower.chunks_exact_mut(n).enumerate() {
-                if row[j + 1] == 0.0 {
-                    continue;
+                let u = row[j + 1];
+                let factor = u * inverse;
+                below[k] = factor;
+                if u != 0.0 {
+                    below[k + 1 + j..].iter_mut().zip(&row[j + 1..=end]).for_each(|(a, u)| *a -= factor * u);
+                    self.starts[k + 1 + j] = self.starts[k + 1 + j].min(k);
                 }
-                let factor = row[j + 1] * inverse;
-                below[k + 1 + j..].iter_mut().zip(&row[j + 1..]).for_each(|(a, u)| *a -= factor * u);
             }
-            row[1..].iter_mut().for_each(|u| *u *= inverse);
-            self.scale[k] = inverse;
+            row[1..=end].iter_mut().for_each(|u| *u *= inverse);
+            (self.scale[k], self.ends[k]) = (inverse, k + 1 + end);
         }
         true
     }
@@ -132,14 +143,18 @@ impl Lu {
 
     fn solve_definite(&self, b: &mut [f64]) {
         let n = self.size;
+        // A zero without a minus stays as it is when nothing is taken off it, so that zeros may be left out.
+        b.iter_mut().for_each(|b| *b += 0.0);
         for k in 0..n {
             let (done, left) = b.split_at_mut(k + 1);
-            left.iter_mut().zip(&self.factors[k * n + k + 1..]).for_each(|(b, u)| *b -= u * done[k]);
+            let row = &self.factors[k * n + k + 1..k * n + self.ends[k]];
+            left.iter_mut().zip(row).for_each(|(b, u)| *b -= u * done[k]);
         }
-        b.iter_mut().zip(&self.scale).for_each(|(b, inverse)| *b *= inverse);
+        b.iter_mut().zip(&self.scale).for_each(|(b, inverse)| *b = *b * inverse + 0.0);
         for k in (0..n).rev() {
-            let (left, done) = b.split_at_mut(k + 1);
-            left[k] = less_products(left[k], &self.factors[k * n + k + 1..][..n - k - 1], done);
+            let (left, done) = b.split_at_mut(k);
+            let row = &self.factors[k * n + self.starts[k]..k * n + k];
+            left[self.starts[k]..].iter_mut().zip(row).for_each(|(b, u)| *b -= u * done[0]);
         }
     }
 

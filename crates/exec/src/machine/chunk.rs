@@ -560,17 +560,21 @@ impl Chunk<'_, '_> {
             }
             inverses.push(inverse);
         }
+        b.iter_mut().for_each(|b| *b = self.w.add(*b, zero));
         for k in 0..n {
             for j in k + 1..n {
                 let product = self.w.mul(u[k * n + j], b[k]);
                 b[j] = self.w.sub(b[j], product);
             }
         }
-        b.iter_mut().zip(inverses).for_each(|(b, inverse)| *b = self.w.mul(*b, inverse));
+        for (b, inverse) in b.iter_mut().zip(inverses) {
+            let scaled = self.w.mul(*b, inverse);
+            *b = self.w.add(scaled, zero);
+        }
         for k in (0..n).rev() {
-            for j in k + 1..n {
-                let product = self.w.mul(u[k * n + j], b[j]);
-                b[k] = self.w.sub(b[k], product);
+            for i in 0..k {
+                let product = self.w.mul(u[i * n + k], b[k]);
+                b[i] = self.w.sub(b[i], product);
             }
         }
     }

@@ -67,6 +67,9 @@ pub struct Model {
     begun: bool,
     /// When the last jump was crossed, in s.
     crossed: f64,
+    /// The time of the rates that stand in the registers, those of the states that stand there, if nothing has been done
+    /// since.
+    rated: Option<f64>,
 }
 
 /// What a held signal remembers.
@@ -127,6 +130,7 @@ impl Model {
             shown_blocks: Vec::new(),
             begun: false,
             crossed: f64::NEG_INFINITY,
+            rated: None,
             observe: Routine::default(),
             recorded: Vec::new(),
             layout,
@@ -262,6 +266,7 @@ impl Model {
     }
 
     fn follow(&mut self) {
+        self.rated = None;
         self.frame.conditions.clock = Hold::Follow;
         self.frame.conditions.state = Hold::Follow;
     }
@@ -303,7 +308,8 @@ impl Model {
     }
 
     fn place_time(&mut self, t: f64) {
-        let Model { frame, layout, inputs, held, crossed, .. } = self;
+        let Model { frame, layout, inputs, held, crossed, rated, .. } = self;
+        *rated = None;
         frame.r[layout.time as usize] = t;
         for (i, signal) in inputs.iter().enumerate() {
             frame.r[layout.inputs as usize + i] = signal.at(t).0;

@@ -63,7 +63,11 @@ impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
     fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
-            self.rates_at(t, x)?;
+            let states = &self.frame.r[self.layout.states as usize..][..x.len()];
+            if self.rated != Some(t) || states != x {
+                self.rates_at(t, x)?;
+            }
+            self.rated = None;
             let blocks = self.rates.solves.iter().map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
         }
@@ -222,6 +226,7 @@ impl System for Model {
                 return Err(self.explain(t).unwrap_or(Failure::NotFinite { time: t, what }));
             }
         }
+        self.rated = Some(t);
         Ok(())
     }
 
@@ -280,6 +285,7 @@ impl System for Model {
             self.restart();
         }
         self.crossed = t;
+        self.rated = None;
         self.inputs.iter_mut().for_each(|signal| signal.hold(t));
         self.frame.conditions.state = Hold::Follow;
         // A solution may leap where something jumps.

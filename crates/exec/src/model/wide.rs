@@ -123,6 +123,7 @@ impl WideModel {
 impl Lane for Model {
     #[inline]
     fn frame(&mut self) -> &mut Frame {
+        self.rated = None;
         &mut self.frame
     }
 }

@@ -91,8 +91,8 @@ static double ha_less_products(double start, const double *a, const double *b, i
     return result;
 }
 
-/* Factors a symmetric matrix that is definite: U above the diagonal, the inverse of D in scale, -1 as the first
- * of the order. 0 if it is not such a matrix. */
+/* Factors a symmetric matrix that is definite: U above the diagonal and its mirror image below, the inverse of D in
+ * scale, -1 as the first of the order. 0 if it is not such a matrix. */
 static int ha_lu_factor_definite(ha_lu *l)
 {
     const int n = l->n;
@@ -122,6 +122,7 @@ static int ha_lu_factor_definite(ha_lu *l)
         inverse = 1.0 / pivot;
         for (j = k + 1; j < n; ++j) {
             const double factor = row[j] * inverse;
+            l->factors[j * n + k] = factor;
             if (row[j] == 0.0) {
                 continue;
             }
@@ -142,19 +143,26 @@ static int ha_lu_factor_definite(ha_lu *l)
 static void ha_lu_solve_definite(const ha_lu *l, double *b)
 {
     const int n = l->n;
-    int j;
+    int i;
     int k;
+    for (i = 0; i < n; ++i) {
+        b[i] += 0.0;
+    }
     for (k = 0; k < n; ++k) {
-        for (j = k + 1; j < n; ++j) {
-            const double product = l->factors[k * n + j] * b[k];
-            b[j] -= product;
+        for (i = k + 1; i < n; ++i) {
+            const double product = l->factors[k * n + i] * b[k];
+            b[i] -= product;
         }
     }
     for (k = 0; k < n; ++k) {
-        b[k] *= l->scale[k];
+        const double scaled = b[k] * l->scale[k];
+        b[k] = scaled + 0.0;
     }
     for (k = n - 1; k >= 0; --k) {
-        b[k] = ha_less_products(b[k], l->factors + k * n + k + 1, b + k + 1, n - k - 1);
+        for (i = 0; i < k; ++i) {
+            const double product = l->factors[k * n + i] * b[k];
+            b[i] -= product;
+        }
     }
 }
 
