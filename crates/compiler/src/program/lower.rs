@@ -4,7 +4,7 @@ use super::values::{Op, Reads, Values};
 use super::{BlockId, Cause, Condition, ConditionId, ConditionKind, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
 use crate::ids::Table;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Values made of expressions so far.
 pub(super) struct Lowering<'a> {
@@ -14,6 +14,8 @@ pub(super) struct Lowering<'a> {
     condition_of: FxHashMap<(Value, ConditionKind), ConditionId>,
     symbols: Vec<Option<Value>>,
     known: Vec<Option<Value>>,
+    /// Sums whose sine and cosine are made of those of their terms.
+    sums: FxHashSet<Expr>,
     /// Symbols and expressions of the Newton block that is being lowered.
     inner: Option<Inner>,
 }
@@ -26,7 +28,7 @@ struct Inner {
 }
 
 impl<'a> Lowering<'a> {
-    pub fn new(exprs: &'a Exprs) -> Self {
+    pub fn new(exprs: &'a Exprs, sums: FxHashSet<Expr>) -> Self {
         Lowering {
             exprs,
             values: Values::default(),
@@ -34,6 +36,7 @@ impl<'a> Lowering<'a> {
             condition_of: FxHashMap::default(),
             symbols: vec![None; exprs.symbol_count()],
             known: vec![None; exprs.len()],
+            sums,
             inner: None,
         }
     }
@@ -134,6 +137,10 @@ impl<'a> Lowering<'a> {
                 let (numerator, denominator) = self.power(*base, *exponent);
                 self.quotient(numerator, denominator)
             }
+            Node::Call(f @ (Function::Sin | Function::Cos), arguments) if self.sums.contains(&arguments[0]) => {
+                let (sine, cosine) = self.turned(arguments[0]);
+                if *f == Function::Sin { sine } else { cosine }
+            }
             Node::Call(f, arguments) => {
                 let a = of(self, arguments[0]);
                 let b = arguments.get(1).map(|&b| of(self, b));
@@ -176,6 +183,28 @@ impl<'a> Lowering<'a> {
             true => self.sub(sum, term),
             false => self.add(sum, term),
         })
+    }
+
+    /// Sine and cosine of a sum from those of its terms.
+    fn turned(&mut self, sum: Expr) -> (Value, Value) {
+        let Node::Add(terms) = self.exprs.node(sum) else { panic!("only sums are taken apart") };
+        let mut all: Option<(Value, Value)> = None;
+        for &term in terms {
+            let (minus, angle) = self.magnitude(term);
+            let (sine, cosine) = (self.op(Op::Call(Function::Sin, angle)), self.op(Op::Call(Function::Cos, angle)));
+            all = Some(match all {
+                None => (if minus { self.neg(sine) } else { sine }, cosine),
+                Some((s, c)) => {
+                    let (sc, cs) = (self.mul(s, cosine), self.mul(c, sine));
+                    let (cc, ss) = (self.mul(c, cosine), self.mul(s, sine));
+                    match minus {
+                        true => (self.sub(sc, cs), self.add(cc, ss)),
+                        false => (self.add(sc, cs), self.sub(cc, ss)),
+                    }
+                }
+            });
+        }
+        all.expect("a sum has terms")
     }
 
     /// Whether a term is subtracted, and the value that is.

@@ -13,6 +13,7 @@
 //! branches of an `if` are evaluated: there are no side effects, and a branch without a value does no harm as long as
 //! it is not chosen. Inside a Newton block conditions that read its unknowns are not held.
 
+mod angles;
 mod dependence;
 mod derive;
 mod jacobian;

@@ -1,5 +1,6 @@
 //! Equations to a program.
 
+use super::angles::sums_of_angles;
 use super::lower::Lowering;
 use super::values::{Op, Reads};
 use super::{
@@ -20,7 +21,7 @@ pub fn schedule(equations: &Equations) -> Program {
     let graph = &equations.graph;
     let mut schedule = Schedule {
         graph,
-        lower: Lowering::new(&graph.exprs),
+        lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &evaluated(equations))),
         blocks: Table::new(),
         watches: Vec::new(),
         kinks: Vec::new(),
@@ -29,6 +30,20 @@ pub fn schedule(equations: &Equations) -> Program {
     schedule.givens(equations);
     equations.steps.iter().for_each(|step| schedule.step(step));
     schedule.finish(equations, parameters)
+}
+
+/// Every expression that is evaluated while running, and all below it.
+fn evaluated(equations: &Equations) -> Vec<Expr> {
+    let mut roots = equations.residuals.clone();
+    for step in &equations.steps {
+        match step {
+            Step::Assign { value, .. } => roots.push(*value),
+            Step::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
+            Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
+            Step::Watch { pivot, .. } => roots.push(*pivot),
+        }
+    }
+    equations.graph.exprs.below(&roots, &|_| true)
 }
 
 struct Schedule<'a> {
