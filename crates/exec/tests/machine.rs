@@ -146,30 +146,3 @@ fn long_programs_run_the_same() {
     }
     compare("a long program", &mut bytecode, &mut machine, 0.7, &x).unwrap_or_else(|why| panic!("{why}"));
 }
-
-/// Pages that are executable and belong to no file.
-fn executable_pages() -> usize {
-    let maps = std::fs::read_to_string("/proc/self/maps").expect("the maps of this process");
-    maps.lines().filter(|line| line.contains("r-xp") && line.split_whitespace().count() == 5).count()
-}
-
-#[test]
-fn memory_of_code_is_given_back() {
-    if !cfg!(target_os = "linux") {
-        return; // There is no /proc to look into.
-    }
-    let (_, program) = common::models().swap_remove(0);
-    let model = with_all(&program);
-    let kept = compiled(&model);
-    let before = executable_pages();
-    let several: Vec<Model> = (0..5).map(|_| compiled(&model)).collect();
-    let copies: Vec<Model> = several.iter().flat_map(|m| [m.clone(), m.clone()]).collect();
-    assert!(executable_pages() > before, "code stands in pages of its own");
-    drop(several);
-    assert!(executable_pages() > before, "copies share the code");
-    drop(copies);
-    let after = executable_pages();
-    // Other tests of this process make code as well.
-    assert!(after <= before + 60, "{before} executable ranges before, {after} after");
-    drop(kept);
-}

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{Block, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register};
+use halfarrow_compiler::program::{Block, BlockId, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::slopes::{call, power, rate_of};
@@ -11,6 +11,9 @@ use super::ssa::{Act, Arg, Code, Step};
 
 /// Steps in one C function: compilers take more than linear time for long ones.
 const CHUNK: usize = 250;
+
+/// Symmetric linear equations of up to this many unknowns are written out.
+const WRITTEN_OUT: usize = 6;
 
 /// How a function is called.
 #[derive(Debug, Clone, Copy)]
@@ -148,6 +151,7 @@ impl<'a> Writer<'a> {
             place: vec![usize::MAX; code.locals as usize],
             rate_place: vec![usize::MAX; code.locals as usize],
             chunk: 0,
+            turns: FxHashMap::default(),
             text: String::new(),
         };
         for (c, steps) in chunks.iter().enumerate() {
@@ -167,6 +171,7 @@ impl<'a> Writer<'a> {
         let kind = if shape.void { "void" } else { "int" };
         for (c, steps) in chunks.iter().enumerate() {
             f.chunk = c;
+            f.turns = turns(steps);
             f.text.clear();
             steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
             self.outputs(&mut f, code, (values, rates), chunks.len());
@@ -326,8 +331,29 @@ impl<'a> Writer<'a> {
             Act::Table(table, piece) | Act::TableSlope(table, piece) | Act::TableCurvature(table, piece) => {
                 self.table(f, step, (&a[0], d[0].as_deref()), (table, piece, place));
             }
+            Act::Call(Function::Sin | Function::Cos) if f.turns.contains_key(&angle(step.args[0])) => {
+                self.turn(f, step, (&a, &d), place);
+            }
             _ => self.plain(f, step, &a, &d),
         }
+    }
+
+    /// One of a sine and a cosine that are computed together.
+    fn turn(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), place: usize) {
+        let out = step.outs[0];
+        let number = match f.turns.insert(angle(step.args[0]), Some(place)) {
+            Some(Some(there)) => {
+                f.turns.insert(angle(step.args[0]), Some(there));
+                there
+            }
+            _ => {
+                let _ = writeln!(f.text, "    double h{place}[2];\n    ha_turn({}, h{place});", a[0]);
+                place
+            }
+        };
+        let value = format!("h{number}[{}]", usize::from(step.act == Act::Call(Function::Cos)));
+        let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
+        self.put(f, out, &value, rate.as_deref());
     }
 
     fn plain(&self, f: &mut Body, step: &Step, a: &[String], d: &[Option<String>]) {
@@ -433,6 +459,11 @@ impl<'a> Writer<'a> {
             return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
         }
         let (matrix, right) = a.split_at(n * n);
+        let symmetric = self.program.blocks[BlockId(block)].is_symmetric();
+        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
+            f.text += &definite(matrix, right, number, &fail);
+            return self.solved(f, step, number);
+        }
         let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
         let _ = writeln!(f.text, "    const double b{number}[] = {{{}}};", right.join(", "));
         let _ = writeln!(f.text, "    double s{number}[{n}];");
@@ -524,7 +555,76 @@ struct Body {
     place: Vec<usize>,
     rate_place: Vec<usize>,
     chunk: usize,
+    /// Angles whose sine and cosine are both wanted in this chunk, with the number of the pair once it is computed.
+    turns: FxHashMap<Angle, Option<usize>>,
     text: String,
+}
+
+/// What a sine reads, to tell equal ones.
+type Angle = (u8, u32);
+
+fn angle(a: Arg) -> Angle {
+    match a {
+        Arg::Fixed(r) => (0, r),
+        Arg::Local(i) => (1, i),
+        Arg::Outer(i) => (2, i),
+        Arg::Guess(i) => (3, i),
+    }
+}
+
+/// The angles of which some steps want both sine and cosine.
+fn turns(steps: &[Step]) -> FxHashMap<Angle, Option<usize>> {
+    let of = |wanted: Function| {
+        let wanted = steps.iter().filter(move |s| s.act == Act::Call(wanted));
+        wanted.map(|s| angle(s.args[0])).collect::<FxHashSet<Angle>>()
+    };
+    let cosines = of(Function::Cos);
+    of(Function::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()
+}
+
+/// Symmetric linear equations, solved as `lu.c` does where the matrix is definite; else by it. Solution in `s<number>`.
+fn definite(matrix: &[String], right: &[String], number: usize, fail: &str) -> String {
+    let n = right.len();
+    let mut text = format!("    double s{number}[{n}];\n    {{\n");
+    let mut line = |words: String| {
+        let _ = writeln!(text, "        {words}");
+    };
+    line(format!("const double sign = copysign(1.0, {});", matrix[0]));
+    let mut u: Vec<String> = matrix.to_vec();
+    let mut good = Vec::new();
+    for k in 0..n {
+        line(format!("const double p{k} = sign * {};", u[k * n + k]));
+        let rounding = self::number(f64::EPSILON * n as f64);
+        good.push(format!("p{k} > 0.0 && p{k} > {rounding} * (sign * {}) && ha_finite(p{k})", matrix[k * n + k]));
+        line(format!("const double i{k} = 1.0 / {};", u[k * n + k]));
+        for j in k + 1..n {
+            line(format!("const double f{k}_{j} = {} * i{k};", u[k * n + j]));
+        }
+        for j in k + 1..n {
+            for i in j..n {
+                line(format!("const double u{k}_{j}_{i} = {} - f{k}_{j} * {};", u[j * n + i], u[k * n + i]));
+                u[j * n + i] = format!("u{k}_{j}_{i}");
+            }
+        }
+    }
+    line(format!("if ({}) {{", good.join(" && ")));
+    right.iter().enumerate().for_each(|(i, b)| line(format!("    double x{i} = {b} + 0.0;")));
+    for k in 0..n {
+        (k + 1..n).for_each(|j| line(format!("    x{j} -= f{k}_{j} * x{k};")));
+    }
+    (0..n).for_each(|k| line(format!("    x{k} = x{k} * i{k} + 0.0;")));
+    for k in (0..n).rev() {
+        (0..k).for_each(|i| line(format!("    x{i} -= f{i}_{k} * x{k};")));
+    }
+    (0..n).for_each(|i| line(format!("    s{number}[{i}] = x{i};")));
+    line("} else {".into());
+    line(format!("    const double a[] = {{{}}};", matrix.join(", ")));
+    line(format!("    const double b[] = {{{}}};", right.join(", ")));
+    line(format!("    if (!ha_linear(m, {n}, a, b, s{number})) {{"));
+    fail.lines().for_each(|l| line(l.to_string()));
+    line("}".into());
+    text += "    }\n";
+    text
 }
 
 /// The lines of straight code without values that no later line reads.

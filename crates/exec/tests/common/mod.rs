@@ -173,12 +173,15 @@ impl Sketch {
 
 /// The minimal form of every model of `models/`, by name.
 pub fn models() -> Vec<(String, Program)> {
-    let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let crates = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folders = std::fs::read_dir(crates.join("../models")).expect("the models are there");
+    let mut files: Vec<_> = folders.map(|e| e.expect("a folder").path().join("model.bond")).collect();
+    // Linear blocks of six unknowns.
+    files.push(crates.join("emit/tests/models/links.bond"));
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).expect("the models are there") {
-        let folder = entry.expect("a folder").path();
-        let Ok(text) = std::fs::read_to_string(folder.join("model.bond")) else { continue };
-        let name = folder.file_name().expect("a name").to_string_lossy().to_string();
+    for file in files {
+        let Ok(text) = std::fs::read_to_string(&file) else { continue };
+        let name = file.to_string_lossy().to_string();
         let text = Text { name: &name, text: &text, files: &NoFiles, overrides: &[] };
         let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false)));
         found.push((name, program.ir));

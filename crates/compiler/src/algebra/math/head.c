@@ -11,8 +11,12 @@
 #endif
 #if defined(__GNUC__)
 #define HA_UNUSED __attribute__((unused))
+#define HA_INLINE static inline __attribute__((always_inline, unused))
+#define HA_SELDOM static __attribute__((noinline, cold, unused))
 #else
 #define HA_UNUSED
+#define HA_INLINE static inline
+#define HA_SELDOM static
 #endif
 #define HA_FUNCTION static HA_UNUSED
 #define HA_DATA static const HA_UNUSED

@@ -12,21 +12,21 @@ typedef struct { double a; double b; uint64_t quarters; } ha_reduced;
 /* 2^power (t + rest); the power stands in its low 12 bits. */
 typedef struct { double t; double rest; uint64_t power; } ha_exponential;
 
-HA_FUNCTION uint64_t ha_bits(double x)
+HA_INLINE uint64_t ha_bits(double x)
 {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits;
 }
 
-HA_FUNCTION double ha_number(uint64_t bits)
+HA_INLINE double ha_number(uint64_t bits)
 {
     double x;
     memcpy(&x, &bits, sizeof x);
     return x;
 }
 
-HA_FUNCTION ha_double ha_pair(double hi, double lo)
+HA_INLINE ha_double ha_pair(double hi, double lo)
 {
     ha_double pair;
     pair.hi = hi;
@@ -34,20 +34,20 @@ HA_FUNCTION ha_double ha_pair(double hi, double lo)
     return pair;
 }
 
-HA_FUNCTION ha_double ha_fast_two_sum(double a, double b)
+HA_INLINE ha_double ha_fast_two_sum(double a, double b)
 {
     const double sum = a + b;
     return ha_pair(sum, b - (sum - a));
 }
 
-HA_FUNCTION ha_double ha_two_sum(double a, double b)
+HA_INLINE ha_double ha_two_sum(double a, double b)
 {
     const double sum = a + b;
     const double part = sum - a;
     return ha_pair(sum, (a - (sum - part)) + (b - part));
 }
 
-HA_FUNCTION double ha_leading(double a)
+HA_INLINE double ha_leading(double a)
 {
     return ha_number(ha_bits(a) & ~((UINT64_C(1) << 27) - 1));
 }
@@ -80,7 +80,7 @@ HA_FUNCTION ha_double ha_sum(ha_double a, ha_double b)
     return ha_fast_two_sum(s.hi, s.lo + (a.lo + b.lo));
 }
 
-HA_FUNCTION ha_double ha_minus(ha_double a)
+HA_INLINE ha_double ha_minus(ha_double a)
 {
     return ha_pair(-a.hi, -a.lo);
 }
@@ -95,7 +95,7 @@ HA_FUNCTION ha_double ha_quotient(ha_double a, ha_double b)
 
 /* Sine, cosine, tangent. */
 
-HA_FUNCTION ha_reduced ha_far(double x)
+HA_SELDOM ha_reduced ha_far(double x)
 {
     const uint64_t limb = UINT64_C(0xffffffff);
     uint64_t product[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
@@ -165,7 +165,8 @@ HA_FUNCTION ha_reduced ha_far(double x)
     return r;
 }
 
-HA_FUNCTION ha_reduced ha_reduce(double x)
+/* Where |x| <= 1e5. */
+HA_INLINE ha_reduced ha_near(double x)
 {
     const double rounded = x * HA_TWO_OVER_PI + HA_ROUNDER;
     const double k = rounded - HA_ROUNDER;
@@ -175,13 +176,10 @@ HA_FUNCTION ha_reduced ha_reduce(double x)
     r.a = s.hi;
     r.b = s.lo - k * HA_PIO2_REST;
     r.quarters = ha_bits(rounded);
-    if (fabs(x) <= 1e5) {
-        return r;
-    }
-    return ha_far(x);
+    return r;
 }
 
-HA_FUNCTION double ha_sine_rest(ha_reduced r, double z)
+HA_INLINE double ha_sine_rest(ha_reduced r, double z)
 {
     const double zz = z * z;
     const double p = (HA_SINE[0] + HA_SINE[1] * z)
@@ -189,7 +187,7 @@ HA_FUNCTION double ha_sine_rest(ha_reduced r, double z)
     return r.b * (1.0 - 0.5 * z) - (r.a * z) * p;
 }
 
-HA_FUNCTION ha_double ha_cosine_parts(ha_reduced r, double z)
+HA_INLINE ha_double ha_cosine_parts(ha_reduced r, double z)
 {
     const double zz = z * z;
     const double p = (HA_COSINE[0] + HA_COSINE[1] * z)
@@ -199,7 +197,7 @@ HA_FUNCTION ha_double ha_cosine_parts(ha_reduced r, double z)
     return ha_pair(w, ((1.0 - w) - half) + (zz * p - r.a * r.b));
 }
 
-HA_FUNCTION double ha_turned(ha_reduced r, uint64_t quarters)
+HA_INLINE double ha_turned(ha_reduced r, uint64_t quarters)
 {
     const double z = r.a * r.a;
     double value;
@@ -212,16 +210,60 @@ HA_FUNCTION double ha_turned(ha_reduced r, uint64_t quarters)
     return ha_number(ha_bits(value) ^ ((quarters & 2) << 62));
 }
 
+HA_SELDOM double ha_sin_far(double x)
+{
+    const ha_reduced r = ha_far(x);
+    return ha_turned(r, r.quarters);
+}
+
+HA_SELDOM double ha_cos_far(double x)
+{
+    const ha_reduced r = ha_far(x);
+    return ha_turned(r, r.quarters + 1);
+}
+
 HA_FUNCTION double ha_sin(double x)
 {
-    const ha_reduced r = ha_reduce(x);
+    ha_reduced r;
+    if (!(fabs(x) <= 1e5)) {
+        return ha_sin_far(x);
+    }
+    r = ha_near(x);
     return ha_turned(r, r.quarters);
 }
 
 HA_FUNCTION double ha_cos(double x)
 {
-    const ha_reduced r = ha_reduce(x);
+    ha_reduced r;
+    if (!(fabs(x) <= 1e5)) {
+        return ha_cos_far(x);
+    }
+    r = ha_near(x);
     return ha_turned(r, r.quarters + 1);
+}
+
+/* Sine and cosine. */
+HA_FUNCTION void ha_turn(double x, double *both)
+{
+    ha_reduced r;
+    ha_double c;
+    double z;
+    double sine;
+    double cosine;
+    int odd;
+    if (!(fabs(x) <= 1e5)) {
+        both[0] = ha_sin_far(x);
+        both[1] = ha_cos_far(x);
+        return;
+    }
+    r = ha_near(x);
+    z = r.a * r.a;
+    sine = ha_number(ha_bits(r.a + ha_sine_rest(r, z)) | (ha_bits(r.a) & HA_SIGN));
+    c = ha_cosine_parts(r, z);
+    cosine = c.hi + c.lo;
+    odd = (r.quarters & 1) != 0;
+    both[0] = ha_number(ha_bits(odd ? cosine : sine) ^ ((r.quarters & 2) << 62));
+    both[1] = ha_number(ha_bits(odd ? sine : cosine) ^ (((r.quarters + 1) & 2) << 62));
 }
 
 HA_FUNCTION double ha_tan(double x)
@@ -233,7 +275,7 @@ HA_FUNCTION double ha_tan(double x)
     if (fabs(x) < HA_TINY) {
         return x;
     }
-    r = ha_reduce(x);
+    r = fabs(x) <= 1e5 ? ha_near(x) : ha_far(x);
     z = r.a * r.a;
     sine = ha_fast_two_sum(r.a, ha_sine_rest(r, z));
     cosine = ha_cosine_parts(r, z);
