@@ -152,7 +152,7 @@ impl Exprs {
 
     /// A sum as a number times a sum whose first term that is no number has a positive coefficient, and whose integer
     /// coefficients have no common divisor. Anything else is 1 times itself.
-    pub(super) fn primitive(&mut self, e: Expr) -> (Rational, Expr) {
+    pub(crate) fn primitive(&mut self, e: Expr) -> (Rational, Expr) {
         if !matches!(self.node(e), Node::Add(_)) {
             return (Rational::from(1), e);
         }

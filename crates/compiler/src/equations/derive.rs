@@ -155,7 +155,13 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     if let Some(lost) = lost_in_itself(&d) {
         return Err(through_itself(graph, &d.x, lost));
     }
+    // A divisor vanishes where any number of times it does.
+    let mut watched = BTreeSet::new();
     for &pivot in &causal.ports.watched {
+        let (_, pivot) = d.x.primitive(pivot);
+        if !watched.insert(pivot) {
+            continue;
+        }
         ordered.steps.push(Step::Watch { pivot, elements: readers(&d, pivot) });
     }
     let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();

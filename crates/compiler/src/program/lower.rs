@@ -1,5 +1,6 @@
 //! Expressions to values.
 
+use super::sharing::{Sharing, Unit, UnitId};
 use super::values::{Op, Reads, Values};
 use super::{BlockId, Cause, Condition, ConditionId, ConditionKind, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
@@ -16,6 +17,7 @@ pub(super) struct Lowering<'a> {
     known: Vec<Option<Value>>,
     /// Sums whose sine and cosine are made of those of their terms.
     sums: FxHashSet<Expr>,
+    sharing: Sharing,
     /// Symbols and expressions of the Newton block that is being lowered.
     inner: Option<Inner>,
 }
@@ -28,7 +30,7 @@ struct Inner {
 }
 
 impl<'a> Lowering<'a> {
-    pub fn new(exprs: &'a Exprs, sums: FxHashSet<Expr>) -> Self {
+    pub fn new(exprs: &'a Exprs, sums: FxHashSet<Expr>, sharing: Sharing) -> Self {
         Lowering {
             exprs,
             values: Values::default(),
@@ -37,6 +39,7 @@ impl<'a> Lowering<'a> {
             symbols: vec![None; exprs.symbol_count()],
             known: vec![None; exprs.len()],
             sums,
+            sharing,
             inner: None,
         }
     }
@@ -131,8 +134,8 @@ impl<'a> Lowering<'a> {
             Node::Symbol(symbol) => self
                 .defined(*symbol)
                 .unwrap_or_else(|| panic!("{} is read before a step defines it", exprs.name(*symbol))),
-            Node::Add(terms) => self.sum(terms),
-            Node::Mul(factors) => self.product(factors, false),
+            Node::Add(terms) => self.sum(e, terms),
+            Node::Mul(factors) => self.product(e, factors, false),
             Node::Pow(base, exponent) => {
                 let (numerator, denominator) = self.power(*base, *exponent);
                 self.quotient(numerator, denominator)
@@ -171,8 +174,17 @@ impl<'a> Lowering<'a> {
         self.constant(number.to_f64())
     }
 
-    fn sum(&mut self, terms: &[Expr]) -> Value {
-        let mut parts: Vec<(bool, Value)> = terms.iter().map(|&t| self.magnitude(t)).collect();
+    fn sum(&mut self, e: Expr, terms: &[Expr]) -> Value {
+        let shared = self.sharing.sums.get(&e).cloned();
+        let parts = match shared {
+            Some(parts) => parts.units.into_iter().map(|(minus, unit)| (minus, self.term(unit))).collect(),
+            None => terms.iter().map(|&t| self.magnitude(t)).collect(),
+        };
+        self.total(parts)
+    }
+
+    /// The sum of terms, each with whether it is subtracted.
+    fn total(&mut self, mut parts: Vec<(bool, Value)>) -> Value {
         // A term that is added goes first, so that nothing need be negated.
         if let Some(first) = parts.iter().position(|&(minus, _)| !minus) {
             parts[..=first].rotate_right(1);
@@ -183,6 +195,61 @@ impl<'a> Lowering<'a> {
             true => self.sub(sum, term),
             false => self.add(sum, term),
         })
+    }
+
+    /// A term of a sum.
+    fn term(&mut self, unit: UnitId) -> Value {
+        match self.sharing.units[unit as usize].clone() {
+            Unit::Pair(a, b, turned) => {
+                let parts = vec![(false, self.term(a)), (turned, self.term(b))];
+                self.total(parts)
+            }
+            Unit::Sum(terms) => {
+                let parts = terms.into_iter().map(|(minus, unit)| (minus, self.term(unit))).collect();
+                self.total(parts)
+            }
+            Unit::Size(term) => match self.exprs.node(term) {
+                Node::Mul(factors) => self.product(term, factors, true),
+                Node::Number(n) => self.number(&n.abs()),
+                _ => self.known(term).expect("parts stand before wholes"),
+            },
+            Unit::Whole(_) | Unit::Inverse(_) | Unit::Product(..) => unreachable!("these are no terms"),
+        }
+    }
+
+    /// A factor of a product: numerator and denominator.
+    fn factor(&mut self, unit: UnitId) -> (Option<Value>, Option<Value>) {
+        match self.sharing.units[unit as usize].clone() {
+            Unit::Whole(e) => (Some(self.known(e).expect("parts stand before wholes")), None),
+            Unit::Inverse(e) => {
+                let value = self.known(e).expect("parts stand before wholes");
+                match self.sharing.reciprocals.contains(&e) {
+                    true => (Some(self.quotient(None, Some(value))), None),
+                    false => (None, Some(value)),
+                }
+            }
+            Unit::Pair(a, b, _) => match self.factors(&[a, b]) {
+                (Some(above), below) => (Some(self.quotient(Some(above), below)), None),
+                below => below,
+            },
+            Unit::Product(number, factors) => {
+                let number = if number.is_one() { None } else { Some(self.number(&number)) };
+                let (above, below) = self.factors(&factors);
+                let above = self.times(number, above);
+                (Some(self.quotient(above, below)), None)
+            }
+            Unit::Sum(_) | Unit::Size(_) => unreachable!("these are no factors"),
+        }
+    }
+
+    fn factors(&mut self, units: &[UnitId]) -> (Option<Value>, Option<Value>) {
+        let (mut numerator, mut denominator) = (None, None);
+        for &unit in units {
+            let (above, below) = self.factor(unit);
+            numerator = self.times(numerator, above);
+            denominator = self.times(denominator, below);
+        }
+        (numerator, denominator)
     }
 
     /// Sine and cosine of a sum from those of its terms.
@@ -212,14 +279,20 @@ impl<'a> Lowering<'a> {
         let exprs = self.exprs;
         let negative = |e: Expr| exprs.is_number(e).is_some_and(|n| n.signum() < 0);
         match exprs.node(term) {
-            Node::Mul(factors) if negative(factors[0]) => (true, self.product(factors, true)),
+            Node::Mul(factors) if negative(factors[0]) => (true, self.product(term, factors, true)),
             Node::Number(n) if n.signum() < 0 => (true, self.number(&n.abs())),
             _ => (false, self.known(term).expect("parts stand before wholes")),
         }
     }
 
     /// The product, with the sign of its number left out if `absolute`.
-    fn product(&mut self, factors: &[Expr], absolute: bool) -> Value {
+    fn product(&mut self, e: Expr, factors: &[Expr], absolute: bool) -> Value {
+        if let Some(parts) = self.sharing.products.get(&e).cloned() {
+            let units: Vec<UnitId> = parts.units.iter().map(|u| u.1).collect();
+            let (numerator, denominator) = self.factors(&units);
+            let value = self.quotient(numerator, denominator);
+            return if parts.minus && !absolute { self.neg(value) } else { value };
+        }
         let (mut numerator, mut denominator, mut minus) = (None, None, false);
         for &factor in factors {
             let (above, below) = match self.exprs.node(factor) {

@@ -22,6 +22,7 @@ mod operations;
 mod print;
 mod routine;
 mod schedule;
+mod sharing;
 mod start;
 mod values;
 

@@ -61,6 +61,14 @@ impl Values {
             0 => self.number(1.0),
             1 => a,
             2 => self.op_of(Op::Mul(a, a)),
+            3 => {
+                let square = self.op_of(Op::Mul(a, a));
+                self.op_of(Op::Mul(square, a))
+            }
+            4 => {
+                let square = self.op_of(Op::Mul(a, a));
+                self.op_of(Op::Mul(square, square))
+            }
             _ => self.op_of(Op::Powi(a, n)),
         }
     }

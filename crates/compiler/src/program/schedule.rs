@@ -2,6 +2,7 @@
 
 use super::angles::sums_of_angles;
 use super::lower::Lowering;
+use super::sharing::share;
 use super::values::{Op, Reads};
 use super::{
     Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Observed, Parameter,
@@ -11,7 +12,7 @@ use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, ParameterId};
 use crate::equations::{Equations, Step};
 use crate::ids::{Id, Table};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// The program that evaluates the equations.
 ///
@@ -19,9 +20,13 @@ use rustc_hash::FxHashMap;
 /// If a step reads a symbol that is not given or defined before it: then the equations are not in evaluation order.
 pub fn schedule(equations: &Equations) -> Program {
     let graph = &equations.graph;
+    let exprs = evaluated(equations);
+    let fixed: FxHashSet<Symbol> = graph.parameters.values().map(|p| p.symbol).collect();
+    let varies = |e| graph.exprs.depends_on_any(e, &|s| !fixed.contains(&s));
+    let sharing = share(&graph.exprs, &exprs, &varies);
     let mut schedule = Schedule {
         graph,
-        lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &evaluated(equations))),
+        lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
         blocks: Table::new(),
         watches: Vec::new(),
         kinks: Vec::new(),
@@ -32,18 +37,40 @@ pub fn schedule(equations: &Equations) -> Program {
     schedule.finish(equations, parameters)
 }
 
-/// Every expression that is evaluated while running, and all below it.
+/// Every expression that the rates are evaluated from, and all below it.
 fn evaluated(equations: &Equations) -> Vec<Expr> {
-    let mut roots = equations.residuals.clone();
-    for step in &equations.steps {
+    let exprs = &equations.graph.exprs;
+    let mut step_of: FxHashMap<Symbol, usize> = FxHashMap::default();
+    for (i, step) in equations.steps.iter().enumerate() {
         match step {
-            Step::Assign { value, .. } => roots.push(*value),
-            Step::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
-            Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
-            Step::Watch { pivot, .. } => roots.push(*pivot),
+            Step::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
+            Step::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
+            Step::Newton { unknowns, body, .. } => {
+                unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
+            }
+            Step::Watch { .. } => {}
         }
     }
-    equations.graph.exprs.below(&roots, &|_| true)
+    let mut roots = equations.residuals.clone();
+    let mut seen = vec![false; equations.steps.len()];
+    let mut open: Vec<Symbol> = equations.states.iter().map(|s| s.rate).collect();
+    let mut read = 0;
+    loop {
+        while let Some(symbol) = open.pop() {
+            let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
+            match &equations.steps[i] {
+                Step::Assign { value, .. } => roots.push(*value),
+                Step::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
+                Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
+                Step::Watch { .. } => {}
+            }
+        }
+        if read == roots.len() {
+            return exprs.below(&roots, &|_| true);
+        }
+        roots[read..].iter().for_each(|&e| open.extend(exprs.symbols_of(e).iter()));
+        read = roots.len();
+    }
 }
 
 struct Schedule<'a> {

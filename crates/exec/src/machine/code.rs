@@ -202,6 +202,7 @@ impl Code {
     }
 
     /// Rates from time and states given here, all else as it was placed last; false if the routine has to be run.
+    #[inline]
     pub fn rates(&self, frame: &mut Frame, t: f64, x: &[f64], dx: &mut [f64]) -> bool {
         let Some(start) = self.direct else { return false };
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
@@ -249,6 +250,7 @@ fn enter(memory: &Memory, reach: Reach, start: Start, frame: &mut Frame) -> u64 
     memory.enter(start, reach, arrays(frame))
 }
 
+#[inline]
 fn arrays(frame: &mut Frame) -> Arrays<'_> {
     let keeps = |hold: Hold| u64::from(hold == Hold::Keep);
     let keep = keeps(frame.conditions.clock) | keeps(frame.conditions.state) << 1;

@@ -80,6 +80,7 @@ impl Memory {
 
 impl Memory {
     /// The same for a function of rates, from `t` and `x` to `dx`.
+    #[inline]
     pub fn enter_rates(
         &self,
         start: Start,

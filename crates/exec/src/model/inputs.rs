@@ -39,11 +39,13 @@ impl Signal {
     }
 
     /// Value and slope at `t`.
+    #[inline]
     pub fn at(&self, t: f64) -> (f64, f64) {
+        if self.times.is_empty() { (self.default, 0.0) } else { self.among_points(t) }
+    }
+
+    fn among_points(&self, t: f64) -> (f64, f64) {
         let n = self.times.len();
-        if n == 0 {
-            return (self.default, 0.0);
-        }
         match self.held {
             Some((first, last)) if first == last => (self.values[first], 0.0),
             Some((first, last)) => {

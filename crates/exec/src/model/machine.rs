@@ -30,13 +30,18 @@ impl Codes {
 
 impl Model {
     /// Rates by machine code from where time and states are given; false if that does not do.
+    #[inline]
     pub(super) fn rates_directly(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> bool {
         if self.codes.rates.is_none() {
             return false;
         }
-        self.place_time(t);
+        if !self.inputs.is_empty() || !self.held.is_empty() {
+            self.place_time(t);
+        }
         let Model { codes, frame, layout, conserved, .. } = self;
-        frame.r[layout.conserved as usize..][..conserved.len()].copy_from_slice(conserved);
+        if !conserved.is_empty() {
+            frame.r[layout.conserved as usize..][..conserved.len()].copy_from_slice(conserved);
+        }
         let Some(code) = &codes.rates else { return false };
         code.rates(frame, t, x, dx) && dx.iter().all(|rate| rate.is_finite())
     }

@@ -1,0 +1,238 @@
+//! What products and sums have in common is computed once.
+//!
+//! A product is a bag of factors, a sum one of terms. The pair of factors (or terms) that most of them have becomes one
+//! factor of its own, then the next, until no pair is found twice: `r x sin a/h` in `m r x sin a/h` and `r x sin a w/h`.
+//! What parameters alone make is taken together first, as it is computed once for a set of parameters; reciprocals of what
+//! several products are divided by are computed once, too. No product or sum gets longer by it.
+//! Source: greedy elimination of common pairs, as [Breuer] has it.
+
+use crate::algebra::{Expr, Exprs, Node, Rational};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BinaryHeap;
+
+/// A factor or term.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Unit {
+    /// A factor.
+    Whole(Expr),
+    /// One over a factor.
+    Inverse(Expr),
+    /// What parameters alone make of a product: a number above zero times factors.
+    Product(Rational, Vec<UnitId>),
+    /// A term without its sign.
+    Size(Expr),
+    /// A sum of terms of parameters alone, each with whether it is subtracted.
+    Sum(Vec<(bool, UnitId)>),
+    /// Two factors; or two terms, with whether the second is subtracted.
+    Pair(UnitId, UnitId, bool),
+}
+
+/// The place of a unit.
+pub(super) type UnitId = u32;
+
+/// What a product or sum is made of: each part with whether it is subtracted (of a product: whether the whole is).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Parts {
+    /// Of a product: its sign is turned.
+    pub minus: bool,
+    /// Factors, or terms with whether they are subtracted.
+    pub units: Vec<(bool, UnitId)>,
+}
+
+/// How products and sums are put together.
+#[derive(Debug, Default)]
+pub(super) struct Sharing {
+    pub units: Vec<Unit>,
+    pub products: FxHashMap<Expr, Parts>,
+    pub sums: FxHashMap<Expr, Parts>,
+    /// Expressions of which more than one product takes the reciprocal.
+    pub reciprocals: FxHashSet<Expr>,
+    known: FxHashMap<Unit, UnitId>,
+    /// The first of terms that differ in sign alone.
+    sizes: FxHashMap<(Rational, Vec<Expr>), Expr>,
+}
+
+/// Products and sums of more parts than this are left as they are.
+const LONGEST: usize = 24;
+/// Powers up to this are as many factors.
+const HIGHEST: u64 = 4;
+
+/// How the products and sums among `exprs` are put together; `varies` tells what is no parameter.
+pub(super) fn share(x: &Exprs, exprs: &[Expr], varies: &dyn Fn(Expr) -> bool) -> Sharing {
+    let mut sharing = Sharing::default();
+    let (mut products, mut sums) = (Vec::new(), Vec::new());
+    for &e in exprs {
+        match x.node(e) {
+            Node::Mul(factors) if factors.len() <= LONGEST && varies(e) => {
+                products.push((e, sharing.product(x, factors, varies)));
+            }
+            Node::Add(terms) if terms.len() <= LONGEST && varies(e) => sums.push((e, sharing.sum(x, terms, varies))),
+            _ => {}
+        }
+    }
+    sharing.pair_up(&mut products);
+    sharing.pair_up(&mut sums);
+    let mut uses: FxHashMap<Expr, usize> = FxHashMap::default();
+    let mut counted: FxHashSet<UnitId> = FxHashSet::default();
+    let mut open: Vec<UnitId> = products.iter().flat_map(|(_, p)| &p.units).map(|u| u.1).collect();
+    while let Some(unit) = open.pop() {
+        match sharing.units[unit as usize] {
+            Unit::Inverse(e) => *uses.entry(e).or_default() += 1,
+            Unit::Pair(a, b, _) if counted.insert(unit) => open.extend([a, b]),
+            _ => {}
+        }
+    }
+    sharing.reciprocals = uses.into_iter().filter(|(_, count)| *count > 1).map(|(e, _)| e).collect();
+    sharing.products = products.into_iter().collect();
+    sharing.sums = sums.into_iter().collect();
+    sharing
+}
+
+impl Sharing {
+    fn unit(&mut self, unit: Unit) -> UnitId {
+        let next = self.units.len() as UnitId;
+        *self.known.entry(unit).or_insert_with_key(|unit| {
+            self.units.push(unit.clone());
+            next
+        })
+    }
+
+    fn product(&mut self, x: &Exprs, factors: &[Expr], varies: &dyn Fn(Expr) -> bool) -> Parts {
+        let (mut minus, mut number) = (false, Rational::from(1));
+        let (mut fixed, mut units) = (Vec::new(), Vec::new());
+        for &factor in factors {
+            if let Some(n) = x.is_number(factor) {
+                (minus, number) = (n.signum() < 0, n.abs());
+                continue;
+            }
+            let (unit, count) = match x.node(factor) {
+                Node::Pow(base, exponent) => match x.is_number(*exponent).and_then(|n| n.small()) {
+                    Some((n, 1)) if n.unsigned_abs() <= HIGHEST => {
+                        (if n > 0 { Unit::Whole(*base) } else { Unit::Inverse(*base) }, n.unsigned_abs())
+                    }
+                    _ => (Unit::Whole(factor), 1),
+                },
+                _ => (Unit::Whole(factor), 1),
+            };
+            let unit = self.unit(unit);
+            let place = if varies(factor) { &mut units } else { &mut fixed };
+            place.extend(std::iter::repeat_n((false, unit), count as usize));
+        }
+        if !(number.is_one() && fixed.is_empty()) {
+            let fixed = fixed.into_iter().map(|f| f.1).collect();
+            units.insert(0, (false, self.unit(Unit::Product(number, fixed))));
+        }
+        Parts { minus, units }
+    }
+
+    fn sum(&mut self, x: &Exprs, terms: &[Expr], varies: &dyn Fn(Expr) -> bool) -> Parts {
+        let (mut fixed, mut units) = (Vec::new(), Vec::new());
+        for &term in terms {
+            let one = Rational::from(1);
+            let (minus, size) = match x.node(term) {
+                Node::Number(n) => (n.signum() < 0, (n.abs(), Vec::new())),
+                Node::Mul(factors) => match x.is_number(factors[0]) {
+                    Some(n) => (n.signum() < 0, (n.abs(), factors[1..].to_vec())),
+                    None => (false, (one, factors.to_vec())),
+                },
+                _ => (false, (one, vec![term])),
+            };
+            let first = *self.sizes.entry(size).or_insert(term);
+            let part = (minus, self.unit(Unit::Size(first)));
+            if varies(term) { units.push(part) } else { fixed.push(part) }
+        }
+        match fixed.len() {
+            0 => {}
+            1 => units.push(fixed[0]),
+            _ => units.push((false, self.unit(Unit::Sum(fixed)))),
+        }
+        Parts { minus: false, units }
+    }
+
+    /// Makes units of the pairs that are found more than once.
+    fn pair_up(&mut self, bags: &mut [(Expr, Parts)]) {
+        let mut count: FxHashMap<Pair, usize> = FxHashMap::default();
+        let mut where_: FxHashMap<UnitId, Vec<u32>> = FxHashMap::default();
+        for (i, (_, bag)) in bags.iter().enumerate() {
+            bag.units.iter().for_each(|u| where_.entry(u.1).or_default().push(i as u32));
+            for (pair, n) in pairs(&bag.units) {
+                *count.entry(pair).or_default() += n;
+            }
+        }
+        // Most found first; among equals the first.
+        let entry = |pair: Pair, n: usize| (n, std::cmp::Reverse(pair));
+        let mut heap: BinaryHeap<_> = count.iter().filter(|c| *c.1 > 1).map(|(&p, &n)| entry(p, n)).collect();
+        while let Some((n, std::cmp::Reverse(pair))) = heap.pop() {
+            let now = count.get(&pair).copied().unwrap_or(0);
+            if now != n {
+                if now > 1 && now < n {
+                    heap.push(entry(pair, now));
+                }
+                continue;
+            }
+            let new = self.unit(Unit::Pair(pair.0, pair.1, pair.2));
+            let mut at = where_.get(&pair.0).cloned().unwrap_or_default();
+            at.dedup();
+            let mut risen = FxHashSet::default();
+            for i in at {
+                let units = &mut bags[i as usize].1.units;
+                let before = pairs(units);
+                if !before.contains_key(&pair) {
+                    continue;
+                }
+                while take(units, pair, new) {}
+                for (pair, n) in before {
+                    *count.get_mut(&pair).expect("a pair that was counted") -= n;
+                }
+                for (pair, n) in pairs(units) {
+                    *count.entry(pair).or_default() += n;
+                    risen.insert(pair);
+                }
+                let there = where_.entry(new).or_default();
+                if there.last() != Some(&i) {
+                    there.push(i);
+                }
+            }
+            heap.extend(risen.into_iter().filter_map(|p| Some(entry(p, count.get(&p).copied().filter(|&n| n > 1)?))));
+        }
+    }
+}
+
+/// Two units, the lesser one first, and whether one of them is subtracted.
+type Pair = (UnitId, UnitId, bool);
+
+/// How often each pair can be taken out of a bag.
+fn pairs(units: &[(bool, UnitId)]) -> FxHashMap<Pair, usize> {
+    let mut often: FxHashMap<(bool, UnitId), usize> = FxHashMap::default();
+    units.iter().for_each(|&u| *often.entry(u).or_default() += 1);
+    let all: Vec<((bool, UnitId), usize)> = often.into_iter().collect();
+    let mut found = FxHashMap::default();
+    for (i, &(a, n)) in all.iter().enumerate() {
+        if n > 1 && !a.0 {
+            *found.entry((a.1, a.1, false)).or_default() += n / 2;
+        }
+        for &(b, m) in &all[i + 1..] {
+            if a.1 != b.1 {
+                *found.entry((a.1.min(b.1), a.1.max(b.1), a.0 != b.0)).or_default() += n.min(m);
+            }
+        }
+    }
+    found
+}
+
+/// Puts `new` in the place of a pair, once; whether the pair was there.
+fn take(units: &mut Vec<(bool, UnitId)>, (a, b, turned): Pair, new: UnitId) -> bool {
+    for i in (0..units.len()).filter(|&i| units[i].1 == a).collect::<Vec<_>>() {
+        let minus = units[i].0;
+        if a == b && minus {
+            continue;
+        }
+        let other = (0..units.len()).find(|&j| j != i && units[j] == (minus != turned, b));
+        if let Some(j) = other {
+            units[i.min(j)] = (minus, new);
+            units.remove(i.max(j));
+            return true;
+        }
+    }
+    false
+}
