@@ -4,19 +4,20 @@ use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{AbiParam, InstBuilder, MemFlagsData, SigRef, Signature, Type, Value, types};
 use cranelift_codegen::isa::CallConv;
 use cranelift_frontend::FunctionBuilder;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Writes instructions of one function.
 pub(super) struct Writer<'a> {
     pub builder: FunctionBuilder<'a>,
     convention: CallConv,
     constants: BTreeMap<u64, Value>,
+    numbers: BTreeSet<Value>,
     signatures: BTreeMap<Vec<u8>, SigRef>,
 }
 
 impl<'a> Writer<'a> {
     pub fn new(builder: FunctionBuilder<'a>, convention: CallConv) -> Writer<'a> {
-        Writer { builder, convention, constants: BTreeMap::new(), signatures: BTreeMap::new() }
+        Writer { builder, convention, constants: BTreeMap::new(), numbers: BTreeSet::new(), signatures: BTreeMap::new() }
     }
     pub fn number(&mut self, value: f64) -> Value {
         let bits = value.to_bits();
@@ -25,15 +26,23 @@ impl<'a> Writer<'a> {
         }
         let made = self.builder.ins().f64const(value);
         self.constants.insert(bits, made);
+        self.numbers.insert(made);
         made
     }
+    /// Numbers stand second where that is the same: there they need no register of their own.
+    fn number_last(&self, a: Value, b: Value) -> (Value, Value) {
+        let is_number = |v| self.numbers.contains(&v);
+        if is_number(a) && !is_number(b) { (b, a) } else { (a, b) }
+    }
     pub fn add(&mut self, a: Value, b: Value) -> Value {
+        let (a, b) = self.number_last(a, b);
         self.builder.ins().fadd(a, b)
     }
     pub fn sub(&mut self, a: Value, b: Value) -> Value {
         self.builder.ins().fsub(a, b)
     }
     pub fn mul(&mut self, a: Value, b: Value) -> Value {
+        let (a, b) = self.number_last(a, b);
         self.builder.ins().fmul(a, b)
     }
     pub fn div(&mut self, a: Value, b: Value) -> Value {
@@ -71,11 +80,25 @@ impl<'a> Writer<'a> {
     pub fn integer(&mut self, value: u64) -> Value {
         self.builder.ins().iconst(types::I64, value as i64)
     }
+    /// What nothing changes while the function runs: may be read whenever it is needed.
+    pub fn load_fixed(&mut self, base: Value, index: u32) -> Value {
+        let flags = MemFlagsData::trusted().with_readonly().with_can_move();
+        self.builder.ins().load(types::F64, flags, base, (index * 8) as i32)
+    }
     pub fn load(&mut self, base: Value, index: u32) -> Value {
         self.builder.ins().load(types::F64, MemFlagsData::trusted(), base, (index * 8) as i32)
     }
     pub fn store(&mut self, base: Value, index: u32, value: Value) {
         self.builder.ins().store(MemFlagsData::trusted(), value, base, (index * 8) as i32);
+    }
+
+    /// Two numbers beside each other.
+    pub fn store_two(&mut self, base: Value, index: u32, a: Value, b: Value) {
+        let vector = self.builder.ins().scalar_to_vector(types::F64X2, a);
+        let vector = self.builder.ins().insertlane(vector, b, 1);
+        // Numbers stand at multiples of 8 bytes only.
+        let flags = MemFlagsData::new().with_notrap();
+        self.builder.ins().store(flags, vector, base, (index * 8) as i32);
     }
 
     /// Calls a function of these arguments (integers are pointers or numbers) that returns a number.

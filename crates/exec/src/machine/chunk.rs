@@ -117,8 +117,12 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let values: Vec<Value> = outputs.iter().map(|&r| self.value(r)).collect();
         self.stop_unless_fine();
         let rates = self.direct.as_ref().expect("a function of rates reads directly").rates;
-        for (i, value) in values.into_iter().enumerate() {
-            self.w.store(rates, i as u32, value);
+        // Two at a time: whoever reads them does so too, and would wait for two stores that one read spans.
+        for (i, values) in values.chunks(2).enumerate() {
+            match *values {
+                [a, b] => self.w.store_two(rates, 2 * i as u32, a, b),
+                _ => self.w.store(rates, 2 * i as u32, values[0]),
+            }
         }
         self.fine()
     }
@@ -155,8 +159,9 @@ impl<'a, 'b> Chunk<'a, 'b> {
             Some(direct) if register == direct.time.0 => direct.time.1,
             Some(direct) if direct.states.0.contains(&register) => {
                 let (base, index) = (direct.states.1, register - direct.states.0.start);
-                self.w.load(base, index)
+                self.w.load_fixed(base, index)
             }
+            _ if register < self.setting.states.end => self.w.load_fixed(self.values, register),
             _ => self.w.load(self.values, register),
         };
         self.r.insert(register, value);

@@ -38,6 +38,11 @@ impl Signal {
         self.default = value;
     }
 
+    /// Whether something is connected.
+    pub fn moves(&self) -> bool {
+        !self.times.is_empty()
+    }
+
     /// Value and slope at `t`.
     #[inline]
     pub fn at(&self, t: f64) -> (f64, f64) {

@@ -1,6 +1,7 @@
 //! Which routines of a model run as machine code.
 
 use super::Model;
+use super::inputs::Signal;
 use super::system::What;
 use crate::machine::{Code, Generator, MachineError};
 use std::sync::Arc;
@@ -35,7 +36,7 @@ impl Model {
         if self.codes.rates.is_none() {
             return false;
         }
-        if !self.inputs.is_empty() || !self.held.is_empty() {
+        if !self.held.is_empty() || self.inputs.iter().any(Signal::moves) {
             self.place_time(t);
         }
         let Model { codes, frame, layout, conserved, .. } = self;

@@ -207,6 +207,7 @@ impl Model {
     /// value. For runs in real time, between steps; takes no memory.
     pub fn set_input(&mut self, input: usize, value: f64) {
         self.inputs[input].set_default(value);
+        self.place_constant_inputs();
     }
 
     /// Chooses what is recorded, in this order.
@@ -253,6 +254,7 @@ impl Model {
         self.crossed = f64::NEG_INFINITY;
         self.follow();
         self.inputs.iter_mut().for_each(Signal::release);
+        self.place_constant_inputs();
         self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
         let time = |i: usize| self.layout.registers.get(&self.program.held[i].time).map(|&r| self.frame.r[r as usize]);
         let held = self.program.held.iter().enumerate().map(|(i, h)| {
@@ -305,6 +307,13 @@ impl Model {
         let (states, conserved) = (self.layout.states as usize, self.layout.conserved as usize);
         self.frame.r[states..states + x.len()].copy_from_slice(x);
         self.frame.r[conserved..conserved + self.conserved.len()].copy_from_slice(&self.conserved);
+    }
+
+    /// Inputs to which nothing is connected stand in their registers all the time.
+    fn place_constant_inputs(&mut self) {
+        for (i, signal) in self.inputs.iter().enumerate().filter(|(_, signal)| !signal.moves()) {
+            self.frame.r[self.layout.inputs as usize + i] = signal.at(0.0).0;
+        }
     }
 
     fn place_time(&mut self, t: f64) {
