@@ -8,6 +8,7 @@
 
 use crate::algebra::{Expr, Exprs, Node, Rational};
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::collections::BinaryHeap;
 
 /// A factor or term.
@@ -177,7 +178,7 @@ impl Sharing {
             for i in at {
                 let units = &mut bags[i as usize].1.units;
                 let before = pairs(units);
-                if !before.contains_key(&pair) {
+                if before.binary_search_by_key(&pair, |p| p.0).is_err() {
                     continue;
                 }
                 while take(units, pair, new) {}
@@ -201,22 +202,40 @@ impl Sharing {
 /// Two units, the lesser one first, and whether one of them is subtracted.
 type Pair = (UnitId, UnitId, bool);
 
-/// How often each pair can be taken out of a bag.
-fn pairs(units: &[(bool, UnitId)]) -> FxHashMap<Pair, usize> {
-    let mut often: FxHashMap<(bool, UnitId), usize> = FxHashMap::default();
-    units.iter().for_each(|&u| *often.entry(u).or_default() += 1);
-    let all: Vec<((bool, UnitId), usize)> = often.into_iter().collect();
-    let mut found = FxHashMap::default();
-    for (i, &(a, n)) in all.iter().enumerate() {
-        if n > 1 && !a.0 {
-            *found.entry((a.1, a.1, false)).or_default() += n / 2;
+/// How often each pair can be taken out of a bag, in the order of the pairs.
+fn pairs(units: &[(bool, UnitId)]) -> SmallVec<[(Pair, usize); 6]> {
+    let mut found = SmallVec::new();
+    if units.len() < 2 {
+        return found;
+    }
+    let mut sorted: SmallVec<[(UnitId, bool); 8]> = units.iter().map(|&(minus, unit)| (unit, minus)).collect();
+    sorted.sort_unstable();
+    let mut often: SmallVec<[((UnitId, bool), usize); 8]> = SmallVec::new();
+    for unit in sorted {
+        match often.last_mut() {
+            Some((last, n)) if *last == unit => *n += 1,
+            _ => often.push((unit, 1)),
         }
-        for &(b, m) in &all[i + 1..] {
-            if a.1 != b.1 {
-                *found.entry((a.1.min(b.1), a.1.max(b.1), a.0 != b.0)).or_default() += n.min(m);
+    }
+    for (i, &((a, a_minus), n)) in often.iter().enumerate() {
+        if n > 1 && !a_minus {
+            found.push(((a, a, false), n / 2));
+        }
+        for &((b, b_minus), m) in &often[i + 1..] {
+            if a != b {
+                found.push(((a, b, a_minus != b_minus), n.min(m)));
             }
         }
     }
+    // A term that is both added and subtracted makes a pair twice.
+    found.sort_unstable();
+    found.dedup_by(|next, first| {
+        let same = next.0 == first.0;
+        if same {
+            first.1 += next.1;
+        }
+        same
+    });
     found
 }
 
