@@ -94,6 +94,7 @@ struct All<'a> {
     /// The state of one lane.
     state: Vec<f64>,
     remembers: bool,
+    arch: pulp::Arch,
 }
 
 /// What a lane does with its system where it stands.
@@ -119,6 +120,7 @@ impl<'a> All<'a> {
         let lanes: Vec<Lane> = (0..LANES).map(|i| lane(i, system)).collect();
         All {
             remembers: system.remembers(),
+            arch: pulp::Arch::new(),
             out: vec![[0.0; LANES]; lanes[0].values.len()],
             lanes,
             system,
@@ -160,11 +162,12 @@ impl<'a> All<'a> {
         let n = x.len();
         for (stage, (node, weights)) in tableau.nodes.iter().zip(tableau.stages).enumerate() {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
-            advance(x, h, weights, earlier, &mut self.trial);
+            self.arch.dispatch(Advance { x, h, weights, rates: earlier, out: &mut self.trial });
             let at: Wide = std::array::from_fn(|l| t[l] + node * h[l]);
             self.system.rates(&at, &self.trial, &mut rest[..n], &mut self.failures);
         }
-        advance(x, h, tableau.weights, &self.stages, &mut self.trial);
+        let Self { stages, trial, .. } = self;
+        self.arch.dispatch(Advance { x, h, weights: tableau.weights, rates: stages, out: trial });
     }
 
     /// A lane has come to the end of its step. Gives whether a sample is due there that can be taken with those of others.
@@ -334,13 +337,29 @@ impl Lane {
 }
 
 /// `out = x + h · Σ weight · rates`, as one at a time.
-fn advance(x: &[Wide], h: &Wide, weights: &[f64], rates: &[Wide], out: &mut [Wide]) {
-    for (i, out) in out.iter_mut().enumerate() {
-        let mut sum = [-0.0; LANES];
-        for (stage, weight) in weights.iter().enumerate() {
-            let rate = &rates[stage * x.len() + i];
-            (0..LANES).for_each(|l| sum[l] += weight * rate[l]);
+struct Advance<'a> {
+    x: &'a [Wide],
+    h: &'a Wide,
+    weights: &'a [f64],
+    rates: &'a [Wide],
+    out: &'a mut [Wide],
+}
+
+/// A type of its own, not a closure: only then is all of it compiled for the vectors of the machine.
+impl pulp::WithSimd for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Advance { x, h, weights, rates, out } = self;
+        let states = x.len();
+        for (i, (out, x)) in out.iter_mut().zip(x).enumerate() {
+            let mut sum = [-0.0; LANES];
+            for (stage, weight) in weights.iter().enumerate() {
+                let rate = &rates[stage * states + i];
+                (0..LANES).for_each(|l| sum[l] += weight * rate[l]);
+            }
+            *out = std::array::from_fn(|l| x[l] + h[l] * sum[l]);
         }
-        *out = std::array::from_fn(|l| x[i][l] + h[l] * sum[l]);
     }
 }

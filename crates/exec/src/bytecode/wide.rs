@@ -18,6 +18,25 @@ pub(crate) trait Lane {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WideFrame {
     pub r: Vec<Wide>,
+    arch: pulp::Arch,
+}
+
+/// A routine to be run with the vectors of the machine. A type of its own, not a closure: only then is all of it compiled
+/// for them.
+struct All<'a, L> {
+    registers: &'a mut WideFrame,
+    routine: &'a Routine,
+    frames: &'a mut [L],
+    good: &'a mut [bool; LANES],
+}
+
+impl<L: Lane> pulp::WithSimd for All<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.registers.all(self.routine, self.frames, self.good);
+    }
 }
 
 impl WideFrame {
@@ -30,10 +49,7 @@ impl WideFrame {
     /// filled.
     pub fn run<L: Lane>(&mut self, routine: &Routine, frames: &mut [L], good: &mut [bool; LANES]) {
         // The widest vectors that the machine has; they round as narrow ones do.
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || self.all(routine, frames, good),
-        );
+        self.arch.dispatch(All { registers: self, routine, frames, good });
     }
 
     #[inline(always)]

@@ -58,6 +58,8 @@ pub struct Model {
     /// Derivatives of the rates, if they are computed at once.
     slopes: Option<Slopes>,
     scales: Vec<f64>,
+    /// Whether somebody asks for the scales: explicit methods of fixed step do not.
+    scaled: bool,
     /// Values of the conserved constants.
     conserved: Vec<f64>,
     dx: Vec<f64>,
@@ -125,6 +127,7 @@ impl Model {
             inputs: program.inputs.iter().map(|_| Signal::default()).collect(),
             held: Vec::new(),
             scales: vec![0.0; n],
+            scaled: true,
             conserved: vec![0.0; program.conserved.len()],
             dx: vec![0.0; n],
             shown_blocks: Vec::new(),

@@ -58,7 +58,9 @@ impl Model {
             self.begin_held(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
-        self.scales = self.magnitudes(t, &z);
+        if self.scaled {
+            self.scales = self.magnitudes(t, &z);
+        }
         Ok(z)
     }
 

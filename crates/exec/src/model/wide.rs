@@ -27,8 +27,10 @@ impl WideModel {
     pub fn new(model: &Model) -> WideModel {
         let mut frame = WideFrame::default();
         frame.reserve(model.rates.registers.max(model.observe.registers).max(model.layout.size) as usize);
+        let mut lane = model.clone();
+        lane.scaled = false;
         let mut wide = WideModel {
-            models: vec![model.clone(); LANES],
+            models: vec![lane; LANES],
             frame,
             rates: model.rates.clone(),
             observe: model.observe.clone(),

@@ -136,8 +136,9 @@ impl FixedStep {
 
 /// `out = x + h · Σ weight · rates`, `rates` being one vector after the other.
 fn advance(x: &[f64], h: f64, weights: &[f64], rates: &[f64], out: &mut [f64]) {
-    for (i, out) in out.iter_mut().enumerate() {
-        let sum: f64 = weights.iter().enumerate().map(|(stage, weight)| weight * rates[stage * x.len() + i]).sum();
-        *out = x[i] + h * sum;
+    out.fill(-0.0);
+    for (weight, rates) in weights.iter().zip(rates.chunks_exact(x.len().max(1))) {
+        out.iter_mut().zip(rates).for_each(|(sum, rate)| *sum += weight * rate);
     }
+    out.iter_mut().zip(x).for_each(|(sum, x)| *sum = x + h * *sum);
 }
