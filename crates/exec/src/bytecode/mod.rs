@@ -4,9 +4,14 @@ mod conditions;
 mod frame;
 mod lu;
 mod newton;
+mod operands;
+mod packed;
 mod wide;
 
 pub(crate) use conditions::{Hold, piece_of, table_on};
 pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble, slope_of_power};
 pub(crate) use lu::Lu;
+#[cfg(feature = "machine")]
+pub(crate) use operands::{reads, written};
+pub(crate) use packed::Packed;
 pub(crate) use wide::{Lane, WideFrame};

@@ -4,8 +4,9 @@
 //! through the frame of each lane.
 
 use super::frame::Frame;
+use super::packed::{Block, Kind, Packed, Run};
 use crate::math;
-use halfarrow_compiler::program::{ConditionId, Instruction, Routine, Solve};
+use halfarrow_compiler::program::{ConditionId, Instruction, Routine};
 use halfarrow_sim::wide::{LANES, Wide};
 
 /// What has a frame of its own.
@@ -26,6 +27,7 @@ pub(crate) struct WideFrame {
 struct All<'a, L> {
     registers: &'a mut WideFrame,
     routine: &'a Routine,
+    packed: &'a Packed,
     frames: &'a mut [L],
     good: &'a mut [bool; LANES],
 }
@@ -35,7 +37,7 @@ impl<L: Lane> pulp::WithSimd for All<'_, L> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.registers.all(self.routine, self.frames, self.good);
+        self.registers.all(self.routine, self.packed, self.frames, self.good);
     }
 }
 
@@ -45,39 +47,50 @@ impl WideFrame {
         self.r.resize(self.r.len().max(registers), [0.0; LANES]);
     }
 
-    /// Runs a routine for all lanes, in order; `good` loses those that run into trouble. The fixed registers have been
+    /// Runs a routine, packed, for all lanes; `good` loses those that run into trouble. The fixed registers have been
     /// filled.
-    pub fn run<L: Lane>(&mut self, routine: &Routine, frames: &mut [L], good: &mut [bool; LANES]) {
+    pub fn run<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; LANES]) {
         // The widest vectors that the machine has; they round as narrow ones do.
-        self.arch.dispatch(All { registers: self, routine, frames, good });
+        self.arch.dispatch(All { registers: self, routine, packed, frames, good });
     }
 
     #[inline(always)]
-    fn all<L: Lane>(&mut self, routine: &Routine, frames: &mut [L], good: &mut [bool; LANES]) {
-        for instruction in &routine.code {
-            match *instruction {
-                Instruction::Solve { solve } => self.solve(&routine.solves[solve as usize], frames, good),
-                Instruction::Watch { pivot, scale, .. } => {
-                    let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
+    fn all<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; LANES]) {
+        for run in &packed.runs {
+            match run {
+                Run::Many(Kind::Add, all) => self.many(all, |a, b| a + b),
+                Run::Many(Kind::Sub, all) => self.many(all, |a, b| a - b),
+                Run::Many(Kind::Mul, all) => self.many(all, |a, b| a * b),
+                Run::Many(Kind::Div, all) => self.many(all, |a, b| a / b),
+                Run::Many(Kind::Neg, all) => self.many(all, |a, _| -a),
+                Run::Solve(block) => self.solve(routine, block, frames, good),
+                Run::One(Instruction::Watch { pivot, scale, .. }) => {
+                    let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     (0..LANES).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
                 }
-                ref plain => self.step(plain, frames),
+                Run::One(plain) => self.step(plain, frames),
             }
         }
     }
 
+    #[inline(always)]
+    fn many(&mut self, all: &[[u32; 3]], value: impl Fn(f64, f64) -> f64) {
+        for &[out, a, b] in all {
+            let (a, b) = (self.r[a as usize], self.r[b as usize]);
+            self.r[out as usize] = std::array::from_fn(|l| value(a[l], b[l]));
+        }
+    }
+
     #[inline(never)]
-    fn solve<L: Lane>(&mut self, solve: &Solve, frames: &mut [L], good: &mut [bool; LANES]) {
+    fn solve<L: Lane>(&mut self, routine: &Routine, block: &Block, frames: &mut [L], good: &mut [bool; LANES]) {
         for lane in 0..LANES {
             if !good[lane] {
                 continue;
             }
             let frame = frames[lane].frame();
-            let reads = solve.outer.iter().chain(if solve.guess.is_empty() { &solve.matrix[..] } else { &[] });
-            let right = if solve.guess.is_empty() { &solve.right[..] } else { &[] };
-            reads.chain(right).for_each(|&i| frame.r[i as usize] = self.r[i as usize][lane]);
-            good[lane] = frame.solve::<false>(solve).is_ok();
-            solve.unknowns.iter().for_each(|&i| self.r[i as usize][lane] = frame.r[i as usize]);
+            block.reads.iter().for_each(|&(slot, r)| frame.r[r as usize] = self.r[slot as usize][lane]);
+            good[lane] = frame.solve::<false>(&routine.solves[block.solve]).is_ok();
+            block.finds.iter().for_each(|&(slot, r)| self.r[slot as usize][lane] = frame.r[r as usize]);
         }
     }
 
@@ -92,26 +105,6 @@ impl WideFrame {
         let r = |i: u32| self.r[i as usize];
         let truth = f64::from;
         match *instruction {
-            Add { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| a[l] + b[l]);
-            }
-            Sub { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| a[l] - b[l]);
-            }
-            Mul { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| a[l] * b[l]);
-            }
-            Div { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| a[l] / b[l]);
-            }
-            Neg { out, a } => {
-                let a = r(a);
-                self.each(out, |l| -a[l]);
-            }
             Powi { out, a, n } => {
                 let a = r(a);
                 self.r[out as usize] = powers(a, n);
@@ -152,6 +145,7 @@ impl WideFrame {
             TableSlope { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 1),
             TableCurvature { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 2),
             Parameter { .. } => unreachable!("parameters are set lane by lane"),
+            Add { .. } | Sub { .. } | Mul { .. } | Div { .. } | Neg { .. } => unreachable!("arithmetic is packed"),
             Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
         }
     }

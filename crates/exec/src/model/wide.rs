@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::system::What;
-use crate::bytecode::{Frame, Lane, WideFrame};
+use crate::bytecode::{Frame, Lane, Packed, WideFrame};
 use halfarrow_compiler::program::Routine;
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
 use halfarrow_sim::{Failure, System};
@@ -15,8 +15,8 @@ use halfarrow_sim::{Failure, System};
 pub struct WideModel {
     models: Vec<Model>,
     frame: WideFrame,
-    rates: Routine,
-    observe: Routine,
+    rates: (Routine, Packed),
+    observe: (Routine, Packed),
     /// State and values of one lane.
     state: Vec<f64>,
     values: Vec<f64>,
@@ -26,14 +26,16 @@ impl WideModel {
     /// The same model in every lane, recording what it records.
     pub fn new(model: &Model) -> WideModel {
         let mut frame = WideFrame::default();
-        frame.reserve(model.rates.registers.max(model.observe.registers).max(model.layout.size) as usize);
+        let packed = |routine: &Routine| (routine.clone(), Packed::new(routine, model.layout.size));
+        let (rates, observe) = (packed(&model.rates), packed(&model.observe));
+        frame.reserve(rates.1.slots.max(observe.1.slots).max(model.layout.size as usize));
         let mut lane = model.clone();
         lane.scaled = false;
         let mut wide = WideModel {
             models: vec![lane; LANES],
             frame,
-            rates: model.rates.clone(),
-            observe: model.observe.clone(),
+            rates,
+            observe,
             state: vec![0.0; model.states()],
             values: Vec::new(),
         };
@@ -110,10 +112,10 @@ impl WideModel {
         self.place(t, x);
         let mut good: [bool; LANES] = std::array::from_fn(|lane| failures[lane].is_none());
         let wanted = good;
-        let routine = if let What::Rates = what { &self.rates } else { &self.observe };
-        self.frame.run(routine, &mut self.models, &mut good);
-        for (out, &register) in out.iter_mut().zip(&routine.outputs) {
-            *out = self.frame.r[register as usize];
+        let (routine, packed) = if let What::Rates = what { &self.rates } else { &self.observe };
+        self.frame.run(routine, packed, &mut self.models, &mut good);
+        for (out, &slot) in out.iter_mut().zip(&packed.outputs) {
+            *out = self.frame.r[slot as usize];
             (0..LANES).for_each(|lane| good[lane] &= out[lane].is_finite());
         }
         for lane in (0..LANES).filter(|&lane| wanted[lane] && !good[lane]) {
@@ -145,6 +147,6 @@ impl WideSystem for WideModel {
 
     fn remembers(&self) -> bool {
         let newton = |routine: &Routine| routine.solves.iter().any(|solve| !solve.guess.is_empty());
-        newton(&self.rates) || newton(&self.observe) || !self.models[0].held.is_empty()
+        newton(&self.rates.0) || newton(&self.observe.0) || !self.models[0].held.is_empty()
     }
 }
