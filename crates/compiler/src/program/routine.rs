@@ -145,6 +145,8 @@ pub struct Solve {
     pub code: Vec<Instruction>,
     /// Matrix of a linear block, Jacobian of a Newton block, row by row.
     pub matrix: Vec<Register>,
+    /// The places of the matrix that are not 0 whatever happens.
+    pub entries: Vec<u32>,
     /// Right-hand side of a linear block, residuals of a Newton block.
     pub right: Vec<Register>,
 }
@@ -475,7 +477,7 @@ impl<'a> Builder<'a> {
         let (unknowns, code) = (Vec::new(), Vec::new());
         let (matrix, right, outer) = (Vec::new(), Vec::new(), Vec::new());
         let shared = self.program.shared(block);
-        self.routine.solves.push(Solve { block, shared, unknowns, guess, outer, code, matrix, right });
+        self.routine.solves.push(Solve { block, shared, unknowns, guess, outer, code, matrix, entries: Vec::new(), right });
     }
 
     fn close(&mut self, block: BlockId, at: u32, live: &[bool]) {
@@ -505,6 +507,8 @@ impl<'a> Builder<'a> {
             }
         }
         let solve = self.routine.solves.last_mut().expect("a block is open");
+        let entries = (0u32..).zip(matrix).filter(|(_, v)| self.program.values.constant(**v) != Some(0.0));
+        solve.entries = entries.map(|(place, _)| place).collect();
         (solve.matrix, solve.right, solve.unknowns) = (matrix_registers, right_registers, unknowns);
         solve.outer = outer;
         self.free.extend(&solve.guess);

@@ -172,7 +172,7 @@ impl Frame {
         let Frame { r, d, solvers, .. } = self;
         let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
         if solve.shared.is_none() && !(solver.constant && solver.factored) {
-            solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
+            put_entries(solver.lu.matrix(), solve, r);
             solver.factored = solver.lu.factor().is_ok();
         }
         solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
@@ -202,7 +202,7 @@ impl Frame {
             self.inner::<true>(solve);
             let Frame { r, d, solvers, .. } = self;
             let solver = &mut solvers[solve.block.0 as usize];
-            solver.lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
+            put_entries(solver.lu.matrix(), solve, r);
             if solver.lu.factor().is_err() {
                 return Err(Trouble::Singular { block: solve.block.0 });
             }
@@ -322,6 +322,13 @@ impl Frame {
             }
             Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
         }
+    }
+}
+
+/// Puts the entries of a solve block into a matrix whose other places are 0.
+pub(super) fn put_entries(matrix: &mut [f64], solve: &Solve, r: &[f64]) {
+    for &place in &solve.entries {
+        matrix[place as usize] = r[solve.matrix[place as usize] as usize];
     }
 }
 

@@ -65,8 +65,13 @@ impl Lu {
     fn factor_definite(&mut self) -> bool {
         let n = self.size;
         let sign = 1f64.copysign(self.matrix[0]);
-        self.factors.copy_from_slice(&self.matrix);
-        self.starts.iter_mut().enumerate().for_each(|(k, start)| *start = k);
+        for (k, (row, of_matrix)) in
+            self.factors.chunks_exact_mut(n).zip(self.matrix.chunks_exact(n)).enumerate()
+        {
+            row[..k].fill(0.0);
+            row[k..].copy_from_slice(&of_matrix[k..]);
+            self.starts[k] = k;
+        }
         for k in 0..n {
             let (upper, lower) = self.factors.split_at_mut((k + 1) * n);
             let row = &mut upper[k * n + k..];
@@ -76,11 +81,11 @@ impl Lu {
             }
             let inverse = 1.0 / pivot;
             let end = row.iter().rposition(|&u| u != 0.0).unwrap_or(0);
-            for (j, below) in lower.chunks_exact_mut(n).enumerate() {
+            for (j, below) in lower.chunks_exact_mut(n).enumerate().take(end) {
                 let u = row[j + 1];
-                let factor = u * inverse;
-                below[k] = factor;
                 if u != 0.0 {
+                    let factor = u * inverse;
+                    below[k] = factor;
                     below[k + 1 + j..].iter_mut().zip(&row[j + 1..=end]).for_each(|(a, u)| *a -= factor * u);
                     self.starts[k + 1 + j] = self.starts[k + 1 + j].min(k);
                 }

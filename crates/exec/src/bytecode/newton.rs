@@ -9,7 +9,7 @@
 //! Everything depends on the accepted solution ([`Newton::memory`]) and the values the block reads, on nothing else.
 //! Evaluations are bounded.
 
-use super::frame::{Frame, Trouble};
+use super::frame::{Frame, Trouble, put_entries};
 use halfarrow_compiler::program::Solve;
 
 /// Iterations of one attempt.
@@ -201,7 +201,7 @@ impl Frame {
     fn keep_jacobian(&mut self, solve: &Solve) {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        newton.jacobian.iter_mut().zip(&solve.matrix).for_each(|(j, &m)| *j = r[m as usize]);
+        put_entries(&mut newton.jacobian, solve, r);
     }
 
     /// Why there is no root to go on with.
@@ -568,7 +568,8 @@ impl Frame {
         let point = if trial { &newton.trial } else { &newton.x };
         solve.guess.iter().zip(point).for_each(|(&g, &x)| self.r[g as usize] = x);
         self.inner::<false>(solve);
-        solve.right.iter().chain(&solve.matrix).all(|&v| self.r[v as usize].is_finite())
+        let entries = solve.entries.iter().map(|&place| solve.matrix[place as usize]);
+        entries.chain(solve.right.iter().copied()).all(|v| self.r[v as usize].is_finite())
     }
 
     /// Greatest residual at the point evaluated last.
@@ -581,7 +582,7 @@ impl Frame {
     fn factor(&mut self, solve: &Solve) -> bool {
         let Frame { r, solvers, .. } = self;
         let lu = &mut solvers[solve.block.0 as usize].lu;
-        lu.matrix().iter_mut().zip(&solve.matrix).for_each(|(a, &m)| *a = r[m as usize]);
+        put_entries(lu.matrix(), solve, r);
         lu.factor().is_ok()
     }
 
