@@ -86,6 +86,15 @@ pub enum Failure {
         /// What it has to be.
         expected: &'static str,
     },
+    /// What was computed does not satisfy the model, as an audit found.
+    Untrue {
+        /// When, in s.
+        time: f64,
+        /// Which law is not met.
+        what: String,
+        /// By how much, relative to the greatest magnitude of its kind.
+        miss: f64,
+    },
     /// The receiver of the samples asked to stop.
     Interrupted {
         /// When, in s.
@@ -116,6 +125,7 @@ impl Failure {
             | Failure::Chattering { time, .. }
             | Failure::Branch { time, .. }
             | Failure::Bound { time, .. }
+            | Failure::Untrue { time, .. }
             | Failure::Interrupted { time } => Some(*time).filter(|time| !time.is_nan()),
             Failure::BadOption { .. } | Failure::BadMethod { .. } => None,
         }
@@ -180,6 +190,11 @@ impl fmt::Display for Failure {
                 write!(f, "{option} is {value}, but it must be {expected}")
             }
             Failure::BadMethod { expected } => write!(f, "this method does not fit the equations: use {expected}"),
+            Failure::Untrue { time, what, miss } => write!(
+                f,
+                "at t = {time} s the result does not satisfy the model: {what} is missed by {miss:.0e} of what is there, as the \
+                 audit found; do not use it, and try the minimal form, another solver or tighter tolerances"
+            ),
             Failure::Interrupted { time } => write!(f, "stopped at t = {time} s as asked"),
         }
     }
