@@ -80,7 +80,7 @@ impl Model {
     /// Makes machine code of what a run with fixed step needs if so many evaluations repay it; whether it did. Results are
     /// the same.
     pub fn compile_for(&mut self, evaluations: f64, derivatives: bool) -> bool {
-        // Seconds to make the code, and saved by it: per instruction, measured (docs/TESTING.md).
+        // Seconds to make the code, and saved by it, per instruction: about what docs/TESTING.md has.
         let instructions = self.rates.code.len() as f64;
         let (cost, gain) = (3e-4 + 6e-6 * instructions, 1e-9 * instructions);
         if evaluations * gain <= 2.0 * cost || self.compile_machine().is_err() {

@@ -40,6 +40,7 @@ pub struct Seen {
     pub undetermined: usize,
     pub start_conflicts: usize,
     pub no_point: usize,
+    pub refused_forms: BTreeMap<&'static str, usize>,
     pub worst: BTreeMap<&'static str, f64>,
 }
 

@@ -18,6 +18,11 @@ pub fn check_forms(causal: &CausalGraph, model: &Model, t: f64, x: &[f64], seen:
             Ok(equations) => equations,
             // Rates of inputs, or of algebraic unknowns, that a form would need and does not have.
             Err(faults) if faults.0.iter().any(|d| d.code.name == "E001") => continue,
+            // On some singular rings the choices of a form leave a variable to itself: refused, with the reason.
+            Err(faults) if faults.0.iter().any(|d| d.code.name == "E002") => {
+                *seen.refused_forms.entry(form.name()).or_default() += 1;
+                continue;
+            }
             Err(faults) => return fault(format!("form {}", form.name()), faults.to_string()),
         };
         let made = ImplicitModel::new(schedule(&equations), model.clone());

@@ -8,6 +8,11 @@ pub trait Clock {
     fn now(&mut self) -> f64;
     /// Returns at that time, or at once if it is over.
     fn wait(&mut self, until: f64);
+    /// The same; while the clock would only spin, it offers the time that is left, in s, again and again.
+    fn wait_busily(&mut self, until: f64, offer: &mut dyn FnMut(f64)) {
+        let _ = offer;
+        self.wait(until);
+    }
 }
 
 /// The clock on the wall. It sleeps while there is time, and spins before a tick is due, since sleepers wake late.
@@ -30,11 +35,16 @@ impl Clock for WallClock {
     }
 
     fn wait(&mut self, until: f64) {
+        self.wait_busily(until, &mut |_| ());
+    }
+
+    fn wait_busily(&mut self, until: f64, offer: &mut dyn FnMut(f64)) {
         let Ok(until) = Duration::try_from_secs_f64(until) else { return };
         if let Some(pause) = until.checked_sub(self.zero.elapsed() + self.spin) {
             std::thread::sleep(pause);
         }
-        while self.zero.elapsed() < until {
+        while let Some(left) = until.checked_sub(self.zero.elapsed()).filter(|left| !left.is_zero()) {
+            offer(left.as_secs_f64());
             std::hint::spin_loop();
         }
     }
