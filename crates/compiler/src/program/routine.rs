@@ -477,7 +477,17 @@ impl<'a> Builder<'a> {
         let (unknowns, code) = (Vec::new(), Vec::new());
         let (matrix, right, outer) = (Vec::new(), Vec::new(), Vec::new());
         let shared = self.program.shared(block);
-        self.routine.solves.push(Solve { block, shared, unknowns, guess, outer, code, matrix, entries: Vec::new(), right });
+        self.routine.solves.push(Solve {
+            block,
+            shared,
+            unknowns,
+            guess,
+            outer,
+            code,
+            matrix,
+            entries: Vec::new(),
+            right,
+        });
     }
 
     fn close(&mut self, block: BlockId, at: u32, live: &[bool]) {

@@ -133,7 +133,9 @@ fn parts(text: &str) -> Vec<Part<'_>> {
         }
         if !inside
             && name.is_none()
-            && ["static ", "HA_FUNCTION ", "HA_INLINE ", "HA_SELDOM ", "HA_DATA "].iter().any(|word| bare.starts_with(word))
+            && ["static ", "HA_FUNCTION ", "HA_INLINE ", "HA_SELDOM ", "HA_DATA "]
+                .iter()
+                .any(|word| bare.starts_with(word))
         {
             // The comment above goes with it.
             let above = comment_above(&text[start..at]);

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{Block, BlockId, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register};
+use halfarrow_compiler::program::{
+    Block, BlockId, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register,
+};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::slopes::{call, power, rate_of};

@@ -65,9 +65,7 @@ impl Lu {
     fn factor_definite(&mut self) -> bool {
         let n = self.size;
         let sign = 1f64.copysign(self.matrix[0]);
-        for (k, (row, of_matrix)) in
-            self.factors.chunks_exact_mut(n).zip(self.matrix.chunks_exact(n)).enumerate()
-        {
+        for (k, (row, of_matrix)) in self.factors.chunks_exact_mut(n).zip(self.matrix.chunks_exact(n)).enumerate() {
             row[..k].fill(0.0);
             row[k..].copy_from_slice(&of_matrix[k..]);
             self.starts[k] = k;

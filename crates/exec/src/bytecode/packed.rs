@@ -137,7 +137,8 @@ fn packed_order(items: &[Item], values: u32) -> Vec<Vec<usize>> {
     let mut order = Vec::new();
     loop {
         // What is no arithmetic waits until there is nothing else.
-        let most = ready.iter().filter(|(_, all)| !all.is_empty()).max_by_key(|(kind, all)| (kind.is_some(), all.len()));
+        let most =
+            ready.iter().filter(|(_, all)| !all.is_empty()).max_by_key(|(kind, all)| (kind.is_some(), all.len()));
         let Some(kind) = most.map(|(kind, _)| *kind) else { return order };
         let now = ready.remove(&kind).unwrap_or_default();
         for &i in &now {

@@ -17,7 +17,13 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     pub fn new(builder: FunctionBuilder<'a>, convention: CallConv) -> Writer<'a> {
-        Writer { builder, convention, constants: BTreeMap::new(), numbers: BTreeSet::new(), signatures: BTreeMap::new() }
+        Writer {
+            builder,
+            convention,
+            constants: BTreeMap::new(),
+            numbers: BTreeSet::new(),
+            signatures: BTreeMap::new(),
+        }
     }
     pub fn number(&mut self, value: f64) -> Value {
         let bits = value.to_bits();
