@@ -245,6 +245,7 @@ impl ImplicitModel {
         self.take_over(t, &mut y)?;
         self.form.cross_jump(t, &mut y)?;
         self.take_rates(t, &y, &mut yp)?;
+        self.settle(t, &mut y, &mut yp)?;
         self.form.scales = y.iter().map(|y| y.abs()).collect();
         let tracked = &self.reference.program.tracked;
         for (i, symbol) in self.form.program.tracked.iter().enumerate() {
@@ -267,7 +268,8 @@ impl ImplicitModel {
             model.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
         }
         self.take_over(t, y)?;
-        self.take_rates(t, y, yp)
+        self.take_rates(t, y, yp)?;
+        self.settle(t, y, yp)
     }
 
     /// Unknowns from the state of the reference.
@@ -363,6 +365,62 @@ impl ImplicitModel {
         Ok(())
     }
 
+    /// Where equations are missed since the reference does not have what a bond carries (it would take the rate of an
+    /// input): rates as the unknowns move along the run of the reference, then the unknowns that it does not have.
+    fn settle(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        let n = y.len();
+        let open: Vec<usize> = (0..n).filter(|&i| !self.equations.explicit[i]).collect();
+        if self.twin || self.are_met(t, y, yp, &open)? {
+            return Ok(());
+        }
+        let ImplicitModel { reference, told, x, known, .. } = self;
+        reference.rates_at(t, x)?;
+        let dx = reference.dx.clone();
+        reference.place(t, x);
+        reference.still();
+        reference.let_time_pass(t);
+        let states = reference.layout.states as usize;
+        reference.frame.d[states..states + dx.len()].copy_from_slice(&dx);
+        reference.frame.run_along(told).map_err(|trouble| reference.failure(t, trouble))?;
+        for (&i, &register) in known.iter().zip(&told.outputs) {
+            if self.equations.differential[i] && !self.equations.explicit[i] {
+                yp[i] = reference.frame.d[register as usize];
+            }
+        }
+        let columns = self.untold.len();
+        for _ in 0..if columns == 0 { 0 } else { REFINEMENTS } {
+            let (mut matrix, mut miss) = (vec![0.0; open.len() * columns], vec![0.0; open.len()]);
+            for column in 0..columns {
+                self.place(t, y, yp);
+                self.form.still();
+                self.form.frame.d[self.form.layout.states as usize + self.untold[column]] = 1.0;
+                let form = &mut self.form;
+                form.frame.run_along(&form.rates).map_err(|trouble| form.failure(t, trouble))?;
+                for (row, &i) in open.iter().enumerate() {
+                    let register = form.rates.outputs[i] as usize;
+                    matrix[row * columns + column] = form.frame.d[register];
+                    miss[row] = form.frame.r[register];
+                }
+            }
+            let Some(step) = super::minimum_norm::step(&matrix, &miss, columns) else { break };
+            self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);
+        }
+        let mut out = vec![0.0; n];
+        self.place(t, y, yp);
+        self.run_rates(t, y, yp, &mut out)?;
+        let explicit = (0..n).filter(|&i| self.equations.explicit[i]);
+        explicit.for_each(|i| yp[i] = out[i]);
+        Ok(())
+    }
+
+    /// Whether the equations that are not explicit are met.
+    fn are_met(&mut self, t: f64, y: &[f64], yp: &[f64], open: &[usize]) -> Result<bool, Failure> {
+        let mut out = vec![0.0; y.len()];
+        self.run_rates(t, y, yp, &mut out)?;
+        let size = y.iter().chain(yp).fold(1e-3f64, |most, v| most.max(v.abs()));
+        Ok(open.iter().all(|&i| out[i].abs() <= 1e-9 * size))
+    }
+
     /// The unknowns and their rates with those that nothing controls computed from the others: errors of a multiplier of
     /// a higher index do not act back on the motion, so that no step is made shorter for them.
     fn controlled(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
@@ -373,6 +431,7 @@ impl ImplicitModel {
             whole[i] = y[i];
         }
         self.take_rates(t, &whole, &mut rates)?;
+        self.settle(t, &mut whole, &mut rates)?;
         Ok((whole, rates))
     }
 
@@ -619,7 +678,8 @@ impl ImplicitSystem for ImplicitModel {
         }
         self.reference.cross_jump(t, &mut self.x)?;
         self.take_over(t, y)?;
-        self.take_rates(t, y, yp)
+        self.take_rates(t, y, yp)?;
+        self.settle(t, y, yp)
     }
 
     fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {

@@ -92,7 +92,7 @@ impl Model {
     }
 
     /// Sets the direction of derivatives to that of time: inputs and held signals move, states do not.
-    fn let_time_pass(&mut self, t: f64) {
+    pub(super) fn let_time_pass(&mut self, t: f64) {
         let Model { frame, layout, inputs, held, crossed, .. } = self;
         frame.d[layout.time as usize] = 1.0;
         inputs.iter().enumerate().for_each(|(i, s)| frame.d[layout.inputs as usize + i] = s.at(t).1);
