@@ -393,3 +393,12 @@ proptest! {
         prop_assert!(laid_out(&text).is_some());
     }
 }
+
+#[test]
+fn a_layout_keeps_tokens_apart() {
+    // Where reserved syntax stands anything may follow; without the space two slashes would begin a comment.
+    let found = include_str!("../../../fuzz/corpus/parse/two_slashes_in_reserved_syntax");
+    for text in [found, "\"\"\" +x1,e(\"+/ /0\n\na"] {
+        assert!(laid_out(text).is_some(), "{text:?} has a layout");
+    }
+}

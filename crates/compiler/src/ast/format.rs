@@ -243,8 +243,13 @@ impl<'t> Layout<'t> {
         }
     }
 
-    /// Whether a space stands between two pieces of a line.
+    /// Whether a space stands between two pieces of a line: where it looks better, or where they would become another
+    /// token without it, which two slashes do.
     fn spaced(&self, i: usize, left: Piece, right: Piece) -> bool {
+        self.looks_spaced(i, left, right) || !stays_two(left.text, right.text)
+    }
+
+    fn looks_spaced(&self, i: usize, left: Piece, right: Piece) -> bool {
         use TokenKind::*;
         let (PieceKind::Token(l), PieceKind::Token(r)) = (left.kind, right.kind) else {
             return match (left.kind, right.kind) {
@@ -290,6 +295,12 @@ impl Piece<'_> {
     fn closes(&self) -> bool {
         self.is(TokenKind::RParen) || self.is(TokenKind::RBracket)
     }
+}
+
+/// Whether two pieces written without a space are still two.
+fn stays_two(left: &str, right: &str) -> bool {
+    let end = left.len() as u32;
+    lex(&format!("{left}{right}")).iter().any(|token| token.start == end)
 }
 
 /// Whether a token follows what stands before it without a space.
