@@ -49,6 +49,15 @@ def row(*cells):
     print("| " + " | ".join(str(c) for c in cells) + " |", flush=True)
 
 
+def beside(peer, there, here):
+    """A run of a peer beside ours, by bytecode and by machine code; what either takes to set up is left out."""
+    row(peer, "bytecode", "ratio", "machine code", "ratio", "making it")
+    row(*["---"] * 6)
+    a = statistics.median(there)
+    b, c, made = (statistics.median(h[k] for h in here) for k in ("seconds", "machine_seconds", "made"))
+    row(f"{a * 1e3:.1f} ms", f"{b * 1e3:.1f} ms", f"{b / a:.2f}", f"{c * 1e3:.1f} ms", f"{c / a:.2f}", f"{made * 1e3:.0f} ms")
+
+
 def links_text(n):
     lines = [f'model Links "Pendulum of {n} point masses in absolute angles"', "", "param mass = 1 kg, l = 1 m, g = 9.81 m/s2"]
     lines += [f"state phi{k}' = w{k}.f from {0.5 / k!r} rad" for k in range(1, n + 1)]
@@ -211,13 +220,10 @@ def ladder(program):
         seconds, y = once()
         there.append(seconds)
         mine = ours(program, "simulate", path, 1.0, 1e-6, 1e-9)
-        here.append(mine["seconds"])
+        here.append(mine)
     off = max(abs(a * 1e3 - b) for a, b in zip(mine["states"], y))
     print("\nRC ladder of", n, "sections, 1 s at rtol 1e-6; greatest difference of voltages", f"{off:.1e} V\n")
-    row("CVODE, banded", "halfarrow", "ratio")
-    row("---", "---", "---")
-    a, b = statistics.median(there), statistics.median(here)
-    row(f"{a * 1e3:.1f} ms", f"{b * 1e3:.1f} ms", f"{b / a:.2f}")
+    beside("CVODE, banded", there, here)
 
 
 def mesh_text(n):
@@ -260,14 +266,11 @@ def mesh(program):
         end = solver(x0=np.zeros(n // 10), z0=np.zeros(n - n // 10))
         there.append(time.perf_counter() - from_)
         mine = ours(program, "simulate", path, 1.0, 1e-6, 1e-9)
-        here.append(mine["seconds"])
+        here.append(mine)
     y = np.array(end["xf"]).ravel()
     off = max(abs(a / c - b) for a, b in zip(mine["states"], y))
     print("\nMesh of", n, "sections, 1 s at rtol 1e-6; greatest difference of voltages", f"{off:.1e} V\n")
-    row("IDAS", "halfarrow", "ratio")
-    row("---", "---", "---")
-    a, b = statistics.median(there), statistics.median(here)
-    row(f"{a * 1e3:.1f} ms", f"{b * 1e3:.1f} ms", f"{b / a:.2f}")
+    beside("IDAS", there, here)
 
 
 def cars_text(n):
