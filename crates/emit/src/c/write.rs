@@ -343,16 +343,11 @@ impl<'a> Writer<'a> {
     /// One of a sine and a cosine that are computed together.
     fn turn(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), place: usize) {
         let out = step.outs[0];
-        let number = match f.turns.insert(angle(step.args[0]), Some(place)) {
-            Some(Some(there)) => {
-                f.turns.insert(angle(step.args[0]), Some(there));
-                there
-            }
-            _ => {
-                let _ = writeln!(f.text, "    double h{place}[2];\n    ha_turn({}, h{place});", a[0]);
-                place
-            }
-        };
+        let pair = f.turns.entry(angle(step.args[0])).or_default();
+        let number = *pair.get_or_insert(place);
+        if number == place {
+            let _ = writeln!(f.text, "    double h{place}[2];\n    ha_turn({}, h{place});", a[0]);
+        }
         let value = format!("h{number}[{}]", usize::from(step.act == Act::Call(Function::Cos)));
         let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
         self.put(f, out, &value, rate.as_deref());

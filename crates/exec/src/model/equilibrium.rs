@@ -51,7 +51,7 @@ impl Model {
         }
         let (load, _) = self.at_rest(t, start).ok()?;
         // States in parts of their magnitude, so that a length along the curve means something.
-        let size: Vec<f64> = start.iter().zip(&self.scales).map(|(x, s)| x.abs().max(*s)).collect();
+        let size = self.magnitudes(t, start);
         let least = size.iter().copied().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         let size: Vec<f64> = size.into_iter().map(|s| if s > 0.0 { s } else { least.min(1.0) }).collect();
         let (mut z, mut part) = (vec![0.0; n], 0.0);

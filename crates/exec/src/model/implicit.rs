@@ -406,7 +406,6 @@ impl ImplicitModel {
             self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);
         }
         let mut out = vec![0.0; n];
-        self.place(t, y, yp);
         self.run_rates(t, y, yp, &mut out)?;
         let explicit = (0..n).filter(|&i| self.equations.explicit[i]);
         explicit.for_each(|i| yp[i] = out[i]);

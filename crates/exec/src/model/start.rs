@@ -66,7 +66,7 @@ impl Model {
 
     /// Typical magnitudes of the states: how great they are at the start, how far they are from where the linearised
     /// motion would take them, and what that motion makes of them in the shortest time it knows. 0 where nothing moves.
-    fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+    pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
         if n > MOST_LINEARISED {
