@@ -1,6 +1,6 @@
 //! The stage: from a causal graph to equations in evaluation order.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::{Closure, Treatment, assemble_all};
 use super::blocks::{Insoluble, Ordered, order};
@@ -9,8 +9,8 @@ use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
 use super::stiff::parameters;
 use super::{
-    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, domains, index,
-    observed,
+    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, display,
+    domains, index, observed,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -178,7 +178,8 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
             span: span_of(graph, s.symbol, s.kind),
         })
         .collect();
-    let (algebraic, residuals) = unknowns(&d, &closures);
+    let (algebraic, mut residuals) = unknowns(&d, &closures);
+    without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     let observed = observed::observed(&mut d, &states);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
@@ -240,6 +241,41 @@ fn unknowns(d: &Definitions, closures: &[Closure]) -> (Vec<Algebraic>, Vec<Expr>
         residuals.push(closure.residual);
     }
     (algebraic, residuals)
+}
+
+/// Writes out the residuals in which terms of an unknown cancel, where that takes the unknown out of them: added up while
+/// running they leave rounding, which would count as a slope.
+fn without_cancelling_terms(
+    d: &mut Definitions,
+    states: &[State],
+    algebraic: &[Algebraic],
+    steps: &[Step],
+    residuals: &mut [Expr],
+) {
+    let cancelling = index::cancelling(d, states, algebraic, steps, residuals);
+    if cancelling.is_empty() {
+        return;
+    }
+    let mut known = BTreeMap::new();
+    for step in steps {
+        if let Step::Assign { symbol, value } = step {
+            let value = display::put_in(&mut d.x, *value, &known);
+            known.insert(*symbol, value);
+        }
+    }
+    let unknown: BTreeSet<Symbol> =
+        states.iter().flat_map(|s| [s.symbol, s.rate]).chain(algebraic.iter().map(|a| a.symbol)).collect();
+    let reads = |d: &Definitions, e: Expr| {
+        let near: BTreeSet<Symbol> = d.x.symbols_of(e).into_iter().collect();
+        let far = reachable(d, &near).into_iter().flat_map(|s| d.x.symbols_of(d.of[&s].expr()));
+        near.iter().copied().chain(far).filter(|s| unknown.contains(s)).collect::<BTreeSet<_>>().len()
+    };
+    for i in cancelling {
+        let written = display::put_in(&mut d.x, residuals[i], &known);
+        if reads(d, written) < reads(d, residuals[i]) {
+            residuals[i] = written;
+        }
+    }
 }
 
 /// A source that reads what the structure does not determine, or one that is a law through what it reads and needs a

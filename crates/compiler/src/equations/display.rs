@@ -330,7 +330,8 @@ fn balanced(x: &mut Exprs, residual: Expr, unknown: &[Symbol]) -> DisplayEquatio
     if left == zero { equation(zero, rest) } else { equation(left, right) }
 }
 
-fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
+/// An expression with what is known put in, in its shortest form.
+pub fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     let e = x.substitute(e, known);
     let e = x.without_settled_terms(e);
     let e = x.simplify(e);

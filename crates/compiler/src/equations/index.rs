@@ -19,6 +19,8 @@ const EXAMINED: usize = 150;
 const HIGHEST: u8 = 4;
 /// Entries below this, in rows scaled to 1, count as zero.
 const TINY: f64 = 1e-9;
+/// What is left of a sum of terms that cancel, against their size.
+const ROUNDING: f64 = 1e-13;
 
 /// Sizes of the arbitrary states: an exponential law can be steep or flat beyond the digits at any one of them.
 const SIZES: [f64; 4] = [1.0, 1e-1, 1e-2, 1e-4];
@@ -96,21 +98,59 @@ fn promised_indices(states: &[State], algebraic: &[Algebraic]) -> Vec<u8> {
     states.iter().map(|_| 1).chain(algebraic.iter().map(of)).collect()
 }
 
-/// A gradient by unknowns and by rates.
+/// A gradient by unknowns and by rates; and the same with all terms of one sign, which tells what cancels.
 #[derive(Debug, Clone, Default)]
 struct Linear {
     values: Row,
     rates: Row,
+    sizes: [Row; 2],
 }
 
 impl Linear {
+    fn value(column: usize) -> Linear {
+        let row = Row::from([(column, 1.0)]);
+        Linear { values: row.clone(), rates: Row::new(), sizes: [row, Row::new()] }
+    }
+
+    fn rate(column: usize) -> Linear {
+        let row = Row::from([(column, 1.0)]);
+        Linear { values: Row::new(), rates: row.clone(), sizes: [Row::new(), row] }
+    }
+
     fn add(&mut self, other: &Linear, factor: f64) {
-        for (mine, theirs) in [(&mut self.values, &other.values), (&mut self.rates, &other.rates)] {
+        let [sizes, sizes_of_rates] = &mut self.sizes;
+        for (mine, theirs, factor) in [
+            (&mut self.values, &other.values, factor),
+            (&mut self.rates, &other.rates, factor),
+            (sizes, &other.sizes[0], factor.abs()),
+            (sizes_of_rates, &other.sizes[1], factor.abs()),
+        ] {
             for (&column, entry) in theirs {
                 *mine.entry(column).or_insert(0.0) += factor * entry;
             }
         }
     }
+
+    /// Whether the terms of an unknown or a rate cancel to rounding.
+    fn cancels(&self) -> bool {
+        let rows = [(&self.values, &self.sizes[0]), (&self.rates, &self.sizes[1])];
+        rows.iter().any(|(row, sizes)| sizes.iter().any(|(c, size)| *size > 0.0 && row[c].abs() <= ROUNDING * size))
+    }
+}
+
+/// The residuals whose terms of an unknown or a rate cancel to rounding at an arbitrary state.
+pub fn cancelling(
+    d: &mut Definitions,
+    states: &[State],
+    algebraic: &[Algebraic],
+    steps: &[Step],
+    residuals: &[Expr],
+) -> Vec<usize> {
+    if residuals.is_empty() || states.len() + algebraic.len() > EXAMINED {
+        return Vec::new();
+    }
+    let mut all = Linearised::of(d, SIZES[0], states, algebraic, steps);
+    (0..residuals.len()).filter(|&i| all.gradient(residuals[i], &[]).cancels()).collect()
 }
 
 /// Values and gradients of all symbols.
@@ -128,10 +168,10 @@ impl<'d, 'a> Linearised<'d, 'a> {
         let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), size, good: true };
         let unknowns = states.iter().map(|s| s.symbol).chain(algebraic.iter().map(|a| a.symbol));
         for (i, symbol) in unknowns.enumerate() {
-            all.gradients.insert(symbol, Linear { values: Row::from([(i, 1.0)]), rates: Row::new() });
+            all.gradients.insert(symbol, Linear::value(i));
         }
         for (i, state) in states.iter().enumerate().filter(|(_, s)| !steps.iter().any(|step| step.defines(s.rate))) {
-            all.gradients.insert(state.rate, Linear { values: Row::new(), rates: Row::from([(i, 1.0)]) });
+            all.gradients.insert(state.rate, Linear::rate(i));
         }
         steps.iter().for_each(|step| all.step(step));
         all
@@ -232,7 +272,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
             let rate = self.gradients.get(&state.rate).cloned().unwrap_or_default();
             let free = rate.rates.len() == 1 && rate.rates.get(&i) == Some(&1.0) && rate.values.is_empty();
             if !free {
-                let mut row = Linear { values: Row::new(), rates: Row::from([(i, 1.0)]) };
+                let mut row = Linear::rate(i);
                 row.add(&rate, -1.0);
                 rows.push(row);
             }

@@ -53,6 +53,16 @@ fn compare(
     model.cross_jump(t, &mut x.to_vec()).or_else(|f| fault(what("minimal"), f.to_string()))?;
     model.observe(t, x, &mut theirs).or_else(|f| fault(what("minimal"), f.to_string()))?;
     other.observe(t, &y, &yp, &mut ours).or_else(|f| fault(what("values"), f.to_string()))?;
+    if std::env::var_os("SHOW").is_some() {
+        for (n, (a, b)) in common.iter().zip(ours.iter().zip(&theirs)) {
+            println!("{form:?} {n} {a} {b}");
+        }
+        println!("{}", other.program());
+        println!(
+            "x {x:?} y {y:?} yp {yp:?} {:?}",
+            other.program().states.iter().map(|s| s.name.clone()).collect::<Vec<_>>()
+        );
+    }
     let greatest = theirs.iter().fold(1e-3f64, |most, v| most.max(v.abs()));
     for (name, (a, b)) in common.iter().zip(ours.iter().zip(&theirs)) {
         let apart = (a - b).abs() / greatest;
