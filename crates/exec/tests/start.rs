@@ -170,3 +170,23 @@ fn on_a_line_of_equilibria_the_nearest_is_taken() {
     assert!((rest.x[0] - 2.5).abs() < 1e-14 && (rest.x[1] - 2.5).abs() < 1e-14);
     assert_eq!(rest.free, 1);
 }
+
+/// `x' = x³ - 3 x + 3`: between the start and the only equilibrium, at -2.1, the rate has a minimum of 1 and a maximum
+/// of 5, and the motion runs away from it.
+#[test]
+fn an_equilibrium_behind_two_folds_is_reached_by_taking_the_loads_away() {
+    let mut s = Sketch::default();
+    let x = s.state("x");
+    let (three, minus) = (s.number(3.0), s.number(-3.0));
+    let terms = [s.x.mul(&[x, x, x]), s.x.mul(&[minus, x]), three];
+    let rate = s.x.add(&terms);
+    s.rate("x", rate);
+    s.start("x", x, 1.5);
+    let mut model = s.model();
+    let start = model.initialise(0.0).unwrap();
+    let rest = model.equilibrium(0.0, &start).unwrap();
+    // By Cardano's formula.
+    let root = |inner: f64| inner.cbrt();
+    let exact = -root((3.0 + 5f64.sqrt()) / 2.0) - root((3.0 - 5f64.sqrt()) / 2.0);
+    assert!((rest.x[0] - exact).abs() < 1e-13, "{rest:?}, {exact}");
+}

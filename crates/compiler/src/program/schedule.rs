@@ -145,7 +145,8 @@ impl Schedule<'_> {
             Step::Linear { unknowns, matrix, right, elements } => self.linear(unknowns, matrix, right, elements),
             Step::Newton { unknowns, body, residuals, elements } => self.newton(unknowns, body, residuals, elements),
             Step::Watch { pivot, elements } => {
-                let elements = names(self.graph, elements);
+                let read: Vec<Symbol> = self.graph.exprs.symbols_of(*pivot).into_iter().collect();
+                let elements = self.concerned(elements, &read);
                 divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.watch(factor, &elements));
             }
         }
@@ -154,8 +155,8 @@ impl Schedule<'_> {
     fn linear(&mut self, unknowns: &[Symbol], matrix: &[Vec<Expr>], right: &[Expr], elements: &[ElementId]) {
         let matrix = matrix.iter().flatten().map(|&e| self.lower.value(e)).collect();
         let right = right.iter().map(|&e| self.lower.value(e)).collect();
-        let block =
-            self.blocks.push(Block::Linear { matrix, right, shared: None, elements: names(self.graph, elements) });
+        let elements = self.concerned(elements, unknowns);
+        let block = self.blocks.push(Block::Linear { matrix, right, shared: None, elements });
         self.solved(block, unknowns);
     }
 
@@ -173,7 +174,7 @@ impl Schedule<'_> {
         let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
         let piecewise = self.lower.end_newton();
         let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
-        let (unknown_names, elements) = (unknowns.iter().map(name).collect(), names(self.graph, elements));
+        let (unknown_names, elements) = (unknowns.iter().map(name).collect(), self.concerned(elements, unknowns));
         self.blocks.push(Block::Newton { residuals: values, jacobian, unknowns: unknown_names, elements });
         self.solved(block, unknowns);
         for &(symbol, value) in body {
@@ -187,6 +188,13 @@ impl Schedule<'_> {
             });
             self.kinks.extend(self.lower.conditions.ids().skip(known));
         }
+    }
+
+    /// The elements of a block or of a divisor, or if there are none but junctions and two-ports its variables.
+    fn concerned(&self, elements: &[ElementId], variables: &[Symbol]) -> String {
+        let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
+        let listed = names(self.graph, elements);
+        if listed.is_empty() { variables.iter().map(name).collect::<Vec<_>>().join(", ") } else { listed }
     }
 
     fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {

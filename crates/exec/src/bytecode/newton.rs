@@ -36,6 +36,8 @@ const NEAR: f64 = 0.25;
 /// A step that shrinks as the last one did, with the same Jacobian, leaves about twice its square over the last: below
 /// this, rounding.
 const FINISHED: f64 = 0.125 * f64::EPSILON;
+/// Residuals below this part of their terms are rounding.
+const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// Points at which the way to a solution that is not near is looked at.
 const LOOKS: usize = 8;
 /// The same where the way may be long.
@@ -242,10 +244,33 @@ impl Frame {
             Ok(()) if self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve) => {
                 return Ok(());
             }
+            _ if self.stays(solve) => return Ok(()),
             Ok(()) => self.elsewhere(solve),
             Err(miss) => Missed::All(miss),
         };
         if self.approach(solve) { Ok(()) } else { Err(missed) }
+    }
+
+    /// Whether the memory still solves the equations to rounding: where an unknown is 0 but for the rounding of others,
+    /// no step is small against it.
+    fn stays(&mut self, solve: &Solve) -> bool {
+        let n = solve.right.len();
+        let newton = self.newton_of(solve);
+        newton.trial.copy_from_slice(&newton.memory);
+        if !self.evaluate(solve, true) {
+            return false;
+        }
+        let Frame { r, solvers, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        for (i, &right) in solve.right.iter().enumerate() {
+            let entries = solve.matrix[i * n..][..n].iter().zip(&newton.memory);
+            let terms = entries.fold(0.0, |sum, (&m, x)| sum + (r[m as usize] * x).abs());
+            if !(r[right as usize].abs() <= ROUNDING * terms) {
+                return false;
+            }
+        }
+        newton.x.copy_from_slice(&newton.memory);
+        true
     }
 
     /// The root found is another one: the unknown that differs most.

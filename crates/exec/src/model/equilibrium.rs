@@ -150,10 +150,9 @@ impl Model {
             // A rate that changes nothing in the shortest time that the model knows is none.
             let fastest = (0..n).map(|i| jacobian[i * n + i].abs()).fold(fastest_pair(&jacobian, n), f64::max);
             let idle = |i: usize, part: f64| rates[i].abs() <= part * x[i].abs() * fastest;
-            let settled = |i: usize| {
-                newton.step[i].abs() <= 1e-13 * x[i].abs() || rates[i].abs() <= 1e-15 * scale[i] || idle(i, 1e-15)
-            };
-            if (0..n).all(settled) || rates.iter().all(|&rate| rate == 0.0) {
+            let stays = |i: usize| newton.step[i].abs() <= 1e-13 * x[i].abs();
+            let rests = |i: usize| rates[i].abs() <= 1e-15 * scale[i] || idle(i, 1e-15);
+            if (0..n).all(stays) || (0..n).all(rests) {
                 if (0..n).all(|i| rates[i].abs() <= AT_REST * scale[i] || idle(i, 1e-13)) {
                     return Ok(Equilibrium { x, free: n - newton.rank, iterations: iteration });
                 }

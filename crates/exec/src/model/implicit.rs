@@ -3,11 +3,15 @@
 use super::{InputError, Model, Operations, ParameterError, RecordError, StartError};
 use crate::bytecode::Trouble;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Implicit, Program, Routine, Value};
+use halfarrow_compiler::program::{Implicit, Op, Program, Routine, Value};
 use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 
 /// Passes of Newton on states of the minimal form.
 const ITERATIONS: usize = 30;
+/// What rounding leaves of a slope whose terms cancel, against the greatest slope by the same unknown.
+const CANCELLED: f64 = 1e-14;
+/// A relative step of theirs that is rounding.
+const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// Passes of Newton on what is recorded, and unknowns up to which there are any.
 const REFINEMENTS: usize = 4;
 const MOST_REFINED: usize = 60;
@@ -39,6 +43,9 @@ pub struct ImplicitModel {
     untold: Vec<usize>,
     common: Routine,
     common_there: Routine,
+    /// Unknowns of Newton blocks of the form (block, place) that the reference has, with the routine that computes them.
+    guesses: Vec<(usize, usize)>,
+    guessed: Routine,
     /// What the bonds of states with a free rate carry: in the form, and in the reference.
     free: Vec<usize>,
     carried: Routine,
@@ -85,6 +92,13 @@ impl ImplicitModel {
         let told: Vec<Value> = known.iter().filter_map(|&i| there(&form.program.tracked[i])).collect();
         let carried: Vec<(usize, Value, Value)> =
             equations.carried.iter().filter_map(|(i, s, v)| Some((*i as usize, *v, there(s)?))).collect();
+        let solution = |(s, v): (&Symbol, &Value)| match form.program.values.op(*v) {
+            Op::Solution(block, i) => Some(((block.0 as usize, i as usize), there(s)?)),
+            _ => None,
+        };
+        let newton = |((block, i), _): &((usize, usize), Value)| form.frame.solvers[*block].newton.memory.len() > *i;
+        let guessed = form.program.variables.iter().filter_map(solution).filter(newton);
+        let (guesses, guessed): (Vec<(usize, usize)>, Vec<Value>) = guessed.unzip();
         let seen: Vec<Value> = pairs.iter().map(|p| p.1).collect();
         let mirrored: Vec<Value> = pairs.iter().map(|p| p.2).collect();
         let carried_here: Vec<Value> = carried.iter().map(|c| c.1).collect();
@@ -108,6 +122,8 @@ impl ImplicitModel {
             common: form.routine_for(&common),
             common_there: reference.routine_for(&common_there),
             untold,
+            guesses,
+            guessed: reference.routine_for(&guessed),
             carried: form.routine_for(&carried_here),
             carried_there: reference.routine_for(&carried_there),
             free: carried.iter().map(|c| c.0).collect(),
@@ -242,6 +258,7 @@ impl ImplicitModel {
             self.form.conserved.copy_from_slice(&self.reference.conserved);
         }
         self.reference.cross_jump(t, &mut self.x)?;
+        self.guess(t)?;
         self.take_over(t, &mut y)?;
         self.form.cross_jump(t, &mut y)?;
         self.take_rates(t, &y, &mut yp)?;
@@ -267,9 +284,24 @@ impl ImplicitModel {
         for model in [&mut self.reference, &mut self.form] {
             model.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
         }
+        self.guess(t)?;
         self.take_over(t, y)?;
         self.take_rates(t, y, yp)?;
         self.settle(t, y, yp)
+    }
+
+    /// Newton blocks of the form begin where the reference is: where their equations have several solutions, at its own.
+    fn guess(&mut self, t: f64) -> Result<(), Failure> {
+        let ImplicitModel { reference, form, guesses, guessed, x, .. } = self;
+        reference.place(t, x);
+        reference.frame.run(guessed).map_err(|trouble| reference.failure(t, trouble))?;
+        for (&(block, i), &register) in guesses.iter().zip(&guessed.outputs) {
+            let value = reference.frame.r[register as usize];
+            if value.is_finite() {
+                form.frame.solvers[block].newton.memory[i] = value;
+            }
+        }
+        Ok(())
     }
 
     /// Unknowns from the state of the reference.
@@ -291,7 +323,7 @@ impl ImplicitModel {
     }
 
     /// Unknowns that the reference does not have, such as one of two reactions of which it knows the sum: the least that
-    /// makes all other variables right. What they carry is linear in them.
+    /// makes all other variables right.
     fn infer(&mut self, t: f64, y: &mut [f64]) -> Result<(), Failure> {
         let ImplicitModel { reference, common_there, x, .. } = self;
         reference.place(t, x);
@@ -301,27 +333,43 @@ impl ImplicitModel {
         let (mut matrix, mut miss) = (vec![0.0; rows * columns], vec![0.0; rows]);
         let still = vec![0.0; y.len()];
         self.untold.iter().for_each(|&i| y[i] = 0.0);
-        for column in 0..columns {
-            self.place(t, y, &still);
-            self.form.still();
-            self.form.frame.d[self.form.layout.states as usize + self.untold[column]] = 1.0;
-            self.form.frame.run_along(&self.common).map_err(|trouble| self.form.failure(t, trouble))?;
-            for (row, &register) in self.common.outputs.iter().enumerate() {
-                matrix[row * columns + column] = self.form.frame.d[register as usize];
-                miss[row] = self.form.frame.r[register as usize] - wanted[row];
+        let mut before = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            for column in 0..columns {
+                self.place(t, y, &still);
+                self.form.still();
+                self.form.frame.d[self.form.layout.states as usize + self.untold[column]] = 1.0;
+                self.form.frame.run_along(&self.common).map_err(|trouble| self.form.failure(t, trouble))?;
+                for (row, &register) in self.common.outputs.iter().enumerate() {
+                    matrix[row * columns + column] = self.form.frame.d[register as usize];
+                    miss[row] = self.form.frame.r[register as usize] - wanted[row];
+                }
             }
-        }
-        // What does not read them says nothing about them.
-        for row in 0..rows {
-            let slopes = &mut matrix[row * columns..][..columns];
-            let good = miss[row].is_finite() && slopes.iter().all(|s| s.is_finite());
-            if !good || slopes.iter().all(|s| *s == 0.0) {
-                slopes.fill(0.0);
-                miss[row] = 0.0;
+            // What does not read them, or only by what rounding leaves of terms that cancel, says nothing about them.
+            let mut greatest = vec![0.0f64; columns];
+            for row in matrix.chunks(columns) {
+                greatest.iter_mut().zip(row).for_each(|(most, s)| *most = most.max(s.abs()));
             }
-        }
-        if let Some(step) = super::minimum_norm::step(&matrix, &miss, columns) {
-            self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] = *s);
+            for row in 0..rows {
+                let slopes = &mut matrix[row * columns..][..columns];
+                let good = miss[row].is_finite() && slopes.iter().all(|s| s.is_finite());
+                if !good || slopes.iter().zip(&greatest).all(|(s, most)| s.abs() <= CANCELLED * most) {
+                    slopes.fill(0.0);
+                    miss[row] = 0.0;
+                }
+            }
+            // Most of what they carry is linear in them: the second step is rounding then.
+            let Some(step) = super::minimum_norm::step(&matrix, &miss, columns) else { break };
+            let relative = |(&i, s): (&usize, &f64)| s.abs() / y[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
+            let length = self.untold.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
+            if !length.is_finite() || length < 1.0 && length >= 0.5 * before {
+                break;
+            }
+            self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);
+            if length <= SETTLED {
+                break;
+            }
+            before = length;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Least squares of minimum norm, for rows and columns of any magnitude.
 
-use nalgebra::{DMatrix, DVector};
+use faer::Mat;
+use faer::linalg::solvers::Solve;
 
 /// Singular values below this fraction of the greatest count as zero.
 const RANK: f64 = 1e-11;
@@ -39,12 +40,23 @@ pub(super) fn weighed_step(jacobian: &[f64], residual: &[f64], columns: usize, w
     let sizes: Vec<f64> = (0..columns)
         .map(|j| inverse(greatest(&mut weighed(j).map(|(i, j)| jacobian[i * columns + j] * weights[i]))))
         .collect();
-    let matrix = DMatrix::from_fn(rows, columns, |i, j| jacobian[i * columns + j] * weights[i] * sizes[j]);
-    let right = DVector::from_fn(rows, |i, _| -residual[i] * weights[i]);
-    let svd = matrix.try_svd(true, true, f64::EPSILON, 10_000)?;
-    let limit = RANK * svd.singular_values.max();
-    let rank = svd.rank(limit);
-    let solution = svd.solve(&right, limit).ok()?;
+    let matrix = Mat::from_fn(rows, columns, |i, j| jacobian[i * columns + j] * weights[i] * sizes[j]);
+    let svd = matrix.thin_svd().ok()?;
+    let (u, values, v) = (svd.U(), svd.S().column_vector(), svd.V());
+    let limit = RANK * values.iter().fold(0.0f64, |most, s| most.max(*s));
+    let rank = values.iter().filter(|s| **s > limit).count();
+    let mut solution = vec![0.0; columns];
+    if rank == rows && rank == columns {
+        // One solution alone: elimination keeps its zeros.
+        let mut x = Mat::from_fn(rows, 1, |i, _| -residual[i] * weights[i]);
+        matrix.partial_piv_lu().solve_in_place(x.as_mut());
+        let step = x.col(0).iter().zip(&sizes).map(|(s, size)| s * size).collect();
+        return Some(Step { step, rank, weights });
+    }
+    for k in (0..values.nrows()).filter(|&k| values[k] > limit) {
+        let part = (0..rows).map(|i| -u[(i, k)] * residual[i] * weights[i]).sum::<f64>() / values[k];
+        solution.iter_mut().enumerate().for_each(|(j, x)| *x += v[(j, k)] * part);
+    }
     Some(Step { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
 }
 
@@ -68,5 +80,12 @@ mod tests {
         let s = step(&[1.0, 1e-6], &[-1.0, -3e-6], 1).unwrap();
         assert!(s.rank == 1 && (s.step[0] - 2.0).abs() < 1e-14);
         assert!(step(&[f64::NAN], &[1.0], 1).is_none());
+        // One equation for two of three unknowns.
+        let mut jacobian = [0.0; 12];
+        (jacobian[9], jacobian[11]) = (1.0, 0.5);
+        let s = step(&jacobian, &[0.0, 0.0, 0.0, 1.0], 3).unwrap();
+        assert!((s.step[0] + 0.5 * s.step[2] + 1.0).abs() < 1e-14, "{:?}", s.step);
+        // A pendulum on its way to rest: what should be 0 is.
+        assert_eq!(step(&[0.0, 1.0, -2.0, -0.5], &[0.0, 1.0], 2).unwrap().step, [0.5, 0.0]);
     }
 }

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 /// A start condition is met if it is missed by less than this fraction of the terms it is made of.
 const MET: f64 = 1e-9;
+/// What solving together leaves of an unknown that should be 0.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// How much more a constraint weighs than a start value, where they contradict each other.
 const FIRM: f64 = 1e4;
 /// Passes over conditions that one unknown is left in.
@@ -179,7 +181,16 @@ impl Model {
             let terms = group.unknowns.iter().enumerate().map(|(j, &u)| (jacobian[i * n + j] * z[u as usize]).abs());
             asked(i) + terms.sum::<f64>()
         };
-        (0..residual.len()).filter(|&i| residual[i].abs() > MET * size(i) || residual[i].is_nan()).collect()
+        // What rounding leaves of an unknown that should be 0, beside the greatest of the others: each weighed by what
+        // it does to the conditions.
+        let greatest = |row: &[f64]| row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
+        let rows: Vec<f64> = (0..residual.len()).map(|i| greatest(&jacobian[i * n..][..n])).collect();
+        let share = |i: usize, j: usize| if rows[i] > 0.0 { jacobian[i * n + j].abs() / rows[i] } else { 0.0 };
+        let weight = |j: usize| (0..rows.len()).fold(0.0f64, |most, i| most.max(share(i, j)));
+        let weighed = group.unknowns.iter().enumerate().map(|(j, &u)| weight(j) * z[u as usize].abs());
+        let rounding = ROUNDING * weighed.fold(0.0, f64::max);
+        let missed = |i: &usize| residual[*i].abs() > MET * size(*i) + rounding * rows[*i] || residual[*i].is_nan();
+        (0..residual.len()).filter(missed).collect()
     }
 
     /// Gauss-Newton of minimum norm, damped.

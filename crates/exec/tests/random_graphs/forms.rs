@@ -4,7 +4,7 @@ use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::equations::{Form, derive_equations};
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_exec::{ImplicitModel, Model};
-use halfarrow_sim::{ImplicitSystem, System};
+use halfarrow_sim::{Failure, ImplicitSystem, System};
 
 use crate::check::{Fault, Seen, fault};
 
@@ -12,7 +12,14 @@ use crate::check::{Fault, Seen, fault};
 const AGREES: f64 = 1e-8;
 
 /// Checks every form that applies where the minimal one has the state `x`.
-pub fn check_forms(causal: &CausalGraph, model: &Model, t: f64, x: &[f64], seen: &mut Seen) -> Result<(), Fault> {
+/// `constant` if no modulus reads a state.
+pub fn check_forms(
+    causal: &CausalGraph,
+    model: &Model,
+    (t, x): (f64, &[f64]),
+    constant: bool,
+    seen: &mut Seen,
+) -> Result<(), Fault> {
     for form in Form::ALL.into_iter().filter(|f| *f != Form::Minimal) {
         let equations = match derive_equations(causal, form) {
             Ok(equations) => equations,
@@ -27,9 +34,18 @@ pub fn check_forms(causal: &CausalGraph, model: &Model, t: f64, x: &[f64], seen:
         };
         let made = ImplicitModel::new(schedule(&equations), model.clone());
         let mut other = made.or_else(|f| fault(format!("form {}", form.name()), f.to_string()))?;
+        if !constant && is_singular(&mut other, t, x) {
+            *seen.singular_forms.entry(form.name()).or_default() += 1;
+            continue;
+        }
         compare(form, &mut other, &mut model.clone(), t, x, seen)?;
     }
     Ok(())
+}
+
+/// Whether a form has no value at a point: where a modulus vanishes, more equations degenerate than in the minimal form.
+fn is_singular(other: &mut ImplicitModel, t: f64, x: &[f64]) -> bool {
+    matches!(other.start_at(t, x), Err(Failure::Singular { .. } | Failure::OutOfDomain { .. }))
 }
 
 fn compare(

@@ -526,6 +526,28 @@ static int ha_approach(ha_model *m, ha_newton *w)
     return 0;
 }
 
+/* Whether the memory still solves the equations to rounding: where an unknown is 0 but for the rounding of others, no
+   step is small against it. */
+static int ha_stays(ha_model *m, ha_newton *w)
+{
+    int i;
+    int j;
+    if (!ha_look_at(m, w, w->memory)) {
+        return 0;
+    }
+    for (i = 0; i < w->n; ++i) {
+        double terms = 0.0;
+        for (j = 0; j < w->n; ++j) {
+            terms += fabs(w->matrix[i * w->n + j] * w->memory[j]);
+        }
+        if (!(fabs(w->right[i]) <= 2.0 * DBL_EPSILON * terms)) {
+            return 0;
+        }
+    }
+    ha_copy(w->x, w->memory, w->n);
+    return 1;
+}
+
 /* The root that goes on from the memory: 0, or why there is none. */
 static int ha_follow(ha_model *m, ha_newton *w)
 {
@@ -547,7 +569,7 @@ static int ha_follow(ha_model *m, ha_newton *w)
             w->span[i] = ha_max(fabs(w->x[i]), fabs(w->memory[i]));
         }
     }
-    if (ha_approach(m, w)) {
+    if (ha_stays(m, w) || ha_approach(m, w)) {
         return MODEL_OK;
     }
     return why == MODEL_NO_CONVERGENCE && w->evaluations >= w->limit ? MODEL_BOUND : why;
