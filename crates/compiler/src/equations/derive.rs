@@ -1,6 +1,6 @@
 //! The stage: from a causal graph to equations in evaluation order.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::along::{Closure, Treatment, assemble_all};
 use super::blocks::{Insoluble, Ordered, order};
@@ -256,13 +256,8 @@ fn without_cancelling_terms(
     if cancelling.is_empty() {
         return;
     }
-    let mut known = BTreeMap::new();
-    for step in steps {
-        if let Step::Assign { symbol, value } = step {
-            let value = display::put_in(&mut d.x, *value, &known);
-            known.insert(*symbol, value);
-        }
-    }
+    let named = display::named_sources(d);
+    let known = display::expansions(d, steps, &states.iter().map(|s| s.rate).collect(), &named);
     let unknown: BTreeSet<Symbol> =
         states.iter().flat_map(|s| [s.symbol, s.rate]).chain(algebraic.iter().map(|a| a.symbol)).collect();
     let reads = |d: &Definitions, e: Expr| {

@@ -162,7 +162,7 @@ fn shifted_states(d: &mut Definitions, states: &[State]) -> Vec<Shifted> {
 }
 
 /// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.
-fn named_sources(d: &Definitions) -> BTreeMap<Symbol, Expr> {
+pub fn named_sources(d: &Definitions) -> BTreeMap<Symbol, Expr> {
     let mut named = BTreeMap::new();
     for element in d.graph.elements.values() {
         let (symbol, value) = match element.kind {
@@ -349,7 +349,7 @@ fn textbook(x: &mut Exprs, e: Expr) -> Expr {
 }
 
 /// Every variable in terms of states, time, inputs, named sources and what stays implicit.
-fn expansions(
+pub fn expansions(
     d: &mut Definitions,
     steps: &[Step],
     rates: &BTreeSet<Symbol>,
