@@ -4,23 +4,65 @@ use super::Value;
 use super::values::{Op, Reads, Values};
 use crate::algebra::Function;
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 impl Values {
-    /// Derivative of each of `wanted` by `guess`. All of them were made after `from`.
-    pub(super) fn derivatives(&mut self, wanted: &[Value], guess: Value, from: usize) -> Vec<Value> {
-        let zero = self.number(0.0);
-        let one = self.number(1.0);
+    /// Derivatives of each of `wanted` by each of `guesses`, one column a guess. All of them were made after `from`.
+    ///
+    /// A value that reads guesses through one other value alone, its *root* (the argument of a law, say), is derived by
+    /// that once for all guesses.
+    pub(super) fn derivatives(&mut self, wanted: &[Value], guesses: &[Value], from: usize) -> Vec<Vec<Value>> {
+        let (zero, one) = (self.number(0.0), self.number(1.0));
         let end = wanted.iter().map(|v| v.0 as usize + 1).max().unwrap_or(from);
-        let mut slopes: FxHashMap<Value, Value> = FxHashMap::from_iter([(guess, one)]);
-        for index in from..end {
-            let value = Value(index as u32);
-            if self.reads(value).includes(Reads::GUESS)
-                && let Some(slope) = self.slope(value, &|v| slopes.get(&v).copied())
-            {
-                slopes.entry(value).or_insert(slope);
+        let inner: Vec<Value> =
+            (from..end).map(|i| Value(i as u32)).filter(|v| self.reads(*v).includes(Reads::GUESS)).collect();
+        let mut roots: FxHashMap<Value, Value> = guesses.iter().map(|&g| (g, g)).collect();
+        let mut by_root: FxHashMap<Value, Value> = guesses.iter().map(|&g| (g, one)).collect();
+        for &value in inner.iter().filter(|v| !guesses.contains(v)) {
+            let mut read = Vec::new();
+            self.op(value).for_each_operand(|o| read.extend(roots.get(&o)));
+            let root = match read.first() {
+                None => continue,
+                Some(&first) if read.iter().all(|&r| r == first) => first,
+                Some(_) => value,
+            };
+            let slope = match root == value {
+                true => Some(one),
+                false => self.slope(value, &|o| by_root.get(&o).filter(|_| roots.contains_key(&o)).copied()),
+            };
+            if let Some(slope) = slope {
+                roots.insert(value, root);
+                by_root.insert(value, slope);
             }
         }
-        wanted.iter().map(|v| slopes.get(v).copied().unwrap_or(zero)).collect()
+        let joints: Vec<Value> =
+            inner.into_iter().filter(|v| roots.get(v) == Some(v) && !guesses.contains(v)).collect();
+        let mut columns = Vec::with_capacity(guesses.len());
+        for &guess in guesses {
+            let mut slopes: FxHashMap<Value, Value> = FxHashMap::from_iter([(guess, one)]);
+            for &value in &joints {
+                let mut read: SmallVec<[(Value, Value); 3]> = SmallVec::new();
+                self.op(value).for_each_operand(|o| {
+                    if let Some(&slope) = roots.get(&o).and_then(|root| slopes.get(root)) {
+                        read.push((o, slope));
+                    }
+                });
+                if read.is_empty() {
+                    continue;
+                }
+                read.iter_mut().for_each(|(o, slope)| *slope = self.times(by_root[o], *slope));
+                let of = |o: Value| read.iter().find(|(v, _)| *v == o).map(|(_, slope)| *slope);
+                if let Some(slope) = self.slope(value, &of) {
+                    slopes.insert(value, slope);
+                }
+            }
+            let column = wanted.iter().map(|v| {
+                let slope = roots.get(v).and_then(|root| slopes.get(root)).copied();
+                slope.map_or(zero, |slope| self.times(by_root[v], slope))
+            });
+            columns.push(column.collect());
+        }
+        columns
     }
 
     /// Derivative of a value from those of its operands; `None` if it is zero.

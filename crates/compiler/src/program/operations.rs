@@ -31,7 +31,11 @@ impl Values {
         match () {
             () if self.is(a, 0.0) => b,
             () if self.is(b, 0.0) => a,
-            () => self.op_of(Op::Add(a, b)),
+            () => match (self.op(a), self.op(b)) {
+                (_, Op::Neg(b)) => self.op_of(Op::Sub(a, b)),
+                (Op::Neg(a), _) => self.op_of(Op::Sub(b, a)),
+                _ => self.op_of(Op::Add(a, b)),
+            },
         }
     }
 
@@ -39,7 +43,10 @@ impl Values {
         match () {
             () if self.is(a, 0.0) => self.neg(b),
             () if self.is(b, 0.0) => a,
-            () => self.op_of(Op::Sub(a, b)),
+            () => match self.op(b) {
+                Op::Neg(b) => self.op_of(Op::Add(a, b)),
+                _ => self.op_of(Op::Sub(a, b)),
+            },
         }
     }
 
@@ -48,6 +55,7 @@ impl Values {
             () if self.is(a, 1.0) => b,
             () if self.is(b, 1.0) => a,
             () if self.is(a, -1.0) => self.neg(b),
+            () if self.is(b, -1.0) => self.neg(a),
             () => self.op_of(Op::Mul(a, b)),
         }
     }

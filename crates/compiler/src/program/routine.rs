@@ -356,13 +356,51 @@ impl<'a> Builder<'a> {
         }
     }
 
+    /// The values in the order in which they are computed: their own, but if there are several Newton blocks, these as
+    /// soon as all that they read is there, one after the other.
+    fn sequence(&self, live: &[bool]) -> Vec<Value> {
+        let program = self.program;
+        let wanted = |v: &Value| live[v.index()] && !self.is_fixed(*v);
+        let mut all: Vec<Value> = program.values.iter().map(|(v, _)| v).filter(wanted).collect();
+        let first_of_newton = |v: &&Value| match program.values.op(**v) {
+            Op::Solution(block, _) => matches!(program.blocks[block], Block::Newton { .. }),
+            _ => false,
+        };
+        let mut blocks: Vec<Op> = all.iter().filter(first_of_newton).map(|v| program.values.op(*v)).collect();
+        blocks.dedup_by_key(|op| if let Op::Solution(block, _) = op { Some(*block) } else { None });
+        if blocks.len() < 2 {
+            return all;
+        }
+        // How many blocks stand behind one another before a value.
+        let mut depth = vec![0u32; program.values.len()];
+        let mut depth_of_block: FxHashMap<BlockId, u32> = FxHashMap::default();
+        for (v, op) in program.values.iter() {
+            depth[v.index()] = match op {
+                Op::Solution(block, _) => *depth_of_block.entry(block).or_insert_with(|| {
+                    1 + program.blocks[block].reads().map(|r| depth[r.index()]).max().unwrap_or(0)
+                }),
+                _ => {
+                    let mut most = 0;
+                    op.for_each_operand(|o| most = most.max(depth[o.index()]));
+                    most
+                }
+            };
+        }
+        let solution = |v: Value| matches!(program.values.op(v), Op::Solution(..));
+        all.sort_by_key(|&v| (depth[v.index()], !solution(v), v));
+        all
+    }
+
     fn order(&self, live: &[bool], watches: &[u32]) -> Vec<Item> {
         let program = self.program;
+        let sequence = self.sequence(live);
+        let mut place = vec![0u32; program.values.len()];
+        (0u32..).zip(&sequence).for_each(|(at, v)| place[v.index()] = at);
         let mut watch_after: FxHashMap<Value, Vec<u32>> = FxHashMap::default();
         let mut items = Vec::new();
         for &watch in watches {
             let w = &program.watches[watch as usize];
-            let last = [w.pivot, w.scale].into_iter().filter(|&v| !self.is_fixed(v)).max();
+            let last = [w.pivot, w.scale].into_iter().filter(|&v| !self.is_fixed(v)).max_by_key(|v| place[v.index()]);
             match last {
                 Some(last) => watch_after.entry(last).or_default().push(watch),
                 None => items.push(Item::Watch(watch)),
@@ -371,10 +409,8 @@ impl<'a> Builder<'a> {
         let mut inner: FxHashMap<BlockId, Vec<Value>> = FxHashMap::default();
         let mut owner: FxHashMap<Value, BlockId> = FxHashMap::default();
         let mut closed = vec![false; program.blocks.len()];
-        for (value, op) in program.values.iter() {
-            if !live[value.index()] || self.is_fixed(value) {
-                continue;
-            }
+        for value in sequence {
+            let op = program.values.op(value);
             match op {
                 Op::Guess(block, _) => {
                     owner.insert(value, block);

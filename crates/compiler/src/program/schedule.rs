@@ -169,8 +169,7 @@ impl Schedule<'_> {
             self.lower.define(symbol, value);
         }
         let values: Vec<Value> = residuals.iter().map(|&e| self.lower.value(e)).collect();
-        let columns: Vec<Vec<Value>> =
-            guesses.iter().map(|&guess| self.lower.values.derivatives(&values, guess, from)).collect();
+        let columns = self.lower.values.derivatives(&values, &guesses, from);
         let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
         let piecewise = self.lower.end_newton();
         let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
