@@ -376,9 +376,9 @@ impl<'a> Builder<'a> {
         let mut depth_of_block: FxHashMap<BlockId, u32> = FxHashMap::default();
         for (v, op) in program.values.iter() {
             depth[v.index()] = match op {
-                Op::Solution(block, _) => *depth_of_block.entry(block).or_insert_with(|| {
-                    1 + program.blocks[block].reads().map(|r| depth[r.index()]).max().unwrap_or(0)
-                }),
+                Op::Solution(block, _) => *depth_of_block
+                    .entry(block)
+                    .or_insert_with(|| 1 + program.blocks[block].reads().map(|r| depth[r.index()]).max().unwrap_or(0)),
                 _ => {
                     let mut most = 0;
                     op.for_each_operand(|o| most = most.max(depth[o.index()]));

@@ -1,9 +1,11 @@
 //! Registers and the code that runs on them.
 
+use super::abreast::{Abreast, Space};
 use super::conditions::{Conditions, table_on};
 use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
+use super::wide::Lane;
 use crate::math;
 use halfarrow_compiler::algebra::{Function, Table1d};
 use halfarrow_compiler::program::{Block, ConditionId, Instruction, Layout, Program, Reads, Routine, Solve};
@@ -50,6 +52,9 @@ pub(crate) struct Frame {
     time: u32,
     /// The code of the Newton block that is being solved, where it is not to be interpreted.
     pub inner: Option<Arc<dyn InnerCode>>,
+    /// Newton blocks of the routine that runs which are solved together.
+    pub abreast: Option<Arc<Abreast>>,
+    pub(super) space: Space,
 }
 
 /// What a solve block needs.
@@ -94,6 +99,8 @@ impl Frame {
             tables: program.tables.clone(),
             time: layout.time,
             inner: None,
+            abreast: None,
+            space: Space::default(),
         }
     }
 
@@ -107,9 +114,22 @@ impl Frame {
         }
     }
 
+    /// Makes room for Newton blocks that are solved together.
+    pub fn reserve_abreast(&mut self, abreast: &Abreast) {
+        self.space.reserve(abreast);
+    }
+
+    /// From now on Newton blocks are solved together where `abreast` says so, if it says anything.
+    pub fn begin(&mut self, abreast: Option<&Arc<Abreast>>) {
+        self.abreast = abreast.cloned();
+        self.space.turn += 1;
+    }
+
     /// Forgets what was kept for the old parameters.
     pub fn parameters_changed(&mut self) {
-        self.solvers.iter_mut().for_each(|s| s.factored = false);
+        for solver in &mut self.solvers {
+            (solver.factored, solver.newton.fresh) = (false, false);
+        }
     }
 
     /// Runs a routine.
@@ -322,6 +342,12 @@ impl Frame {
             }
             Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
         }
+    }
+}
+
+impl Lane for Frame {
+    fn frame(&mut self) -> &mut Frame {
+        self
     }
 }
 

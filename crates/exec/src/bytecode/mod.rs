@@ -1,5 +1,6 @@
 //! The interpreter of routines.
 
+mod abreast;
 mod conditions;
 mod frame;
 mod lu;
@@ -8,6 +9,7 @@ mod operands;
 mod packed;
 mod wide;
 
+pub(crate) use abreast::Abreast;
 pub(crate) use conditions::{Hold, piece_of, table_on};
 pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble, slope_of_power};
 pub(crate) use lu::Lu;

@@ -10,7 +10,7 @@
 //! Evaluations are bounded.
 
 use super::frame::{Frame, Trouble, put_entries};
-use halfarrow_compiler::program::Solve;
+use halfarrow_compiler::program::{Instruction, Solve};
 
 /// Iterations of one attempt.
 const ITERATIONS: usize = 100;
@@ -19,7 +19,7 @@ const ITERATIONS_AT_START: usize = 2_000;
 /// Shortest fraction of a step that is tried.
 const SHORTEST: f64 = 1e-12;
 /// A relative step below this that no longer improves the residual is rounding.
-const SETTLED: f64 = 1e-9;
+pub(super) const SETTLED: f64 = 1e-9;
 /// The same while a solution is followed.
 const SHORTEST_FOLLOWING: f64 = 1e-6;
 /// Shortest part of the way from one solution to the next that is gone at once.
@@ -32,10 +32,10 @@ const SHORT_MOVE: f64 = 1e-2;
 const SHORT_ITERATIONS: usize = 10;
 const SHORT_FRACTION: f64 = 0.1;
 /// Contraction of the first step below which the solution is near without doubt.
-const NEAR: f64 = 0.25;
+pub(super) const NEAR: f64 = 0.25;
 /// A step that shrinks as the last one did, with the same Jacobian, leaves about twice its square over the last: below
 /// this, rounding.
-const FINISHED: f64 = 0.125 * f64::EPSILON;
+pub(super) const FINISHED: f64 = 0.125 * f64::EPSILON;
 /// Residuals below this part of their terms are rounding.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// Points at which the way to a solution that is not near is looked at.
@@ -62,13 +62,15 @@ pub(crate) struct Newton {
     pub following: bool,
     /// What the block read there, and its Jacobian, row by row: part of the model's state too.
     outer_memory: Vec<f64>,
-    jacobian_memory: Vec<f64>,
+    pub(super) jacobian_memory: Vec<f64>,
     /// The last solution found, what the block read there, and its Jacobian.
     pub x: Vec<f64>,
-    outer: Vec<f64>,
-    jacobian: Vec<f64>,
+    pub(super) outer: Vec<f64>,
+    pub(super) jacobian: Vec<f64>,
+    /// Whether these go on from the present memory, with the present parameters and conditions.
+    pub fresh: bool,
     /// Evaluations at most while following.
-    pub most: usize,
+    pub(super) most: usize,
     evaluations: usize,
     step: Vec<f64>,
     trial: Vec<f64>,
@@ -105,6 +107,7 @@ impl Newton {
             x: line.clone(),
             outer: Vec::new(),
             jacobian: square.clone(),
+            fresh: false,
             most: MOST,
             evaluations: 0,
             step: line.clone(),
@@ -132,7 +135,22 @@ impl Newton {
     /// Forgets the run.
     pub fn forget(&mut self) {
         self.memory.fill(0.0);
-        self.following = false;
+        self.leave();
+    }
+
+    /// Any solution may come next.
+    pub fn leave(&mut self) {
+        (self.following, self.fresh) = (false, false);
+    }
+
+    /// The next solution starts where unknown `i` has this value.
+    pub fn start_at(&mut self, i: usize, value: f64) {
+        (self.memory[i], self.fresh) = (value, false);
+    }
+
+    /// Evaluations at most while following.
+    pub fn bound(&mut self, most: usize) {
+        (self.most, self.fresh) = (most, false);
     }
 
     /// Goes on with the solution found last.
@@ -140,7 +158,7 @@ impl Newton {
         self.memory.copy_from_slice(&self.x);
         self.outer_memory.copy_from_slice(&self.outer);
         self.jacobian_memory.copy_from_slice(&self.jacobian);
-        self.following = true;
+        (self.following, self.fresh) = (true, false);
     }
 
     /// How far `next` is from the first step, measured as steps are.
@@ -183,9 +201,29 @@ impl Frame {
     /// Finds the root of a block that goes on from its memory, at a start any root; leaves it in `newton.x` and in the
     /// guesses.
     pub(super) fn find_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
+        if !self.is_fresh(solve) {
+            self.solve_abreast(solve);
+        }
+        if !self.is_fresh(solve) {
+            self.find_root_alone(solve)?;
+        }
+        let Frame { r, solvers, .. } = self;
+        let root = &solvers[solve.block.0 as usize].newton.x;
+        solve.guess.iter().zip(root).for_each(|(&guess, &x)| r[guess as usize] = x);
+        Ok(())
+    }
+
+    /// Whether the root found last is the one sought: the block reads what it read then.
+    fn is_fresh(&self, solve: &Solve) -> bool {
+        let newton = &self.solvers[solve.block.0 as usize].newton;
+        let same = |(value, &register): (&f64, &u32)| value.to_bits() == self.r[register as usize].to_bits();
+        newton.fresh && newton.outer.iter().zip(&solve.outer).all(same)
+    }
+
+    fn find_root_alone(&mut self, solve: &Solve) -> Result<(), Trouble> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        newton.evaluations = 0;
+        (newton.evaluations, newton.fresh) = (0, false);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
         if let Err(missed) = self.follow(solve)
             && (self.newton_of(solve).following || !self.search(solve))
@@ -193,9 +231,7 @@ impl Frame {
             return Err(self.trouble(solve, missed));
         }
         self.keep_jacobian(solve);
-        let Frame { r, solvers, .. } = self;
-        let root = &solvers[solve.block.0 as usize].newton.x;
-        solve.guess.iter().zip(root).for_each(|(&guess, &x)| r[guess as usize] = x);
+        self.newton_of(solve).fresh = !has_conditions(solve);
         Ok(())
     }
 
@@ -745,6 +781,15 @@ impl Frame {
         }
         Trouble::NoSolution { block: solve.block.0, nearest: best.0, residual: best.1 }
     }
+}
+
+/// Whether inner code reads conditions, which may be held or not.
+pub(super) fn has_conditions(solve: &Solve) -> bool {
+    use Instruction::*;
+    let condition = |i: &Instruction| {
+        matches!(i, Side { .. } | Floor { .. } | Table { .. } | TableSlope { .. } | TableCurvature { .. })
+    };
+    solve.code.iter().any(condition)
 }
 
 /// Distances from tiny to huge.

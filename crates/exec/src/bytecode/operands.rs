@@ -36,8 +36,7 @@ pub(crate) fn written(instruction: &Instruction) -> Option<Register> {
     }
 }
 
-/// The same instruction on other registers, in the order in which [`reads`] visits them; it is no arithmetic, solve block
-/// or parameter.
+/// The same instruction on other registers, in the order in which [`reads`] visits them; it is no solve block or parameter.
 pub(crate) fn moved(instruction: Instruction, read: &[Register], out: Option<Register>) -> Instruction {
     use Instruction::*;
     let out = out.unwrap_or_default();
@@ -59,7 +58,11 @@ pub(crate) fn moved(instruction: Instruction, read: &[Register], out: Option<Reg
         TableSlope { table, piece, .. } => TableSlope { out, a, table, piece },
         TableCurvature { table, piece, .. } => TableCurvature { out, a, table, piece },
         Watch { watch, .. } => Watch { pivot: a, scale: b(), watch },
-        Add { .. } | Sub { .. } | Mul { .. } | Div { .. } | Neg { .. } => unreachable!("arithmetic is packed"),
+        Add { .. } => Add { out, a, b: b() },
+        Sub { .. } => Sub { out, a, b: b() },
+        Mul { .. } => Mul { out, a, b: b() },
+        Div { .. } => Div { out, a, b: b() },
+        Neg { .. } => Neg { out, a },
         Parameter { .. } | Solve { .. } => unreachable!("neither stands in a routine for lanes as it is"),
     }
 }

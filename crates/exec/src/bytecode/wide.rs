@@ -54,8 +54,15 @@ impl WideFrame {
         self.arch.dispatch(All { registers: self, routine, packed, frames, good });
     }
 
+    /// The same where the vectors of the machine are in use already.
     #[inline(always)]
-    fn all<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; LANES]) {
+    pub(super) fn all<L: Lane>(
+        &mut self,
+        routine: &Routine,
+        packed: &Packed,
+        frames: &mut [L],
+        good: &mut [bool; LANES],
+    ) {
         for run in &packed.runs {
             match run {
                 Run::Many(Kind::Add, all) => self.many(all, |a, b| a + b),

@@ -282,7 +282,7 @@ impl ImplicitModel {
         self.x.copy_from_slice(x);
         // The state may be far from the last one.
         for model in [&mut self.reference, &mut self.form] {
-            model.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
+            model.frame.solvers.iter_mut().for_each(|s| s.newton.leave());
         }
         self.guess(t)?;
         self.take_over(t, y)?;
@@ -298,7 +298,7 @@ impl ImplicitModel {
         for (&(block, i), &register) in guesses.iter().zip(&guessed.outputs) {
             let value = reference.frame.r[register as usize];
             if value.is_finite() {
-                form.frame.solvers[block].newton.memory[i] = value;
+                form.frame.solvers[block].newton.start_at(i, value);
             }
         }
         Ok(())

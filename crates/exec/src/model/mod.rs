@@ -23,7 +23,7 @@ pub use linear::Linearised;
 pub use operations::Operations;
 pub use wide::WideModel;
 
-use crate::bytecode::{Frame, Hold, Trouble};
+use crate::bytecode::{Abreast, Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value};
@@ -32,6 +32,7 @@ use history::{Delay, Sample};
 use inputs::Signal;
 use jacobian::Slopes;
 use machine::Codes;
+use std::sync::Arc;
 
 /// A model that runs: a program, the values of its parameters, what is connected to its inputs, and its memory.
 ///
@@ -47,6 +48,8 @@ pub struct Model {
     switching: Routine,
     sources: Routine,
     frame: Frame,
+    /// Newton blocks that are solved together: of the rates, and of what is recorded.
+    abreast: (Option<Arc<Abreast>>, Option<Arc<Abreast>>),
     codes: Codes,
     recorded: Vec<usize>,
     /// Conditions of the state that are offered as switching functions.
@@ -142,6 +145,7 @@ impl Model {
             switching,
             sources,
             frame,
+            abreast: (None, None),
             codes: Codes::default(),
             switches,
             clock,
@@ -149,6 +153,7 @@ impl Model {
         };
         let defaults = model.program.observed.iter().enumerate().filter(|(_, o)| o.default && o.value.is_ok());
         model.recorded = defaults.map(|(i, _)| i).collect();
+        model.abreast.0 = model.abreast_of(&model.rates);
         model.choose_recorded();
         model.parameters_changed()?;
         Ok(model)
@@ -248,7 +253,7 @@ impl Model {
     /// stops the run and says so. For real time; without it the bound is 2000. The start of a run and its jumps may
     /// take more.
     pub fn bound_iterations(&mut self, most: usize) {
-        self.frame.solvers.iter_mut().for_each(|s| s.newton.most = most.max(1));
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.bound(most.max(1)));
     }
 
     /// Forgets a run: the next crossing is its start. Parameters, inputs and conserved constants stay.
@@ -293,11 +298,19 @@ impl Model {
         Ok(())
     }
 
+    fn abreast_of(&self, routine: &Routine) -> Option<Arc<Abreast>> {
+        Abreast::of(&self.program, routine).map(Arc::new)
+    }
+
     fn choose_recorded(&mut self) {
         let value = |&i: &usize| self.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = self.recorded.iter().filter_map(value).collect();
         self.observe = self.program.watched_routine(&self.layout, &wanted);
         self.frame.reserve(&self.observe);
+        self.abreast.1 = self.abreast_of(&self.observe);
+        for abreast in [&self.abreast.0, &self.abreast.1].into_iter().flatten() {
+            self.frame.reserve_abreast(abreast);
+        }
         self.recorded_changed();
         let of_rates = |block: BlockId| self.rates.solves.iter().any(|s| s.block == block);
         let newton = self.observe.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);

@@ -22,6 +22,11 @@ impl Model {
             What::Switches => &self.switching,
             What::Slopes => &self.slopes.as_ref().expect("asked for only where they are").routine,
         };
+        self.frame.begin(match what {
+            What::Rates => self.abreast.0.as_ref(),
+            What::Recorded => self.abreast.1.as_ref(),
+            What::Switches | What::Slopes => None,
+        });
         match (self.codes.of(what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,
             (None, false) => self.frame.run(routine)?,
@@ -289,7 +294,7 @@ impl System for Model {
         self.inputs.iter_mut().for_each(|signal| signal.hold(t));
         self.frame.conditions.state = Hold::Follow;
         // A solution may leap where something jumps.
-        self.frame.solvers.iter_mut().for_each(|s| s.newton.following = false);
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.leave());
         self.clock.cross(&mut self.frame, t);
         if !self.begun {
             self.begin_held(t, x)?;

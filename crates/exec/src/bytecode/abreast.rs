@@ -1,0 +1,585 @@
+//! Newton blocks of one shape, several at once: each lane solves one of them.
+//!
+//! Only the usual way of [`newton`](super::newton) is gone here: a solution is followed, every step is taken whole, the
+//! matrix is symmetric and definite. It takes the same operations in the same order, hence gives the same bits. A block
+//! that needs anything else is left to the solver of single blocks.
+
+use super::frame::Frame;
+use super::newton::{FINISHED, NEAR, SETTLED, has_conditions};
+use super::operands::{moved, reads, written};
+use super::packed::Packed;
+use super::wide::WideFrame;
+use halfarrow_compiler::program::{Instruction, Program, Register, Routine, Solve};
+use halfarrow_sim::wide::{LANES, Wide};
+use std::collections::BTreeMap;
+
+/// Iterations at most.
+const ITERATIONS: usize = 8;
+/// Evaluations of a block that may come to pass here.
+const EVALUATIONS: usize = ITERATIONS + 1;
+/// Blocks of more unknowns are left alone.
+const LARGEST: usize = 32;
+/// Fewer blocks are solved one at a time.
+const FEWEST: usize = 3;
+
+/// The blocks of a routine that are solved together.
+#[derive(Debug, Default)]
+pub(crate) struct Abreast {
+    groups: Vec<Group>,
+    /// The group of each block that has one.
+    of: BTreeMap<u32, usize>,
+}
+
+/// Blocks of one shape, of which none reads what another finds, with what they read there before the first.
+#[derive(Debug)]
+struct Group {
+    /// Number of unknowns.
+    size: usize,
+    members: Vec<Member>,
+    /// The inner code of all of them: guesses, then what is read from outside, then what is computed.
+    code: Routine,
+    packed: Packed,
+    /// The places of the matrix that are not 0, row by row, in the order of the first outputs; residuals follow.
+    entries: Vec<u32>,
+    rows: Vec<Row>,
+}
+
+/// A row of `U`, and what elimination by it does.
+#[derive(Debug)]
+struct Row {
+    /// The entry of the matrix on the diagonal.
+    diagonal: Option<usize>,
+    /// Where its places right of the diagonal begin.
+    start: usize,
+    /// These: column, and the entry of the matrix that stands there.
+    right: Vec<(usize, Option<usize>)>,
+    /// For each of them, in the row of that column, where the places of the columns after it stand.
+    below: Vec<Vec<usize>>,
+}
+
+#[derive(Debug)]
+struct Member {
+    block: usize,
+    /// Where the routine has what the block reads from outside.
+    inputs: Vec<Register>,
+    /// What of it varies, as [`Solve::outer`] has it.
+    outer: Vec<Register>,
+}
+
+/// A block with registers of its own.
+struct Shape {
+    size: usize,
+    code: Vec<Instruction>,
+    entries: Vec<u32>,
+    outputs: Vec<Register>,
+    inputs: Vec<Register>,
+}
+
+impl Abreast {
+    /// The groups of a routine; `None` if there are none.
+    pub fn of(program: &Program, routine: &Routine) -> Option<Abreast> {
+        let mut written_at: BTreeMap<Register, usize> = BTreeMap::new();
+        // Shape, position of the first and members.
+        let mut open: Vec<(Shape, usize, Vec<Member>)> = Vec::new();
+        for (at, instruction) in routine.code.iter().enumerate() {
+            let Instruction::Solve { solve } = *instruction else {
+                written(instruction).map(|out| written_at.insert(out, at));
+                continue;
+            };
+            let solve = &routine.solves[solve as usize];
+            if let Some(shape) = Shape::of(program, solve) {
+                let there = |since: usize| shape.inputs.iter().all(|r| written_at.get(r).is_none_or(|&w| w < since));
+                let member =
+                    Member { block: solve.block.0 as usize, inputs: shape.inputs.clone(), outer: solve.outer.clone() };
+                let alike = |(other, since, _): &&mut (Shape, usize, Vec<Member>)| other.is(&shape) && there(*since);
+                match open.iter_mut().rev().find(alike) {
+                    Some((_, _, members)) => members.push(member),
+                    None => open.push((shape, at, vec![member])),
+                }
+            }
+            let inner = solve.code.iter().filter_map(written);
+            let all = inner.chain(solve.guess.iter().copied()).chain(solve.unknowns.iter().copied());
+            all.for_each(|out| _ = written_at.insert(out, at));
+        }
+        let groups: Vec<Group> =
+            open.into_iter().filter(|(_, _, members)| members.len() >= FEWEST).map(Group::of).collect();
+        let members = groups.iter().enumerate().flat_map(|(g, group)| group.members.iter().map(move |m| (m, g)));
+        let of: BTreeMap<u32, usize> = members.map(|(member, g)| (member.block as u32, g)).collect();
+        (!groups.is_empty()).then_some(Abreast { groups, of })
+    }
+}
+
+impl Shape {
+    /// `None` if the block may take another way than the usual one, whatever its values.
+    fn of(program: &Program, solve: &Solve) -> Option<Shape> {
+        let size = solve.right.len();
+        let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
+        if solve.guess.is_empty() || !symmetric || size > LARGEST || has_conditions(solve) {
+            return None;
+        }
+        // First what is read from outside, in the order in which it is read.
+        let mut inside: BTreeMap<Register, ()> = solve.guess.iter().map(|&g| (g, ())).collect();
+        let mut inputs: Vec<Register> = Vec::new();
+        let mut seen = BTreeMap::new();
+        let places = solve.entries.iter().map(|&place| solve.matrix[place as usize]);
+        let outputs: Vec<Register> = places.chain(solve.right.iter().copied()).collect();
+        let mut note = |r: Register, inside: &BTreeMap<Register, ()>| {
+            if !inside.contains_key(&r) && seen.insert(r, ()).is_none() {
+                inputs.push(r);
+            }
+        };
+        for instruction in &solve.code {
+            reads(instruction, |r| note(r, &inside));
+            written(instruction).map(|out| inside.insert(out, ()));
+        }
+        outputs.iter().for_each(|&r| note(r, &inside));
+        // A register that is an input first and written later would have two meanings.
+        if inputs.iter().any(|r| inside.contains_key(r)) {
+            return None;
+        }
+        let mut named: BTreeMap<Register, Register> = BTreeMap::new();
+        let given = solve.guess.iter().chain(&inputs).copied();
+        named.extend(given.zip(0..));
+        let mut next = (size + inputs.len()) as Register;
+        let code = solve.code.iter().map(|instruction| {
+            let mut read = [0; 3];
+            let mut n = 0;
+            reads(instruction, |r| {
+                read[n] = named[&r];
+                n += 1;
+            });
+            let out = written(instruction).inspect(|&out| {
+                named.insert(out, next);
+                next += 1;
+            });
+            moved(*instruction, &read[..n], out.map(|_| next - 1))
+        });
+        let code = code.collect();
+        let outputs = outputs.iter().map(|r| named[r]).collect();
+        Some(Shape { size, code, entries: solve.entries.clone(), outputs, inputs })
+    }
+
+    fn is(&self, other: &Shape) -> bool {
+        self.size == other.size
+            && self.inputs.len() == other.inputs.len()
+            && self.entries == other.entries
+            && self.outputs == other.outputs
+            && self.code == other.code
+    }
+}
+
+impl Group {
+    fn of((shape, _, members): (Shape, usize, Vec<Member>)) -> Group {
+        let n = shape.size;
+        let fixed = (n + shape.inputs.len()) as u32;
+        let code = Routine { code: shape.code, solves: Vec::new(), outputs: shape.outputs, registers: 0 };
+        let packed = Packed::new(&code, fixed);
+        let entry = |i: usize, j: usize| shape.entries.iter().position(|&place| place as usize == i * n + j);
+        // What elimination fills.
+        let mut full: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| entry(i, j).is_some()).collect()).collect();
+        for k in 0..n {
+            let row: Vec<usize> = (k + 1..n).filter(|&j| full[k][j]).collect();
+            for &i in &row {
+                row.iter().filter(|&&j| j >= i).for_each(|&j| full[i][j] = true);
+            }
+        }
+        let columns: Vec<Vec<usize>> = (0..n).map(|i| (i + 1..n).filter(|&j| full[i][j]).collect()).collect();
+        let starts: Vec<usize> = (0..n).map(|i| columns[..i].iter().map(Vec::len).sum()).collect();
+        let place = |i: usize, j: usize| starts[i] + columns[i].iter().position(|&c| c == j).expect("filled");
+        let row = |i: usize| {
+            let right = columns[i].iter().map(|&j| (j, entry(i, j))).collect();
+            let after = |a: usize| columns[i][a + 1..].iter().map(|&j| place(columns[i][a], j)).collect();
+            let below = (0..columns[i].len()).map(after).collect();
+            Row { diagonal: entry(i, i), start: starts[i], right, below }
+        };
+        let rows = (0..n).map(row).collect();
+        Group { size: n, members, code, packed, entries: shape.entries, rows }
+    }
+}
+
+/// Working space: one number for each lane in every place.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Space {
+    registers: WideFrame,
+    kept: Vec<Wide>,
+    x: Vec<Wide>,
+    size: Vec<Wide>,
+    step: Vec<Wide>,
+    next: Vec<Wide>,
+    lead: Vec<Wide>,
+    opening: Vec<Wide>,
+    /// Factors: above the diagonal, row by row, and the inverse diagonal.
+    upper: Vec<Wide>,
+    inverse: Vec<Wide>,
+    /// The Jacobian where the solution followed stands, its entries.
+    base: Vec<Wide>,
+    /// Solutions, and the entries of the Jacobian there.
+    found: Vec<Wide>,
+    jacobian: Vec<Wide>,
+    /// Where each group was tried last.
+    tried: Vec<u64>,
+    /// Evaluations of routines so far.
+    pub turn: u64,
+}
+
+impl Space {
+    /// Makes room for the groups of a routine.
+    pub fn reserve(&mut self, abreast: &Abreast) {
+        let most = |of: &dyn Fn(&Group) -> usize| abreast.groups.iter().map(of).max().unwrap_or(0);
+        let (n, entries) = (most(&|g| g.size), most(&|g| g.entries.len()));
+        let upper = most(&|g| g.rows.iter().map(|row| row.right.len()).sum());
+        self.registers.reserve(most(&|g| g.packed.slots.max(g.size + g.members[0].inputs.len())));
+        for line in [
+            &mut self.kept,
+            &mut self.x,
+            &mut self.size,
+            &mut self.step,
+            &mut self.next,
+            &mut self.lead,
+            &mut self.opening,
+            &mut self.inverse,
+            &mut self.found,
+        ] {
+            line.resize(line.len().max(n), [0.0; LANES]);
+        }
+        self.upper.resize(self.upper.len().max(upper), [0.0; LANES]);
+        self.base.resize(self.base.len().max(entries), [0.0; LANES]);
+        self.jacobian.resize(self.jacobian.len().max(entries), [0.0; LANES]);
+        self.tried.resize(self.tried.len().max(abreast.groups.len()), 0);
+    }
+}
+
+impl Frame {
+    /// Solves the group of a block, if it has one that has not been tried in this turn.
+    pub(super) fn solve_abreast(&mut self, solve: &Solve) {
+        let Some(abreast) = &self.abreast else { return };
+        let Some(&number) = abreast.of.get(&solve.block.0) else { return };
+        if std::mem::replace(&mut self.space.tried[number], self.space.turn) == self.space.turn {
+            return;
+        }
+        let abreast = abreast.clone();
+        let group = &abreast.groups[number];
+        for members in group.members.chunks(LANES) {
+            let follows = |m: &Member| {
+                let newton = &self.solvers[m.block].newton;
+                newton.following && newton.most / 4 > EVALUATIONS
+            };
+            if members.iter().filter(|m| follows(m)).count() < FEWEST {
+                continue;
+            }
+            let mut good: [bool; LANES] = std::array::from_fn(|l| members.get(l).is_some_and(follows));
+            let mut space = std::mem::take(&mut self.space);
+            space.gather(group, members, self);
+            let arch = pulp::Arch::new();
+            arch.dispatch(Usual { space: &mut space, group, good: &mut good });
+            space.hand_over(group, members, self, &good);
+            self.space = space;
+        }
+    }
+}
+
+impl Space {
+    /// Takes up what the blocks read, and where they are; lanes without a block do as the first.
+    fn gather(&mut self, group: &Group, members: &[Member], frame: &Frame) {
+        let n = group.size;
+        for lane in 0..LANES {
+            let member = members.get(lane).unwrap_or(&members[0]);
+            let newton = &frame.solvers[member.block].newton;
+            (0..n).for_each(|i| self.kept[i][lane] = newton.memory[i]);
+            for (place, &r) in member.inputs.iter().enumerate() {
+                self.registers.r[n + place][lane] = frame.r[r as usize];
+            }
+            for (base, &place) in self.base.iter_mut().zip(&group.entries) {
+                base[lane] = newton.jacobian_memory[place as usize];
+            }
+        }
+    }
+
+    /// Gives the blocks what has been found.
+    fn hand_over(&self, group: &Group, members: &[Member], frame: &mut Frame, good: &[bool; LANES]) {
+        let n = group.size;
+        for (lane, member) in members.iter().enumerate().filter(|(lane, _)| good[*lane]) {
+            let newton = &mut frame.solvers[member.block].newton;
+            (0..n).for_each(|i| newton.x[i] = self.found[i][lane]);
+            for (jacobian, &place) in self.jacobian.iter().zip(&group.entries) {
+                newton.jacobian[place as usize] = jacobian[lane];
+            }
+            newton.outer.iter_mut().zip(&member.outer).for_each(|(value, &r)| *value = frame.r[r as usize]);
+            newton.fresh = true;
+        }
+    }
+}
+
+/// The usual way, to be gone with the vectors of the machine.
+struct Usual<'a> {
+    space: &'a mut Space,
+    group: &'a Group,
+    good: &'a mut [bool; LANES],
+}
+
+impl pulp::WithSimd for Usual<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        *self.good = self.space.solve(self.group, *self.good);
+    }
+}
+
+#[inline(always)]
+fn each(value: impl Fn(usize) -> f64) -> Wide {
+    std::array::from_fn(value)
+}
+
+/// The greater one; as `f64::max` where neither is NaN.
+#[inline(always)]
+fn greater(a: &Wide, b: &Wide) -> Wide {
+    each(|l| if b[l] > a[l] { b[l] } else { a[l] })
+}
+
+impl Space {
+    /// Which lanes have come to their solution, which is left in `found`.
+    #[inline(always)]
+    fn solve(&mut self, group: &Group, used: [bool; LANES]) -> [bool; LANES] {
+        let n = group.size;
+        let mut good = used;
+        for i in 0..n {
+            self.x[i] = self.kept[i];
+            self.size[i] = each(|l| self.kept[i][l].abs());
+            self.lead[i] = [0.0; LANES];
+            self.opening[i] = [0.0; LANES];
+        }
+        let mut solved = [false; LANES];
+        self.evaluate(group, false);
+        for iteration in 0..ITERATIONS {
+            // A residual of zero ends a lane before the others.
+            let residual = self.residual(group);
+            (0..LANES).for_each(|l| good[l] &= residual[l] != 0.0);
+            self.factor(group, &mut good);
+            self.right(group);
+            if iteration == 0 {
+                self.opening[..n].copy_from_slice(&self.next[..n]);
+            }
+            self.back(group);
+            self.step[..n].copy_from_slice(&self.next[..n]);
+            if iteration == 0 {
+                self.lead[..n].copy_from_slice(&self.next[..n]);
+            }
+            let mut size = [0.0; LANES];
+            for i in 0..n {
+                let step = each(|l| self.step[i][l].abs());
+                let scale = greater(&greater(&self.size[i], &step), &[f64::MIN_POSITIVE; LANES]);
+                (0..LANES).for_each(|l| good[l] &= step[l].is_finite());
+                size = greater(&size, &each(|l| step[l] / scale[l]));
+            }
+            self.evaluate(group, true);
+            self.right(group);
+            self.back(group);
+            let mut next = [0.0; LANES];
+            for i in 0..n {
+                let step = each(|l| self.step[i][l].abs());
+                let scale = greater(&greater(&self.size[i], &step), &[f64::MIN_POSITIVE; LANES]);
+                (0..LANES).for_each(|l| good[l] &= !self.next[i][l].is_nan());
+                next = greater(&next, &each(|l| self.next[i][l].abs() / scale[l]));
+            }
+            let (mut done, mut finished) = ([false; LANES], [false; LANES]);
+            for l in 0..LANES {
+                good[l] &= next[l].is_finite() && (next[l] <= 0.75 * size[l] || size[l] <= 2.0 * f64::EPSILON);
+                let near = next[l] <= NEAR * size[l] || size[l] <= SETTLED;
+                // A first step that leaves much to do is no usual one.
+                good[l] &= iteration > 0 || near;
+                finished[l] = near && next[l] * next[l] <= FINISHED * size[l];
+                done[l] = finished[l] || size[l] <= 4.0 * f64::EPSILON;
+            }
+            for i in 0..n {
+                let trial = each(|l| self.x[i][l] + self.step[i][l]);
+                let moved = each(|l| if finished[l] { trial[l] + self.next[i][l] } else { trial[l] });
+                self.size[i] = greater(&self.size[i], &each(|l| trial[l].abs()));
+                self.size[i] = greater(&self.size[i], &each(|l| moved[l].abs()));
+                self.x[i] = moved;
+            }
+            let mut there: [bool; LANES] = std::array::from_fn(|l| good[l] && done[l]);
+            if there.contains(&true) {
+                self.goes_on(group, &mut there);
+                self.keep(group, &mut there);
+                (0..LANES).for_each(|l| solved[l] |= there[l]);
+                (0..LANES).for_each(|l| good[l] &= !done[l]);
+            }
+            if !good.contains(&true) {
+                break;
+            }
+        }
+        solved
+    }
+
+    /// Takes note of the lanes that are where they should be, if all is finite there.
+    #[inline(always)]
+    fn keep(&mut self, group: &Group, there: &mut [bool; LANES]) {
+        for &slot in &group.packed.outputs {
+            let value = &self.registers.r[slot as usize];
+            (0..LANES).for_each(|l| there[l] &= value[l].is_finite());
+        }
+        for (found, x) in self.found.iter_mut().zip(&self.x) {
+            *found = each(|l| if there[l] { x[l] } else { found[l] });
+        }
+        for (jacobian, &slot) in self.jacobian.iter_mut().zip(&group.packed.outputs[..group.entries.len()]) {
+            let value = &self.registers.r[slot as usize];
+            *jacobian = each(|l| if there[l] { value[l] } else { jacobian[l] });
+        }
+    }
+
+    /// Runs the inner code at `x`, or a step from there.
+    #[inline(always)]
+    fn evaluate(&mut self, group: &Group, trial: bool) {
+        for i in 0..group.size {
+            self.registers.r[i] = match trial {
+                true => each(|l| self.x[i][l] + self.step[i][l]),
+                false => self.x[i],
+            };
+        }
+        let mut nobody: [Frame; 0] = [];
+        self.registers.all(&group.code, &group.packed, &mut nobody, &mut [true; LANES]);
+    }
+
+    /// Greatest residual.
+    #[inline(always)]
+    fn residual(&self, group: &Group) -> Wide {
+        let slots = &group.packed.outputs[group.entries.len()..];
+        slots.iter().fold([0.0; LANES], |most, &slot| {
+            let value = &self.registers.r[slot as usize];
+            greater(&most, &each(|l| value[l].abs()))
+        })
+    }
+
+    /// Puts the right-hand side of the Newton step into `next`.
+    #[inline(always)]
+    fn right(&mut self, group: &Group) {
+        let slots = &group.packed.outputs[group.entries.len()..];
+        for (next, &slot) in self.next.iter_mut().zip(slots) {
+            let value = &self.registers.r[slot as usize];
+            *next = each(|l| 0.0 - value[l]);
+        }
+    }
+
+    /// Factors the matrix, as `Lu` does; `good` loses those that are not definite.
+    #[inline(always)]
+    fn factor(&mut self, group: &Group, good: &mut [bool; LANES]) {
+        let n = group.size;
+        let entry = |this: &Self, e: Option<usize>| {
+            e.map_or([0.0; LANES], |e| this.registers.r[group.packed.outputs[e] as usize])
+        };
+        if n == 1 {
+            let a = entry(self, group.rows[0].diagonal);
+            for l in 0..LANES {
+                let size = a[l].abs();
+                let weight = size / if size > f64::MIN_POSITIVE { size } else { f64::MIN_POSITIVE };
+                good[l] &= weight > f64::EPSILON && weight < f64::INFINITY;
+            }
+            self.inverse[0] = a;
+            return;
+        }
+        for (i, row) in group.rows.iter().enumerate() {
+            self.inverse[i] = entry(self, row.diagonal);
+            for (a, &(_, e)) in row.right.iter().enumerate() {
+                self.upper[row.start + a] = entry(self, e);
+            }
+        }
+        let first = self.inverse[0];
+        let sign = each(|l| 1f64.copysign(first[l]));
+        for (k, row) in group.rows.iter().enumerate() {
+            let (pivot, diagonal) = (self.inverse[k], entry(self, row.diagonal));
+            for l in 0..LANES {
+                let (size, entry) = (sign[l] * pivot[l], sign[l] * diagonal[l]);
+                good[l] &= size > 0.0 && size > f64::EPSILON * n as f64 * entry && size < f64::INFINITY;
+            }
+            let inverse = each(|l| 1.0 / pivot[l]);
+            for (a, (&(i, _), below)) in row.right.iter().zip(&row.below).enumerate() {
+                let u = self.upper[row.start + a];
+                let factor = each(|l| u[l] * inverse[l]);
+                self.inverse[i] = each(|l| self.inverse[i][l] - factor[l] * u[l]);
+                for (&at, other) in below.iter().zip(row.start + a + 1..) {
+                    let other = self.upper[other];
+                    self.upper[at] = each(|l| self.upper[at][l] - factor[l] * other[l]);
+                }
+            }
+            for u in &mut self.upper[row.start..][..row.right.len()] {
+                *u = each(|l| u[l] * inverse[l]);
+            }
+            self.inverse[k] = inverse;
+        }
+    }
+
+    /// Replaces `next` by the solution.
+    #[inline(always)]
+    fn back(&mut self, group: &Group) {
+        let n = group.size;
+        if n == 1 {
+            self.next[0] = each(|l| self.next[0][l] / self.inverse[0][l]);
+            return;
+        }
+        self.next[..n].iter_mut().for_each(|b| *b = each(|l| b[l] + 0.0));
+        for (k, row) in group.rows.iter().enumerate() {
+            let done = self.next[k];
+            for (u, &(j, _)) in self.upper[row.start..].iter().zip(&row.right) {
+                self.next[j] = each(|l| self.next[j][l] - u[l] * done[l]);
+            }
+        }
+        for (next, inverse) in self.next[..n].iter_mut().zip(&self.inverse) {
+            *next = each(|l| next[l] * inverse[l] + 0.0);
+        }
+        // What an unknown takes off those before it, from the last one on.
+        for (k, row) in group.rows.iter().enumerate().rev() {
+            let mut value = self.next[k];
+            for (u, &(j, _)) in self.upper[row.start..][..row.right.len()].iter().zip(&row.right).rev() {
+                let done = &self.next[j];
+                value = each(|l| value[l] - u[l] * done[l]);
+            }
+            self.next[k] = value;
+        }
+    }
+
+    /// Whether each solution is without doubt the one that goes on from where the lane began.
+    #[inline(always)]
+    fn goes_on(&mut self, group: &Group, good: &mut [bool; LANES]) {
+        let n = group.size;
+        let mut most = [SETTLED; LANES];
+        let mut off = [0.0; LANES];
+        for i in 0..n {
+            let lead = each(|l| self.lead[i][l].abs());
+            let scale = greater(&greater(&self.size[i], &lead), &[f64::MIN_POSITIVE; LANES]);
+            most = greater(&most, &each(|l| lead[l] / scale[l]));
+            self.next[i] = each(|l| self.x[i][l] - self.kept[i][l]);
+        }
+        self.widen(n, &mut off);
+        self.next[..n].copy_from_slice(&self.opening[..n]);
+        self.back(group);
+        self.widen(n, &mut off);
+        self.next[..n].fill([-0.0; LANES]);
+        for (e, &place) in group.entries.iter().enumerate() {
+            let (row, column) = (place as usize / n, place as usize % n);
+            self.next[row] = each(|l| self.next[row][l] + self.base[e][l] * self.lead[column][l]);
+        }
+        self.back(group);
+        self.widen(n, &mut off);
+        (0..LANES).for_each(|l| good[l] &= off[l] <= 0.5 * most[l]);
+    }
+
+    /// How far `next` is from the first step.
+    #[inline(always)]
+    fn widen(&self, n: usize, off: &mut Wide) {
+        for i in 0..n {
+            let lead = each(|l| self.lead[i][l].abs());
+            let scale = greater(&greater(&self.size[i], &lead), &[f64::MIN_POSITIVE; LANES]);
+            for l in 0..LANES {
+                let away = (self.next[i][l] - self.lead[i][l]).abs() / scale[l];
+                off[l] = if away.is_nan() {
+                    f64::INFINITY
+                } else if away > off[l] {
+                    away
+                } else {
+                    off[l]
+                };
+            }
+        }
+    }
+}
