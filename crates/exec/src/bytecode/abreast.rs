@@ -8,9 +8,9 @@ use super::frame::Frame;
 use super::newton::{FINISHED, NEAR, SETTLED, has_conditions};
 use super::operands::{moved, reads, written};
 use super::packed::Packed;
-use super::wide::WideFrame;
+use super::wide::{Line, WideFrame};
 use halfarrow_compiler::program::{Instruction, Program, Register, Routine, Solve};
-use halfarrow_sim::wide::{LANES, Wide};
+use halfarrow_sim::wide::LANES;
 use std::collections::BTreeMap;
 
 /// Iterations at most.
@@ -201,21 +201,21 @@ impl Group {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Space {
     registers: WideFrame,
-    kept: Vec<Wide>,
-    x: Vec<Wide>,
-    size: Vec<Wide>,
-    step: Vec<Wide>,
-    next: Vec<Wide>,
-    lead: Vec<Wide>,
-    opening: Vec<Wide>,
+    kept: Vec<Line>,
+    x: Vec<Line>,
+    size: Vec<Line>,
+    step: Vec<Line>,
+    next: Vec<Line>,
+    lead: Vec<Line>,
+    opening: Vec<Line>,
     /// Factors: above the diagonal, row by row, and the inverse diagonal.
-    upper: Vec<Wide>,
-    inverse: Vec<Wide>,
+    upper: Vec<Line>,
+    inverse: Vec<Line>,
     /// The Jacobian where the solution followed stands, its entries.
-    base: Vec<Wide>,
+    base: Vec<Line>,
     /// Solutions, and the entries of the Jacobian there.
-    found: Vec<Wide>,
-    jacobian: Vec<Wide>,
+    found: Vec<Line>,
+    jacobian: Vec<Line>,
     /// Where each group was tried last.
     tried: Vec<u64>,
     /// Evaluations of routines so far.
@@ -240,11 +240,11 @@ impl Space {
             &mut self.inverse,
             &mut self.found,
         ] {
-            line.resize(line.len().max(n), [0.0; LANES]);
+            line.resize(line.len().max(n), Line::default());
         }
-        self.upper.resize(self.upper.len().max(upper), [0.0; LANES]);
-        self.base.resize(self.base.len().max(entries), [0.0; LANES]);
-        self.jacobian.resize(self.jacobian.len().max(entries), [0.0; LANES]);
+        self.upper.resize(self.upper.len().max(upper), Line::default());
+        self.base.resize(self.base.len().max(entries), Line::default());
+        self.jacobian.resize(self.jacobian.len().max(entries), Line::default());
         self.tried.resize(self.tried.len().max(abreast.groups.len()), 0);
     }
 }
@@ -326,15 +326,32 @@ impl pulp::WithSimd for Usual<'_> {
     }
 }
 
+const NONE: Line = Line([0.0; LANES]);
+
 #[inline(always)]
-fn each(value: impl Fn(usize) -> f64) -> Wide {
-    std::array::from_fn(value)
+fn each(value: impl Fn(usize) -> f64) -> Line {
+    Line(std::array::from_fn(value))
+}
+
+/// 1 where something holds, 0 elsewhere: truth values that stay in the vectors of the machine.
+#[inline(always)]
+fn truth(holds: impl Fn(usize) -> bool) -> Line {
+    each(|l| if holds(l) { 1.0 } else { 0.0 })
 }
 
 /// The greater one; as `f64::max` where neither is NaN.
 #[inline(always)]
-fn greater(a: &Wide, b: &Wide) -> Wide {
+fn greater(a: &Line, b: &Line) -> Line {
     each(|l| if b[l] > a[l] { b[l] } else { a[l] })
+}
+
+/// What a step is measured by: the magnitude of its unknown, its own, or the least number.
+#[inline(always)]
+fn scale(size: &Line, step: &Line) -> Line {
+    each(|l| {
+        let most = if step[l] > size[l] { step[l] } else { size[l] };
+        if most > f64::MIN_POSITIVE { most } else { f64::MIN_POSITIVE }
+    })
 }
 
 impl Space {
@@ -342,19 +359,27 @@ impl Space {
     #[inline(always)]
     fn solve(&mut self, group: &Group, used: [bool; LANES]) -> [bool; LANES] {
         let n = group.size;
-        let mut good = used;
+        let mut good = truth(|l| used[l]);
         for i in 0..n {
             self.x[i] = self.kept[i];
             self.size[i] = each(|l| self.kept[i][l].abs());
-            self.lead[i] = [0.0; LANES];
-            self.opening[i] = [0.0; LANES];
         }
         let mut solved = [false; LANES];
         self.evaluate(group, false);
         for iteration in 0..ITERATIONS {
-            // A residual of zero ends a lane before the others.
             let residual = self.residual(group);
-            (0..LANES).for_each(|l| good[l] &= residual[l] != 0.0);
+            let mut there = truth(|l| (good[l] != 0.0) & (residual[l] == 0.0));
+            if there.contains(&1.0) {
+                good = each(|l| if there[l] != 0.0 { 0.0 } else { good[l] });
+                if iteration > 0 {
+                    self.goes_on(group, &mut there);
+                }
+                self.keep(group, &mut there);
+                (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
+                if !good.contains(&1.0) {
+                    break;
+                }
+            }
             self.factor(group, &mut good);
             self.right(group);
             if iteration == 0 {
@@ -365,47 +390,47 @@ impl Space {
             if iteration == 0 {
                 self.lead[..n].copy_from_slice(&self.next[..n]);
             }
-            let mut size = [0.0; LANES];
+            let mut size = NONE;
             for i in 0..n {
                 let step = each(|l| self.step[i][l].abs());
-                let scale = greater(&greater(&self.size[i], &step), &[f64::MIN_POSITIVE; LANES]);
-                (0..LANES).for_each(|l| good[l] &= step[l].is_finite());
+                let scale = scale(&self.size[i], &step);
+                good = each(|l| if step[l] < f64::INFINITY { good[l] } else { 0.0 });
                 size = greater(&size, &each(|l| step[l] / scale[l]));
             }
             self.evaluate(group, true);
             self.right(group);
             self.back(group);
-            let mut next = [0.0; LANES];
+            let mut next = NONE;
             for i in 0..n {
-                let step = each(|l| self.step[i][l].abs());
-                let scale = greater(&greater(&self.size[i], &step), &[f64::MIN_POSITIVE; LANES]);
-                (0..LANES).for_each(|l| good[l] &= !self.next[i][l].is_nan());
-                next = greater(&next, &each(|l| self.next[i][l].abs() / scale[l]));
+                let (step, after) = (each(|l| self.step[i][l].abs()), each(|l| self.next[i][l].abs()));
+                let scale = scale(&self.size[i], &step);
+                good = each(|l| if after[l] < f64::INFINITY { good[l] } else { 0.0 });
+                next = greater(&next, &each(|l| after[l] / scale[l]));
             }
-            let (mut done, mut finished) = ([false; LANES], [false; LANES]);
-            for l in 0..LANES {
-                good[l] &= next[l].is_finite() && (next[l] <= 0.75 * size[l] || size[l] <= 2.0 * f64::EPSILON);
-                let near = next[l] <= NEAR * size[l] || size[l] <= SETTLED;
+            let shrinks = truth(|l| (next[l] <= 0.75 * size[l]) | (size[l] <= 2.0 * f64::EPSILON));
+            let near = truth(|l| (next[l] <= NEAR * size[l]) | (size[l] <= SETTLED));
+            let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= FINISHED * size[l]));
+            let done = truth(|l| (finished[l] != 0.0) | (size[l] <= 4.0 * f64::EPSILON));
+            good = each(|l| good[l] * shrinks[l]);
+            if iteration == 0 {
                 // A first step that leaves much to do is no usual one.
-                good[l] &= iteration > 0 || near;
-                finished[l] = near && next[l] * next[l] <= FINISHED * size[l];
-                done[l] = finished[l] || size[l] <= 4.0 * f64::EPSILON;
+                good = each(|l| good[l] * near[l]);
             }
             for i in 0..n {
                 let trial = each(|l| self.x[i][l] + self.step[i][l]);
-                let moved = each(|l| if finished[l] { trial[l] + self.next[i][l] } else { trial[l] });
-                self.size[i] = greater(&self.size[i], &each(|l| trial[l].abs()));
-                self.size[i] = greater(&self.size[i], &each(|l| moved[l].abs()));
+                let moved = each(|l| if finished[l] != 0.0 { trial[l] + self.next[i][l] } else { trial[l] });
+                let size = greater(&self.size[i], &each(|l| trial[l].abs()));
+                self.size[i] = greater(&size, &each(|l| moved[l].abs()));
                 self.x[i] = moved;
             }
-            let mut there: [bool; LANES] = std::array::from_fn(|l| good[l] && done[l]);
-            if there.contains(&true) {
+            let mut there = each(|l| good[l] * done[l]);
+            if there.contains(&1.0) {
                 self.goes_on(group, &mut there);
                 self.keep(group, &mut there);
-                (0..LANES).for_each(|l| solved[l] |= there[l]);
-                (0..LANES).for_each(|l| good[l] &= !done[l]);
+                (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
+                good = each(|l| if done[l] != 0.0 { 0.0 } else { good[l] });
             }
-            if !good.contains(&true) {
+            if !good.contains(&1.0) {
                 break;
             }
         }
@@ -414,17 +439,17 @@ impl Space {
 
     /// Takes note of the lanes that are where they should be, if all is finite there.
     #[inline(always)]
-    fn keep(&mut self, group: &Group, there: &mut [bool; LANES]) {
+    fn keep(&mut self, group: &Group, there: &mut Line) {
         for &slot in &group.packed.outputs {
             let value = &self.registers.r[slot as usize];
-            (0..LANES).for_each(|l| there[l] &= value[l].is_finite());
+            *there = each(|l| if value[l].abs() < f64::INFINITY { there[l] } else { 0.0 });
         }
-        for (found, x) in self.found.iter_mut().zip(&self.x) {
-            *found = each(|l| if there[l] { x[l] } else { found[l] });
+        for (found, x) in self.found.iter_mut().zip(&self.x[..group.size]) {
+            *found = each(|l| if there[l] != 0.0 { x[l] } else { found[l] });
         }
         for (jacobian, &slot) in self.jacobian.iter_mut().zip(&group.packed.outputs[..group.entries.len()]) {
             let value = &self.registers.r[slot as usize];
-            *jacobian = each(|l| if there[l] { value[l] } else { jacobian[l] });
+            *jacobian = each(|l| if there[l] != 0.0 { value[l] } else { jacobian[l] });
         }
     }
 
@@ -443,9 +468,9 @@ impl Space {
 
     /// Greatest residual.
     #[inline(always)]
-    fn residual(&self, group: &Group) -> Wide {
+    fn residual(&self, group: &Group) -> Line {
         let slots = &group.packed.outputs[group.entries.len()..];
-        slots.iter().fold([0.0; LANES], |most, &slot| {
+        slots.iter().fold(NONE, |most, &slot| {
             let value = &self.registers.r[slot as usize];
             greater(&most, &each(|l| value[l].abs()))
         })
@@ -463,35 +488,37 @@ impl Space {
 
     /// Factors the matrix, as `Lu` does; `good` loses those that are not definite.
     #[inline(always)]
-    fn factor(&mut self, group: &Group, good: &mut [bool; LANES]) {
+    fn factor(&mut self, group: &Group, good: &mut Line) {
         let n = group.size;
-        let entry = |this: &Self, e: Option<usize>| {
-            e.map_or([0.0; LANES], |e| this.registers.r[group.packed.outputs[e] as usize])
-        };
+        let entry =
+            |this: &Self, e: Option<usize>| e.map_or(NONE, |e| this.registers.r[group.packed.outputs[e] as usize]);
         if n == 1 {
             let a = entry(self, group.rows[0].diagonal);
-            for l in 0..LANES {
-                let size = a[l].abs();
-                let weight = size / if size > f64::MIN_POSITIVE { size } else { f64::MIN_POSITIVE };
-                good[l] &= weight > f64::EPSILON && weight < f64::INFINITY;
-            }
+            let size = each(|l| a[l].abs());
+            let weight = each(|l| size[l] / if size[l] > f64::MIN_POSITIVE { size[l] } else { f64::MIN_POSITIVE });
+            *good = each(|l| {
+                let stands = (weight[l] > f64::EPSILON) & (weight[l] < f64::INFINITY);
+                if stands { good[l] } else { 0.0 }
+            });
             self.inverse[0] = a;
             return;
         }
         for (i, row) in group.rows.iter().enumerate() {
             self.inverse[i] = entry(self, row.diagonal);
-            for (a, &(_, e)) in row.right.iter().enumerate() {
-                self.upper[row.start + a] = entry(self, e);
+            for (upper, &(_, e)) in self.upper[row.start..].iter_mut().zip(&row.right) {
+                *upper = e.map_or(NONE, |e| self.registers.r[group.packed.outputs[e] as usize]);
             }
         }
         let first = self.inverse[0];
         let sign = each(|l| 1f64.copysign(first[l]));
+        let least = f64::EPSILON * n as f64;
         for (k, row) in group.rows.iter().enumerate() {
             let (pivot, diagonal) = (self.inverse[k], entry(self, row.diagonal));
-            for l in 0..LANES {
+            *good = each(|l| {
                 let (size, entry) = (sign[l] * pivot[l], sign[l] * diagonal[l]);
-                good[l] &= size > 0.0 && size > f64::EPSILON * n as f64 * entry && size < f64::INFINITY;
-            }
+                let stands = (size > 0.0) & (size > least * entry) & (size < f64::INFINITY);
+                if stands { good[l] } else { 0.0 }
+            });
             let inverse = each(|l| 1.0 / pivot[l]);
             for (a, (&(i, _), below)) in row.right.iter().zip(&row.below).enumerate() {
                 let u = self.upper[row.start + a];
@@ -540,46 +567,40 @@ impl Space {
 
     /// Whether each solution is without doubt the one that goes on from where the lane began.
     #[inline(always)]
-    fn goes_on(&mut self, group: &Group, good: &mut [bool; LANES]) {
+    fn goes_on(&mut self, group: &Group, good: &mut Line) {
         let n = group.size;
-        let mut most = [SETTLED; LANES];
-        let mut off = [0.0; LANES];
+        let mut most = Line([SETTLED; LANES]);
+        let mut off = NONE;
         for i in 0..n {
             let lead = each(|l| self.lead[i][l].abs());
-            let scale = greater(&greater(&self.size[i], &lead), &[f64::MIN_POSITIVE; LANES]);
+            let scale = scale(&self.size[i], &lead);
             most = greater(&most, &each(|l| lead[l] / scale[l]));
             self.next[i] = each(|l| self.x[i][l] - self.kept[i][l]);
         }
-        self.widen(n, &mut off);
+        self.widen(n, &mut off, good);
         self.next[..n].copy_from_slice(&self.opening[..n]);
         self.back(group);
-        self.widen(n, &mut off);
-        self.next[..n].fill([-0.0; LANES]);
-        for (e, &place) in group.entries.iter().enumerate() {
+        self.widen(n, &mut off, good);
+        self.next[..n].fill(Line([-0.0; LANES]));
+        for (base, &place) in self.base.iter().zip(&group.entries) {
             let (row, column) = (place as usize / n, place as usize % n);
-            self.next[row] = each(|l| self.next[row][l] + self.base[e][l] * self.lead[column][l]);
+            let lead = &self.lead[column];
+            self.next[row] = each(|l| self.next[row][l] + base[l] * lead[l]);
         }
         self.back(group);
-        self.widen(n, &mut off);
-        (0..LANES).for_each(|l| good[l] &= off[l] <= 0.5 * most[l]);
+        self.widen(n, &mut off, good);
+        *good = each(|l| if off[l] <= 0.5 * most[l] { good[l] } else { 0.0 });
     }
 
-    /// How far `next` is from the first step.
+    /// How far `next` is from the first step; `good` loses those of which nobody knows.
     #[inline(always)]
-    fn widen(&self, n: usize, off: &mut Wide) {
+    fn widen(&self, n: usize, off: &mut Line, good: &mut Line) {
         for i in 0..n {
-            let lead = each(|l| self.lead[i][l].abs());
-            let scale = greater(&greater(&self.size[i], &lead), &[f64::MIN_POSITIVE; LANES]);
-            for l in 0..LANES {
-                let away = (self.next[i][l] - self.lead[i][l]).abs() / scale[l];
-                off[l] = if away.is_nan() {
-                    f64::INFINITY
-                } else if away > off[l] {
-                    away
-                } else {
-                    off[l]
-                };
-            }
+            let lead = &self.lead[i];
+            let scale = scale(&self.size[i], &each(|l| lead[l].abs()));
+            let away = each(|l| (self.next[i][l] - lead[l]).abs() / scale[l]);
+            *good = each(|l| if away[l] < f64::INFINITY { good[l] } else { 0.0 });
+            *off = greater(off, &away);
         }
     }
 }

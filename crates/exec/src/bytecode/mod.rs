@@ -16,4 +16,4 @@ pub(crate) use lu::Lu;
 #[cfg(feature = "machine")]
 pub(crate) use operands::{reads, written};
 pub(crate) use packed::Packed;
-pub(crate) use wide::{Lane, WideFrame};
+pub(crate) use wide::{Lane, Line, WideFrame};

@@ -15,10 +15,31 @@ pub(crate) trait Lane {
     fn frame(&mut self) -> &mut Frame;
 }
 
+/// A number for each lane, in a cache line of its own.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(crate) struct Line(pub Wide);
+
+impl std::ops::Deref for Line {
+    type Target = Wide;
+
+    #[inline(always)]
+    fn deref(&self) -> &Wide {
+        &self.0
+    }
+}
+
+impl std::ops::DerefMut for Line {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Wide {
+        &mut self.0
+    }
+}
+
 /// The registers of all lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WideFrame {
-    pub r: Vec<Wide>,
+    pub r: Vec<Line>,
     arch: pulp::Arch,
 }
 
@@ -44,7 +65,7 @@ impl<L: Lane> pulp::WithSimd for All<'_, L> {
 impl WideFrame {
     /// Makes room for a routine.
     pub fn reserve(&mut self, registers: usize) {
-        self.r.resize(self.r.len().max(registers), [0.0; LANES]);
+        self.r.resize(self.r.len().max(registers), Line::default());
     }
 
     /// Runs a routine, packed, for all lanes; `good` loses those that run into trouble. The fixed registers have been
@@ -84,7 +105,7 @@ impl WideFrame {
     fn many(&mut self, all: &[[u32; 3]], value: impl Fn(f64, f64) -> f64) {
         for &[out, a, b] in all {
             let (a, b) = (self.r[a as usize], self.r[b as usize]);
-            self.r[out as usize] = std::array::from_fn(|l| value(a[l], b[l]));
+            self.r[out as usize] = Line(std::array::from_fn(|l| value(a[l], b[l])));
         }
     }
 
@@ -103,21 +124,21 @@ impl WideFrame {
 
     #[inline(always)]
     fn each(&mut self, out: u32, value: impl Fn(usize) -> f64) {
-        self.r[out as usize] = std::array::from_fn(value);
+        self.r[out as usize] = Line(std::array::from_fn(value));
     }
 
     #[inline(always)]
     fn step<L: Lane>(&mut self, instruction: &Instruction, frames: &mut [L]) {
         use Instruction::*;
-        let r = |i: u32| self.r[i as usize];
+        let r = |i: u32| self.r[i as usize].0;
         let truth = f64::from;
         match *instruction {
             Powi { out, a, n } => {
                 let a = r(a);
-                self.r[out as usize] = powers(a, n);
+                self.r[out as usize] = Line(powers(a, n));
             }
-            Pow { out, a, b } => self.r[out as usize] = math::pow_lanes(&r(a), &r(b)),
-            Call { f, out, a } => self.r[out as usize] = math::call_lanes(f, &r(a)),
+            Pow { out, a, b } => self.r[out as usize] = Line(math::pow_lanes(&r(a), &r(b))),
+            Call { f, out, a } => self.r[out as usize] = Line(math::call_lanes(f, &r(a))),
             Call2 { f, out, a, b } => {
                 let (a, b) = (r(a), r(b));
                 self.each(out, |l| math::call2(f, a[l], b[l]));

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::system::What;
-use crate::bytecode::{Frame, Lane, Packed, WideFrame};
+use crate::bytecode::{Frame, Lane, Line, Packed, WideFrame};
 use halfarrow_compiler::program::Routine;
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
 use halfarrow_sim::{Failure, System};
@@ -53,7 +53,7 @@ impl WideModel {
     pub fn begin(&mut self) {
         let first = &self.models[0];
         for register in 0..first.layout.size as usize {
-            self.frame.r[register] = std::array::from_fn(|lane| self.models[lane].frame.r[register]);
+            self.frame.r[register] = Line(std::array::from_fn(|lane| self.models[lane].frame.r[register]));
         }
     }
 
@@ -61,8 +61,8 @@ impl WideModel {
     fn place(&mut self, t: &Wide, x: &[Wide]) {
         let WideModel { models, frame, .. } = self;
         let (states, time) = (models[0].layout.states as usize, models[0].layout.time as usize);
-        frame.r[states..states + x.len()].copy_from_slice(x);
-        frame.r[time] = *t;
+        frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Line(*x));
+        frame.r[time] = Line(*t);
         if states == time + 1 {
             return; // no inputs, held signals or constants
         }
@@ -115,7 +115,7 @@ impl WideModel {
         let (routine, packed) = if let What::Rates = what { &self.rates } else { &self.observe };
         self.frame.run(routine, packed, &mut self.models, &mut good);
         for (out, &slot) in out.iter_mut().zip(&packed.outputs) {
-            *out = self.frame.r[slot as usize];
+            *out = self.frame.r[slot as usize].0;
             (0..LANES).for_each(|lane| good[lane] &= out[lane].is_finite());
         }
         for lane in (0..LANES).filter(|&lane| wanted[lane] && !good[lane]) {
