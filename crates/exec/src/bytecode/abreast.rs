@@ -8,10 +8,14 @@ use super::frame::Frame;
 use super::newton::{FINISHED, NEAR, SETTLED, has_conditions};
 use super::operands::{moved, reads, written};
 use super::packed::Packed;
-use super::wide::{Line, WideFrame};
+use super::wide::{self, WideFrame};
 use halfarrow_compiler::program::{Instruction, Program, Register, Routine, Solve};
-use halfarrow_sim::wide::LANES;
 use std::collections::BTreeMap;
+
+/// Blocks that are solved at once: as many as it takes to keep the processor busy, since each step of an elimination
+/// waits for the one before.
+const LANES: usize = 16;
+type Line = wide::Line<LANES>;
 
 /// Iterations at most.
 const ITERATIONS: usize = 8;
@@ -36,6 +40,8 @@ struct Group {
     /// Number of unknowns.
     size: usize,
     members: Vec<Member>,
+    /// Which memory the first lanes have.
+    first: usize,
     /// The inner code of all of them: guesses, then what is read from outside, then what is computed.
     code: Routine,
     packed: Packed,
@@ -101,8 +107,15 @@ impl Abreast {
             let all = inner.chain(solve.guess.iter().copied()).chain(solve.unknowns.iter().copied());
             all.for_each(|out| _ = written_at.insert(out, at));
         }
-        let groups: Vec<Group> =
-            open.into_iter().filter(|(_, _, members)| members.len() >= FEWEST).map(Group::of).collect();
+        let mut first = 0;
+        let together = open.into_iter().filter(|(_, _, members)| members.len() >= FEWEST);
+        let groups: Vec<Group> = together
+            .map(|(shape, _, members)| {
+                let lanes = members.len().div_ceil(LANES);
+                first += lanes;
+                Group::of(shape, members, first - lanes)
+            })
+            .collect();
         let members = groups.iter().enumerate().flat_map(|(g, group)| group.members.iter().map(move |m| (m, g)));
         let of: BTreeMap<u32, usize> = members.map(|(member, g)| (member.block as u32, g)).collect();
         (!groups.is_empty()).then_some(Abreast { groups, of })
@@ -169,7 +182,7 @@ impl Shape {
 }
 
 impl Group {
-    fn of((shape, _, members): (Shape, usize, Vec<Member>)) -> Group {
+    fn of(shape: Shape, members: Vec<Member>, first: usize) -> Group {
         let n = shape.size;
         let fixed = (n + shape.inputs.len()) as u32;
         let code = Routine { code: shape.code, solves: Vec::new(), outputs: shape.outputs, registers: 0 };
@@ -193,15 +206,27 @@ impl Group {
             Row { diagonal: entry(i, i), start: starts[i], right, below }
         };
         let rows = (0..n).map(row).collect();
-        Group { size: n, members, code, packed, entries: shape.entries, rows }
+        Group { size: n, members, first, code, packed, entries: shape.entries, rows }
     }
+}
+
+/// The solutions that lanes follow, and the entries of the Jacobian there.
+#[derive(Debug, Clone, Default)]
+struct Memory {
+    /// The blocks, and the versions of their memories that these are.
+    of: [(usize, u64); LANES],
+    kept: Vec<Line>,
+    base: Vec<Line>,
 }
 
 /// Working space: one number for each lane in every place.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Space {
-    registers: WideFrame,
-    kept: Vec<Line>,
+    registers: WideFrame<LANES>,
+    /// What lanes remember, for each time that a group is gone through with all lanes.
+    memories: Vec<Memory>,
+    /// Which of them is in use.
+    memory: usize,
     x: Vec<Line>,
     size: Vec<Line>,
     step: Vec<Line>,
@@ -211,8 +236,6 @@ pub(crate) struct Space {
     /// Factors: above the diagonal, row by row, and the inverse diagonal.
     upper: Vec<Line>,
     inverse: Vec<Line>,
-    /// The Jacobian where the solution followed stands, its entries.
-    base: Vec<Line>,
     /// Solutions, and the entries of the Jacobian there.
     found: Vec<Line>,
     jacobian: Vec<Line>,
@@ -230,7 +253,6 @@ impl Space {
         let upper = most(&|g| g.rows.iter().map(|row| row.right.len()).sum());
         self.registers.reserve(most(&|g| g.packed.slots.max(g.size + g.members[0].inputs.len())));
         for line in [
-            &mut self.kept,
             &mut self.x,
             &mut self.size,
             &mut self.step,
@@ -243,9 +265,14 @@ impl Space {
             line.resize(line.len().max(n), Line::default());
         }
         self.upper.resize(self.upper.len().max(upper), Line::default());
-        self.base.resize(self.base.len().max(entries), Line::default());
         self.jacobian.resize(self.jacobian.len().max(entries), Line::default());
         self.tried.resize(self.tried.len().max(abreast.groups.len()), 0);
+        let memories = most(&|g| g.first + g.members.len().div_ceil(LANES));
+        self.memories.resize(self.memories.len().max(memories), Memory::default());
+        for memory in &mut self.memories {
+            memory.kept.resize(memory.kept.len().max(n), Line::default());
+            memory.base.resize(memory.base.len().max(entries), Line::default());
+        }
     }
 }
 
@@ -259,7 +286,7 @@ impl Frame {
         }
         let abreast = abreast.clone();
         let group = &abreast.groups[number];
-        for members in group.members.chunks(LANES) {
+        for (members, memory) in group.members.chunks(LANES).zip(group.first..) {
             let follows = |m: &Member| {
                 let newton = &self.solvers[m.block].newton;
                 newton.following && newton.most / 4 > EVALUATIONS
@@ -269,6 +296,7 @@ impl Frame {
             }
             let mut good: [bool; LANES] = std::array::from_fn(|l| members.get(l).is_some_and(follows));
             let mut space = std::mem::take(&mut self.space);
+            space.memory = memory;
             space.gather(group, members, self);
             let arch = pulp::Arch::new();
             arch.dispatch(Usual { space: &mut space, group, good: &mut good });
@@ -285,12 +313,17 @@ impl Space {
         for lane in 0..LANES {
             let member = members.get(lane).unwrap_or(&members[0]);
             let newton = &frame.solvers[member.block].newton;
-            (0..n).for_each(|i| self.kept[i][lane] = newton.memory[i]);
             for (place, &r) in member.inputs.iter().enumerate() {
                 self.registers.r[n + place][lane] = frame.r[r as usize];
             }
-            for (base, &place) in self.base.iter_mut().zip(&group.entries) {
-                base[lane] = newton.jacobian_memory[place as usize];
+            let memory = &mut self.memories[self.memory];
+            let present = (member.block, newton.version);
+            if memory.of[lane] != present {
+                memory.of[lane] = present;
+                (0..n).for_each(|i| memory.kept[i][lane] = newton.memory[i]);
+                for (base, &place) in memory.base.iter_mut().zip(&group.entries) {
+                    base[lane] = newton.jacobian_memory[place as usize];
+                }
             }
         }
     }
@@ -326,11 +359,11 @@ impl pulp::WithSimd for Usual<'_> {
     }
 }
 
-const NONE: Line = Line([0.0; LANES]);
+const NONE: Line = wide::Line([0.0; LANES]);
 
 #[inline(always)]
 fn each(value: impl Fn(usize) -> f64) -> Line {
-    Line(std::array::from_fn(value))
+    wide::Line(std::array::from_fn(value))
 }
 
 /// 1 where something holds, 0 elsewhere: truth values that stay in the vectors of the machine.
@@ -360,9 +393,9 @@ impl Space {
     fn solve(&mut self, group: &Group, used: [bool; LANES]) -> [bool; LANES] {
         let n = group.size;
         let mut good = truth(|l| used[l]);
-        for i in 0..n {
-            self.x[i] = self.kept[i];
-            self.size[i] = each(|l| self.kept[i][l].abs());
+        for (i, kept) in self.memories[self.memory].kept[..n].iter().enumerate() {
+            self.x[i] = *kept;
+            self.size[i] = each(|l| kept[l].abs());
         }
         let mut solved = [false; LANES];
         self.evaluate(group, false);
@@ -372,7 +405,7 @@ impl Space {
             if there.contains(&1.0) {
                 good = each(|l| if there[l] != 0.0 { 0.0 } else { good[l] });
                 if iteration > 0 {
-                    self.goes_on(group, &mut there);
+                    self.goes_on(group, iteration - 1, &mut there);
                 }
                 self.keep(group, &mut there);
                 (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
@@ -425,7 +458,7 @@ impl Space {
             }
             let mut there = each(|l| good[l] * done[l]);
             if there.contains(&1.0) {
-                self.goes_on(group, &mut there);
+                self.goes_on(group, iteration, &mut there);
                 self.keep(group, &mut there);
                 (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
                 good = each(|l| if done[l] != 0.0 { 0.0 } else { good[l] });
@@ -565,24 +598,28 @@ impl Space {
         }
     }
 
-    /// Whether each solution is without doubt the one that goes on from where the lane began.
+    /// Whether each solution is without doubt the one that goes on from where the lane began; `last` iteration.
     #[inline(always)]
-    fn goes_on(&mut self, group: &Group, good: &mut Line) {
+    fn goes_on(&mut self, group: &Group, last: usize, good: &mut Line) {
         let n = group.size;
-        let mut most = Line([SETTLED; LANES]);
+        let mut most = wide::Line([SETTLED; LANES]);
         let mut off = NONE;
         for i in 0..n {
             let lead = each(|l| self.lead[i][l].abs());
             let scale = scale(&self.size[i], &lead);
             most = greater(&most, &each(|l| lead[l] / scale[l]));
-            self.next[i] = each(|l| self.x[i][l] - self.kept[i][l]);
+            let kept = &self.memories[self.memory].kept[i];
+            self.next[i] = each(|l| self.x[i][l] - kept[l]);
         }
         self.widen(n, &mut off, good);
-        self.next[..n].copy_from_slice(&self.opening[..n]);
-        self.back(group);
-        self.widen(n, &mut off, good);
-        self.next[..n].fill(Line([-0.0; LANES]));
-        for (base, &place) in self.base.iter().zip(&group.entries) {
+        // With the first Jacobian it would be the first step again.
+        if last > 0 {
+            self.next[..n].copy_from_slice(&self.opening[..n]);
+            self.back(group);
+            self.widen(n, &mut off, good);
+        }
+        self.next[..n].fill(wide::Line([-0.0; LANES]));
+        for (base, &place) in self.memories[self.memory].base.iter().zip(&group.entries) {
             let (row, column) = (place as usize / n, place as usize % n);
             let lead = &self.lead[column];
             self.next[row] = each(|l| self.next[row][l] + base[l] * lead[l]);

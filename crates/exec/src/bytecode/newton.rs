@@ -60,6 +60,8 @@ pub(crate) struct Newton {
     pub memory: Vec<f64>,
     /// Whether the memory is an accepted solution, which is followed.
     pub following: bool,
+    /// Counts the changes of the memory, from 1 on.
+    pub(super) version: u64,
     /// What the block read there, and its Jacobian, row by row: part of the model's state too.
     outer_memory: Vec<f64>,
     pub(super) jacobian_memory: Vec<f64>,
@@ -101,6 +103,7 @@ impl Newton {
         let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
         Newton {
             memory: line.clone(),
+            version: 1,
             following: false,
             outer_memory: Vec::new(),
             jacobian_memory: square.clone(),
@@ -135,6 +138,7 @@ impl Newton {
     /// Forgets the run.
     pub fn forget(&mut self) {
         self.memory.fill(0.0);
+        self.version += 1;
         self.leave();
     }
 
@@ -146,6 +150,7 @@ impl Newton {
     /// The next solution starts where unknown `i` has this value.
     pub fn start_at(&mut self, i: usize, value: f64) {
         (self.memory[i], self.fresh) = (value, false);
+        self.version += 1;
     }
 
     /// Evaluations at most while following.
@@ -155,6 +160,7 @@ impl Newton {
 
     /// Goes on with the solution found last.
     pub fn accept(&mut self) {
+        self.version += 1;
         self.memory.copy_from_slice(&self.x);
         self.outer_memory.copy_from_slice(&self.outer);
         self.jacobian_memory.copy_from_slice(&self.jacobian);

@@ -7,7 +7,6 @@ use super::frame::Frame;
 use super::packed::{Block, Kind, Packed, Run};
 use crate::math;
 use halfarrow_compiler::program::{ConditionId, Instruction, Routine};
-use halfarrow_sim::wide::{LANES, Wide};
 
 /// What has a frame of its own.
 pub(crate) trait Lane {
@@ -15,45 +14,51 @@ pub(crate) trait Lane {
     fn frame(&mut self) -> &mut Frame;
 }
 
-/// A number for each lane, in a cache line of its own.
-#[derive(Debug, Clone, Copy, Default)]
+/// A number for each lane, in cache lines of its own.
+#[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(crate) struct Line(pub Wide);
+pub(crate) struct Line<const N: usize>(pub [f64; N]);
 
-impl std::ops::Deref for Line {
-    type Target = Wide;
+impl<const N: usize> Default for Line<N> {
+    fn default() -> Line<N> {
+        Line([0.0; N])
+    }
+}
+
+impl<const N: usize> std::ops::Deref for Line<N> {
+    type Target = [f64; N];
 
     #[inline(always)]
-    fn deref(&self) -> &Wide {
+    fn deref(&self) -> &[f64; N] {
         &self.0
     }
 }
 
-impl std::ops::DerefMut for Line {
+impl<const N: usize> std::ops::DerefMut for Line<N> {
     #[inline(always)]
-    fn deref_mut(&mut self) -> &mut Wide {
+    fn deref_mut(&mut self) -> &mut [f64; N] {
         &mut self.0
     }
 }
 
 /// The registers of all lanes.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct WideFrame {
-    pub r: Vec<Line>,
+pub(crate) struct WideFrame<const N: usize> {
+    pub r: Vec<Line<N>>,
     arch: pulp::Arch,
 }
 
 /// A routine to be run with the vectors of the machine. A type of its own, not a closure: only then is all of it compiled
 /// for them.
-struct All<'a, L> {
-    registers: &'a mut WideFrame,
+struct All<'a, L, const N: usize> {
+    registers: &'a mut WideFrame<N>,
     routine: &'a Routine,
     packed: &'a Packed,
     frames: &'a mut [L],
-    good: &'a mut [bool; LANES],
+    good: &'a mut [bool; N],
 }
 
-impl<L: Lane> pulp::WithSimd for All<'_, L> {
+impl<L: Lane, const N: usize> pulp::WithSimd for All<'_, L, N> {
     type Output = ();
 
     #[inline(always)]
@@ -62,7 +67,7 @@ impl<L: Lane> pulp::WithSimd for All<'_, L> {
     }
 }
 
-impl WideFrame {
+impl<const N: usize> WideFrame<N> {
     /// Makes room for a routine.
     pub fn reserve(&mut self, registers: usize) {
         self.r.resize(self.r.len().max(registers), Line::default());
@@ -70,20 +75,14 @@ impl WideFrame {
 
     /// Runs a routine, packed, for all lanes; `good` loses those that run into trouble. The fixed registers have been
     /// filled.
-    pub fn run<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; LANES]) {
+    pub fn run<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
         // The widest vectors that the machine has; they round as narrow ones do.
         self.arch.dispatch(All { registers: self, routine, packed, frames, good });
     }
 
     /// The same where the vectors of the machine are in use already.
     #[inline(always)]
-    pub(super) fn all<L: Lane>(
-        &mut self,
-        routine: &Routine,
-        packed: &Packed,
-        frames: &mut [L],
-        good: &mut [bool; LANES],
-    ) {
+    pub(super) fn all<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
         for run in &packed.runs {
             match run {
                 Run::Many(Kind::Add, all) => self.many(all, |a, b| a + b),
@@ -94,7 +93,7 @@ impl WideFrame {
                 Run::Solve(block) => self.solve(routine, block, frames, good),
                 Run::One(Instruction::Watch { pivot, scale, .. }) => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
-                    (0..LANES).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
+                    (0..N).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
                 }
                 Run::One(plain) => self.step(plain, frames),
             }
@@ -110,8 +109,8 @@ impl WideFrame {
     }
 
     #[inline(never)]
-    fn solve<L: Lane>(&mut self, routine: &Routine, block: &Block, frames: &mut [L], good: &mut [bool; LANES]) {
-        for lane in 0..LANES {
+    fn solve<L: Lane>(&mut self, routine: &Routine, block: &Block, frames: &mut [L], good: &mut [bool; N]) {
+        for lane in 0..N {
             if !good[lane] {
                 continue;
             }
@@ -196,13 +195,13 @@ impl WideFrame {
 
 /// [`math::powi`] for each lane.
 #[inline(always)]
-fn powers(x: Wide, n: u32) -> Wide {
-    let (mut result, mut square, mut left) = ([1.0; LANES], x, n);
+fn powers<const N: usize>(x: [f64; N], n: u32) -> [f64; N] {
+    let (mut result, mut square, mut left) = ([1.0; N], x, n);
     while left > 0 {
         if left & 1 == 1 {
-            (0..LANES).for_each(|l| result[l] *= square[l]);
+            (0..N).for_each(|l| result[l] *= square[l]);
         }
-        (0..LANES).for_each(|l| square[l] *= square[l]);
+        (0..N).for_each(|l| square[l] *= square[l]);
         left >>= 1;
     }
     result

@@ -14,7 +14,7 @@ use halfarrow_sim::{Failure, System};
 #[derive(Debug, Clone)]
 pub struct WideModel {
     models: Vec<Model>,
-    frame: WideFrame,
+    frame: WideFrame<LANES>,
     rates: (Routine, Packed),
     observe: (Routine, Packed),
     /// State and values of one lane.
