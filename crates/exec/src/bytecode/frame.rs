@@ -185,7 +185,13 @@ impl Frame {
     }
 
     pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
-        if solve.guess.is_empty() { self.linear::<ALONG>(solve) } else { self.newton::<ALONG>(solve) }
+        if solve.guess.is_empty() {
+            self.linear::<ALONG>(solve)
+        } else if !ALONG && self.takes_root(solve) {
+            Ok(())
+        } else {
+            self.newton::<ALONG>(solve)
+        }
     }
 
     fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {

@@ -207,16 +207,34 @@ impl Frame {
     /// Finds the root of a block that goes on from its memory, at a start any root; leaves it in `newton.x` and in the
     /// guesses.
     pub(super) fn find_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
-        if !self.is_fresh(solve) {
-            self.solve_abreast(solve);
-        }
-        if !self.is_fresh(solve) {
+        if !self.has_root(solve) {
             self.find_root_alone(solve)?;
         }
         let Frame { r, solvers, .. } = self;
         let root = &solvers[solve.block.0 as usize].newton.x;
         solve.guess.iter().zip(root).for_each(|(&guess, &x)| r[guess as usize] = x);
         Ok(())
+    }
+
+    /// Whether the root is known, or has been found beside those of blocks of the same shape.
+    fn has_root(&mut self, solve: &Solve) -> bool {
+        if !self.is_fresh(solve) {
+            self.solve_abreast(solve);
+            return self.is_fresh(solve);
+        }
+        true
+    }
+
+    /// Puts the unknowns of a Newton block where they belong if its root needs no search of its own; whether it does not.
+    #[inline]
+    pub fn takes_root(&mut self, solve: &Solve) -> bool {
+        if solve.guess.is_empty() || !self.has_root(solve) {
+            return false;
+        }
+        let Frame { r, solvers, .. } = self;
+        let root = &solvers[solve.block.0 as usize].newton.x;
+        solve.unknowns.iter().zip(root).for_each(|(&out, &x)| r[out as usize] = x);
+        true
     }
 
     /// Whether the root found last is the one sought: the block reads what it read then.
