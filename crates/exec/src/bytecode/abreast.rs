@@ -4,7 +4,7 @@
 //! matrix is symmetric and definite. It takes the same operations in the same order, hence gives the same bits. A block
 //! that needs anything else is left to the solver of single blocks.
 
-use super::frame::Frame;
+use super::frame::{Frame, Solver};
 use super::newton::{FINISHED, NEAR, SETTLED, has_conditions};
 use super::operands::{moved, reads, written};
 use super::packed::Packed;
@@ -286,35 +286,34 @@ impl Frame {
         }
         let abreast = abreast.clone();
         let group = &abreast.groups[number];
+        let arch = pulp::Arch::new();
+        let Frame { r, solvers, space, .. } = self;
         for (members, memory) in group.members.chunks(LANES).zip(group.first..) {
             let follows = |m: &Member| {
-                let newton = &self.solvers[m.block].newton;
+                let newton = &solvers[m.block].newton;
                 newton.following && newton.most / 4 > EVALUATIONS
             };
             if members.iter().filter(|m| follows(m)).count() < FEWEST {
                 continue;
             }
             let mut good: [bool; LANES] = std::array::from_fn(|l| members.get(l).is_some_and(follows));
-            let mut space = std::mem::take(&mut self.space);
             space.memory = memory;
-            space.gather(group, members, self);
-            let arch = pulp::Arch::new();
-            arch.dispatch(Usual { space: &mut space, group, good: &mut good });
-            space.hand_over(group, members, self, &good);
-            self.space = space;
+            space.gather(group, members, r, solvers);
+            arch.dispatch(Usual { space, group, good: &mut good });
+            space.hand_over(group, members, r, solvers, &good);
         }
     }
 }
 
 impl Space {
     /// Takes up what the blocks read, and where they are; lanes without a block do as the first.
-    fn gather(&mut self, group: &Group, members: &[Member], frame: &Frame) {
+    fn gather(&mut self, group: &Group, members: &[Member], r: &[f64], solvers: &[Solver]) {
         let n = group.size;
         for lane in 0..LANES {
             let member = members.get(lane).unwrap_or(&members[0]);
-            let newton = &frame.solvers[member.block].newton;
-            for (place, &r) in member.inputs.iter().enumerate() {
-                self.registers.r[n + place][lane] = frame.r[r as usize];
+            let newton = &solvers[member.block].newton;
+            for (place, &input) in member.inputs.iter().enumerate() {
+                self.registers.r[n + place][lane] = r[input as usize];
             }
             let memory = &mut self.memories[self.memory];
             let present = (member.block, newton.version);
@@ -329,15 +328,15 @@ impl Space {
     }
 
     /// Gives the blocks what has been found.
-    fn hand_over(&self, group: &Group, members: &[Member], frame: &mut Frame, good: &[bool; LANES]) {
+    fn hand_over(&self, group: &Group, members: &[Member], r: &[f64], solvers: &mut [Solver], good: &[bool; LANES]) {
         let n = group.size;
         for (lane, member) in members.iter().enumerate().filter(|(lane, _)| good[*lane]) {
-            let newton = &mut frame.solvers[member.block].newton;
+            let newton = &mut solvers[member.block].newton;
             (0..n).for_each(|i| newton.x[i] = self.found[i][lane]);
             for (jacobian, &place) in self.jacobian.iter().zip(&group.entries) {
                 newton.jacobian[place as usize] = jacobian[lane];
             }
-            newton.outer.iter_mut().zip(&member.outer).for_each(|(value, &r)| *value = frame.r[r as usize]);
+            newton.outer.iter_mut().zip(&member.outer).for_each(|(value, &outer)| *value = r[outer as usize]);
             newton.fresh = true;
         }
     }
@@ -638,6 +637,103 @@ impl Space {
             let away = each(|l| (self.next[i][l] - lead[l]).abs() / scale[l]);
             *good = each(|l| if away[l] < f64::INFINITY { good[l] } else { 0.0 });
             *off = greater(off, &away);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halfarrow_compiler::bond_graph::NoFiles;
+    use halfarrow_compiler::compile::{Text, compile};
+    use halfarrow_compiler::equations::Form;
+    use halfarrow_compiler::program::Layout;
+    use std::sync::Arc;
+
+    /// A ladder of resistors with a compliance in every so manieth section.
+    fn mesh(sections: usize, every: usize, law: &str) -> Program {
+        let mut text = String::from("model Mesh\nparam g = 1, c = 0.1\ninput u = 1\nSe:source(u) -> 1:s0\n");
+        for k in 1..=sections {
+            let from = if k == 1 { "s0".to_string() } else { format!("n{} -> 1:s{k}", k - 1) };
+            let to = if k == 1 { "s0".to_string() } else { format!("s{k}") };
+            text += &format!("{from} -> R:R{k}({law})\n{to} -> 0:n{k} -> R:G{k}({law})\n");
+            if k % every == 0 {
+                text += &format!("n{k} -> C:C{k}(c)\n");
+            }
+        }
+        let text = Text { name: "mesh.bond", text: &text, files: &NoFiles, overrides: &[] };
+        compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir
+    }
+
+    fn frame(program: &Program, layout: &Layout, routine: &Routine, abreast: Option<&Abreast>) -> Frame {
+        let preamble = program.preamble(layout);
+        let mut frame = Frame::new(program, layout, layout.size);
+        frame.reserve(routine);
+        frame.reserve(&preamble);
+        abreast.into_iter().for_each(|a| frame.reserve_abreast(a));
+        frame.run(&preamble).unwrap();
+        frame.r[layout.inputs as usize] = 1.0;
+        frame
+    }
+
+    /// Along states that move by more and by less; how many blocks have been solved on lanes.
+    fn same_bits(program: &Program) -> usize {
+        let layout = program.layout();
+        let wanted: Vec<_> = program.states.iter().map(|s| s.rate).collect();
+        let routine = program.watched_routine(&layout, &wanted);
+        let abreast = Arc::new(Abreast::of(program, &routine).expect("blocks of one shape"));
+        let mut alone = frame(program, &layout, &routine, None);
+        let mut together = frame(program, &layout, &routine, Some(&abreast));
+        let n = program.states.len();
+        let (mut seed, mut on_lanes) = (1.0f64, 0);
+        let mut x = vec![0.0; n];
+        for turn in 0..60 {
+            let reach = [0.0, 1e-9, 1e-4, 1e-2, 0.1][turn % 5];
+            for x in &mut x {
+                seed = (seed * 16807.0) % 2147483647.0;
+                *x += reach * (seed / 2147483647.0 - 0.4);
+            }
+            for frame in [&mut alone, &mut together] {
+                frame.r[layout.states as usize..][..n].copy_from_slice(&x);
+            }
+            let versions: Vec<bool> = together.solvers.iter().map(|s| s.newton.following).collect();
+            together.begin(Some(&abreast));
+            together.solvers.iter_mut().for_each(|s| s.newton.evaluations = usize::MAX);
+            let (a, b) = (alone.run(&routine), together.run(&routine));
+            assert_eq!(a, b, "turn {turn}");
+            if a.is_err() {
+                continue;
+            }
+            let untouched = |(s, f): (&Solver, &bool)| s.newton.evaluations == usize::MAX && *f;
+            on_lanes += together.solvers.iter().zip(&versions).filter(|p| untouched((p.0, p.1))).count();
+            for &out in &routine.outputs {
+                let (a, b) = (alone.r[out as usize], together.r[out as usize]);
+                assert_eq!(a.to_bits(), b.to_bits(), "turn {turn}: {a} and {b}");
+            }
+            for (a, b) in alone.solvers.iter_mut().zip(&mut together.solvers) {
+                assert_eq!(a.newton.x, b.newton.x, "turn {turn}");
+                assert_eq!(a.newton.jacobian, b.newton.jacobian, "turn {turn}");
+                if turn % 3 != 2 {
+                    a.newton.accept();
+                    b.newton.accept();
+                }
+            }
+        }
+        on_lanes
+    }
+
+    #[test]
+    fn blocks_side_by_side_have_the_bits_of_single_ones() {
+        // Blocks of one, four and nine unknowns; more blocks than lanes, and fewer.
+        for (sections, every, law, least) in [
+            (60, 2, "f = g*(e + e^3)", 1000),
+            (50, 5, "f = g*(e + e^3)", 300),
+            (80, 10, "f = g*(e + e^3)", 200),
+            (40, 5, "f = g*sinh(2*e)", 200),
+            (30, 3, "f = g*(exp(e) - 1)", 200),
+        ] {
+            let on_lanes = same_bits(&mesh(sections, every, law));
+            assert!(on_lanes >= least, "{sections} {every} {law}: {on_lanes}");
         }
     }
 }

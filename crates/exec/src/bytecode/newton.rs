@@ -73,7 +73,7 @@ pub(crate) struct Newton {
     pub fresh: bool,
     /// Evaluations at most while following.
     pub(super) most: usize,
-    evaluations: usize,
+    pub(super) evaluations: usize,
     step: Vec<f64>,
     trial: Vec<f64>,
     next: Vec<f64>,
