@@ -76,7 +76,7 @@ Examples:
     /// Run a model with many sets of parameters, on all cores
     #[command(after_help = "\
 Writes a row for each set: its number, its parameters, what is kept of the run, and failed = 1 where it did not come to
-its end. With euler, heun or rk4 eight sets run at once. A sweep that was interrupted goes on where it stopped.
+its end. With euler, heun or rk4 sixteen sets run at once. A sweep that was interrupted goes on where it stopped.
 What can be kept: initial, final, min, max, max_abs, mean, rms, time_of_max.
 Examples:
   halfarrow sweep car.bond --vary ks=lin(10 kN/m,30 kN/m,100) --vary b=log(100,3000,20) --to 10 --step 1e-3 \\

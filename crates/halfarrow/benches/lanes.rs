@@ -1,7 +1,7 @@
 //! Does a sweep on lanes beat a loop over single runs of machine code, on one core?
 //!
 //! `cargo bench -p halfarrow --bench lanes`: time of a set, median of rounds in which both take turns, and the ratio, for
-//! the quarter car and for four of them on a chassis.
+//! the quarter car and for four and forty of them on a chassis; `-- four` takes those whose name has it.
 
 use std::fmt::Write;
 use std::time::Instant;
@@ -29,9 +29,15 @@ impl Sink for Last {
 
 fn main() {
     let quarter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/quarter_car/model.bond"));
-    compare("quarter car", &quarter.expect("a model"), 10.0);
-    compare("four on a chassis", &chassis(4), 10.0);
-    compare("forty on a chassis", &chassis(40), 10.0);
+    let wanted: Option<String> = std::env::args().skip(1).find(|word| !word.starts_with("--"));
+    let models = [
+        ("quarter car", quarter.expect("a model")),
+        ("four on a chassis", chassis(4)),
+        ("forty on a chassis", chassis(40)),
+    ];
+    for (name, text) in models.iter().filter(|(name, _)| wanted.as_ref().is_none_or(|w| name.contains(w.as_str()))) {
+        compare(name, text, 10.0);
+    }
 }
 
 fn compare(name: &str, text: &str, to: f64) {
@@ -51,9 +57,9 @@ fn compare(name: &str, text: &str, to: f64) {
         let single: Vec<f64> = (0..LANES).map(|set| one(&mut machine, set, &options)).collect();
         alone.push(from.elapsed().as_secs_f64() / LANES as f64);
         let from = Instant::now();
-        let together = eight(&mut wide, &options);
+        let at_once = together(&mut wide, &options);
         lanes.push(from.elapsed().as_secs_f64() / LANES as f64);
-        assert_eq!(single, together, "the same bits");
+        assert_eq!(single, at_once, "the same bits");
     }
     let [alone, lanes] = [alone, lanes].map(|mut times: Vec<f64>| {
         times.sort_by(f64::total_cmp);
@@ -78,7 +84,7 @@ fn one(model: &mut Model, number: usize, options: &Options) -> f64 {
     last.0
 }
 
-fn eight(wide: &mut WideModel, options: &Options) -> Vec<f64> {
+fn together(wide: &mut WideModel, options: &Options) -> Vec<f64> {
     let starts: Vec<Vec<f64>> = (0..LANES).map(|lane| set(wide.model(lane), lane)).collect();
     wide.begin();
     let mut x: Vec<[f64; LANES]> = (0..starts[0].len()).map(|i| std::array::from_fn(|l| starts[l][i])).collect();

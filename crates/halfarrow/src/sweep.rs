@@ -28,7 +28,7 @@ use plan::Plan;
 use reduce::Reducers;
 
 /// Sets of a chunk: what is computed in one go, written at once, and lost when the program is killed.
-const CHUNK: usize = 8 * LANES;
+const CHUNK: usize = 4 * LANES;
 
 /// Many runs, and what is kept of each.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use crate::shared::Counted;
 use crate::{Failure, Method, Options, Sink, Stopped, Summary, System};
 
 /// Runs at once.
-pub const LANES: usize = 8;
+pub const LANES: usize = 16;
 
 /// A number for each lane.
 pub type Wide = [f64; LANES];

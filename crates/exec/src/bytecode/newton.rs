@@ -325,7 +325,7 @@ impl Frame {
         for (i, &right) in solve.right.iter().enumerate() {
             let entries = solve.matrix[i * n..][..n].iter().zip(&newton.memory);
             let terms = entries.fold(0.0, |sum, (&m, x)| sum + (r[m as usize] * x).abs());
-            if !(r[right as usize].abs() <= ROUNDING * terms) {
+            if r[right as usize].abs() > ROUNDING * terms {
                 return false;
             }
         }

@@ -540,7 +540,7 @@ static int ha_stays(ha_model *m, ha_newton *w)
         for (j = 0; j < w->n; ++j) {
             terms += fabs(w->matrix[i * w->n + j] * w->memory[j]);
         }
-        if (!(fabs(w->right[i]) <= 2.0 * DBL_EPSILON * terms)) {
+        if (fabs(w->right[i]) > 2.0 * DBL_EPSILON * terms) {
             return 0;
         }
     }
