@@ -165,16 +165,44 @@ def casadi_links(n):
     return program
 
 
+def pinocchio_links(n):
+    """The same chain for pinocchio: a function that times one call of its articulated body algorithm from Python, and the
+    accelerations in absolute angles."""
+    import numpy as np
+    import pinocchio as pin
+
+    chain, parent = pin.Model(), 0
+    tip = np.array([0.0, 0.0, -1.0])
+    for k in range(n):
+        place = pin.SE3.Identity()
+        place.translation = tip if k else np.zeros(3)
+        parent = chain.addJoint(parent, pin.JointModelRY(), place, f"joint{k + 1}")
+        chain.appendBodyToJoint(parent, pin.Inertia(1.0, tip, np.zeros((3, 3))), pin.SE3.Identity())
+    data = chain.createData()
+    absolute = np.array([0.5 / k for k in range(1, n + 1)])
+    q, zero = np.diff(absolute, prepend=0.0), np.zeros(n)
+
+    def nanoseconds(count):
+        from_ = time.perf_counter()
+        for _ in range(count):
+            pin.aba(chain, data, q, zero, zero)
+        return (time.perf_counter() - from_) / count * 1e9
+
+    return nanoseconds, np.cumsum(pin.aba(chain, data, q, zero, zero))
+
+
 def links(program):
     print("\nPendulum of n links, one evaluation of the accelerations (median of", ROUNDS, "rounds in turns)\n")
-    row("n", "CasADi", "machine code", "ratio", "bytecode", "instructions")
-    row("---", "---", "---", "---", "---", "---")
+    row("n", "CasADi", "machine code", "ratio", "bytecode", "instructions", "pinocchio, called from Python")
+    row("---", "---", "---", "---", "---", "---", "---")
     for n in (1, 2, 5, 10, 20):
         path = model(f"links_{n}", links_text(n))
         peer = casadi_links(n)
         count = 4000 // (n * n) + 50
-        there, machine, bytecode = [], [], []
+        there, machine, bytecode, others = [], [], [], []
+        other, accelerations = pinocchio_links(n)
         for _ in range(ROUNDS):
+            others.append(other(20000))
             found = json.loads(subprocess.run([peer, str(count)], check=True, capture_output=True, text=True).stdout)
             there.append(found["ns"])
             mine = ours(program, "rates", path, count)
@@ -184,8 +212,10 @@ def links(program):
         for k in range(n):
             off = abs(mine["rates"][order[k]] - found["rates"][k])
             assert off < 1e-6 * (1 + abs(found["rates"][k])), f"accelerations differ: {mine} {found}"
-        a, b, c = map(statistics.median, (there, machine, bytecode))
-        row(n, f"{a:.0f} ns", f"{b:.0f} ns", f"{b / a:.2f}", f"{c:.0f} ns", mine["instructions"])
+            off = abs(mine["rates"][order[k]] - accelerations[k])
+            assert off < 1e-4 * (1 + abs(accelerations[k])), f"accelerations differ: {mine} {accelerations}"
+        a, b, c, d = map(statistics.median, (there, machine, bytecode, others))
+        row(n, f"{a:.0f} ns", f"{b:.0f} ns", f"{b / a:.2f}", f"{c:.0f} ns", mine["instructions"], f"{d:.0f} ns")
 
 
 def ladder_text(n):
@@ -224,6 +254,42 @@ def ladder(program):
     off = max(abs(a * 1e3 - b) for a, b in zip(mine["states"], y))
     print("\nRC ladder of", n, "sections, 1 s at rtol 1e-6; greatest difference of voltages", f"{off:.1e} V\n")
     beside("CVODE, banded", there, here)
+
+
+def rumoca(program):
+    import rumoca as rm
+
+    sections = "\n".join(["  for k in 2:n loop i[k] = (u[k-1] - u[k])/r; end for;", "  for k in 1:n-1 loop c*der(u[k]) = i[k] - i[k+1]; end for;"])
+    print("\nRC ladder in Modelica, 1 s at rtol 1e-6 by BDF, against our own machine code\n")
+    row("sections", "rumoca: text to model", "run", "halfarrow: text to machine code", "run", "ratio of the runs")
+    row(*["---"] * 6)
+    for n in (100, 300, 1000):
+        text = "\n".join([
+            "model Ladder",
+            f"  parameter Integer n = {n}; parameter Real r = 1, c = 1e-3;",
+            "  Real u[n](each start = 0, each fixed = true), i[n];",
+            "equation",
+            "  i[1] = (1 - u[1])/r;",
+            sections,
+            "  c*der(u[n]) = i[n] - u[n]/r;",
+            "end Ladder;",
+        ])
+        from_ = time.perf_counter()
+        there = rm.Session().loads(text, model="Ladder")
+        loaded = time.perf_counter() - from_
+        times = []
+        for _ in range(ROUNDS):
+            found = there.simulate(t=(0, 1), dt=1.0, config=rm.SimConfig(rtol=1e-6, atol=1e-9, solver="bdf"))
+            times.append(found.metrics["simulate_seconds"])
+        path = model(f"ladder_{n}", ladder_text(n))
+        mine = [ours(program, "simulate", path, 1.0, 1e-6, 1e-9) for _ in range(ROUNDS)]
+        made = ours(program, "compile", path)
+        ends = found.to_numpy()[[found.names.index(f"u[{k}]") for k in range(1, n + 1)], -1]
+        off = max(abs(a * 1e3 - b) for a, b in zip(mine[0]["states"], ends))
+        assert off < 1e-4, f"voltages differ by {off}"
+        a, b = statistics.median(times), statistics.median(m["machine_seconds"] for m in mine)
+        whole = sum(made[k] for k in ("program", "model", "machine"))
+        row(n, f"{loaded * 1e3:.0f} ms", f"{a * 1e3:.0f} ms", f"{whole * 1e3:.1f} ms", f"{b * 1e3:.1f} ms", f"{b / a:.4f}")
 
 
 def mesh_text(n):
@@ -299,7 +365,7 @@ def compiling(program):
     row(*(f"{p:.2f} ms" for p in parts), f"{sum(parts):.2f} ms")
 
 
-BENCHES = {"links": links, "ladder": ladder, "mesh": mesh, "compile": compiling}
+BENCHES = {"links": links, "ladder": ladder, "mesh": mesh, "compile": compiling, "rumoca": rumoca}
 
 if __name__ == "__main__":
     in_environment()
