@@ -523,6 +523,10 @@ pub enum FixedSolver {
     Rk4,
     /// Order 2, implicit
     ImplicitMidpoint,
+    /// Order 1, linearly implicit, for stiff models
+    LinearlyImplicitEuler,
+    /// Order 3, linearly implicit, for stiff models
+    Rosenbrock,
 }
 
 /// `export`.

@@ -38,11 +38,22 @@ pub enum Method {
     Rk4,
     /// The implicit midpoint rule, at most 20 Newton iterations a step.
     ImplicitMidpoint,
+    /// Linearly implicit Euler.
+    LinearlyImplicitEuler,
+    /// RODAS3, a linearly implicit method of order 3.
+    Rosenbrock,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 4] = [Method::Euler, Method::Heun, Method::Rk4, Method::ImplicitMidpoint];
+    pub const ALL: [Method; 6] = [
+        Method::Euler,
+        Method::Heun,
+        Method::Rk4,
+        Method::ImplicitMidpoint,
+        Method::LinearlyImplicitEuler,
+        Method::Rosenbrock,
+    ];
 
     /// Its name, as on the command line.
     pub fn name(self) -> &'static str {
@@ -51,16 +62,28 @@ impl Method {
             Method::Heun => "heun",
             Method::Rk4 => "rk4",
             Method::ImplicitMidpoint => "implicit_midpoint",
+            Method::LinearlyImplicitEuler => "linearly_implicit_euler",
+            Method::Rosenbrock => "rosenbrock",
         }
     }
 
-    /// Evaluations of the rates in a step; of the midpoint rule in an iteration.
+    /// Stages of a step; of the midpoint rule of an iteration.
     pub fn stages(self) -> usize {
         match self {
-            Method::Euler | Method::ImplicitMidpoint => 1,
+            Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler => 1,
             Method::Heun => 2,
-            Method::Rk4 => 4,
+            Method::Rk4 | Method::Rosenbrock => 4,
         }
+    }
+
+    /// Whether a step takes the Jacobian.
+    pub fn is_implicit(self) -> bool {
+        self == Method::ImplicitMidpoint || self.is_linearly_implicit()
+    }
+
+    /// Whether it takes one matrix a step, and no iteration.
+    pub fn is_linearly_implicit(self) -> bool {
+        matches!(self, Method::LinearlyImplicitEuler | Method::Rosenbrock)
     }
 }
 

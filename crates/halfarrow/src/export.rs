@@ -206,7 +206,7 @@ impl<'a> Code<'a> {
         Ok(emit::c::Export {
             program: &self.program,
             start: &self.start,
-            method: method(self.export.method)?,
+            method: method(self.export.method),
             step: self.export.step,
             recorded: &self.recorded,
             derivatives,
@@ -233,7 +233,7 @@ impl<'a> Code<'a> {
             model: p.name.clone(),
             target: self.export.target.name(),
             name: name.to_string(),
-            method: method(self.export.method).ok().map(emit::Method::name),
+            method: Some(method(self.export.method).name()),
             step: Some(self.export.step),
             states: p.states.iter().map(|s| s.name.clone()).collect(),
             inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
@@ -265,17 +265,15 @@ fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarro
     })
 }
 
-fn method(method: FixedMethod) -> Result<emit::Method, Problem> {
-    Ok(match method {
+fn method(method: FixedMethod) -> emit::Method {
+    match method {
         FixedMethod::Euler => emit::Method::Euler,
         FixedMethod::Heun => emit::Method::Heun,
         FixedMethod::Rk4 => emit::Method::Rk4,
         FixedMethod::ImplicitMidpoint => emit::Method::ImplicitMidpoint,
-        FixedMethod::LinearlyImplicitEuler | FixedMethod::Rosenbrock => {
-            let reason = "linearly implicit methods are not exported yet; take implicit_midpoint for a stiff model";
-            return Err(Problem::BadOption { reason: reason.into() });
-        }
-    })
+        FixedMethod::LinearlyImplicitEuler => emit::Method::LinearlyImplicitEuler,
+        FixedMethod::Rosenbrock => emit::Method::Rosenbrock,
+    }
 }
 
 fn refused(error: EmitError) -> Error {

@@ -43,6 +43,8 @@ fn asked(arguments: &arguments::Export) -> Export {
             FixedSolver::Heun => FixedMethod::Heun,
             FixedSolver::Rk4 => FixedMethod::Rk4,
             FixedSolver::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
+            FixedSolver::LinearlyImplicitEuler => FixedMethod::LinearlyImplicitEuler,
+            FixedSolver::Rosenbrock => FixedMethod::Rosenbrock,
         },
         step: arguments.step,
         binary: !arguments.source_only,

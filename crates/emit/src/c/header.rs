@@ -140,7 +140,7 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     part(true, format!("double shown[{}];", n(export.recorded.len())));
     part(s.order > 0, format!("double work[{}]; /* for solve blocks */", n(s.work)));
     part(s.order > 0, format!("int order[{}];", n(s.order)));
-    let implicit = export.method == crate::Method::ImplicitMidpoint;
+    let implicit = export.method.is_implicit();
     part(implicit, format!("double matrix[{}], matrix_scale[{1}], matrix_work[{1}];", n(nx * nx), n(nx)));
     part(implicit, format!("int matrix_order[{}];", n(nx)));
     part(implicit, format!("double middle[{0}], sizes[{0}], correction[{0}], direction[{0}], product[{0}];", n(nx)));

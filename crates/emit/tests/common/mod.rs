@@ -115,6 +115,8 @@ impl Exported {
             Method::Heun => FixedMethod::Heun,
             Method::Rk4 => FixedMethod::Rk4,
             Method::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
+            Method::LinearlyImplicitEuler => FixedMethod::LinearlyImplicitEuler,
+            Method::Rosenbrock => FixedMethod::Rosenbrock,
         };
         let per_second = (1.0 / self.step).round();
         let to = if 1.0 / per_second == self.step { steps as f64 / per_second } else { steps as f64 * self.step };

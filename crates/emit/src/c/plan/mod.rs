@@ -191,6 +191,10 @@ impl<'a> Plan<'a> {
         text += &along(&mut writer, "ha_sources_along", &sources_code, run);
         let tangent = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
         text += &along(&mut writer, "ha_rates_along", &rates_code, tangent);
+        if self.export.method.is_linearly_implicit() {
+            let drift = Moving { time: true, held: true, ..Moving::default() };
+            text += &along(&mut writer, "ha_rates_drift", &rates_code, drift);
+        }
         if self.export.derivatives {
             text += &along(&mut writer, "ha_observe_along", &observe_code, tangent);
         }
@@ -339,8 +343,12 @@ impl<'a> Plan<'a> {
         }
         text += &piece(include_str!("../runtime/held.c"));
         text += &piece(include_str!("../runtime/system.c"));
+        if self.export.method.is_implicit() {
+            text += &piece(include_str!("../runtime/matrix.c"));
+        }
         let method = match self.export.method {
             Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
+            method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
             _ => include_str!("../runtime/explicit.c"),
         };
         text += &piece(method);
@@ -366,7 +374,8 @@ impl<'a> Plan<'a> {
     fn flags(&self) -> BTreeSet<&'static str> {
         let held = !self.program.held.is_empty();
         let conditions = &self.program.conditions;
-        let all: [(&str, bool); 31] = [
+        let drift = self.export.method.is_linearly_implicit();
+        let all: [(&str, bool); 33] = [
             ("tables", !self.program.tables.is_empty()),
             ("conditions", !conditions.is_empty()),
             ("conditions_along", !conditions.is_empty()),
@@ -395,6 +404,8 @@ impl<'a> Plan<'a> {
             ("outputs", !self.export.recorded.is_empty()),
             ("tangent", self.has_tangent()),
             ("derivatives", self.export.derivatives),
+            ("drift", drift),
+            ("time_passes", drift || held),
             ("conserved", !self.program.conserved.is_empty()),
             ("inputs", !self.program.inputs.is_empty()),
             ("parameters", !self.program.parameters.is_empty()),
@@ -407,7 +418,7 @@ impl<'a> Plan<'a> {
 
     /// Whether the rates have a function for their derivatives.
     pub fn has_tangent(&self) -> bool {
-        self.export.derivatives || self.export.method == Method::ImplicitMidpoint
+        self.export.derivatives || self.export.method.is_implicit()
     }
 
     /// Rows of the nonzeros of each column of the Jacobian.
@@ -447,6 +458,12 @@ impl<'a> Plan<'a> {
                 let mut one = w.rates.clone() + w.tangent.clone() * groups;
                 one.operations += n * n * n + 4 * n * n;
                 one * 20
+            }
+            Method::LinearlyImplicitEuler | Method::Rosenbrock => {
+                let (groups, stages) = (self.column_groups().len() as u64, method.stages() as u64);
+                let mut all = w.rates.clone() * stages + w.tangent.clone() * (groups + 1);
+                all.operations += n * n * n + 4 * n * n + stages * (2 * n * n + (2 * stages + 4) * n);
+                all
             }
             _ => {
                 let stages = method.stages() as u64;

@@ -106,7 +106,8 @@ impl Plan<'_> {
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
-        words.into_iter().map(|(word, text)| (word.to_string(), text)).collect()
+        let more = linearly_implicit(self.export.method);
+        words.into_iter().chain(more).map(|(word, text)| (word.to_string(), text)).collect()
     }
 
     fn tables(&self) -> String {
@@ -186,7 +187,9 @@ impl Plan<'_> {
 /// Nodes, and the weights of each stage and of the step.
 fn tableau(method: Method) -> (String, String) {
     let (nodes, weights): (&[f64], Vec<Vec<f64>>) = match method {
-        Method::Euler | Method::ImplicitMidpoint => (&[0.0], vec![vec![0.0], vec![1.0]]),
+        Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler => {
+            (&[0.0], vec![vec![0.0], vec![1.0]])
+        }
         Method::Heun => (&[0.0, 1.0], vec![vec![0.0; 2], vec![1.0, 0.0], vec![0.5, 0.5]]),
         Method::Rk4 => (
             &[0.0, 0.5, 0.5, 1.0],
@@ -198,7 +201,45 @@ fn tableau(method: Method) -> (String, String) {
                 vec![1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
             ],
         ),
+        Method::Rosenbrock => (
+            &[0.0, 0.0, 1.0, 1.0],
+            vec![
+                vec![0.0; 4],
+                vec![0.0; 4],
+                vec![2.0, 0.0, 0.0, 0.0],
+                vec![2.0, 0.0, 1.0, 0.0],
+                vec![2.0, 0.0, 1.0, 1.0],
+            ],
+        ),
     };
-    let list = |values: &[f64]| values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ");
-    (list(nodes), weights.iter().map(|row| format!("{{{}}}", list(row))).collect::<Vec<_>>().join(", "))
+    (list(nodes), rows(&weights))
+}
+
+/// What linearly implicit methods have besides: γ, parts of the derivative by time, weights of earlier stages on the right
+/// side of each, and which stages stand where the one before does.
+fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
+    let (gamma, drifts, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
+        Method::Rosenbrock => (
+            0.5,
+            &[0.5, 1.5, 0.0, 0.0],
+            vec![vec![0.0; 4], vec![4.0, 0.0, 0.0, 0.0], vec![1.0, -1.0, 0.0, 0.0], vec![1.0, -1.0, -8.0 / 3.0, 0.0]],
+            &[false, true, false, false],
+        ),
+        _ => (1.0, &[1.0], vec![vec![0.0]], &[false]),
+    };
+    let repeats: Vec<&str> = repeats.iter().map(|&repeats| if repeats { "1" } else { "0" }).collect();
+    [
+        ("GAMMA", number(gamma)),
+        ("DRIFTS", list(drifts)),
+        ("RIGHT_WEIGHTS", rows(&right)),
+        ("REPEATS", repeats.join(", ")),
+    ]
+}
+
+fn list(values: &[f64]) -> String {
+    values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ")
+}
+
+fn rows(all: &[Vec<f64>]) -> String {
+    all.iter().map(|row| format!("{{{}}}", list(row))).collect::<Vec<_>>().join(", ")
 }

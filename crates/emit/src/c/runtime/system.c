@@ -133,26 +133,44 @@ int MODEL_observe(MODEL *m, double t, const double *x, double *y)
 //end
 }
 
+//if time_passes
+/* Sets the direction of derivatives to that of time: what is delayed moves, states and inputs do not. */
+static void ha_let_time_pass(ha_model *m, double t)
+{
+    ha_fill(m->along, 0.0, HA_DIRECTION);
+    m->along[0] = 1.0;
+//if delays
+    {
+        static const int places[] = {DELAY_PLACES};
+        int d;
+        for (d = 0; d < DELAYS; ++d) {
+            (void)ha_delay_at(m, d, t, &m->along[HA_HELD_AT + places[d]]);
+        }
+    }
+//else
+    (void)t;
+//end
+}
+
+//end
 //if tangent
-int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv)
+/* Code for derivatives along e. */
+typedef int ha_along_code(ha_model *m, double t, const double *x, const double *e, double *out, double *rates);
+
+/* Derivatives of the rates along m->along, by code for it. */
+static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
 {
     double *e = m->along;
     double *dx = m->along_out;
-    int status;
+    int status = code(m, t, x, e, dx, dv);
     int i;
-    ha_fill(e, 0.0, HA_DIRECTION);
-    ha_copy(e + HA_STATES_AT, v, HA_NX);
-//if held
-    ha_place(m, t);
-//end
-    status = ha_rates_along(m, t, x, e, dx, dv);
 //if switches
     if (m->state_hold == HA_KEEP && (status != MODEL_OK || !ha_all_finite(dv, HA_NX))) {
         m->state_hold = HA_FOLLOW;
-        status = ha_rates_along(m, t, x, e, dx, dv);
+        status = code(m, t, x, e, dx, dv);
         if (status != MODEL_OK || !ha_all_finite(dv, HA_NX)) {
             m->state_hold = HA_KEEP;
-            status = ha_rates_along(m, t, x, e, dx, dv);
+            status = code(m, t, x, e, dx, dv);
         }
         m->state_hold = HA_KEEP;
         if (status == MODEL_OK) {
@@ -169,6 +187,28 @@ int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *
         }
     }
     return MODEL_OK;
+}
+
+int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv)
+{
+    ha_fill(m->along, 0.0, HA_DIRECTION);
+    ha_copy(m->along + HA_STATES_AT, v, HA_NX);
+//if held
+    ha_place(m, t);
+//end
+    return ha_slopes(m, t, x, ha_rates_along, dv);
+}
+
+//end
+//if drift
+/* Derivatives of the rates by time, states and inputs at rest. */
+static int ha_drift(ha_model *m, double t, const double *x, double *dv)
+{
+    ha_let_time_pass(m, t);
+//if held
+    ha_place(m, t);
+//end
+    return ha_slopes(m, t, x, ha_rates_drift, dv);
 }
 
 //end
@@ -281,25 +321,13 @@ int MODEL_switched(MODEL *m, double t, const double *x, int *switched)
 /* Values and rates of what is delayed or sampled. */
 static int ha_sources(ha_model *m, double t, const double *x)
 {
-    double *e = m->along;
-    int status = MODEL_rates(m, t, x, m->dx);
+    const int status = MODEL_rates(m, t, x, m->dx);
     if (status != MODEL_OK) {
         return status;
     }
-    ha_fill(e, 0.0, HA_DIRECTION);
-    e[0] = 1.0;
-//if delays
-    {
-        static const int places[] = {DELAY_PLACES};
-        int d;
-        for (d = 0; d < DELAYS; ++d) {
-            (void)ha_delay_at(m, d, t, &e[HA_HELD_AT + places[d]]);
-        }
-    }
-//end
-    ha_copy(e + HA_STATES_AT, m->dx, HA_NX);
-    status = ha_sources_along(m, t, x, e, m->source, m->source_rate);
-    return status;
+    ha_let_time_pass(m, t);
+    ha_copy(m->along + HA_STATES_AT, m->dx, HA_NX);
+    return ha_sources_along(m, t, x, m->along, m->source, m->source_rate);
 }
 
 /* Held signals at the start of a run. They may read each other: passes until nothing changes. */

@@ -1,0 +1,133 @@
+/* ---- the matrix of an implicit step ---- */
+
+/* Columns of the Jacobian in groups: no two of a group have a nonzero in the same row. */
+static const int ha_group_starts[] = {
+GROUP_STARTS
+};
+static const int ha_group_columns[] = {
+GROUP_COLUMNS
+};
+static const int ha_column_starts[] = {
+COLUMN_STARTS
+};
+static const int ha_column_rows[] = {
+COLUMN_ROWS
+};
+/* Factors m->matrix in place; the column without pivot, or -1. */
+static int ha_dense_factor(ha_model *m)
+{
+    double *a = m->matrix;
+    int row;
+    int j;
+    int k;
+    for (row = 0; row < HA_NX; ++row) {
+        double most = DBL_MIN;
+        for (j = 0; j < HA_NX; ++j) {
+            if (fabs(a[row * HA_NX + j]) > most) {
+                most = fabs(a[row * HA_NX + j]);
+            }
+        }
+        m->matrix_order[row] = row;
+        m->matrix_scale[row] = most;
+    }
+    for (k = 0; k < HA_NX; ++k) {
+        const double diagonal = fabs(a[k * HA_NX + k]) / m->matrix_scale[k];
+        double most = diagonal;
+        int best = k;
+        for (row = k + 1; row < HA_NX; ++row) {
+            const double weight = fabs(a[row * HA_NX + k]) / m->matrix_scale[row];
+            if (weight > most || weight != weight) {
+                best = row;
+                most = weight;
+            }
+        }
+        if (diagonal >= 0.1 * most) {
+            best = k;
+            most = diagonal;
+        }
+        if (!(most > DBL_EPSILON * (double)HA_NX)) {
+            return k;
+        }
+        if (best != k) {
+            const double scale = m->matrix_scale[k];
+            const int order = m->matrix_order[k];
+            for (j = 0; j < HA_NX; ++j) {
+                const double entry = a[k * HA_NX + j];
+                a[k * HA_NX + j] = a[best * HA_NX + j];
+                a[best * HA_NX + j] = entry;
+            }
+            m->matrix_scale[k] = m->matrix_scale[best];
+            m->matrix_scale[best] = scale;
+            m->matrix_order[k] = m->matrix_order[best];
+            m->matrix_order[best] = order;
+        }
+        for (row = k + 1; row < HA_NX; ++row) {
+            const double factor = a[row * HA_NX + k] / a[k * HA_NX + k];
+            a[row * HA_NX + k] = factor;
+            if (factor != 0.0) {
+                for (j = k + 1; j < HA_NX; ++j) {
+                    const double product = factor * a[k * HA_NX + j];
+                    a[row * HA_NX + j] -= product;
+                }
+            }
+        }
+    }
+    return -1;
+}
+
+static void ha_dense_solve(ha_model *m, double *b)
+{
+    const double *a = m->matrix;
+    int row;
+    int j;
+    for (row = 0; row < HA_NX; ++row) {
+        double sum = -0.0;
+        for (j = 0; j < row; ++j) {
+            const double product = a[row * HA_NX + j] * m->matrix_work[j];
+            sum += product;
+        }
+        m->matrix_work[row] = b[m->matrix_order[row]] - sum;
+    }
+    for (row = HA_NX - 1; row >= 0; --row) {
+        double sum = -0.0;
+        for (j = row + 1; j < HA_NX; ++j) {
+            const double product = a[row * HA_NX + j] * b[j];
+            sum += product;
+        }
+        b[row] = (m->matrix_work[row] - sum) / a[row * HA_NX + row];
+    }
+}
+
+/* Puts 1 - factor * Jacobian at x into m->matrix; m->sizes takes up what its rows add up where the states are. */
+static int ha_step_matrix(ha_model *m, double t, const double *x, double factor)
+{
+    int group;
+    int i;
+    int j;
+    ha_fill(m->matrix, 0.0, HA_NX * HA_NX);
+    for (i = 0; i < HA_NX; ++i) {
+        m->matrix[i * HA_NX + i] = 1.0;
+    }
+    for (group = 0; group < GROUPS; ++group) {
+        int status;
+        ha_fill(m->direction, 0.0, HA_NX);
+        for (i = ha_group_starts[group]; i < ha_group_starts[group + 1]; ++i) {
+            m->direction[ha_group_columns[i]] = 1.0;
+        }
+        status = MODEL_tangent(m, t, x, m->direction, m->product);
+        if (status != MODEL_OK) {
+            return status;
+        }
+        for (i = ha_group_starts[group]; i < ha_group_starts[group + 1]; ++i) {
+            const int column = ha_group_columns[i];
+            for (j = ha_column_starts[column]; j < ha_column_starts[column + 1]; ++j) {
+                const int row = ha_column_rows[j];
+                const double value = factor * m->product[row];
+                m->matrix[row * HA_NX + column] += -factor * m->product[row];
+                m->sizes[row] += fabs(value * x[column]);
+            }
+        }
+    }
+    i = ha_dense_factor(m);
+    return i >= 0 ? ha_fail(m, MODEL_STEP_SINGULAR, i, t) : MODEL_OK;
+}

@@ -1,0 +1,64 @@
+
+/* ---- a linearly implicit method: one matrix and a fixed number of stages ---- */
+
+/* out = x + sum of weight * stage. */
+static void ha_combine(const ha_model *m, const double *x, const double *weights, int stages, double *out)
+{
+    int stage;
+    int i;
+    for (i = 0; i < HA_NX; ++i) {
+        double sum = -0.0;
+        for (stage = 0; stage < stages; ++stage) {
+            const double part = weights[stage] * m->stages[stage * HA_NX + i];
+            sum += part;
+        }
+        out[i] = x[i] + sum;
+    }
+}
+
+/* From t to t + h: the end in m->trial. */
+static int ha_method(ha_model *m, double t, double h, const double *x)
+{
+    static const double nodes[] = {NODES};
+    static const double drifts[] = {DRIFTS};
+    static const int repeats[] = {REPEATS};
+    static const double states[][STAGES] = {WEIGHTS};
+    static const double right[][STAGES] = {RIGHT_WEIGHTS};
+    const double scale = h * GAMMA;
+    int status = ha_drift(m, t, x, m->correction);
+    int stage;
+    int i;
+    int j;
+    if (status == MODEL_OK) {
+        ha_fill(m->sizes, 0.0, HA_NX);
+        status = ha_step_matrix(m, t, x, scale);
+    }
+    if (status != MODEL_OK) {
+        return status;
+    }
+    for (stage = 0; stage < STAGES; ++stage) {
+        double *own = m->stages + stage * HA_NX;
+        if (!repeats[stage]) {
+            const double part = nodes[stage] * h;
+            ha_combine(m, x, states[stage], stage, m->trial);
+            status = MODEL_rates(m, t + part, m->trial, m->middle);
+            if (status != MODEL_OK) {
+                return status;
+            }
+        }
+        for (i = 0; i < HA_NX; ++i) {
+            const double drift = drifts[stage] * h * m->correction[i];
+            const double rate = scale * (m->middle[i] + drift);
+            double sum = -0.0;
+            for (j = 0; j < stage; ++j) {
+                const double part = right[stage][j] * m->stages[j * HA_NX + i];
+                sum += part;
+            }
+            sum *= GAMMA;
+            own[i] = rate + sum;
+        }
+        ha_dense_solve(m, own);
+    }
+    ha_combine(m, x, states[STAGES], STAGES, m->trial);
+    return MODEL_OK;
+}
