@@ -139,6 +139,10 @@ impl Model {
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
         // Without machine code for this processor the bytecode runs on.
         let machine = system.compile_machine().is_ok();
+        if machine && run.method.is_implicit() {
+            // So do derivatives.
+            let _ = system.compile_tangent();
+        }
         let mut ports = Ports::open(run, &system)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);

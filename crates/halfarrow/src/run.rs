@@ -10,7 +10,6 @@ use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
-use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate, simulate_implicit};
 use halfarrow_trace::{Trace, read_inputs};
 use serde::Serialize;
@@ -191,12 +190,8 @@ impl Model {
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Simulated, Error> {
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
-            let (stages, derivatives) = match method {
-                FixedMethod::Rk4 => (4.0, false),
-                FixedMethod::Euler | FixedMethod::Heun => (2.0, false),
-                _ => (4.0, true),
-            };
-            system.compile_for(stages * (options.to - options.from) / step, derivatives);
+            let evaluations = method.evaluations() * (options.to - options.from) / step;
+            system.compile_for(evaluations, method.is_implicit());
         }
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);

@@ -31,6 +31,22 @@ pub enum FixedMethod {
     Rosenbrock,
 }
 
+impl FixedMethod {
+    /// Evaluations of the rates a step, of an implicit method about.
+    pub fn evaluations(self) -> f64 {
+        match self {
+            FixedMethod::Euler => 1.0,
+            FixedMethod::Heun => 2.0,
+            _ => 4.0,
+        }
+    }
+
+    /// Whether it asks for derivatives.
+    pub fn is_implicit(self) -> bool {
+        !matches!(self, FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4)
+    }
+}
+
 /// Takes steps; all memory is taken in [`new`](FixedStep::new).
 pub struct FixedStep {
     tableau: Option<&'static Tableau>,
