@@ -296,15 +296,16 @@ impl Frame {
         newton.kept.copy_from_slice(&newton.memory);
         newton.base.copy_from_slice(&newton.jacobian_memory);
         let first = self.attempt(solve, Trust::Damped);
+        if first.is_ok() && (self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve))
+            || self.stays(solve)
+        {
+            return Ok(());
+        }
         let newton = self.newton_of(solve);
         for i in 0..newton.x.len() {
             newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
         }
         let missed = match first {
-            Ok(()) if self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve) => {
-                return Ok(());
-            }
-            _ if self.stays(solve) => return Ok(()),
             Ok(()) => self.elsewhere(solve),
             Err(miss) => Missed::All(miss),
         };
@@ -320,17 +321,36 @@ impl Frame {
         if !self.evaluate(solve, true) {
             return false;
         }
-        let Frame { r, solvers, .. } = self;
-        let newton = &mut solvers[solve.block.0 as usize].newton;
-        for (i, &right) in solve.right.iter().enumerate() {
+        for i in 0..n {
+            let Frame { r, solvers, .. } = &mut *self;
+            let newton = &mut solvers[solve.block.0 as usize].newton;
             let entries = solve.matrix[i * n..][..n].iter().zip(&newton.memory);
             let terms = entries.fold(0.0, |sum, (&m, x)| sum + (r[m as usize] * x).abs());
-            if r[right as usize].abs() > ROUNDING * terms {
+            newton.first[i] = r[solve.right[i] as usize];
+            newton.span[i] = ROUNDING * terms;
+        }
+        // What the last digits of what the block reads make of the residuals.
+        for &register in &solve.outer {
+            let value = self.r[register as usize];
+            self.r[register as usize] = value + ROUNDING * value;
+            let finite = self.evaluate(solve, true);
+            self.r[register as usize] = value;
+            if !finite {
                 return false;
             }
+            for (i, &right) in solve.right.iter().enumerate() {
+                let moved = self.r[right as usize];
+                let newton = self.newton_of(solve);
+                newton.span[i] += (moved - newton.first[i]).abs();
+            }
+        }
+        let newton = self.newton_of(solve);
+        if newton.first.iter().zip(&newton.span).any(|(residual, rounding)| residual.abs() > *rounding) {
+            return false;
         }
         newton.x.copy_from_slice(&newton.memory);
-        true
+        newton.trial.copy_from_slice(&newton.memory);
+        self.evaluate(solve, true)
     }
 
     /// The root found is another one: the unknown that differs most.

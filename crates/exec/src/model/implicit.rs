@@ -10,6 +10,8 @@ use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 const ITERATIONS: usize = 30;
 /// What rounding leaves of a slope whose terms cancel, against the greatest slope by the same unknown.
 const CANCELLED: f64 = 1e-14;
+/// A relative step of theirs that has to shrink faster, or is what rounding leaves; before it, a law may be steep.
+const NOISE: f64 = 1e-6;
 /// A relative step of theirs that is rounding.
 const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// Passes of Newton on what is recorded, and unknowns up to which there are any.
@@ -362,7 +364,7 @@ impl ImplicitModel {
             let Some(step) = super::minimum_norm::step(&matrix, &miss, columns) else { break };
             let relative = |(&i, s): (&usize, &f64)| s.abs() / y[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
             let length = self.untold.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
-            if !length.is_finite() || length < 1.0 && length >= 0.5 * before {
+            if !length.is_finite() || length < NOISE && length >= 0.5 * before {
                 break;
             }
             self.untold.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);

@@ -530,6 +530,7 @@ static int ha_approach(ha_model *m, ha_newton *w)
    step is small against it. */
 static int ha_stays(ha_model *m, ha_newton *w)
 {
+    const double rounding = 2.0 * DBL_EPSILON;
     int i;
     int j;
     if (!ha_look_at(m, w, w->memory)) {
@@ -540,12 +541,31 @@ static int ha_stays(ha_model *m, ha_newton *w)
         for (j = 0; j < w->n; ++j) {
             terms += fabs(w->matrix[i * w->n + j] * w->memory[j]);
         }
-        if (fabs(w->right[i]) > 2.0 * DBL_EPSILON * terms) {
+        w->first[i] = w->right[i];
+        w->span[i] = rounding * terms;
+    }
+    /* What the last digits of what the block reads make of the residuals. */
+    for (j = 0; j < w->block->reads; ++j) {
+        const double value = w->present[j];
+        const double digits = rounding * value;
+        int finite;
+        w->present[j] = value + digits;
+        finite = ha_look_at(m, w, w->memory);
+        w->present[j] = value;
+        if (!finite) {
+            return 0;
+        }
+        for (i = 0; i < w->n; ++i) {
+            w->span[i] += fabs(w->right[i] - w->first[i]);
+        }
+    }
+    for (i = 0; i < w->n; ++i) {
+        if (fabs(w->first[i]) > w->span[i]) {
             return 0;
         }
     }
     ha_copy(w->x, w->memory, w->n);
-    return 1;
+    return ha_look_at(m, w, w->memory);
 }
 
 /* The root that goes on from the memory: 0, or why there is none. */
@@ -557,19 +577,18 @@ static int ha_follow(ha_model *m, ha_newton *w)
     ha_copy(w->kept, w->memory, w->n);
     ha_copy(w->base, w->jacobian_memory, w->n * w->n);
     if (ha_attempt(m, w, HA_DAMPED)) {
-        for (i = 0; i < w->n; ++i) {
-            w->span[i] = ha_max(fabs(w->x[i]), fabs(w->memory[i]));
-        }
         if (ha_goes_on(w) || (w->following && ha_is_the_only_one(m, w))) {
             return MODEL_OK;
         }
         why = MODEL_BRANCH;
-    } else {
-        for (i = 0; i < w->n; ++i) {
-            w->span[i] = ha_max(fabs(w->x[i]), fabs(w->memory[i]));
-        }
     }
-    if (ha_stays(m, w) || ha_approach(m, w)) {
+    if (ha_stays(m, w)) {
+        return MODEL_OK;
+    }
+    for (i = 0; i < w->n; ++i) {
+        w->span[i] = ha_max(fabs(w->x[i]), fabs(w->memory[i]));
+    }
+    if (ha_approach(m, w)) {
         return MODEL_OK;
     }
     return why == MODEL_NO_CONVERGENCE && w->evaluations >= w->limit ? MODEL_BOUND : why;
