@@ -155,7 +155,8 @@ impl Assembled<'_> {
         let moved = mobility_of(&mut self.d, relation, mobility);
         let d = &mut self.d;
         let inertia = if moved.is_finite() && moved > 0.0 { 1.0 / moved } else { 1.0 };
-        let inertia = d.x.float(inertia);
+        // A default: three digits of it are enough, and can be read.
+        let inertia = d.x.decimal(&format!("{inertia:.2e}")).expect("a decimal");
         let (stiffness, damping, rate) = (d.x.sym(springs.stiffness), d.x.sym(springs.damping), d.x.sym(springs.rate));
         let (two, root) = (d.x.int(2), d.x.sqrt(stiffness));
         let k = d.x.mul(&[stiffness, rate, rate, inertia]);
