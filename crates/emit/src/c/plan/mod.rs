@@ -346,6 +346,7 @@ impl<'a> Plan<'a> {
         if self.export.method.is_implicit() {
             text += &piece(include_str!("../runtime/matrix.c"));
         }
+        text += &piece(include_str!("../runtime/advance.c"));
         let method = match self.export.method {
             Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
             method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),

@@ -1,21 +1,6 @@
 
 /* ---- a linearly implicit method: one matrix and a fixed number of stages ---- */
 
-/* out = x + sum of weight * stage. */
-static void ha_combine(const ha_model *m, const double *x, const double *weights, int stages, double *out)
-{
-    int stage;
-    int i;
-    for (i = 0; i < HA_NX; ++i) {
-        double sum = -0.0;
-        for (stage = 0; stage < stages; ++stage) {
-            const double part = weights[stage] * m->stages[stage * HA_NX + i];
-            sum += part;
-        }
-        out[i] = x[i] + sum;
-    }
-}
-
 /* From t to t + h: the end in m->trial. */
 static int ha_method(ha_model *m, double t, double h, const double *x)
 {
@@ -40,7 +25,7 @@ static int ha_method(ha_model *m, double t, double h, const double *x)
         double *own = m->stages + stage * HA_NX;
         if (!repeats[stage]) {
             const double part = nodes[stage] * h;
-            ha_combine(m, x, states[stage], stage, m->trial);
+            ha_advance(m, x, 1.0, states[stage], stage, m->trial);
             status = MODEL_rates(m, t + part, m->trial, m->middle);
             if (status != MODEL_OK) {
                 return status;
@@ -59,6 +44,6 @@ static int ha_method(ha_model *m, double t, double h, const double *x)
         }
         ha_dense_solve(m, own);
     }
-    ha_combine(m, x, states[STAGES], STAGES, m->trial);
+    ha_advance(m, x, 1.0, states[STAGES], STAGES, m->trial);
     return MODEL_OK;
 }
