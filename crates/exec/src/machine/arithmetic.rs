@@ -142,16 +142,16 @@ impl Writer<'_> {
         let (left, right) = (self.sub(a, rest), self.sub(b, part));
         (sum, self.add(left, right))
     }
-    /// `(c0 + c1 x) + xx ((c2 + c3 x) + xx (c4 + c5 x))`
+    /// `((c0 + c1 x) + xx (c2 + c3 x)) + xx² (c4 + c5 x)`
     pub fn polynomial_of_6(&mut self, c: &[f64; 6], x: Value, xx: Value) -> Value {
-        let high = self.line(c[4], c[5], x);
-        let high = self.mul(xx, high);
-        let middle = self.line(c[2], c[3], x);
-        let high = self.add(middle, high);
-        let high = self.mul(xx, high);
-        let low = self.line(c[0], c[1], x);
+        let (low, middle, high) = (self.line(c[0], c[1], x), self.line(c[2], c[3], x), self.line(c[4], c[5], x));
+        let middle = self.mul(xx, middle);
+        let low = self.add(low, middle);
+        let fourth = self.mul(xx, xx);
+        let high = self.mul(fourth, high);
         self.add(low, high)
     }
+
     /// `c0 + c1 x`
     pub fn line(&mut self, c0: f64, c1: f64, x: Value) -> Value {
         let (c0, c1) = (self.number(c0), self.number(c1));

@@ -182,16 +182,16 @@ HA_INLINE ha_reduced ha_near(double x)
 HA_INLINE double ha_sine_rest(ha_reduced r, double z)
 {
     const double zz = z * z;
-    const double p = (HA_SINE[0] + HA_SINE[1] * z)
-        + zz * ((HA_SINE[2] + HA_SINE[3] * z) + zz * (HA_SINE[4] + HA_SINE[5] * z));
+    const double low = (HA_SINE[0] + HA_SINE[1] * z) + zz * (HA_SINE[2] + HA_SINE[3] * z);
+    const double p = low + (zz * zz) * (HA_SINE[4] + HA_SINE[5] * z);
     return r.b * (1.0 - 0.5 * z) - (r.a * z) * p;
 }
 
 HA_INLINE ha_double ha_cosine_parts(ha_reduced r, double z)
 {
     const double zz = z * z;
-    const double p = (HA_COSINE[0] + HA_COSINE[1] * z)
-        + zz * ((HA_COSINE[2] + HA_COSINE[3] * z) + zz * (HA_COSINE[4] + HA_COSINE[5] * z));
+    const double low = (HA_COSINE[0] + HA_COSINE[1] * z) + zz * (HA_COSINE[2] + HA_COSINE[3] * z);
+    const double p = low + (zz * zz) * (HA_COSINE[4] + HA_COSINE[5] * z);
     const double half = 0.5 * z;
     const double w = 1.0 - half;
     return ha_pair(w, ((1.0 - w) - half) + (zz * p - r.a * r.b));

@@ -84,7 +84,8 @@ pub fn far(x: f64) -> Reduced {
 #[inline(always)]
 fn sine_rest(r: Reduced, z: f64) -> f64 {
     let zz = z * z;
-    let p = (SINE[0] + SINE[1] * z) + zz * ((SINE[2] + SINE[3] * z) + zz * (SINE[4] + SINE[5] * z));
+    let low = (SINE[0] + SINE[1] * z) + zz * (SINE[2] + SINE[3] * z);
+    let p = low + (zz * zz) * (SINE[4] + SINE[5] * z);
     r.b * (1.0 - 0.5 * z) - (r.a * z) * p
 }
 
@@ -92,7 +93,8 @@ fn sine_rest(r: Reduced, z: f64) -> f64 {
 #[inline(always)]
 fn cosine_parts(r: Reduced, z: f64) -> Double {
     let zz = z * z;
-    let p = (COSINE[0] + COSINE[1] * z) + zz * ((COSINE[2] + COSINE[3] * z) + zz * (COSINE[4] + COSINE[5] * z));
+    let low = (COSINE[0] + COSINE[1] * z) + zz * (COSINE[2] + COSINE[3] * z);
+    let p = low + (zz * zz) * (COSINE[4] + COSINE[5] * z);
     let half = 0.5 * z;
     let w = 1.0 - half;
     (w, ((1.0 - w) - half) + (zz * p - r.a * r.b))
