@@ -362,13 +362,13 @@ impl<'a> Builder<'a> {
         let program = self.program;
         let wanted = |v: &Value| live[v.index()] && !self.is_fixed(*v);
         let mut all: Vec<Value> = program.values.iter().map(|(v, _)| v).filter(wanted).collect();
-        let first_of_newton = |v: &&Value| match program.values.op(**v) {
-            Op::Solution(block, _) => matches!(program.blocks[block], Block::Newton { .. }),
-            _ => false,
+        let newton = |v: &Value| match program.values.op(*v) {
+            Op::Solution(block, _) => matches!(program.blocks[block], Block::Newton { .. }).then_some(block),
+            _ => None,
         };
-        let mut blocks: Vec<Op> = all.iter().filter(first_of_newton).map(|v| program.values.op(*v)).collect();
-        blocks.dedup_by_key(|op| if let Op::Solution(block, _) = op { Some(*block) } else { None });
-        if blocks.len() < 2 {
+        let mut blocks = all.iter().filter_map(newton);
+        let first = blocks.next();
+        if blocks.all(|block| Some(block) == first) {
             return all;
         }
         // How many blocks stand behind one another before a value.

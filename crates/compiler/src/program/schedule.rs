@@ -172,8 +172,7 @@ impl Schedule<'_> {
         let columns = self.lower.values.derivatives(&values, &guesses, from);
         let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
         let piecewise = self.lower.end_newton();
-        let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
-        let (unknown_names, elements) = (unknowns.iter().map(name).collect(), self.concerned(elements, unknowns));
+        let (unknown_names, elements) = (self.names_of(unknowns), self.concerned(elements, unknowns));
         self.blocks.push(Block::Newton { residuals: values, jacobian, unknowns: unknown_names, elements });
         self.solved(block, unknowns);
         for &(symbol, value) in body {
@@ -191,9 +190,12 @@ impl Schedule<'_> {
 
     /// The elements of a block or of a divisor, or if there are none but junctions and two-ports its variables.
     fn concerned(&self, elements: &[ElementId], variables: &[Symbol]) -> String {
-        let name = |&s: &Symbol| self.graph.exprs.name(s).trim_end_matches('*').to_string();
         let listed = names(self.graph, elements);
-        if listed.is_empty() { variables.iter().map(name).collect::<Vec<_>>().join(", ") } else { listed }
+        if listed.is_empty() { self.names_of(variables).join(", ") } else { listed }
+    }
+
+    fn names_of(&self, variables: &[Symbol]) -> Vec<String> {
+        variables.iter().map(|&s| self.graph.exprs.name(s).trim_end_matches('*').to_string()).collect()
     }
 
     fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {

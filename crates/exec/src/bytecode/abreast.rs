@@ -10,7 +10,7 @@ use super::operands::{moved, reads, written};
 use super::packed::Packed;
 use super::wide::{self, WideFrame};
 use halfarrow_compiler::program::{Instruction, Program, Register, Routine, Solve};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Blocks that are solved at once: as many as it takes to keep the processor busy, since each step of an elimination
 /// waits for the one before.
@@ -131,28 +131,26 @@ impl Shape {
             return None;
         }
         // First what is read from outside, in the order in which it is read.
-        let mut inside: BTreeMap<Register, ()> = solve.guess.iter().map(|&g| (g, ())).collect();
+        let mut inside: BTreeSet<Register> = solve.guess.iter().copied().collect();
         let mut inputs: Vec<Register> = Vec::new();
-        let mut seen = BTreeMap::new();
         let places = solve.entries.iter().map(|&place| solve.matrix[place as usize]);
         let outputs: Vec<Register> = places.chain(solve.right.iter().copied()).collect();
-        let mut note = |r: Register, inside: &BTreeMap<Register, ()>| {
-            if !inside.contains_key(&r) && seen.insert(r, ()).is_none() {
+        let mut seen = BTreeSet::new();
+        let mut note = |r: Register, inside: &BTreeSet<Register>| {
+            if !inside.contains(&r) && seen.insert(r) {
                 inputs.push(r);
             }
         };
         for instruction in &solve.code {
             reads(instruction, |r| note(r, &inside));
-            written(instruction).map(|out| inside.insert(out, ()));
+            inside.extend(written(instruction));
         }
         outputs.iter().for_each(|&r| note(r, &inside));
         // A register that is an input first and written later would have two meanings.
-        if inputs.iter().any(|r| inside.contains_key(r)) {
+        if inputs.iter().any(|r| inside.contains(r)) {
             return None;
         }
-        let mut named: BTreeMap<Register, Register> = BTreeMap::new();
-        let given = solve.guess.iter().chain(&inputs).copied();
-        named.extend(given.zip(0..));
+        let mut named: BTreeMap<Register, Register> = solve.guess.iter().chain(&inputs).copied().zip(0..).collect();
         let mut next = (size + inputs.len()) as Register;
         let code = solve.code.iter().map(|instruction| {
             let mut read = [0; 3];

@@ -61,3 +61,24 @@ static int ha_fail(ha_model *m, int code, int where, double t)
     m->failure.time = t;
     return code;
 }
+
+/* The row of a matrix of n rows to bring to place k, and its weight there: the diagonal stays if it is good enough. */
+static int ha_pivot_row(const double *a, const double *scale, int n, int k, double *weight)
+{
+    const double diagonal = fabs(a[k * n + k]) / scale[k];
+    int best = k;
+    int row;
+    *weight = diagonal;
+    for (row = k + 1; row < n; ++row) {
+        const double other = fabs(a[row * n + k]) / scale[row];
+        if (other > *weight || other != other) {
+            best = row;
+            *weight = other;
+        }
+    }
+    if (diagonal >= 0.1 * *weight) {
+        best = k;
+        *weight = diagonal;
+    }
+    return best;
+}

@@ -29,23 +29,9 @@ static ha_lu ha_lu_at(double *place, int *order, int n)
 /* The row to bring to place k, -1 if all are 0 to rounding. */
 static int ha_lu_pivot(const ha_lu *l, int k)
 {
-    const int n = l->n;
-    const double diagonal = fabs(l->factors[k * n + k]) / l->scale[k];
-    double most = diagonal;
-    int best = k;
-    int row;
-    for (row = k + 1; row < n; ++row) {
-        const double weight = fabs(l->factors[row * n + k]) / l->scale[row];
-        if (weight > most || weight != weight) {
-            best = row;
-            most = weight;
-        }
-    }
-    if (diagonal >= 0.1 * most) {
-        best = k;
-        most = diagonal;
-    }
-    return most > DBL_EPSILON * (double)n && ha_finite(most) ? best : -1;
+    double weight;
+    const int best = ha_pivot_row(l->factors, l->scale, l->n, k, &weight);
+    return weight > DBL_EPSILON * (double)l->n && ha_finite(weight) ? best : -1;
 }
 
 static void ha_lu_swap(ha_lu *l, int a, int b)

@@ -31,21 +31,9 @@ static int ha_dense_factor(ha_model *m)
         m->matrix_scale[row] = most;
     }
     for (k = 0; k < HA_NX; ++k) {
-        const double diagonal = fabs(a[k * HA_NX + k]) / m->matrix_scale[k];
-        double most = diagonal;
-        int best = k;
-        for (row = k + 1; row < HA_NX; ++row) {
-            const double weight = fabs(a[row * HA_NX + k]) / m->matrix_scale[row];
-            if (weight > most || weight != weight) {
-                best = row;
-                most = weight;
-            }
-        }
-        if (diagonal >= 0.1 * most) {
-            best = k;
-            most = diagonal;
-        }
-        if (!(most > DBL_EPSILON * (double)HA_NX)) {
+        double weight;
+        const int best = ha_pivot_row(a, m->matrix_scale, HA_NX, k, &weight);
+        if (!(weight > DBL_EPSILON * (double)HA_NX)) {
             return k;
         }
         if (best != k) {
