@@ -38,7 +38,7 @@ Examples:
     #[command(after_help = "Example:\n  halfarrow show causal_graph car.bond")]
     Show(Show),
     /// List zero-order causal paths, dependent storages and conserved quantities
-    #[command(after_help = "Example:\n  halfarrow loops car.bond --set b=900")]
+    #[command(after_help = "Example:\n  halfarrow loops car.bond --set b=600")]
     Loops(Loops),
     /// Print the equations
     #[command(after_help = "\
@@ -64,7 +64,7 @@ Examples:
 Examples:
   halfarrow simulate car.bond --to 10
   halfarrow simulate car.bond --to 10 --every 0.01 --out car.csv --plot car.svg
-  halfarrow simulate car.bond --to 10 --set k=20e3 --input road=road.csv --record body.f,damper.e
+  halfarrow simulate car.bond --to 10s --set ks=20e3 --input road=road.csv --record body.f,damper.e
   halfarrow simulate car.bond --to 10 --solver rk4 --step 1e-3 --out -")]
     Simulate(Box<Simulate>),
     /// Write one page with everything: drawing, causality, paths, equations, comparison, plots, audit
@@ -79,7 +79,7 @@ Writes a row for each set: its number, its parameters, what is kept of the run, 
 its end. With euler, heun or rk4 sixteen sets run at once. A sweep that was interrupted goes on where it stopped.
 What can be kept: initial, final, min, max, max_abs, mean, rms, time_of_max.
 Examples:
-  halfarrow sweep car.bond --vary ks=lin(10 kN/m,30 kN/m,100) --vary b=log(100,3000,20) --to 10 --step 1e-3 \\
+  halfarrow sweep car.bond --vary 'ks=lin(10 kN/m,30 kN/m,100)' --vary 'b=log(100,3000,20)' --to 10 --step 1ms \\
       --reduce \"max_abs(body.f),final(spring.q)\" --out sweep.parquet
   halfarrow sweep car.bond --samples sets.csv --to 10 --solver auto --out sweep.csv")]
     Sweep(Box<Sweep>),
@@ -266,11 +266,11 @@ pub enum Start {
 pub struct Simulate {
     #[command(flatten)]
     pub model: ModelArguments,
-    /// End of the run, in s; it begins at 0
-    #[arg(long, value_name = "TIME")]
+    /// End of the run, in s or with a unit (`10`, `500ms`); it begins at 0
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
     /// Time between recorded points, in s; without it every step is recorded
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// The formulation
     #[arg(long, default_value = "minimal")]
@@ -285,13 +285,13 @@ pub struct Simulate {
     #[arg(long, default_value = "auto")]
     pub solver: Solver,
     /// Step of a method with fixed step, longest step of the others, in s
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub step: Option<f64>,
     /// Relative error allowed in a step
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub rtol: f64,
     /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub atol: Option<f64>,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
@@ -319,10 +319,10 @@ pub struct Compare {
     #[command(flatten)]
     pub model: ModelArguments,
     /// End of the runs, in s [default: ten times the slowest time of the motion near the start]
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: Option<f64>,
     /// Error at which times are compared, relative to the greatest magnitude of each variable
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub error: f64,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
@@ -331,7 +331,7 @@ pub struct Compare {
     #[arg(long, default_value_t = 7)]
     pub repeats: usize,
     /// Time of a run, in s, beyond which no tighter tolerance is tried
-    #[arg(long, value_name = "TIME", default_value_t = 20.0)]
+    #[arg(long, value_name = "TIME", default_value = "20", value_parser = duration, allow_hyphen_values = true)]
     pub patience: f64,
     /// Where to plot work against error: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
@@ -387,13 +387,13 @@ pub struct Report {
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// End of the runs, in s [default: ten times the slowest time of the motion near the start]
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: Option<f64>,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,
     /// Error at which forms are compared, relative to the greatest magnitude of each variable
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub error: f64,
     /// Leave out the comparison of forms, which takes time
     #[arg(long)]
@@ -416,19 +416,19 @@ pub struct Sweep {
     #[arg(long, value_name = "REDUCTIONS", value_delimiter = ',')]
     pub reduce: Vec<String>,
     /// End of each run, in s
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
     /// Time between the samples that are kept or reduced, in s; without it every step is one
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// The method
     #[arg(long, default_value = "rk4")]
     pub solver: Solver,
     /// Step of a method with fixed step, longest step of the others, in s
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub step: Option<f64>,
     /// Relative error allowed in a step of a method with variable step
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub rtol: f64,
     /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
@@ -462,7 +462,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FREQUENCY")]
     pub rate: String,
     /// Length of the run in s of the model; without it, until it is interrupted
-    #[arg(long = "for", value_name = "TIME")]
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub length: Option<f64>,
     /// Where inputs come from: `udp://ADDRESS:PORT`, `stdin`, NAME=FILE, or a .csv file with columns called as inputs; may
     /// be repeated
@@ -546,7 +546,7 @@ pub struct Export {
     #[arg(long, default_value = "rk4")]
     pub method: FixedSolver,
     /// The length of a step, in s
-    #[arg(long, value_name = "TIME", default_value_t = 1e-3)]
+    #[arg(long, value_name = "TIME", default_value = "1e-3", value_parser = duration, allow_hyphen_values = true)]
     pub step: f64,
     /// FMUs: no binary for this machine, sources alone
     #[arg(long)]
@@ -558,9 +558,7 @@ fn point(text: &str) -> Result<Point, String> {
     match text {
         "start" => Ok(Point::Start),
         "equilibrium" => Ok(Point::Equilibrium),
-        _ => {
-            text.parse().map(Point::Time).map_err(|_| format!("`{text}` is neither start, equilibrium nor a time in s"))
-        }
+        _ => duration(text).map(Point::Time).map_err(|_| format!("`{text}` is neither start, equilibrium nor a time")),
     }
 }
 
@@ -571,5 +569,14 @@ fn pair(text: &str) -> Result<(String, String), String> {
             Ok((name.trim().to_string(), value.trim().to_string()))
         }
         _ => Err(format!("`{text}` is not of the form name=value")),
+    }
+}
+
+/// Reads a time in s, with or without a unit.
+fn duration(text: &str) -> Result<f64, String> {
+    match halfarrow::duration(text) {
+        Some(time) if time.is_finite() && time >= 0.0 => Ok(time),
+        Some(_) => Err("a time cannot be negative or infinite".to_owned()),
+        None => Err("it is no time: write `0.5`, `500ms` or `2 min`".to_owned()),
     }
 }

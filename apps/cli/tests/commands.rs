@@ -63,7 +63,7 @@ fn a_new_model_runs_at_once() {
     assert_eq!(status(&laid_out), 0, "{}", stderr(&laid_out));
     let run = halfarrow(&here, &["simulate", "quarter-car.bond", "--to", "10"]);
     assert_eq!(status(&run), 0, "{}", stderr(&run));
-    assert!(stdout(&run).contains("stretch") && stdout(&run).contains("audit"), "{}", stdout(&run));
+    assert!(stdout(&run).contains("travel") && stdout(&run).contains("audit"), "{}", stdout(&run));
     let again = halfarrow(&here, &["new", "quarter-car"]);
     assert_eq!(status(&again), 2);
     assert!(stderr(&again).contains("there already"));

@@ -139,7 +139,7 @@ impl Unit {
         }
     }
 
-    /// The first symbol, without exponent: a model that declares this name cannot mean it as a unit after a number.
+    /// The first symbol, without exponent.
     pub fn first_symbol(text: &str) -> &str {
         read::first_symbol(text)
     }

@@ -429,15 +429,17 @@ fn ladder(n: usize) -> String {
 
 #[test]
 fn ladders_take_time_in_proportion_to_their_length() {
+    // The least of some runs: other work on the machine only makes a run longer.
     let time = |n: usize| {
         let text = ladder(n);
-        let start = std::time::Instant::now();
-        let bonds = elaborate(&text).graph.unwrap().bonds.len();
-        assert_eq!(bonds, 4 * n);
-        start.elapsed()
+        let once = || {
+            let start = std::time::Instant::now();
+            assert_eq!(elaborate(&text).graph.unwrap().bonds.len(), 4 * n);
+            start.elapsed()
+        };
+        (0..5).map(|_| once()).min().unwrap()
     };
     let (short, long) = (time(500), time(5000));
-    println!("500: {short:?}, 5000: {long:?}");
     assert!(long < short * 40, "500 sections {short:?}, 5000 sections {long:?}");
 }
 
@@ -603,4 +605,21 @@ fn time_of_a_long_ladder() {
         println!("parsed in {read:?}, elaborated in {:?}", start.elapsed() - read);
         assert!(result.graph.is_some());
     }
+}
+
+#[test]
+fn two_ports_take_their_factor_from_in_to_out() {
+    let law = |declared: &str| {
+        let shown = graph(&format!("model M\nparam x = 4\nSe:s(1) -> {declared} -> I:m(1)\n")).to_string();
+        shown
+            .lines()
+            .find(|line| line.starts_with("  TF") || line.starts_with("  GY"))
+            .unwrap_or_else(|| panic!("{shown}"))
+            .trim()
+            .to_string()
+    };
+    assert_eq!(law("TF:t(f_out = x)"), law("TF:t(x)"));
+    assert_eq!(law("TF:t(e_out = x)"), law("TF:t(1/x)"));
+    assert_eq!(law("GY:t(e_out = x)"), law("GY:t(x)"));
+    assert_eq!(law("GY:t(f_out = x)"), law("GY:t(1/x)"));
 }

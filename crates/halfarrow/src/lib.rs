@@ -49,8 +49,8 @@ pub use linearize::{
     Linearize, LinearizeReport, Mode, Point, ReachReport, Response, StateAt, SymbolicReport, Terminal, TransferFunction,
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
-pub use model::{Model, format_text};
-pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, frequency};
+pub use model::{Model, format_text, read_text};
+pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, duration, frequency};
 pub use report::Report;
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;

@@ -25,7 +25,7 @@ impl Model {
     /// # Errors
     /// The file cannot be read, or the model has errors.
     pub fn load(path: &Path, set: &[Override]) -> Result<Model, Error> {
-        let text = read(path)?;
+        let text = read_text(path)?;
         Model::read(&path.to_string_lossy(), &text, &Disk, set)
     }
 
@@ -99,6 +99,23 @@ pub fn format_text(name: &str, text: &str) -> Result<String, Error> {
 }
 
 /// The text of a file.
-pub(crate) fn read(path: &Path) -> Result<String, Problem> {
-    std::fs::read_to_string(path).map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })
+///
+/// # Errors
+/// It cannot be read, or is not UTF-8; then the words say where.
+pub fn read_text(path: &Path) -> Result<String, Problem> {
+    let unreadable = |why: String| Problem::Unreadable { path: path.into(), why };
+    let bytes = std::fs::read(path).map_err(|why| unreadable(why.to_string()))?;
+    utf8(bytes).map_err(unreadable)
+}
+
+/// Text of bytes; in the error the place of the first one that is no UTF-8.
+pub(crate) fn utf8(bytes: Vec<u8>) -> Result<String, String> {
+    String::from_utf8(bytes).map_err(|why| {
+        let (sound, rest) = why.as_bytes().split_at(why.utf8_error().valid_up_to());
+        let line = 1 + sound.iter().filter(|b| **b == b'\n').count();
+        let begun = sound.rsplit(|b| *b == b'\n').next().unwrap_or_default();
+        let column = 1 + String::from_utf8_lossy(begun).chars().count();
+        let byte = rest.first().copied().unwrap_or_default();
+        format!("the byte 0x{byte:02x} at line {line}, column {column} is not UTF-8: save the file in this encoding")
+    })
 }

@@ -11,7 +11,7 @@ use halfarrow_compiler::program::schedule;
 
 use crate::Override;
 use crate::error::Error;
-use crate::model::{Model, read};
+use crate::model::{Model, read_text};
 
 /// A stage of the compiler whose result can be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Stage {
         match self {
             Stage::Ast => {
                 let name = path.to_string_lossy();
-                let text = read(path)?;
+                let text = read_text(path)?;
                 let mut sources = Sources::new();
                 let file = sources.add(name, text);
                 let parsed = ast::parse(sources.text(file), file);

@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Error, Problem, format_text, write_whole};
+use halfarrow::{Error, Problem, format_text, read_text, write_whole};
 use serde_json::json;
 
 use crate::arguments;
@@ -66,8 +66,7 @@ pub fn fmt(arguments: &arguments::Fmt) -> u8 {
 }
 
 fn laid_out(path: &Path) -> Result<(String, String), Error> {
-    let before =
-        std::fs::read_to_string(path).map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })?;
+    let before = read_text(path)?;
     let after = format_text(&path.to_string_lossy(), &before)?;
     Ok((before, after))
 }

@@ -76,6 +76,9 @@ pub(super) enum TokenKind {
     Newline,
     #[regex(r"//[^\n]*", allow_greedy = true)]
     Comment,
+    /// `/* ... */`, which other languages have.
+    #[regex(r"/\*([^*]|\*+[^*/])*\*+/")]
+    BlockComment,
     /// Characters without a meaning.
     Unknown,
     /// The end of the text.

@@ -293,6 +293,8 @@ pub struct Element {
     pub args: Vec<Arg>,
     /// What it is.
     pub doc: Option<Doc>,
+    /// The port in `Diode:d.p`, where a bond ends: an error of the parser says that it is named elsewhere.
+    pub port: Option<Name>,
     /// From the kind to the closing parenthesis.
     pub span: Span,
 }

@@ -106,6 +106,8 @@ pub(super) struct Builder<'a, 'f> {
     pub pairs: Vec<Pair>,
     /// Variables of the bond of every constraint.
     pub reactions: Vec<Pair>,
+    /// Dimensions of the moduli of two-ports.
+    pub moduli: BTreeMap<usize, Quantity>,
     /// Stored quantities of every port of every part.
     pub stored: Vec<Vec<Symbol>>,
     /// Values of the declarations; `None` before they are known and where they are at fault.
@@ -151,6 +153,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             incomplete: wiring.broken,
             meanings: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
+            moduli: BTreeMap::new(),
             reactions: Vec::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
@@ -312,7 +315,9 @@ impl<'a, 'f> Builder<'a, 'f> {
             }
             _ => "put a TF or GY between the two domains, or correct a unit",
         };
-        self.fault(d.hint(hint));
+        // Of the two that clash a two-port is the one to look at.
+        let two_port = [Some(part), why.part].into_iter().flatten().find_map(|p| self.modulus_hint(p, says, is));
+        self.fault(d.hint(two_port.unwrap_or_else(|| hint.to_owned())));
     }
 
     /// The number that an expression of parameters is; `None` if it reads anything else.

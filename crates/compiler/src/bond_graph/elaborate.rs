@@ -205,11 +205,16 @@ impl Builder<'_, '_> {
     ) -> Option<Unit> {
         let dim = self.dims.value(quantity).filter(|_| self.units_written)?;
         let turning = self.is_turning(meaning);
-        let make = || match (turning, dim == Dimension::NONE) {
-            (true, true) => Unit::parse("rad").unwrap_or_else(|_| Unit::si(dim)),
-            (true, false) => Unit::parse("rad/s").unwrap_or_else(|_| Unit::si(dim)),
-            _ => Unit::si(dim),
+        let stored = matches!(meaning, Meaning::Stored(_));
+        let name = match (turning, dim) {
+            (true, Dimension::NONE) => Some("rad"),
+            (true, _) => Some("rad/s"),
+            // What is stored is never a torque: heat in a pseudo bond graph.
+            (false, Dimension::JOULE) if stored => Some("J"),
+            _ => None,
         };
+        let make = || name.and_then(|name| Unit::parse(name).ok()).unwrap_or_else(|| Unit::si(dim));
+        let turning = turning || (stored && dim == Dimension::JOULE);
         Some(units.entry((dim, turning)).or_insert_with(make).clone())
     }
 

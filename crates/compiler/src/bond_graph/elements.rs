@@ -49,8 +49,8 @@ impl<'a> Builder<'a, '_> {
             Word::Zc => self.only_value(part, "f", false).map(|flow| Kind::ZeroCompliance { flow }),
             Word::ResidualSe => self.residual(part).map(|residual| Kind::ResidualEffort { residual }),
             Word::ResidualSf => self.residual(part).map(|residual| Kind::ResidualFlow { residual }),
-            Word::Tf => self.modulus(part, "m").map(|modulus| Kind::Transformer { modulus }),
-            Word::Gy => self.modulus(part, "r").map(|modulus| Kind::Gyrator { modulus }),
+            Word::Tf => self.modulus(part, ["m", "f_out", "e_out"]).map(|modulus| Kind::Transformer { modulus }),
+            Word::Gy => self.modulus(part, ["r", "e_out", "f_out"]).map(|modulus| Kind::Gyrator { modulus }),
             Word::I => self.storage(part).map(Kind::Inertance),
             Word::C => self.storage(part).map(Kind::Compliance),
             Word::R => self.resistor(part).map(Kind::Resistor),
@@ -163,9 +163,11 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn modulus(&mut self, part: usize, letter: &'static str) -> Option<Expr> {
+    /// The modulus of a two-port: given by its letter, as the factor from in to out of the variable that it is the
+    /// factor of, or as that of the other variable, whose inverse it is.
+    fn modulus(&mut self, part: usize, [letter, direct, inverse]: [&'static str; 3]) -> Option<Expr> {
         let p = self.part(part);
-        let Some(arg) = self.single(part, &[letter]).ok()? else {
+        let Some(arg) = self.single(part, &[letter, direct, inverse]).ok()? else {
             let title = format!("{} `{}` has no modulus", p.word.text(), p.name);
             let law =
                 if p.word == Word::Tf { "e_in = m e_out, f_out = m f_in" } else { "e_in = r f_out, e_out = r f_in" };
@@ -173,7 +175,12 @@ impl<'a> Builder<'a, '_> {
             self.fault(d.note(law).hint(format!("write `{}:{}( … )`", p.ast.kind.text, p.ast.name.text)));
             return None;
         };
-        let value = self.arg(part, &arg.value, false)?;
+        let mut value = self.arg(part, &arg.value, false)?;
+        if arg.label.as_ref().is_some_and(|label| label.name.text == inverse) {
+            let one = Value::number(self.exprs.int(1), Quantity::NONE);
+            value = self.quotient(&one, &value, arg.value.span)?;
+        }
+        self.moduli.insert(part, value.quantity.clone());
         let (inner, outer) = (self.wire_at(part, 0)?, self.wire_at(part, 1)?);
         let (a, b) = (self.pairs[inner].clone(), self.pairs[outer].clone());
         let (first, second) = match p.word {
@@ -192,11 +199,22 @@ impl<'a> Builder<'a, '_> {
         let p = self.part(part);
         let ports = p.ast.ports.len().max(1);
         let mut args = LawArgs { laws: vec![Vec::new(); ports], coefficient: None, energy: None, starts: Vec::new() };
-        let mut fine = true;
+        let mut fine = self.ports_are_distinct(p);
         for arg in &p.ast.args {
             fine &= self.sort_arg(p, arg, &mut args);
         }
         fine.then_some(args)
+    }
+
+    /// Says which name is given to two ports.
+    fn ports_are_distinct(&mut self, p: &Part<'_>) -> bool {
+        let ports = &p.ast.ports;
+        let twice = (1..ports.len()).find_map(|i| Some((i, ports[..i].iter().position(|q| q.text == ports[i].text)?)));
+        let Some((again, first)) = twice else { return true };
+        let title = format!("two ports of `{}` have the name `{}`", p.name, ports[again].text);
+        let d = Diagnostic::error(codes::N002, title, ports[again].span, "again");
+        self.fault(d.also(ports[first].span, "the first").hint("give each port a name of its own"));
+        false
     }
 
     fn sort_arg(&mut self, p: &Part<'_>, arg: &'a Arg, args: &mut LawArgs<'a>) -> bool {

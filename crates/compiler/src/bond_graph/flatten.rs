@@ -430,6 +430,10 @@ impl<'a> Flat<'a> {
         let title = format!("there is no kind of element `{}`", kind.text);
         let d = Diagnostic::error(codes::N005, title, kind.span, "neither a kind nor a component");
         let d = match nearest(&kind.text, known) {
+            _ if usual_name(&kind.text).is_some() => {
+                let (word, what) = usual_name(&kind.text).unwrap_or_default();
+                d.hint(format!("write `{word}:{}(…)`: {what}", element.name.text))
+            }
             Some(near) => d.hint(format!("did you mean `{near}`?")),
             None => {
                 d.hint("kinds are 0 1 Se Sf I C R TF GY ZC rSe rSf De Df, and components that are declared or imported")
@@ -598,6 +602,9 @@ impl<'a> Flat<'a> {
             ast::Node::Declared(element) => {
                 let known = self.names.scopes[scope].nodes.get(element.name.text.as_str()).copied();
                 let at = match known {
+                    Some((node, span)) if span == element.name.span && element.port.is_some() => {
+                        element.port.as_ref().map_or(At::Broken, |port| self.port_of(node, port))
+                    }
                     Some((Node::Part(part), span)) if span == element.name.span => At::Part(part, None),
                     Some((Node::Instance(inner), span)) if span == element.name.span => {
                         self.only_port(inner, element.span)
@@ -607,6 +614,18 @@ impl<'a> Flat<'a> {
                 End { at, span: element.span }
             }
             ast::Node::Named(path) => End { at: self.named_end(scope, path), span: path.span },
+        }
+    }
+
+    /// A port of an element or of an instance, where the parser has told all that is wrong.
+    fn port_of(&mut self, node: Node, port: &'a ast::Name) -> At {
+        match node {
+            Node::Part(part) => self.named_port(part, port),
+            Node::Instance(inner) => match self.names.scopes[inner].nodes.get(port.text.as_str()) {
+                Some(&(Node::Joint(joint), _)) => At::Outside(joint),
+                _ => At::Broken,
+            },
+            _ => At::Broken,
         }
     }
 
@@ -685,4 +704,22 @@ impl<'a> Flat<'a> {
         });
         At::Broken
     }
+}
+
+/// The kind that a word of one domain stands for, and what it is in a bond graph.
+fn usual_name(word: &str) -> Option<(&'static str, &'static str)> {
+    Some(match word {
+        "L" | "Inductor" | "Coil" => ("I", "an inductance is an inertance"),
+        "M" | "m" | "J" | "Mass" | "Inertia" => ("I", "a mass is an inertance"),
+        "K" | "k" | "Spring" => ("C", "a spring is a compliance; `k = …` gives its stiffness"),
+        "Capacitor" => ("C", "a capacitor is a compliance"),
+        "B" | "b" | "D" | "Damper" | "Resistor" | "Friction" => ("R", "a damper is a resistor"),
+        "G" => ("R", "a conductance is a resistor; `g = …` gives it"),
+        "V" | "U" | "F" | "P" | "E" => ("Se", "a voltage, force or pressure is a source of effort"),
+        "Q" => ("Sf", "a flow that is given is a source of flow"),
+        "SE" | "se" => ("Se", "kinds are written like this"),
+        "SF" | "sf" => ("Sf", "kinds are written like this"),
+        "Gear" | "Lever" => ("TF", "its ratio is the modulus of a transformer"),
+        _ => return None,
+    })
 }

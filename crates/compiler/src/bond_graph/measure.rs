@@ -5,7 +5,6 @@ use super::dimension::Quantity;
 use super::value::Reading;
 use crate::algebra::{Expr, Rational};
 use crate::ast;
-use crate::diagnostic::{Diagnostic, codes};
 use crate::unit::{Dimension, Unit};
 
 /// A unit with the way to SI as expressions.
@@ -43,18 +42,18 @@ impl Builder<'_, '_> {
         Value::number(self.exprs.add(&[scaled, scale.offset]), Quantity::of(scale.dim))
     }
 
-    /// `2 m` where a parameter `m` is declared could mean `2*m`.
-    pub fn refuse_name_as_unit(&mut self, cx: &Reading<'_>, n: &ast::Number, unit: &ast::UnitText) {
-        let symbol = Unit::first_symbol(&unit.text);
-        let Some(decl) = self.flat.names.value(cx.scope, symbol) else { return };
-        let number = &n.text;
-        let title = format!("`{number} {}` can be read in two ways", unit.text);
-        self.fault(
-            Diagnostic::error(codes::U004, title, unit.span, format!("`{symbol}` is a unit, and a declared name"))
-                .also(self.flat.names.decls[decl].span, format!("`{symbol}` is declared here"))
-                .hint(format!(
-                    "write `{number}*{symbol}` for the product; to use the unit, give the declared name another one"
-                )),
-        );
+    /// Reads the unit of a number; where there is no such unit but a declared name, a product is meant.
+    pub fn unit_of_number(&mut self, cx: &Reading<'_>, n: &ast::Number, unit: &ast::UnitText) -> Option<Scale> {
+        let names = [unit.text.as_str(), Unit::first_symbol(&unit.text)];
+        let declared = |name: &str| Some((name.to_string(), self.flat.names.value(cx.scope, name)?));
+        match (Unit::parse(&unit.text), names.into_iter().find_map(declared)) {
+            (Err(why), Some((symbol, decl))) => {
+                let declared = self.flat.names.decls[decl].span;
+                let hint = format!("write `{}*{symbol}` for the product", n.text);
+                self.fault(why.at(unit.span).also(declared, format!("`{symbol}` is declared here")).hint(hint));
+                None
+            }
+            _ => self.unit(unit),
+        }
     }
 }

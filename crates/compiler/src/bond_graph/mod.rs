@@ -25,6 +25,7 @@ mod print;
 mod recognise;
 mod scope;
 mod symbols;
+mod two_ports;
 mod value;
 mod verify;
 mod warnings;

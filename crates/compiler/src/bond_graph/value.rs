@@ -93,8 +93,7 @@ impl<'a> Builder<'a, '_> {
             return None;
         };
         let Some(unit) = &n.unit else { return Some(Value::number(number, Quantity::Any)) };
-        self.refuse_name_as_unit(cx, n, unit);
-        let scale = self.unit(unit)?;
+        let scale = self.unit_of_number(cx, n, unit)?;
         Some(self.in_unit(number, &scale))
     }
 
@@ -124,7 +123,10 @@ impl<'a> Builder<'a, '_> {
             BinaryOp::Add => Some(self.sum(&l, &r, false, span)),
             BinaryOp::Sub => Some(self.sum(&l, &r, true, span)),
             BinaryOp::Mul => Some(Value::number(self.exprs.mul(&[l.expr, r.expr]), l.quantity.times(&r.quantity))),
-            BinaryOp::Div => self.quotient(&l, &r, b.right.span),
+            BinaryOp::Div => {
+                let l = if is_one(&b.left) { Value { quantity: Quantity::NONE, ..l } } else { l };
+                self.quotient(&l, &r, b.right.span)
+            }
             BinaryOp::Pow => Some(self.power(&l, &r, b.right.span)),
             op => {
                 self.equal(&l.quantity, &r.quantity, span, "the two sides");
@@ -140,7 +142,8 @@ impl<'a> Builder<'a, '_> {
         Value::number(expr, known_of(&l.quantity, &r.quantity))
     }
 
-    fn quotient(&mut self, l: &Value, r: &Value, span: Span) -> Option<Value> {
+    /// A quotient; says so where the divisor is 0.
+    pub fn quotient(&mut self, l: &Value, r: &Value, span: Span) -> Option<Value> {
         if self.exprs.is_number(r.expr).is_some_and(|n| n.is_zero()) {
             self.fault(Diagnostic::error(codes::L008, "division by zero", span, "this is 0"));
             return None;
@@ -224,6 +227,9 @@ impl<'a> Builder<'a, '_> {
         let known = FUNCTIONS.iter().map(|f| f.0).chain(self.visible_functions(cx.scope));
         self.fault(match crate::diagnostic::nearest(&name.text, known) {
             _ if is_value => d.hint(format!("write `{}*( … )` for a product", name.text)),
+            _ if matches!(name.text.as_str(), "der" | "ddt" | "dot" | "derivative") => {
+                d.hint("a time derivative is written with a prime: `x'`, `spring.q'`, `(a*x)'`")
+            }
             Some(near) => d.hint(format!("did you mean `{near}`?")),
             None => d.hint("write `let f(x) = …` to declare one"),
         });
@@ -332,6 +338,11 @@ fn comparison(op: BinaryOp) -> Comparison {
         BinaryOp::Eq => Comparison::Eq,
         _ => Comparison::Ne,
     }
+}
+
+/// Whether it is the 1 of a reciprocal `1/x`, which has no unit; any other number may have one.
+fn is_one(e: &ast::Expr) -> bool {
+    matches!(&e.kind, ExprKind::Number(n) if n.unit.is_none() && n.text == "1")
 }
 
 /// How a function is written.

@@ -326,8 +326,9 @@ impl Wiring {
                 self.fault(half_connected(p, self.ports[i][0].is_none()));
             } else if p.ast.ports.len() > 1 && found > 0 {
                 let ports = self.ports[i].clone();
-                let empty = p.ast.ports.iter().zip(&ports).filter(|(_, found)| found.is_none());
-                for (port, _) in empty {
+                let empty = p.ast.ports.iter().zip(&ports).enumerate().filter(|(_, (_, found))| found.is_none());
+                let named_before = |i: usize, name: &str| p.ast.ports[..i].iter().any(|port| port.text == name);
+                for (_, (port, _)) in empty.filter(|(i, (port, _))| !named_before(*i, &port.text)) {
                     self.fault(
                         Diagnostic::error(
                             codes::B011,

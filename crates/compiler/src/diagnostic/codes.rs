@@ -48,7 +48,6 @@ codes! {
     U001 "an unknown unit";
     U002 "a unit that cannot be read";
     U003 "units that do not agree";
-    U004 "a unit that is also a declared name";
     U005 "elements of different domains on one junction structure";
     U006 "a quantity with a unit where a number is needed";
     U007 "a stiffness where a compliance belongs, or the like";

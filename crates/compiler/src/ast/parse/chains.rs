@@ -97,13 +97,30 @@ impl Parser<'_> {
         let (ports, index) = if self.is(TokenKind::LBracket) { self.ports() } else { (Vec::new(), None) };
         let args = if self.is(TokenKind::LParen) { self.args().0 } else { Vec::new() };
         let span = self.since(start);
+        let port = self.port_of_declaration(span, name.as_ref());
         match name {
             Some(name) => {
                 let kind = self.name_of(kind);
-                Node::Declared(Box::new(Element { kind, width, name, ports, index, args, doc: None, span }))
+                Node::Declared(Box::new(Element { kind, width, name, ports, index, args, doc: None, port, span }))
             }
             None => Node::Missing(span),
         }
+    }
+
+    /// `Diode:d1.p`: a part cannot be declared and its port be named at once.
+    fn port_of_declaration(&mut self, declared: Span, name: Option<&Name>) -> Option<Name> {
+        let name = name?;
+        if !self.is(TokenKind::Dot) || !self.adjacent(0) || self.ahead(1).kind != TokenKind::Ident {
+            return None;
+        }
+        self.bump();
+        let token = self.bump();
+        let port = self.name_of(token);
+        let text = &self.text[declared.start as usize..declared.end as usize];
+        let title = "a port is named only where its part has been declared";
+        let hint = format!("write `{text}` on a line of its own, and `{}.{}` here", name.text, port.text);
+        self.report(Diagnostic::error(codes::S001, title, port.span, "a port").hint(hint));
+        Some(port)
     }
 
     fn no_such_junction(&mut self, kind: Token) {

@@ -106,11 +106,19 @@ impl Parser<'_> {
     /// `base ^ exponent`, to the right: the exponent may have a sign and a power of its own.
     fn power(&mut self) -> Tall {
         let (base, height) = self.rate();
-        if !self.is(TokenKind::Caret) {
+        let stars = self.is(TokenKind::Star) && self.ahead(1).kind == TokenKind::Star && self.adjacent(1);
+        if !self.is(TokenKind::Caret) && !stars {
             return (base, height);
         }
-        let op_span = self.span();
+        let mut op_span = self.span();
         self.bump();
+        if stars {
+            op_span = op_span.to(self.span());
+            self.bump();
+            self.remark(
+                Diagnostic::error(codes::S001, "a power is written `^`", op_span, "").hint("write `^` for `**`"),
+            );
+        }
         let (exponent, right_height) = self.nested(Self::unary).unwrap_or_else(|| self.missing());
         let span = base.span.to(exponent.span);
         let binary = Binary { op: BinaryOp::Pow, op_span, left: Box::new(base), right: Box::new(exponent) };
@@ -174,7 +182,23 @@ impl Parser<'_> {
             self.remark(digits_missing(span, &format!("write `{text}.0`")));
             text.push_str(".0");
         }
+        self.grouped_digits(token, &mut text);
         self.with_unit(self.span_of(token), text)
+    }
+
+    /// `1_000`, which should be `1000`.
+    fn grouped_digits(&mut self, first: Token, text: &mut String) {
+        let next = self.token();
+        let more = self.text_of(next);
+        let groups = more.starts_with('_') && more.trim_start_matches('_').starts_with(|c: char| c.is_ascii_digit());
+        if next.kind != TokenKind::Ident || !self.adjacent(0) || !groups {
+            return;
+        }
+        self.bump();
+        text.push_str(&more.chars().filter(char::is_ascii_digit).collect::<String>());
+        let title = "the digits of a number stand together";
+        let span = self.span_of(first).to(self.span_of(next));
+        self.remark(Diagnostic::error(codes::S007, title, span, "").hint(format!("write `{text}`")));
     }
 
     /// `.5`, which should be `0.5`.
@@ -232,10 +256,22 @@ impl Parser<'_> {
         let (cond, a) = self.tall();
         self.expect_word("then");
         let (yes, b) = self.tall();
-        self.expect_word("else");
-        let (no, c) = self.tall();
+        let (no, c) = match self.is_word("elseif") || self.is_word("elif") {
+            true => self.joined_else_if(),
+            false => {
+                self.expect_word("else");
+                self.tall()
+            }
+        };
         let kind = ExprKind::If(If { cond: Box::new(cond), yes: Box::new(yes), no: Box::new(no) });
         (Expr { span: self.since(start), kind }, 1 + a.max(b).max(c))
+    }
+
+    /// `elseif`, which should be `else if`.
+    fn joined_else_if(&mut self) -> Tall {
+        let title = format!("there is no `{}`", self.text_of(self.token()));
+        self.remark(Diagnostic::error(codes::S001, title, self.span(), "").hint("write `else if`, two words"));
+        self.nested(Self::conditional).unwrap_or_else(|| self.missing())
     }
 
     fn call(&mut self) -> Tall {

@@ -82,7 +82,9 @@ pub(super) fn parse_with_units(text: &str, file: FileId) -> (Parsed, Vec<Span>) 
     if text.len() > MAX_TEXT {
         return (too_large(text, file), Vec::new());
     }
-    let tokens: Vec<Token> = significant(text, lex(text));
+    let tokens = lex(text);
+    let blocks: Vec<Diagnostic> = block_comments(&tokens, file).collect();
+    let tokens: Vec<Token> = significant(text, tokens);
     let mut parser = Parser {
         text,
         file,
@@ -92,13 +94,23 @@ pub(super) fn parse_with_units(text: &str, file: FileId) -> (Parsed, Vec<Span>) 
         signature: false,
         nesting: 0,
         quiet: false,
-        faults: Vec::new(),
+        faults: blocks,
         units: Vec::new(),
     };
     let ast = parser.model();
     let mut diagnostics = parser.faults;
     diagnostics.sort_by_key(|d| d.primary.span);
     (Parsed { ast, diagnostics }, parser.units)
+}
+
+/// Comments that do not end with their line.
+fn block_comments(tokens: &[Token], file: FileId) -> impl Iterator<Item = Diagnostic> {
+    let blocks = tokens.iter().filter(|t| t.kind == TokenKind::BlockComment).take(MAX_DIAGNOSTICS - 1);
+    blocks.map(move |t| {
+        let span = Span { file, start: t.start, end: t.end };
+        let title = "a comment runs to the end of its line";
+        Diagnostic::error(codes::S001, title, span, "").hint("begin each line of it with `//`")
+    })
 }
 
 fn too_large(text: &str, file: FileId) -> Parsed {
@@ -116,7 +128,7 @@ pub(super) fn significant(text: &str, mut tokens: Vec<Token>) -> Vec<Token> {
     tokens.retain_mut(|t| {
         newlines = newlines.max(t.newlines);
         t.newlines = newlines;
-        let keep = t.kind != TokenKind::Comment;
+        let keep = !matches!(t.kind, TokenKind::Comment | TokenKind::BlockComment);
         newlines = if keep { 0 } else { newlines };
         keep
     });

@@ -122,6 +122,12 @@ impl Parser<'_> {
                 self.idle_doc(doc);
                 return None;
             }
+            TokenKind::Slash if self.ahead(1).kind == TokenKind::Star && self.adjacent(1) => {
+                let span = self.span().to(self.span_of(self.ahead(1)));
+                let title = "a comment runs to the end of its line";
+                self.report(Diagnostic::error(codes::S001, title, span, "").hint("begin each line of it with `//`"));
+                return None;
+            }
             _ => {
                 self.expected("a statement");
                 return None;
