@@ -4,6 +4,7 @@ use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::node::{Expr, Function, Node, Parts};
 use super::rational::Rational;
 use num_integer::Integer;
+use num_rational::BigRational;
 use smallvec::{SmallVec, smallvec};
 
 impl Exprs {
@@ -275,9 +276,9 @@ impl Exprs {
     /// `(base^(1/d))^k`: roots whose exponents add up to an integer stay roots, since the base must not be negative.
     fn power_of_root(&mut self, base: Expr, exponents: &[Rational], sum: &Rational) -> Expr {
         let d = exponents.iter().fold(num_bigint::BigInt::from(1), |d, n| d.lcm(&n.denominator()));
-        let d = Rational::from_big(d.into());
-        let root = self.pow_number(base, &(&Rational::from(1) / &d));
-        let k = self.number(sum * &d);
+        let part = Rational::from_big(BigRational::new(1.into(), d.clone()));
+        let root = self.pow_number(base, &part);
+        let k = self.number(sum * &Rational::from_big(d.into()));
         self.intern(Node::Pow(root, k))
     }
 

@@ -18,7 +18,7 @@ pub(super) struct Split {
 /// among equals those are taken out.
 pub(super) fn best_split(polynomial: &Polynomial, lengths: &[u64], varies: &[bool]) -> Option<Split> {
     let count = polynomial.0.len();
-    if !(2..=MOST_TERMS).contains(&count) || polynomial.0.values().any(Rational::is_zero) {
+    if !(2..=MOST_TERMS).contains(&count) || polynomial.has_zeros() {
         return None;
     }
     let whole = length(polynomial, lengths);
@@ -94,20 +94,20 @@ fn divisors(polynomial: &Polynomial) -> Vec<Polynomial> {
     }
     for (k, &(a, p)) in terms.iter().enumerate() {
         for &(b, q) in &terms[k + 1..] {
-            note(two_terms(a, p, b, q));
+            two_terms(a, p, b, q).into_iter().for_each(&mut note);
         }
     }
     found
 }
 
-/// The sum of two terms without what they have in common; the first has the factor 1.
-fn two_terms(a: &Monomial, p: &Rational, b: &Monomial, q: &Rational) -> Polynomial {
+/// The sum of two terms without what they have in common; the first has the factor 1, unless it has cancelled.
+fn two_terms(a: &Monomial, p: &Rational, b: &Monomial, q: &Rational) -> Option<Polynomial> {
     let at = |m: &Monomial, i: usize| m.get(i).copied().unwrap_or(0);
     let common: Monomial = (0..a.len().max(b.len())).map(|i| -at(a, i).min(at(b, i))).collect();
     let mut sum = Polynomial::default();
     sum.add_term(times(a, &common), Rational::from(1));
-    sum.add_term(times(b, &common), q / p);
-    sum
+    sum.add_term(times(b, &common), q.over(p)?);
+    Some(sum)
 }
 
 /// `a² ± 2 a b + b²` as squares of sums.
@@ -163,10 +163,12 @@ fn divided(polynomial: &Polynomial, divisor: Polynomial) -> Option<Split> {
 fn weak_quotient(polynomial: &Polynomial, divisor: &Polynomial) -> Polynomial {
     let mut left = polynomial.clone();
     let mut quotient = Polynomial::default();
-    let Some((lead, scale)) = divisor.0.first_key_value() else { return quotient };
+    let Some((lead, inverse)) = divisor.0.first_key_value().and_then(|(m, c)| Some((m, c.recip()?))) else {
+        return quotient;
+    };
     for (monomial, coefficient) in &polynomial.0 {
         let Some(t) = quotient_of(monomial, lead) else { continue };
-        let c = coefficient / scale;
+        let c = coefficient * &inverse;
         let product = |(m, d): (&Monomial, &Rational)| (times(&t, m), &c * d);
         if divisor.0.iter().map(product).all(|(m, value)| left.0.get(&m) == Some(&value)) {
             for (m, _) in divisor.0.iter().map(product) {

@@ -270,9 +270,9 @@ impl Exprs {
 
     fn modulo(&mut self, a: Expr, b: Expr) -> Expr {
         if let (Some(p), Some(q)) = (self.is_number(a), self.is_number(b))
-            && !q.is_zero()
+            && let Some(ratio) = p.over(q)
         {
-            let value = p - &(q * &(p / q).floor());
+            let value = p - &(q * &ratio.floor());
             return self.number(value);
         }
         self.intern(Node::Call(Function::Mod, smallvec![a, b]))

@@ -380,9 +380,10 @@ impl Ring {
             let parts: Vec<Expr> = parts
                 .map(|(i, &n)| {
                     let part = self.generators[i].0;
-                    x.scale(&Rational::new(n, self.shares[&part]), part)
+                    let share = Rational::from(n).over(&Rational::from(self.shares[&part]))?;
+                    Some(x.scale(&share, part))
                 })
-                .collect();
+                .collect::<Option<_>>()?;
             let angle = x.add(&parts);
             for (f, number) in [(Function::Cos, &coefficient.0), (Function::Sin, &-&coefficient.1)] {
                 let value = x.call(f, &[angle]);

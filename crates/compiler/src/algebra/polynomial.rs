@@ -101,14 +101,24 @@ impl Polynomial {
         Polynomial(self.0.iter().map(|(m, c)| (times(m, &inverse), c.clone())).collect())
     }
 
-    /// The quotient, if there is no remainder. Exponents are not negative.
+    /// Whether a term is kept only for the sake of where it is defined.
+    pub fn has_zeros(&self) -> bool {
+        self.0.values().any(Rational::is_zero)
+    }
+
+    /// The quotient, if there is no remainder. Exponents are not negative. `None` also where terms of the divisor have
+    /// cancelled: the quotient would be defined where the divisor is not.
     pub fn divided_by(&self, divisor: &Polynomial) -> Option<Self> {
+        if divisor.has_zeros() {
+            return None;
+        }
         let (lead, scale) = divisor.0.last_key_value()?;
+        let inverse = scale.recip()?;
         let (mut rest, mut quotient) = (self.clone(), Polynomial::default());
         rest.0.retain(|_, c| !c.is_zero());
         while let Some((monomial, coefficient)) = rest.0.last_key_value() {
             let factor = quotient_of(monomial, lead)?;
-            let coefficient = coefficient / scale;
+            let coefficient = coefficient * &inverse;
             for (m, c) in &divisor.0 {
                 let product = &coefficient * c;
                 rest.add_term(times(m, &factor), -&product);

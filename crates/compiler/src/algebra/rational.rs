@@ -6,7 +6,7 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::fmt;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 /// An exact rational number.
 ///
@@ -27,7 +27,8 @@ enum Repr {
 }
 
 impl Rational {
-    /// `numerator / denominator`. Panics if the denominator is zero.
+    /// `numerator / denominator`, for numbers that stand in the program; others are divided by [`over`](Rational::over).
+    /// Panics if the denominator is zero.
     pub fn new(numerator: i64, denominator: i64) -> Self {
         assert!(denominator != 0, "a rational needs a denominator that is not zero");
         Self::reduced(i128::from(numerator), i128::from(denominator))
@@ -157,6 +158,11 @@ impl Rational {
         }
     }
 
+    /// `self/other`; `None` if that is 0. There is no operator for it: who divides says what becomes of a divisor of 0.
+    pub fn over(&self, other: &Self) -> Option<Self> {
+        other.recip().map(|inverse| self * &inverse)
+    }
+
     /// `self^exponent`; `None` for a negative power of 0, or if the result has more than about 4,000 digits.
     pub fn powi(&self, exponent: i64) -> Option<Self> {
         if self.is_one() || exponent == 0 {
@@ -242,10 +248,6 @@ operator!(Sub, sub, |a, b, c, d| if b == 1 && d == 1 {
     Rational::reduced(a * d - c * b, b * d)
 });
 operator!(Mul, mul, |a, b, c, d| Rational::reduced(a * c, b * d));
-operator!(Div, div, |a, b, c, d| {
-    assert!(c != 0, "division of a rational by zero");
-    Rational::reduced(a * d, b * c)
-});
 
 impl Neg for &Rational {
     type Output = Rational;

@@ -407,7 +407,7 @@ impl Exprs {
     /// The shorter of: factors taken out wherever that helps; one product for each variable, which people like better.
     fn numerator(&mut self, polynomial: &Polynomial, generators: &Generators) -> Expr {
         let deep = self.factored_deep(polynomial, generators);
-        if polynomial.0.values().any(Rational::is_zero) {
+        if polynomial.has_zeros() {
             return deep;
         }
         let content = polynomial.content();

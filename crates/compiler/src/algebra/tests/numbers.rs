@@ -17,11 +17,20 @@ fn big_numbers_come_back_small() {
     let big = Rational::from(i64::MAX);
     let square = &big * &big;
     assert!(square.small().is_none());
-    assert_eq!(&square / &big, big);
+    assert_eq!(square.over(&big), Some(big));
     let least = Rational::from(i64::MIN);
     assert_eq!(&(&least + &Rational::from(1)) - &Rational::from(1), least);
     assert_eq!(-&-&least, least);
     assert_eq!(Rational::new(i64::MIN, i64::MIN), Rational::from(1));
+}
+
+#[test]
+fn nothing_is_divided_by_zero() {
+    let zero = Rational::from(0);
+    assert_eq!(Rational::from(3).over(&zero), None);
+    assert_eq!(zero.over(&zero), None);
+    assert_eq!(zero.recip(), None);
+    assert_eq!(Rational::new(3, 4).over(&Rational::new(-3, 2)), Some(Rational::new(-1, 2)));
 }
 
 #[test]
