@@ -111,6 +111,8 @@ pub struct Start {
 pub enum EmitError {
     /// Its equations are no explicit rates.
     Implicit,
+    /// States that a jump of a source changes: their names.
+    Jumps(Vec<String>),
     /// The step is not a finite number above zero.
     Step(f64),
     /// A delay would keep too many points with this step: its name, and how many.
@@ -121,6 +123,11 @@ impl fmt::Display for EmitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             EmitError::Implicit => f.write_str("only explicit equations are exported: use the form minimal or kane"),
+            EmitError::Jumps(states) => write!(
+                f,
+                "a source that jumps changes {}, which are states of this form: export the form minimal, whose states do not jump",
+                states.join(", ")
+            ),
             EmitError::Step(step) => write!(f, "the step is {step}: it has to be a finite number above zero"),
             EmitError::Delay(name, points) => write!(
                 f,

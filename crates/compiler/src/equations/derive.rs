@@ -7,6 +7,7 @@ use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
+use super::momenta::{Momentum, known};
 use super::stiff::parameters;
 use super::{
     Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, display,
@@ -129,7 +130,9 @@ struct Draft<'a> {
 /// Puts everything into order. `truth` is the graph with its exact ports.
 fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
-    let Draft { assembled: Assembled { mut d, states, .. }, closures, conserved, breaks } = draft;
+    let Draft { mut assembled, closures, conserved, breaks } = draft;
+    let momenta = assembled.momenta(truth);
+    let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {
@@ -164,6 +167,8 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         }
         ordered.steps.push(Step::Watch { pivot, elements: readers(&d, pivot) });
     }
+    let momenta = known(&d, momenta).into_iter();
+    let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();
     let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();
     let free_rates: BTreeSet<Symbol> = rates.intersection(&d.free).copied().collect();
     let meanings: Vec<_> = states.iter().filter_map(|s| s.meaning.map(|m| (s.symbol, m))).collect();
@@ -218,6 +223,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         counts,
         breaks,
         tracked,
+        momenta,
         free_rates,
         certificate: None,
         dof,

@@ -85,14 +85,7 @@ pub(super) struct Cell<'a> {
 pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
     let graph = &causal.graph;
     let mut d = Definitions::new(graph.exprs.clone(), graph);
-    let mut rows = Map::new();
-    for state in &causal.ports.ports {
-        causal.ports.resolve_into(&mut d.x, state.output, &mut rows);
-        if !rows.contains_key(&state.output) {
-            // Where two elements share a bond, what one gives is what the other takes.
-            rows.insert(state.output, Combination(vec![(state.output, ONE)]));
-        }
-    }
+    let mut rows = structure(&mut d.x, causal);
     for v in &causal.ports.virtual_speeds {
         causal.ports.resolve_into(&mut d.x, v.reaction, &mut rows);
     }
@@ -116,8 +109,21 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
     Ok(assembled)
 }
 
+/// What the junction structure makes of its inputs, by output.
+pub(super) fn structure(x: &mut Exprs, causal: &CausalGraph) -> Map<Symbol, Combination> {
+    let mut rows = Map::new();
+    for state in &causal.ports.ports {
+        causal.ports.resolve_into(x, state.output, &mut rows);
+        if !rows.contains_key(&state.output) {
+            // Where two elements share a bond, what one gives is what the other takes.
+            rows.insert(state.output, Combination(vec![(state.output, ONE)]));
+        }
+    }
+    rows
+}
+
 /// Sources whose value is zero leave the rows: a constraint at rest imposes nothing on a dependent storage.
-fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut Map<Symbol, Combination>) {
+pub(super) fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut Map<Symbol, Combination>) {
     let mut zero = BTreeSet::new();
     for state in causal.ports.ports.iter().filter(|p| matches!(p.role, Role::Source | Role::Redundant)) {
         let value = imposed(&mut d.x, causal, state);
@@ -131,7 +137,7 @@ fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut 
 }
 
 /// The value that a port imposes.
-fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) -> Expr {
+pub(super) fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) -> Expr {
     match &causal.graph.elements[state.port.element].kind {
         Kind::EffortSource { value } | Kind::FlowSource { value } => *value,
         Kind::ZeroCompliance { flow } => *flow,
@@ -246,7 +252,7 @@ impl<'a> Assembled<'a> {
             self.d.stored.insert(cell.stored, cell.rate);
         }
         let speeds = &causal.ports.virtual_speeds;
-        for (members, group_speeds) in groups(causal, &cells, speeds, &self.rows) {
+        for (members, group_speeds) in groups(&cells, speeds, &self.rows) {
             let group: Vec<&Cell> = members.iter().map(|&m| &cells[m]).collect();
             if group.iter().all(|c| c.state.role == Role::Independent) && group_speeds.is_empty() {
                 group.iter().for_each(|cell| self.independent(cell));
@@ -268,7 +274,7 @@ impl<'a> Assembled<'a> {
         self.states.sort_by_key(place);
     }
 
-    pub(super) fn cell(&mut self, causal: &'a CausalGraph, state: &'a PortState) -> Option<Cell<'a>> {
+    pub(super) fn cell<'c>(&mut self, causal: &'c CausalGraph, state: &'c PortState) -> Option<Cell<'c>> {
         if !matches!(state.role, Role::Independent | Role::Dependent) {
             return None;
         }
@@ -645,13 +651,11 @@ impl Cell<'_> {
 }
 
 /// Storages that depend on each other, or are ports of one field, with the virtual speeds among them.
-fn groups(
-    causal: &CausalGraph,
+pub(super) fn groups(
     cells: &[Cell],
     speeds: &[Virtual],
     rows: &Map<Symbol, Combination>,
 ) -> Vec<(Vec<usize>, Vec<Virtual>)> {
-    let _ = causal;
     let mut index: BTreeMap<Symbol, usize> = cells.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
     index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, cells.len() + k)));
     let mut set = UnionFind::<usize>::new(cells.len() + speeds.len());

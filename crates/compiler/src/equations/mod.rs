@@ -11,6 +11,7 @@ mod domains;
 mod form;
 mod index;
 mod minimal;
+mod momenta;
 mod observed;
 mod places;
 mod stiff;
@@ -30,6 +31,7 @@ pub use definitions::Definition;
 pub use derive::derive_equations;
 pub use display::{Dependent, DisplayEquation, Shown, show};
 pub use form::Form;
+pub use momenta::Momentum;
 pub use text::{
     Style, print, print_certificate, print_dependent, print_expr, print_form, print_meanings, print_sides, print_symbol,
 };
@@ -82,6 +84,8 @@ pub struct Equations {
     pub counts: Count,
     /// For each state the variable of the bond graph that tells it: itself, or the co-energy variable of its storage.
     pub tracked: Vec<Symbol>,
+    /// Sums of stored quantities that no jump of a source changes; speeds as [`tracked`](Equations::tracked) names them.
+    pub momenta: Vec<Momentum>,
     /// Rates that nothing defines.
     pub free_rates: BTreeSet<Symbol>,
     /// How few break variables open all loops, where the form has any.

@@ -84,6 +84,12 @@ pub struct Program {
     pub variables: BTreeMap<Symbol, Value>,
     /// For each state the variable of the bond graph that tells it.
     pub tracked: Vec<Symbol>,
+    /// Sums of stored quantities that no jump of a source changes, by the variable of the bond graph that tells the
+    /// independent storage among them: the same in all forms of a graph.
+    pub momenta: BTreeMap<Symbol, Value>,
+    /// Explicit rates whose states are speeds: the states that a jump of a source changes, each with the sum of stored
+    /// quantities that it does not. Empty where nothing jumps.
+    pub kept: Vec<(u32, Value)>,
     /// Constants fixed by the start values.
     pub conserved: Vec<String>,
     /// What can be recorded.

@@ -281,6 +281,7 @@ impl Program {
         wanted.extend(self.observed.iter().filter_map(|o| o.value.clone().ok()));
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
         wanted.extend(self.held.iter().flat_map(|h| [h.source, h.time]));
+        wanted.extend(self.momenta.values());
         wanted.extend(self.inputs.iter().map(|i| i.default));
         wanted.extend(self.parameters.iter().map(|p| p.default));
         wanted.extend(self.watches.iter().flat_map(|w| [w.pivot, w.scale]));

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, ParameterId};
-use crate::equations::{Equations, Step};
+use crate::equations::{Equations, Momentum, Step};
 use crate::ids::{Id, Table};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -253,6 +253,8 @@ impl Schedule<'_> {
             implicit,
             variables,
             tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
+            momenta: equations.momenta.iter().map(|m| (m.speed, lower.value(m.sum))).collect(),
+            kept: Vec::new(),
             conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
             inputs: inputs
                 .map(|i| Input { name: i.name.clone(), default: lower.value(i.default), unit: i.unit.clone() })
@@ -298,8 +300,28 @@ impl Schedule<'_> {
         };
         program.find_dependence();
         find_causes(&mut program, &self.kinks);
+        program.kept = kept(&program, equations);
         program
     }
+}
+
+/// Speeds that are states although a source that can jump moves storages that follow them.
+fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
+    if program.implicit.is_some() {
+        return Vec::new();
+    }
+    let of_state = |m: &Momentum| equations.tracked.iter().position(|s| *s == m.speed);
+    // A sum that is itself the state keeps its value anyway.
+    let is_sum = |i: usize| equations.meanings.iter().any(|(s, _)| *s == equations.states[i].symbol);
+    let moved = equations.momenta.iter().filter(|m| m.moved);
+    let kept: Vec<(u32, Value)> = moved
+        .filter_map(|m| Some((of_state(m).filter(|&i| !is_sum(i))? as u32, program.momenta[&m.speed])))
+        .collect();
+    let sums: Vec<Value> = kept.iter().map(|k| k.1).collect();
+    let live = program.live(&sums, false);
+    let jumps = |op: Op| condition_of(op).is_some() || matches!(op, Op::Held(_));
+    let jumps = program.values.iter().any(|(v, op)| live[v.index()] && jumps(op));
+    if jumps { kept } else { Vec::new() }
 }
 
 /// What the equations are, where they are no explicit rates.

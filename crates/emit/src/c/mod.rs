@@ -77,6 +77,10 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     if export.program.implicit.is_some() {
         return Err(EmitError::Implicit);
     }
+    if !export.program.kept.is_empty() {
+        let name = |k: &(u32, _)| export.program.states[k.0 as usize].name.clone();
+        return Err(EmitError::Jumps(export.program.kept.iter().map(name).collect()));
+    }
     if !(export.step > 0.0 && export.step.is_finite()) {
         return Err(EmitError::Step(export.step));
     }

@@ -32,12 +32,9 @@ pub struct ImplicitModel {
     equations: Implicit,
     sparsity: Sparsity,
     groups: Vec<Vec<usize>>,
-    /// States of the reference that the form can tell, and what tells them: in the form, and in the reference.
+    /// States of the reference that the form can tell, and what they are there: variables, and sums of stored quantities.
     states: Vec<usize>,
     seen: Routine,
-    mirrored: Routine,
-    /// Places in `states` of those that are sums of momenta, told by a speed.
-    summed: Vec<usize>,
     /// Unknowns as the reference has them, with the routine that computes these.
     known: Vec<usize>,
     told: Routine,
@@ -77,15 +74,13 @@ impl ImplicitModel {
         });
         let there = |s: &Symbol| reference.program.variables.get(s).copied();
         // States of the reference that the form can tell; the others keep the value they have.
-        let mut pairs: Vec<(usize, Value, Value)> = Vec::new();
+        let mut pairs: Vec<(usize, Value)> = Vec::new();
         for (k, symbol) in reference.program.tracked.iter().enumerate() {
-            if let (Some(here), Some(value)) = (form.program.variables.get(symbol), there(symbol)) {
-                pairs.push((k, *here, value));
-            }
+            let own = reference.layout.states + k as u32;
+            let is_state = there(symbol).and_then(|v| reference.layout.registers.get(&v).copied()) == Some(own);
+            let told = if is_state { &form.program.variables } else { &form.program.momenta };
+            pairs.extend(told.get(symbol).map(|&value| (k, value)));
         }
-        let own = |k: usize| Some(reference.layout.states + k as u32);
-        let told_by_another = |p: &(usize, Value, Value)| own(p.0) != reference.layout.registers.get(&p.2).copied();
-        let summed = (0..pairs.len()).filter(|&at| told_by_another(&pairs[at])).collect();
         let known = |i: &usize| there(&form.program.tracked[*i]).is_some();
         let known: Vec<usize> = (0..n).filter(known).collect();
         let untold: Vec<usize> = (0..n).filter(|i| !known.contains(i)).collect();
@@ -102,7 +97,6 @@ impl ImplicitModel {
         let guessed = form.program.variables.iter().filter_map(solution).filter(newton);
         let (guesses, guessed): (Vec<(usize, usize)>, Vec<Value>) = guessed.unzip();
         let seen: Vec<Value> = pairs.iter().map(|p| p.1).collect();
-        let mirrored: Vec<Value> = pairs.iter().map(|p| p.2).collect();
         let carried_here: Vec<Value> = carried.iter().map(|c| c.1).collect();
         let carried_there: Vec<Value> = carried.iter().map(|c| c.2).collect();
         let sparsity = sparsity_of(&form.program, &equations);
@@ -117,9 +111,7 @@ impl ImplicitModel {
             all_told,
             uncontrolled: (0..n).filter(|i| all_told && algebraic(i)).collect(),
             seen: form.routine_for(&seen),
-            mirrored: reference.routine_for(&mirrored),
             states: pairs.iter().map(|p| p.0).collect(),
-            summed,
             told: reference.routine_for(&told),
             common: form.routine_for(&common),
             common_there: reference.routine_for(&common_there),
@@ -536,47 +528,10 @@ impl ImplicitModel {
     fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place(t, y, yp);
         self.form.frame.run(&self.seen).map_err(|trouble| self.form.failure(t, trouble))?;
-        let seen: Vec<f64> = self.seen.outputs.iter().map(|&r| self.form.frame.r[r as usize]).collect();
-        for (at, &k) in self.states.iter().enumerate() {
-            if !self.summed.contains(&at) {
-                self.x[k] = seen[at];
-            }
+        for (&k, &register) in self.states.iter().zip(&self.seen.outputs) {
+            self.x[k] = self.form.frame.r[register as usize];
         }
-        if self.summed.is_empty() {
-            return Ok(());
-        }
-        let n = self.summed.len();
-        let mut left = f64::INFINITY;
-        for _ in 0..ITERATIONS {
-            let mut matrix = vec![0.0; n * n];
-            let mut right = vec![0.0; n];
-            let ImplicitModel { reference, mirrored, summed, states, x, .. } = self;
-            for column in 0..n {
-                reference.place(t, x);
-                reference.still();
-                reference.frame.d[reference.layout.states as usize + states[summed[column]]] = 1.0;
-                reference.frame.run_along(mirrored).map_err(|trouble| reference.failure(t, trouble))?;
-                for (row, &at) in summed.iter().enumerate() {
-                    let register = mirrored.outputs[at] as usize;
-                    matrix[row * n + column] = reference.frame.d[register];
-                    right[row] = reference.frame.r[register] - seen[at];
-                }
-            }
-            left = right.iter().fold(0.0f64, |most, r| most.max(r.abs()));
-            let Some(step) = super::minimum_norm::step(&matrix, &right, n) else { break };
-            let moves = |(&at, s): (&usize, &f64)| s.abs() > 4.0 * f64::EPSILON * x[states[at]].abs();
-            let moved = summed.iter().zip(&step.step).any(moves);
-            summed.iter().zip(&step.step).for_each(|(&at, s)| x[states[at]] += s);
-            if !moved || left == 0.0 {
-                return Ok(());
-            }
-        }
-        let size = seen.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        if left <= 1e-9 * size {
-            return Ok(());
-        }
-        let what = "the momenta of dependent storages".to_string();
-        Err(Failure::NoConvergence { time: t, what, iterations: ITERATIONS, residual: left })
+        Ok(())
     }
 
     fn place(&mut self, t: f64, y: &[f64], yp: &[f64]) {
@@ -721,11 +676,14 @@ impl ImplicitSystem for ImplicitModel {
             if !implicit {
                 return self.take_rates(t, y, yp);
             }
+            self.reference.cross_jump(t, &mut self.x)?;
         } else {
+            // What is sampled at a jump, and the side of a condition, are those of the unknowns after it.
             self.follow_back(t, y, yp)?;
+            self.reference.cross_jump(t, &mut self.x)?;
+            self.take_over(t, y)?;
             self.form.cross_jump(t, y)?;
         }
-        self.reference.cross_jump(t, &mut self.x)?;
         self.take_over(t, y)?;
         self.take_rates(t, y, yp)?;
         self.settle(t, y, yp)

@@ -8,6 +8,7 @@ mod history;
 mod implicit;
 mod inputs;
 mod jacobian;
+mod jumps;
 mod linear;
 mod machine;
 mod minimum_norm;
@@ -31,6 +32,7 @@ use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
 use jacobian::Slopes;
+use jumps::Kept;
 use machine::Codes;
 use std::sync::Arc;
 
@@ -65,6 +67,8 @@ pub struct Model {
     scaled: bool,
     /// Values of the conserved constants.
     conserved: Vec<f64>,
+    /// States that jump with a source, if there are any.
+    kept: Option<Kept>,
     dx: Vec<f64>,
     /// Newton blocks that recorded values need and no rate does.
     shown_blocks: Vec<BlockId>,
@@ -119,8 +123,9 @@ impl Model {
         let mut frame = Frame::new(&program, &layout, layout.size);
         let sparsity = sparsity_of(&program);
         let slopes = entries.map(|entries| Slopes::new(&program, &layout, &sparsity, &entries));
-        let of_slopes = slopes.as_ref().map(|s| &s.routine);
-        for routine in [&rates, &preamble, &sources, &switching, clock.routine()].into_iter().chain(of_slopes) {
+        let kept = Kept::of(&program, &layout);
+        let more = slopes.as_ref().map(|s| &s.routine).into_iter().chain(kept.as_ref().map(Kept::routine));
+        for routine in [&rates, &preamble, &sources, &switching, clock.routine()].into_iter().chain(more) {
             frame.reserve(routine);
         }
         let n = program.states.len();
@@ -132,6 +137,7 @@ impl Model {
             scales: vec![0.0; n],
             scaled: true,
             conserved: vec![0.0; program.conserved.len()],
+            kept,
             dx: vec![0.0; n],
             shown_blocks: Vec::new(),
             begun: false,

@@ -289,6 +289,7 @@ impl System for Model {
         if t < self.crossed {
             self.restart();
         }
+        let sums = if self.begun { self.sums(t, x)? } else { Vec::new() };
         self.crossed = t;
         self.rated = None;
         self.inputs.iter_mut().for_each(|signal| signal.hold(t));
@@ -299,10 +300,16 @@ impl System for Model {
         if !self.begun {
             self.begin_held(t, x)?;
             self.begun = true;
+            self.take_sides(t, x)?;
         } else {
+            self.keep_sums(t, x, &sums)?;
             self.take_samples(t, x)?;
+            self.keep_sums(t, x, &sums)?;
+            self.take_sides(t, x)?;
+            if self.keep_sums(t, x, &sums)? {
+                self.take_sides(t, x)?;
+            }
         }
-        self.take_sides(t, x)?;
         if self.has_delays() {
             self.run_sources(t, x)?;
             for i in 0..self.held.len() {

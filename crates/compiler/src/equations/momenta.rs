@@ -1,0 +1,74 @@
+//! What stays as it is where a source jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
+//! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
+
+use super::definitions::Definitions;
+use super::minimal::{Assembled, Cell, drop_vanishing_sources, groups, imposed, structure};
+use crate::algebra::{Expr, Symbol};
+use crate::bond_graph::Meaning;
+use crate::causal_graph::{CausalGraph, Role};
+
+/// A sum of stored quantities that no jump of a source changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Momentum {
+    /// The independent variable it belongs to: the co-energy variable of a storage, or a speed without one.
+    pub speed: Symbol,
+    /// The sum, in stored quantities of the graph: the same in all forms.
+    pub sum: Expr,
+    /// Whether a source that is no constant moves one of its storages.
+    pub moved: bool,
+}
+
+impl Assembled<'_> {
+    /// The sums of all storages that depend on each other. `truth` is the graph with its exact ports, of whose pool that
+    /// of these definitions is a continuation.
+    pub(super) fn momenta(&mut self, truth: &CausalGraph) -> Vec<Momentum> {
+        let mut rows = structure(&mut self.d.x, truth);
+        drop_vanishing_sources(&mut self.d, truth, &mut rows);
+        let cells: Vec<Cell> = truth.ports.ports.iter().filter_map(|state| self.cell(truth, state)).collect();
+        let mut all = Vec::new();
+        for (members, speeds) in groups(&cells, &truth.ports.virtual_speeds, &rows) {
+            let dependent: Vec<&Cell> =
+                members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Dependent).collect();
+            if dependent.is_empty() {
+                continue;
+            }
+            let moved = dependent.iter().any(|c| rows[&c.z].0.iter().any(|t| is_moving(&mut self.d, truth, t.0)));
+            let independent = members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Independent);
+            let own = independent.map(|c| (c.z, Some(c.stored)));
+            for (speed, stored) in own.chain(speeds.iter().map(|v| (v.speed, None))) {
+                let mut sum: Vec<Expr> = stored.map(|s| self.d.x.sym(s)).into_iter().collect();
+                for cell in &dependent {
+                    if let Some(factor) = rows[&cell.z].coefficient(speed) {
+                        let stored = self.d.x.sym(cell.stored);
+                        sum.push(self.d.x.mul(&[factor, stored]));
+                    }
+                }
+                let sum = self.d.x.add(&sum);
+                all.push(Momentum { speed, sum, moved });
+            }
+        }
+        all
+    }
+}
+
+/// Whether an input of the junction structure is a source whose value may change.
+fn is_moving(d: &mut Definitions, truth: &CausalGraph, input: Symbol) -> bool {
+    let port = truth.ports.ports.iter().find(|p| p.input == input);
+    let source = port.filter(|p| matches!(p.role, Role::Source | Role::Redundant));
+    source.is_some_and(|port| {
+        let value = imposed(&mut d.x, truth, port);
+        !d.is_constant(value)
+    })
+}
+
+/// Those that can be computed from what is defined.
+pub(super) fn known(d: &Definitions, momenta: Vec<Momentum>) -> Vec<Momentum> {
+    let outside = |s| {
+        matches!(d.meaning(s), Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)))
+    };
+    let given = |s: Symbol| {
+        d.of.contains_key(&s) || d.states.contains_key(&s) || d.free.contains(&s) || d.constants.contains(&s) || outside(s)
+    };
+    let defined = |m: &Momentum| d.x.symbols_of(m.sum).iter().all(|&s| !d.missing.contains_key(&s) && given(s));
+    momenta.into_iter().filter(defined).collect()
+}

@@ -1,0 +1,86 @@
+//! Jumps of sources where speeds are states: what stays as it is are sums of stored quantities, and the speeds follow.
+
+use super::Model;
+use halfarrow_compiler::program::{Layout, Program, Routine, Value};
+use halfarrow_sim::Failure;
+
+/// Passes of Newton on the speeds after a jump.
+const ITERATIONS: usize = 50;
+/// A relative step of theirs that has to shrink, or is what rounding leaves.
+const NOISE: f64 = 1e-9;
+/// A relative step of theirs that is rounding.
+const SETTLED: f64 = 4.0 * f64::EPSILON;
+
+/// The states that jump, and the routine of the sums that do not.
+#[derive(Debug, Clone)]
+pub(super) struct Kept {
+    states: Vec<usize>,
+    sums: Routine,
+}
+
+impl Kept {
+    /// `None` where no source that jumps moves a storage that follows a state.
+    pub fn of(program: &Program, layout: &Layout) -> Option<Kept> {
+        let (states, sums): (Vec<usize>, Vec<Value>) = program.kept.iter().map(|k| (k.0 as usize, k.1)).unzip();
+        (!states.is_empty()).then(|| Kept { sums: program.routine(layout, &sums), states })
+    }
+
+    pub fn routine(&self) -> &Routine {
+        &self.sums
+    }
+}
+
+impl Model {
+    /// The sums at `(t, x)` in the present mode.
+    pub(super) fn sums(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {
+        let Some(kept) = self.kept.take() else { return Ok(Vec::new()) };
+        self.place(t, x);
+        let run = self.frame.run(&kept.sums);
+        let sums = kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
+        self.kept = Some(kept);
+        run.map(|()| sums).map_err(|trouble| self.failure(t, trouble))
+    }
+
+    /// Gives the states that jump the values at which the sums in the present mode are what they were; whether any moved.
+    pub(super) fn keep_sums(&mut self, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
+        let Some(kept) = self.kept.take() else { return Ok(false) };
+        let moved = self.solve_sums(&kept, t, x, before);
+        self.kept = Some(kept);
+        moved
+    }
+
+    fn solve_sums(&mut self, kept: &Kept, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
+        let n = kept.states.len();
+        let (mut last, mut miss) = (f64::INFINITY, vec![0.0; n]);
+        for iteration in 0..ITERATIONS {
+            let mut matrix = vec![0.0; n * n];
+            for column in 0..n {
+                self.place(t, x);
+                self.still();
+                self.frame.d[self.layout.states as usize + kept.states[column]] = 1.0;
+                self.frame.run_along(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+                for (row, &register) in kept.sums.outputs.iter().enumerate() {
+                    matrix[row * n + column] = self.frame.d[register as usize];
+                    miss[row] = self.frame.r[register as usize] - before[row];
+                }
+            }
+            if miss.iter().all(|m| *m == 0.0) {
+                return Ok(iteration > 0);
+            }
+            let Some(step) = super::minimum_norm::step(&matrix, &miss, n).filter(|step| step.rank == n) else { break };
+            let relative = |(&i, s): (&usize, &f64)| s.abs() / x[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
+            let length = kept.states.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
+            if length < NOISE && length >= 0.5 * last {
+                return Ok(true);
+            }
+            kept.states.iter().zip(&step.step).for_each(|(&i, s)| x[i] += s);
+            if length <= SETTLED {
+                return Ok(true);
+            }
+            last = length;
+        }
+        let what = "the speeds after a jump of a source".to_string();
+        let residual = miss.iter().fold(0.0f64, |most, m| most.max(m.abs()));
+        Err(Failure::NoConvergence { time: t, what, iterations: ITERATIONS, residual })
+    }
+}
