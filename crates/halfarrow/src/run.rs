@@ -141,6 +141,17 @@ impl fmt::Display for Stopped {
     }
 }
 
+/// What to know of unknowns that nothing determined.
+fn floats(names: Vec<String>) -> Option<String> {
+    let verb = if names.len() == 1 { "floats" } else { "float" };
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} {verb} for a while: what the laws say lies below rounding, so the least change is taken; an R of large resistance beside them would tell",
+            names.join(", ")
+        )
+    })
+}
+
 /// A law that is missed by more than this, relative to the greatest magnitude of its kind, is not met.
 const MISSED: f64 = 1e-2;
 
@@ -186,7 +197,7 @@ impl Model {
         system: &mut exec::Model,
         mut x: Vec<f64>,
         options: &Options,
-        notes: Vec<String>,
+        mut notes: Vec<String>,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Simulated, Error> {
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
@@ -196,7 +207,9 @@ impl Model {
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate(&mut audited, options, &mut x, &mut sink);
-        self.ended(outcome, options, sink.trace, audited.finish(), notes)
+        let audit = audited.finish();
+        notes.extend(floats(system.floating()));
+        self.ended(outcome, options, sink.trace, audit, notes)
     }
 
     fn integrate_implicit(
@@ -204,13 +217,15 @@ impl Model {
         system: &mut exec::ImplicitModel,
         (mut y, mut yp): (Vec<f64>, Vec<f64>),
         options: &Options,
-        notes: Vec<String>,
+        mut notes: Vec<String>,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate_implicit(&mut audited, options, &mut y, &mut yp, &mut sink);
-        self.ended(outcome, options, sink.trace, audited.finish(), notes)
+        let audit = audited.finish();
+        notes.extend(floats(system.floating()));
+        self.ended(outcome, options, sink.trace, audit, notes)
     }
 
     fn ended(

@@ -63,11 +63,14 @@ fn is_moving(d: &mut Definitions, truth: &CausalGraph, input: Symbol) -> bool {
 
 /// Those that can be computed from what is defined.
 pub(super) fn known(d: &Definitions, momenta: Vec<Momentum>) -> Vec<Momentum> {
-    let outside = |s| {
-        matches!(d.meaning(s), Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)))
-    };
+    let outside =
+        |s| matches!(d.meaning(s), Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)));
     let given = |s: Symbol| {
-        d.of.contains_key(&s) || d.states.contains_key(&s) || d.free.contains(&s) || d.constants.contains(&s) || outside(s)
+        d.of.contains_key(&s)
+            || d.states.contains_key(&s)
+            || d.free.contains(&s)
+            || d.constants.contains(&s)
+            || outside(s)
     };
     let defined = |m: &Momentum| d.x.symbols_of(m.sum).iter().all(|&s| !d.missing.contains_key(&s) && given(s));
     momenta.into_iter().filter(defined).collect()

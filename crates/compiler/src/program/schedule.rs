@@ -314,9 +314,8 @@ fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
     // A sum that is itself the state keeps its value anyway.
     let is_sum = |i: usize| equations.meanings.iter().any(|(s, _)| *s == equations.states[i].symbol);
     let moved = equations.momenta.iter().filter(|m| m.moved);
-    let kept: Vec<(u32, Value)> = moved
-        .filter_map(|m| Some((of_state(m).filter(|&i| !is_sum(i))? as u32, program.momenta[&m.speed])))
-        .collect();
+    let kept: Vec<(u32, Value)> =
+        moved.filter_map(|m| Some((of_state(m).filter(|&i| !is_sum(i))? as u32, program.momenta[&m.speed]))).collect();
     let sums: Vec<Value> = kept.iter().map(|k| k.1).collect();
     let live = program.live(&sums, false);
     let jumps = |op: Op| condition_of(op).is_some() || matches!(op, Op::Held(_));

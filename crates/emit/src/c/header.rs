@@ -128,6 +128,7 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     part(s.factored > 0, format!("double factors[{}]; /* of matrices of parameters alone */", n(s.factors)));
     part(s.factored > 0, format!("int factors_order[{}], factored[{}];", n(s.factors_order), n(s.factored)));
     part(true, format!("double stages[{}], trial[{}], dx[{}];", n(nx * export.method.stages()), n(nx), n(nx)));
+    part(true, format!("double beside[{}]; /* a state beside another one */", n(nx)));
     part(true, format!("double w[{}]; /* values from one piece of code to the next */", n(s.crossing)));
     part(
         true,

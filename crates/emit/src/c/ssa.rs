@@ -7,7 +7,7 @@ use halfarrow_compiler::program::{
 use rustc_hash::FxHashMap;
 
 /// What a step reads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Arg {
     /// A fixed register.
     Fixed(Register),
@@ -71,6 +71,60 @@ pub(super) struct Code {
 
 /// The code of Newton blocks: residuals, then the Jacobian row by row.
 pub(super) type Inner = FxHashMap<BlockId, Code>;
+
+/// The code of a Newton block that computes of what its first `n` outputs are the sums, in magnitude.
+pub(super) fn terms_of(code: &Code, n: usize) -> Code {
+    let (steps, locals, outputs) = (Vec::with_capacity(2 * code.steps.len()), code.locals, Vec::new());
+    let mut terms = Terms { code: Code { steps, outputs, fixed: Vec::new(), locals }, of: FxHashMap::default() };
+    for step in &code.steps {
+        terms.code.steps.push(step.clone());
+        let [a, b] = [0, 1].map(|i| step.args.get(i).copied());
+        let (Some(a), [out]) = (a, &step.outs[..]) else { continue };
+        let sum = match (step.act, b) {
+            (Act::Neg, _) => terms.of(a),
+            (Act::Add | Act::Sub, Some(b)) => terms.both(Act::Add, a, b),
+            (Act::Mul, Some(b)) => terms.both(Act::Mul, a, b),
+            (Act::Div, Some(b)) => {
+                let (over, under) = (terms.of(a), terms.step(Act::Call(Function::Abs), vec![b]));
+                terms.step(Act::Div, vec![over, under])
+            }
+            _ => continue,
+        };
+        terms.of.insert(Arg::Local(*out), sum);
+    }
+    let outputs = code.outputs[..n].iter().map(|&a| terms.of(a)).collect();
+    terms.code.outputs = outputs;
+    terms.code.without_the_unread()
+}
+
+struct Terms {
+    code: Code,
+    /// What values are the sums of.
+    of: FxHashMap<Arg, Arg>,
+}
+
+impl Terms {
+    fn step(&mut self, act: Act, args: Vec<Arg>) -> Arg {
+        let local = self.code.locals;
+        self.code.locals += 1;
+        self.code.steps.push(Step { act, args, outs: vec![local] });
+        Arg::Local(local)
+    }
+
+    fn of(&mut self, a: Arg) -> Arg {
+        if let Some(&known) = self.of.get(&a) {
+            return known;
+        }
+        let size = self.step(Act::Call(Function::Abs), vec![a]);
+        self.of.insert(a, size);
+        size
+    }
+
+    fn both(&mut self, act: Act, a: Arg, b: Arg) -> Arg {
+        let args = vec![self.of(a), self.of(b)];
+        self.step(act, args)
+    }
+}
 
 /// The steps of a routine; the code of its Newton blocks is added to `inner`.
 pub(super) fn of_routine(program: &Program, layout: &Layout, routine: &Routine, inner: &mut Inner) -> Code {

@@ -46,6 +46,8 @@ pub(crate) struct Frame {
     pub d: Vec<f64>,
     pub conditions: Conditions,
     pub solvers: Vec<Solver>,
+    /// What values are the sums of, in magnitude, where somebody asks.
+    pub(super) terms: Vec<f64>,
     /// Set values of parameters.
     pub set: Vec<Option<f64>>,
     pub tables: Vec<Table1d>,
@@ -92,6 +94,7 @@ impl Frame {
         layout.constants.iter().for_each(|&(register, value)| r[register as usize] = value);
         Frame {
             d: vec![0.0; r.len()],
+            terms: vec![0.0; r.len()],
             r,
             conditions: Conditions::new(program.conditions.values()),
             solvers: program.blocks.values().map(solver).collect(),
@@ -109,6 +112,7 @@ impl Frame {
         let size = self.r.len().max(routine.registers as usize);
         self.r.resize(size, 0.0);
         self.d.resize(size, 0.0);
+        self.terms.resize(size, 0.0);
         for solve in &routine.solves {
             self.solvers[solve.block.0 as usize].newton.reserve(solve.outer.len());
         }

@@ -2,6 +2,7 @@
 
 mod abreast;
 mod conditions;
+mod floating;
 mod frame;
 mod lu;
 mod newton;

@@ -9,6 +9,7 @@
 //! Everything depends on the accepted solution ([`Newton::memory`]) and the values the block reads, on nothing else.
 //! Evaluations are bounded.
 
+use super::floating::Floating;
 use super::frame::{Frame, Trouble, put_entries};
 use halfarrow_compiler::program::{Instruction, Solve};
 
@@ -80,10 +81,10 @@ pub(crate) struct Newton {
     /// Greatest magnitude of each unknown so far.
     size: Vec<f64>,
     /// What is subtracted from the residuals on the way from a point where they do not vanish.
-    offset: Vec<f64>,
+    pub(super) offset: Vec<f64>,
     first: Vec<f64>,
     /// Where the attempt began: the last root on the way.
-    kept: Vec<f64>,
+    pub(super) kept: Vec<f64>,
     /// Where the attempt began, while another way is looked at.
     began: Vec<f64>,
     /// The first step of the attempt: to first order the change of the solution.
@@ -96,6 +97,8 @@ pub(crate) struct Newton {
     span: Vec<f64>,
     /// Whether the first step, taken whole, left little to do.
     near: bool,
+    /// What nothing tells.
+    pub floating: Floating,
 }
 
 impl Newton {
@@ -126,6 +129,7 @@ impl Newton {
             span: line,
             base: square,
             near: false,
+            floating: Floating::new(size),
         }
     }
 
@@ -139,6 +143,7 @@ impl Newton {
     pub fn forget(&mut self) {
         self.memory.fill(0.0);
         self.version += 1;
+        self.floating.ever.fill(false);
         self.leave();
     }
 
@@ -161,6 +166,7 @@ impl Newton {
     /// Goes on with the solution found last.
     pub fn accept(&mut self) {
         self.version += 1;
+        self.floating.accept();
         self.memory.copy_from_slice(&self.x);
         self.outer_memory.copy_from_slice(&self.outer);
         self.jacobian_memory.copy_from_slice(&self.jacobian);
@@ -182,7 +188,7 @@ impl Newton {
         if self.following { self.most } else { MOST_AT_START }
     }
 
-    fn exhausted(&self) -> bool {
+    pub(super) fn exhausted(&self) -> bool {
         self.evaluations >= self.limit()
     }
 }
@@ -248,6 +254,7 @@ impl Frame {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh) = (0, false);
+        newton.floating.now.fill(false);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
         if let Err(missed) = self.follow(solve)
             && (self.newton_of(solve).following || !self.search(solve))
@@ -298,10 +305,12 @@ impl Frame {
         let first = self.attempt(solve, Trust::Damped);
         if first.is_ok() && (self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve))
             || self.stays(solve)
+            || self.floats(solve)
         {
             return Ok(());
         }
         let newton = self.newton_of(solve);
+        newton.floating.now.fill(false);
         for i in 0..newton.x.len() {
             newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
         }
@@ -365,15 +374,16 @@ impl Frame {
     fn search(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
         newton.kept.copy_from_slice(&newton.memory);
-        if self.attempt(solve, Trust::Damped).is_ok() {
+        if self.attempt(solve, Trust::Damped).is_ok() || self.floats(solve) {
             return true;
         }
         for start in std::iter::once(0.0).chain(OTHER_STARTS) {
             self.newton_of(solve).kept.fill(start);
-            if self.attempt(solve, Trust::Damped).is_ok() {
+            if self.attempt(solve, Trust::Damped).is_ok() || self.floats(solve) {
                 return true;
             }
         }
+        self.newton_of(solve).floating.now.fill(false);
         solve.right.len() == 1 && self.scan(solve)
     }
 
@@ -399,7 +409,12 @@ impl Frame {
             let short = stride <= SHORT_STRIDE;
             let trust = if short { Trust::Kink } else { Trust::Contraction };
             let found = self.attempt(solve, trust).is_ok();
-            if found && (self.goes_on(solve) || short && self.moves_little(solve) && self.is_straight(solve, LOOKS)) {
+            let goes_on =
+                found && (self.goes_on(solve) || short && self.moves_little(solve) && self.is_straight(solve, LOOKS));
+            if goes_on || self.floats(solve) {
+                if goes_on {
+                    self.newton_of(solve).floating.now.fill(false);
+                }
                 if next == 1.0 {
                     return true;
                 }
@@ -489,7 +504,7 @@ impl Frame {
             }
             before = rest;
         }
-        let mut orientation = None;
+        let mut orientation = self.orientation_followed(solve);
         for look in 0..=looks {
             let good = self.look(solve, look as f64 / looks as f64);
             // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there.
@@ -501,6 +516,13 @@ impl Frame {
             }
         }
         true
+    }
+
+    /// The orientation of the Jacobian at the root from which the way leads, where that is followed and regular.
+    fn orientation_followed(&mut self, solve: &Solve) -> Option<bool> {
+        let solver = &mut self.solvers[solve.block.0 as usize];
+        solver.lu.matrix().copy_from_slice(&solver.newton.base);
+        (solver.newton.following && solver.lu.factor().is_ok()).then(|| solver.lu.is_positive())
     }
 
     /// Whether the root found is without doubt the only one near the way to it. Ends with an evaluation at the root.
@@ -645,7 +667,8 @@ impl Frame {
                 _ => SHORTEST,
             };
             if fraction < shortest || newton.exhausted() {
-                return if self.is_rounding(solve) { (Damped::Done, true) } else { (Damped::Stuck, false) };
+                let rounding = self.is_rounding(solve) || self.is_at_rounding(solve);
+                return if rounding { (Damped::Done, true) } else { (Damped::Stuck, false) };
             }
         }
     }
@@ -663,6 +686,14 @@ impl Frame {
             newton.x[i] += newton.next[i];
             newton.size[i] = newton.size[i].max(newton.x[i].abs());
         }
+    }
+
+    pub(super) fn evaluate_root(&mut self, solve: &Solve) -> bool {
+        self.evaluate(solve, false)
+    }
+
+    pub(super) fn is_exhausted(&mut self, solve: &Solve) -> bool {
+        self.newton_of(solve).exhausted()
     }
 
     /// Runs the code at `x` (or the trial point); whether residuals and Jacobian are finite.

@@ -147,6 +147,11 @@ impl ImplicitModel {
         counted
     }
 
+    /// As [`Model::floating`].
+    pub fn floating(&self) -> Vec<String> {
+        self.form.floating()
+    }
+
     /// The minimal form beside it.
     pub fn reference(&self) -> &Model {
         &self.reference

@@ -32,12 +32,12 @@ impl Model {
         }
         self.place(t, x);
         self.evaluate(What::Slopes, false, t)?;
-        let Some(slopes) = &self.slopes else { return Ok(false) };
-        values.fill(0.0);
-        for (&place, &register) in slopes.places.iter().zip(&slopes.routine.outputs) {
-            values[place] = self.frame.r[register as usize];
+        if self.take_entries(values).is_some() {
+            self.rates_at(t, x)?;
+            self.place_beside(t, x);
+            self.evaluate(What::Slopes, false, t)?;
         }
-        match values.iter().position(|v| !v.is_finite()) {
+        match self.take_entries(values) {
             None => Ok(true),
             Some(place) => {
                 let row = self.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
@@ -45,5 +45,14 @@ impl Model {
                 Err(Failure::NotFinite { time: t, what })
             }
         }
+    }
+    /// Writes what the routine has computed; the first place that is not finite.
+    fn take_entries(&self, values: &mut [f64]) -> Option<usize> {
+        let slopes = self.slopes.as_ref()?;
+        values.fill(0.0);
+        for (&place, &register) in slopes.places.iter().zip(&slopes.routine.outputs) {
+            values[place] = self.frame.r[register as usize];
+        }
+        values.iter().position(|v| !v.is_finite())
     }
 }

@@ -70,6 +70,8 @@ pub struct Model {
     /// States that jump with a source, if there are any.
     kept: Option<Kept>,
     dx: Vec<f64>,
+    /// A state beside another one.
+    beside: Vec<f64>,
     /// Newton blocks that recorded values need and no rate does.
     shown_blocks: Vec<BlockId>,
     /// Whether the run has begun: conditions are held.
@@ -139,6 +141,7 @@ impl Model {
             conserved: vec![0.0; program.conserved.len()],
             kept,
             dx: vec![0.0; n],
+            beside: vec![0.0; n],
             shown_blocks: Vec::new(),
             begun: false,
             crossed: f64::NEG_INFINITY,
@@ -260,6 +263,17 @@ impl Model {
     /// take more.
     pub fn bound_iterations(&mut self, most: usize) {
         self.frame.solvers.iter_mut().for_each(|s| s.newton.bound(most.max(1)));
+    }
+
+    /// Unknowns of nonlinear laws that nothing determined somewhere on the run, such as the voltage of a node between
+    /// diodes that block: there each stayed where it was.
+    pub fn floating(&self) -> Vec<String> {
+        let blocks = self.program.blocks.iter().zip(&self.frame.solvers);
+        let named = blocks.flat_map(|((_, block), solver)| {
+            let ever = solver.newton.floating.ever.iter().enumerate().filter(|(_, ever)| **ever);
+            ever.map(|(i, _)| block.unknown(i).to_string())
+        });
+        named.collect()
     }
 
     /// Forgets a run: the next crossing is its start. Parameters, inputs and conserved constants stay.

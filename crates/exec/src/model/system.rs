@@ -4,6 +4,9 @@ use super::{Held, Model};
 use crate::bytecode::{Hold, Trouble};
 use halfarrow_sim::{Failure, Sparsity, System};
 
+/// How far beside a state the slope is taken where it is infinite: this part of the state and of its change in a second.
+const BESIDE: f64 = 1e-8;
+
 /// Which routine is run.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum What {
@@ -165,26 +168,51 @@ impl Model {
     pub(super) fn tangent_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, y);
         self.still();
-        self.along(t, self.layout.rates, v, jv)
+        self.along(t, y, self.layout.rates, v, jv)
     }
 
     /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
-    fn along(&mut self, t: f64, first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn along(&mut self, t: f64, x: &[f64], first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.frame.d[first as usize..][..v.len()].copy_from_slice(v);
-        self.slopes_along(t, jv)
+        self.slopes_along(t, x, jv)
     }
 
-    /// Derivative of the rates along the direction that is set.
-    fn slopes_along(&mut self, t: f64, jv: &mut [f64]) -> Result<(), Failure> {
+    /// Derivative of the rates along the direction that is set. Where the slope of a law is infinite it is that a little
+    /// beside.
+    fn slopes_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;
-        for (state, (jv, &register)) in jv.iter_mut().zip(&self.rates.outputs).enumerate() {
-            *jv = self.frame.d[register as usize];
-            if !jv.is_finite() {
+        if self.take_slopes(jv).is_none() {
+            return Ok(());
+        }
+        self.place_beside(t, x);
+        self.evaluate(What::Rates, true, t)?;
+        match self.take_slopes(jv) {
+            None => Ok(()),
+            Some(state) => {
                 let what = format!("the derivative of the rate of {}", self.state_name(state));
-                return Err(Failure::NotFinite { time: t, what });
+                Err(Failure::NotFinite { time: t, what })
             }
         }
-        Ok(())
+    }
+
+    /// Writes the derivatives of the rates; the first state for whose rate there is none.
+    fn take_slopes(&self, jv: &mut [f64]) -> Option<usize> {
+        jv.iter_mut().zip(&self.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
+        jv.iter().position(|slope| !slope.is_finite())
+    }
+
+    /// Puts states in their registers that are a little further on the way that the rates, evaluated last, lead.
+    pub(super) fn place_beside(&mut self, t: f64, x: &[f64]) {
+        let mut beside = std::mem::take(&mut self.beside);
+        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.rates.outputs) {
+            let rate = self.frame.r[register as usize];
+            let rate = if rate.is_finite() { rate } else { 0.0 };
+            let size = if rate < 0.0 { -x.abs() } else { x.abs() };
+            let way = BESIDE * (size + rate);
+            *beside = x + if way == 0.0 { BESIDE * BESIDE } else { way };
+        }
+        self.place(t, &beside);
+        self.beside = beside;
     }
 
     /// Whether there are laws solved by Newton, whose last solution decides which one comes next.
@@ -238,14 +266,14 @@ impl System for Model {
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
-        self.along(t, self.layout.states, v, jv)
+        self.along(t, x, self.layout.states, v, jv)
     }
 
     fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
         self.let_time_pass(t);
-        self.slopes_along(t, out)
+        self.slopes_along(t, x, out)
     }
 
     fn sparsity(&self) -> &Sparsity {

@@ -18,6 +18,9 @@ use tolerances::Tolerances;
 /// Parts of a step by which it is made to go beyond a crossing.
 pub(crate) const MARGINS: [f64; 2] = [1e-3, 1e-6];
 
+/// Longest step of a system without states, as a part of the run.
+const SHORT: f64 = 1e-3;
+
 /// A method of variable step between two restarts.
 trait Integrator {
     /// Order of the first step after a restart.
@@ -133,6 +136,8 @@ struct Drive<'r, 'a, 'i, 's> {
     resume: Option<f64>,
     /// Whether the last announced jump was a mere corner, over which the method went on.
     corner: bool,
+    /// Longest step.
+    longest: Option<f64>,
 }
 
 impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
@@ -146,6 +151,10 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
     ) -> Self {
         let interpolated = vec![0.0; method.state().len()];
         let end_rates = interpolated.clone();
+        // Without states no error tells how far a step may go: laws are followed in short ones.
+        let options = run.options;
+        let blind = interpolated.is_empty().then(|| SHORT * (options.to - options.from));
+        let longest = options.step.into_iter().chain(blind).reduce(f64::min);
         Drive {
             run,
             shared,
@@ -157,6 +166,7 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             end_rates,
             resume: None,
             corner: false,
+            longest,
         }
     }
 
@@ -192,7 +202,7 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
         self.set_off(stop, x)?;
         let mut longest: f64 = 0.0;
         while self.run.time < stop {
-            let stop_now = self.run.options.step.map_or(stop, |longest| stop.min(self.run.time + longest));
+            let stop_now = self.longest.map_or(stop, |longest| stop.min(self.run.time + longest));
             self.method.step(stop_now)?;
             self.run.counts.steps += 1;
             let end = if is_at(self.method.time(), stop, self.method.start()) { stop } else { self.method.time() };
@@ -225,7 +235,7 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
     /// jump: rows of an input table are such corners.
     fn set_off(&mut self, stop: f64, x: &[f64]) -> Result<(), Failure> {
         let (time, mut rates) = (self.run.time, vec![0.0; x.len()]);
-        let longest = (stop - time).min(self.run.options.step.unwrap_or(f64::INFINITY));
+        let longest = (stop - time).min(self.longest.unwrap_or(f64::INFINITY));
         let resume = self.resume.take();
         if let Some(step) = resume {
             self.shared.system().rates(time, x, &mut rates)?;

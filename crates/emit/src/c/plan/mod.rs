@@ -259,6 +259,13 @@ impl<'a> Plan<'a> {
         let right = (0..n).map(|i| format!("right[{i}]"));
         let values: Vec<String> = right.chain((0..n * n).map(|i| format!("matrix[{i}]"))).collect();
         let mut text = writer.function(&format!("ha_block_{number}"), shape, code, &values, &[]);
+        let terms = Shape {
+            parameters: "ha_model *m, const double *o, const double *g, double *terms",
+            arguments: "m, o, g, terms",
+            ..shape
+        };
+        let values: Vec<String> = (0..n).map(|i| format!("terms[{i}]")).collect();
+        text += &writer.function(&format!("ha_block_{number}_terms"), terms, &ssa::terms_of(code, n), &values, &[]);
         let shape = Shape {
             parameters: "ha_model *m, const double *o, const double *e, const double *g, double *rates",
             arguments: "m, o, e, g, rates",
@@ -301,7 +308,7 @@ impl<'a> Plan<'a> {
         let newton: Vec<(usize, usize)> =
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (program.blocks[*b].size(), reads)).collect();
         let lu = |n: usize| 2 * n * n + 3 * n;
-        let work = |&(n, reads): &(usize, usize)| 12 * n + reads + 2 * n * n + lu(n);
+        let work = |&(n, reads): &(usize, usize)| 16 * n + reads + 4 * n * n + lu(n);
         self.sizes = Sizes {
             derived: writer.derived.len(),
             crossing: writer.crossing,

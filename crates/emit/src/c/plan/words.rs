@@ -143,8 +143,11 @@ impl Plan<'_> {
             text += &format!(
                 "static void ha_block_{i}_along(ha_model *m, const double *o, const double *e, const double *g, double *rates);\n"
             );
+            text += &format!(
+                "static void ha_block_{i}_terms(ha_model *m, const double *o, const double *g, double *terms);\n"
+            );
             let n = self.program.blocks[*block].size();
-            list += &format!("    {{{n}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_along}},\n");
+            list += &format!("    {{{n}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_terms, ha_block_{i}_along}},\n");
             memory += 2 * (n + reads + n * n);
         }
         text + "\n" + &list + "};\n"

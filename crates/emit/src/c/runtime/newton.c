@@ -8,6 +8,8 @@ typedef struct {
     /* First place of its memory in m->memory. */
     int memory;
     void (*code)(ha_model *m, const double *o, const double *g, double *right, double *matrix);
+    /* Of what the residuals are the sums, in magnitude. */
+    void (*terms)(ha_model *m, const double *o, const double *g, double *terms);
 //if newton_along
     void (*along)(ha_model *m, const double *o, const double *e, const double *g, double *rates);
 //end
@@ -43,6 +45,13 @@ typedef struct {
     double *present;
     double *base;
     double *matrix;
+    /* Where nothing tells an unknown: see ha_floats. */
+    double *terms;
+    double *units;
+    double *loose;
+    double *order;
+    double *rest;
+    double *free;
     ha_lu lu;
 } ha_newton;
 
@@ -88,6 +97,12 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.present = ha_take(&place, reads);
     w.base = ha_take(&place, n * n);
     w.matrix = ha_take(&place, n * n);
+    w.terms = ha_take(&place, n);
+    w.units = ha_take(&place, n);
+    w.order = ha_take(&place, n);
+    w.rest = ha_take(&place, n);
+    w.loose = ha_take(&place, n * n);
+    w.free = ha_take(&place, n * n);
     w.lu = ha_lu_at(place, m->order, n);
     return w;
 }
@@ -254,6 +269,209 @@ static int ha_is_rounding(ha_model *m, ha_newton *w)
     return ha_look_at(m, w, w->x) && linear;
 }
 
+/* Right side and matrix at w->x, evaluated last: rows in units of their rounding, columns in magnitudes of unknowns. */
+static void ha_measure(ha_model *m, ha_newton *w)
+{
+    const int n = w->n;
+    double largest = 0.0;
+    int i;
+    int j;
+    w->block->terms(m, w->present, w->x, w->terms);
+    for (i = 0; i < n; ++i) {
+        largest = ha_max(largest, fabs(w->x[i]));
+    }
+    for (i = 0; i < n; ++i) {
+        largest = ha_max(largest, fabs(w->memory[i]));
+    }
+    for (j = 0; j < n; ++j) {
+        const double size = ha_max(fabs(w->x[j]), fabs(w->memory[j]));
+        w->units[j] = size > 0.0 ? size : (largest > 0.0 ? largest : 1.0);
+        w->order[j] = (double)j;
+    }
+    for (i = 0; i < n; ++i) {
+        const double rounding = 8.0 * DBL_EPSILON * w->terms[i];
+        w->terms[i] = rounding > 0.0 ? rounding : DBL_MIN;
+        w->rest[i] = (w->offset[i] - w->right[i]) / w->terms[i];
+        for (j = 0; j < n; ++j) {
+            w->loose[i * n + j] = w->matrix[i * n + j] * w->units[j] / w->terms[i];
+        }
+    }
+}
+
+/* Greatest residual in units of its rounding; infinite if something is not finite. */
+static double ha_rest(const ha_newton *w)
+{
+    double most = 0.0;
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        most = ha_finite(w->rest[i]) ? ha_max(most, fabs(w->rest[i])) : HUGE_VAL;
+    }
+    return most;
+}
+
+/* Whether the residuals at w->x, evaluated last, are rounding. */
+static int ha_is_at_rounding(ha_model *m, ha_newton *w)
+{
+    ha_measure(m, w);
+    return ha_rest(w) <= 1.0;
+}
+
+static void ha_swap(double *a, double *b)
+{
+    const double was = *a;
+    *a = *b;
+    *b = was;
+}
+
+/* Eliminates with the greatest pivots there are, down to those at rounding; how many there are. */
+static int ha_eliminate(ha_newton *w)
+{
+    const int n = w->n;
+    double *a = w->loose;
+    int k;
+    int i;
+    int j;
+    for (k = 0; k < n; ++k) {
+        double most = 1.0;
+        int row = k;
+        int column = k;
+        for (i = k; i < n; ++i) {
+            for (j = k; j < n; ++j) {
+                const double size = fabs(a[i * n + j]);
+                if (size > most) {
+                    row = i;
+                    column = j;
+                    most = size;
+                }
+            }
+        }
+        if (most <= 1.0) {
+            return k;
+        }
+        for (j = 0; j < n; ++j) {
+            ha_swap(&a[k * n + j], &a[row * n + j]);
+        }
+        for (i = 0; i < n; ++i) {
+            ha_swap(&a[i * n + k], &a[i * n + column]);
+        }
+        ha_swap(&w->rest[k], &w->rest[row]);
+        ha_swap(&w->order[k], &w->order[column]);
+        for (i = k + 1; i < n; ++i) {
+            const double factor = a[i * n + k] / a[k * n + k];
+            double part;
+            for (j = k + 1; j < n; ++j) {
+                part = factor * a[k * n + j];
+                a[i * n + j] -= part;
+            }
+            part = factor * w->rest[k];
+            w->rest[i] -= part;
+        }
+    }
+    return n;
+}
+
+/* Solves the triangle of the first places. */
+static void ha_back(const ha_newton *w, int rank, double *b)
+{
+    int i;
+    int j;
+    for (i = rank - 1; i >= 0; --i) {
+        for (j = i + 1; j < rank; ++j) {
+            const double part = w->loose[i * w->n + j] * b[j];
+            b[i] -= part;
+        }
+        b[i] /= w->loose[i * w->n + i];
+    }
+}
+
+static double ha_dot(const double *a, const double *b, int n)
+{
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < n; ++i) {
+        const double part = a[i] * b[i];
+        sum += part;
+    }
+    return sum;
+}
+
+/* Takes off what lies along a direction of length 1. */
+static void ha_take_off(double *from, const double *along, int n)
+{
+    const double share = ha_dot(from, along, n);
+    int i;
+    for (i = 0; i < n; ++i) {
+        const double part = share * along[i];
+        from[i] -= part;
+    }
+}
+
+/* Replaces the right side by the shortest step, in places. */
+static void ha_shortest(ha_newton *w, int rank)
+{
+    const int n = w->n;
+    int place;
+    int i;
+    ha_fill(w->rest + rank, 0.0, n - rank);
+    ha_back(w, rank, w->rest);
+    for (place = rank; place < n; ++place) {
+        double *direction = w->free + (place - rank) * n;
+        double length;
+        ha_fill(direction, 0.0, n);
+        for (i = 0; i < rank; ++i) {
+            direction[i] = -w->loose[i * n + place];
+        }
+        ha_back(w, rank, direction);
+        direction[place] = 1.0;
+        for (i = 0; i < place - rank; ++i) {
+            ha_take_off(direction, w->free + i * n, n);
+        }
+        length = sqrt(ha_dot(direction, direction, n));
+        for (i = 0; i < n; ++i) {
+            direction[i] /= length;
+        }
+        ha_take_off(w->rest, direction, n);
+    }
+}
+
+/* From w->kept in steps by what the equations tell of the unknowns, to where the residuals are rounding; only as long as
+ * something is hardly told, such as a node between diodes that block. */
+static int ha_floats(ha_model *m, ha_newton *w)
+{
+    const int n = w->n;
+    double before = HUGE_VAL;
+    int step;
+    int i;
+    ha_copy(w->x, w->kept, n);
+    for (step = 0; step < 30; ++step) {
+        double rest;
+        int rank;
+        if (w->evaluations >= w->limit || !ha_look_at(m, w, w->x)) {
+            return 0;
+        }
+        ha_measure(m, w);
+        rest = ha_rest(w);
+        if (!ha_all_finite(w->loose, n * n) || (rest > 0.75 * before && rest > 1.0)) {
+            return 0;
+        }
+        rank = ha_eliminate(w);
+        if (rank == n && !(fabs(w->loose[n * n - 1]) < 1.0 / 1e-9)) {
+            return 0;
+        }
+        ha_shortest(w, rank);
+        if (rest <= 1.0) {
+            return 1;
+        }
+        for (i = 0; i < n; ++i) {
+            const int unknown = (int)w->order[i];
+            const double part = w->rest[i] * w->units[unknown];
+            w->x[unknown] += part;
+        }
+        before = rest;
+    }
+    return 0;
+}
+
 enum { HA_DAMPED, HA_KINK, HA_CONTRACTION };
 enum { HA_DONE, HA_MOVED, HA_STUCK };
 
@@ -293,7 +511,7 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
             break;
         }
     }
-    *near = ha_is_rounding(m, w);
+    *near = ha_is_rounding(m, w) || ha_is_at_rounding(m, w);
     return *near ? HA_DONE : HA_STUCK;
 }
 
@@ -446,6 +664,11 @@ static int ha_is_straight_at(ha_model *m, ha_newton *w, int looks)
         }
         before = rest;
     }
+    /* The orientation at the root from which the way leads, where that is followed and regular. */
+    ha_copy(w->lu.matrix, w->base, w->n * w->n);
+    if (w->following && ha_lu_factor(&w->lu)) {
+        orientation = ha_lu_is_positive(&w->lu);
+    }
     for (look = 0; look <= looks; ++look) {
         /* A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there. */
         if (ha_look(m, w, (double)look / (double)looks) && ha_newton_factor(w)) {
@@ -509,7 +732,8 @@ static int ha_approach(ha_model *m, ha_newton *w)
         int found;
         ha_go_to(w, next);
         found = ha_attempt(m, w, is_short ? HA_KINK : HA_CONTRACTION);
-        if (found && (ha_goes_on(w) || (is_short && ha_moves_little(w) && ha_is_straight(m, w, 8)))) {
+        found = found && (ha_goes_on(w) || (is_short && ha_moves_little(w) && ha_is_straight(m, w, 8)));
+        if (found || ha_floats(m, w)) {
             if (next == 1.0) {
                 return 1;
             }
@@ -582,7 +806,7 @@ static int ha_follow(ha_model *m, ha_newton *w)
         }
         why = MODEL_BRANCH;
     }
-    if (ha_stays(m, w)) {
+    if (ha_stays(m, w) || ha_floats(m, w)) {
         return MODEL_OK;
     }
     for (i = 0; i < w->n; ++i) {
@@ -687,12 +911,12 @@ static int ha_search(ha_model *m, ha_newton *w)
     static const double starts[] = {0.0, 1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3};
     int i;
     ha_copy(w->kept, w->memory, w->n);
-    if (ha_attempt(m, w, HA_DAMPED)) {
+    if (ha_attempt(m, w, HA_DAMPED) || ha_floats(m, w)) {
         return 1;
     }
     for (i = 0; i < 7; ++i) {
         ha_fill(w->kept, starts[i], w->n);
-        if (ha_attempt(m, w, HA_DAMPED)) {
+        if (ha_attempt(m, w, HA_DAMPED) || ha_floats(m, w)) {
             return 1;
         }
     }

@@ -157,13 +157,12 @@ static void ha_let_time_pass(ha_model *m, double t)
 /* Code for derivatives along e. */
 typedef int ha_along_code(ha_model *m, double t, const double *x, const double *e, double *out, double *rates);
 
-/* Derivatives of the rates along m->along, by code for it. */
-static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
+/* Derivatives of the rates along m->along, by code for it, as they are at x. */
+static int ha_slopes_at(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
 {
     double *e = m->along;
     double *dx = m->along_out;
     int status = code(m, t, x, e, dx, dv);
-    int i;
 //if switches
     if (m->state_hold == HA_KEEP && (status != MODEL_OK || !ha_all_finite(dv, HA_NX))) {
         m->state_hold = HA_FOLLOW;
@@ -178,6 +177,24 @@ static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code
         }
     }
 //end
+    return status;
+}
+
+/* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead. */
+static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
+{
+    const double *dx = m->along_out;
+    int status = ha_slopes_at(m, t, x, code, dv);
+    int i;
+    if (status == MODEL_OK && !ha_all_finite(dv, HA_NX)) {
+        for (i = 0; i < HA_NX; ++i) {
+            const double rate = ha_finite(dx[i]) ? dx[i] : 0.0;
+            const double size = rate < 0.0 ? -fabs(x[i]) : fabs(x[i]);
+            const double way = 1e-8 * (size + rate);
+            m->beside[i] = x[i] + (way == 0.0 ? 1e-8 * 1e-8 : way);
+        }
+        status = ha_slopes_at(m, t, m->beside, code, dv);
+    }
     if (status != MODEL_OK) {
         return status;
     }
@@ -188,7 +205,6 @@ static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code
     }
     return MODEL_OK;
 }
-
 int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv)
 {
     ha_fill(m->along, 0.0, HA_DIRECTION);

@@ -1,0 +1,257 @@
+//! Newton blocks in which nothing tells an unknown: where diodes block, what is left of a slope lies below the rounding
+//! of the currents, and a node between them floats.
+//!
+//! A residual at the rounding of its terms is a solution. What the equations tell of the unknowns is solved for, of the
+//! rest the shortest change is taken: it stays where it was.
+
+use super::frame::Frame;
+use super::newton::SETTLED;
+use halfarrow_compiler::program::{Instruction, Solve};
+
+/// A residual below this part of its terms is rounding.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Steps at most.
+const STEPS: usize = 30;
+/// By how much the residuals have to shrink in a step.
+const SHRINKS: f64 = 0.75;
+/// Share in an undetermined direction from which on an unknown is said to float.
+const SHARE: f64 = 0.1;
+
+/// Working space of a block, and what was found of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Floating {
+    /// What the residuals are the sums of, in magnitude.
+    terms: Vec<f64>,
+    /// The matrix, a row in units of rounding, a column in magnitudes of its unknown.
+    matrix: Vec<f64>,
+    /// Directions that the equations say nothing of, one after the other.
+    free: Vec<f64>,
+    right: Vec<f64>,
+    size: Vec<f64>,
+    /// The unknown in each place.
+    order: Vec<usize>,
+    /// Which unknowns float at the root found last.
+    pub now: Vec<bool>,
+    /// Which have floated in an accepted solution.
+    pub ever: Vec<bool>,
+}
+
+impl Floating {
+    pub fn new(size: usize) -> Floating {
+        let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
+        Floating {
+            terms: line.clone(),
+            matrix: square.clone(),
+            free: square,
+            right: line.clone(),
+            size: line,
+            order: vec![0; size],
+            now: vec![false; size],
+            ever: vec![false; size],
+        }
+    }
+
+    /// Takes note of what floats in the solution that is accepted.
+    pub fn accept(&mut self) {
+        self.ever.iter_mut().zip(&self.now).for_each(|(ever, now)| *ever |= now);
+    }
+
+    /// Greatest residual in units of its rounding; infinite if something is not finite.
+    fn rest(&self) -> f64 {
+        self.right.iter().fold(0.0, |most, r| if r.is_finite() { r.abs().max(most) } else { f64::INFINITY })
+    }
+
+    /// Eliminates with the greatest pivots there are, down to those at rounding; how many there are.
+    fn eliminate(&mut self) -> usize {
+        let n = self.order.len();
+        for k in 0..n {
+            let (mut row, mut column, mut most) = (k, k, 1.0f64);
+            for i in k..n {
+                for j in k..n {
+                    let size = self.matrix[i * n + j].abs();
+                    if size > most {
+                        (row, column, most) = (i, j, size);
+                    }
+                }
+            }
+            if most <= 1.0 {
+                return k;
+            }
+            self.exchange(k, row, column);
+            for i in k + 1..n {
+                let factor = self.matrix[i * n + k] / self.matrix[k * n + k];
+                for j in k + 1..n {
+                    self.matrix[i * n + j] -= factor * self.matrix[k * n + j];
+                }
+                self.right[i] -= factor * self.right[k];
+            }
+        }
+        n
+    }
+
+    fn exchange(&mut self, k: usize, row: usize, column: usize) {
+        let n = self.order.len();
+        for j in 0..n {
+            self.matrix.swap(k * n + j, row * n + j);
+        }
+        for i in 0..n {
+            self.matrix.swap(i * n + k, i * n + column);
+        }
+        self.right.swap(k, row);
+        self.order.swap(k, column);
+    }
+
+    /// Whether after elimination the least pivot tells no more digits of its unknown than a step needs to be settled.
+    fn is_weak(&self, rank: usize) -> bool {
+        let n = self.order.len();
+        rank < n || self.matrix[n * n - 1].abs() < 1.0 / SETTLED
+    }
+
+    /// Replaces the right side by the shortest step, in places, and tells which unknowns float.
+    fn shortest(&mut self, rank: usize) {
+        let n = self.order.len();
+        self.right[rank..].fill(0.0);
+        back(&self.matrix, n, rank, &mut self.right);
+        self.now.fill(false);
+        for place in rank..n {
+            let (known, free) = self.free.split_at_mut((place - rank) * n);
+            let free = &mut free[..n];
+            free.fill(0.0);
+            for i in 0..rank {
+                free[i] = -self.matrix[i * n + place];
+            }
+            back(&self.matrix, n, rank, free);
+            free[place] = 1.0;
+            known.chunks_exact(n).for_each(|other| take_off(free, other));
+            let length = dot(free, free).sqrt();
+            free.iter_mut().for_each(|v| *v /= length);
+            take_off(&mut self.right, free);
+            for (v, &unknown) in free.iter().zip(&self.order) {
+                self.now[unknown] |= v.abs() >= SHARE;
+            }
+        }
+    }
+}
+
+/// Solves the triangle of the first `rank` places.
+fn back(matrix: &[f64], n: usize, rank: usize, b: &mut [f64]) {
+    for i in (0..rank).rev() {
+        for j in i + 1..rank {
+            b[i] -= matrix[i * n + j] * b[j];
+        }
+        b[i] /= matrix[i * n + i];
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    a.iter().zip(b).for_each(|(a, b)| sum += a * b);
+    sum
+}
+
+/// Takes off what lies along a direction of length 1.
+fn take_off(from: &mut [f64], along: &[f64]) {
+    let share = dot(from, along);
+    from.iter_mut().zip(along).for_each(|(v, a)| *v -= share * a);
+}
+
+impl Frame {
+    /// Whether the residuals at `newton.x`, evaluated last, are rounding.
+    pub(super) fn is_at_rounding(&mut self, solve: &Solve) -> bool {
+        self.measure(solve);
+        self.floating_of(solve).rest() <= 1.0
+    }
+
+    /// From `newton.kept` in steps by what the equations tell of the unknowns, to where the residuals are rounding; only
+    /// as long as something is hardly told. Ends with an evaluation at the root.
+    pub(super) fn floats(&mut self, solve: &Solve) -> bool {
+        let newton = &mut self.solvers[solve.block.0 as usize].newton;
+        newton.x.copy_from_slice(&newton.kept);
+        let mut before = f64::INFINITY;
+        for _ in 0..STEPS {
+            if self.is_exhausted(solve) || !self.evaluate_root(solve) {
+                return false;
+            }
+            self.measure(solve);
+            let floating = self.floating_of(solve);
+            let rest = floating.rest();
+            if !floating.matrix.iter().all(|a| a.is_finite()) || rest > SHRINKS * before && rest > 1.0 {
+                return false;
+            }
+            let rank = floating.eliminate();
+            if !floating.is_weak(rank) {
+                return false;
+            }
+            floating.shortest(rank);
+            if rest <= 1.0 {
+                return true;
+            }
+            let newton = &mut self.solvers[solve.block.0 as usize].newton;
+            let floating = &newton.floating;
+            for (place, &unknown) in floating.order.iter().enumerate() {
+                newton.x[unknown] += floating.right[place] * floating.size[unknown];
+            }
+            before = rest;
+        }
+        false
+    }
+
+    fn floating_of(&mut self, solve: &Solve) -> &mut Floating {
+        &mut self.solvers[solve.block.0 as usize].newton.floating
+    }
+
+    /// Right side and matrix at the point evaluated last, rows in units of their rounding.
+    fn measure(&mut self, solve: &Solve) {
+        self.sum_terms(solve);
+        let n = solve.right.len();
+        let Frame { r, solvers, terms, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        let largest = newton.x.iter().chain(&newton.memory).fold(0.0f64, |most, x| most.max(x.abs()));
+        let floating = &mut newton.floating;
+        for j in 0..n {
+            let size = newton.x[j].abs().max(newton.memory[j].abs());
+            let unknown = if largest > 0.0 { largest } else { 1.0 };
+            floating.size[j] = if size > 0.0 { size } else { unknown };
+            floating.order[j] = j;
+        }
+        floating.matrix.fill(0.0);
+        for (i, &right) in solve.right.iter().enumerate() {
+            let rounding = ROUNDING * terms[right as usize];
+            floating.terms[i] = if rounding > 0.0 { rounding } else { f64::MIN_POSITIVE };
+            floating.right[i] = (newton.offset[i] - r[right as usize]) / floating.terms[i];
+        }
+        for &place in &solve.entries {
+            let (i, j) = (place as usize / n, place as usize % n);
+            let entry = r[solve.matrix[place as usize] as usize];
+            floating.matrix[place as usize] = entry * floating.size[j] / floating.terms[i];
+        }
+    }
+
+    /// Runs the code of a block again, and adds up what its values are the sums of, in magnitude.
+    fn sum_terms(&mut self, solve: &Solve) {
+        self.terms.iter_mut().zip(&self.r).for_each(|(terms, value)| *terms = value.abs());
+        let point = &self.solvers[solve.block.0 as usize].newton.x;
+        solve.guess.iter().zip(point).for_each(|(&g, &x)| {
+            (self.r[g as usize], self.terms[g as usize]) = (x, x.abs());
+        });
+        for instruction in &solve.code {
+            let terms = self.terms_of(instruction);
+            self.plain::<false>(std::slice::from_ref(instruction));
+            if let Some(out) = super::operands::written(instruction) {
+                self.terms[out as usize] = terms.unwrap_or(self.r[out as usize].abs());
+            }
+        }
+    }
+
+    /// What an operation adds up, in magnitude, before it is done; `None` where that is its value.
+    fn terms_of(&self, instruction: &Instruction) -> Option<f64> {
+        let t = |r: u32| self.terms[r as usize];
+        match *instruction {
+            Instruction::Add { a, b, .. } | Instruction::Sub { a, b, .. } => Some(t(a) + t(b)),
+            Instruction::Neg { a, .. } => Some(t(a)),
+            Instruction::Mul { a, b, .. } => Some(t(a) * t(b)),
+            Instruction::Div { a, b, .. } => Some(t(a) / self.r[b as usize].abs()),
+            _ => None,
+        }
+    }
+}
