@@ -115,6 +115,14 @@ pub(crate) struct Radau {
     work: Work,
 }
 
+/// A slope that moves an unknown in a step by so many times what it is taken from is steep, and so is one that is so many
+/// times another.
+const STEEP: f64 = 1e3;
+
+fn finite(values: &[f64]) -> bool {
+    values.iter().all(|value| value.is_finite())
+}
+
 /// Where the Jacobian was taken.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Age {
@@ -245,14 +253,37 @@ impl Radau {
         Ok(rates)
     }
 
+    /// What an unknown below its tolerance is says nothing: where a slope by it is steep there and far less so at the
+    /// tolerance, as that of a root at 0, the Jacobian is taken at the tolerance. With the steep one every step would
+    /// seem to be solved.
+    fn bound_slopes(&mut self, system: &mut dyn ImplicitSystem, t: f64, y: &[f64], yp: &[f64]) {
+        let tolerance = |i: usize| self.absolute[i] / self.tightened;
+        let steep = |&(place, (_, i)): &(usize, (usize, usize))| {
+            y[i].abs() < tolerance(i) && (self.dy[place] * self.h).abs() > STEEP
+        };
+        let steep: Vec<(usize, (usize, usize))> = system.sparsity().entries().enumerate().filter(steep).collect();
+        if steep.is_empty() {
+            return;
+        }
+        let mut beside = y.to_vec();
+        for &(_, (_, i)) in &steep {
+            beside[i] = tolerance(i).copysign(if y[i] == 0.0 { yp[i] } else { y[i] });
+        }
+        let (mut dy, mut dyp) = (vec![0.0; self.dy.len()], vec![0.0; self.dyp.len()]);
+        let taken = system.jacobian(t, &beside, yp, &mut dy, &mut dyp).is_ok() && finite(&dy) && finite(&dyp);
+        if taken && steep.iter().any(|&(place, _)| self.dy[place].abs() > STEEP * dy[place].abs()) {
+            (self.dy, self.dyp) = (dy, dyp);
+        }
+    }
+
     /// Takes the Jacobian at `(t, y, y')`, and finds the unknowns that have rates.
     fn take_jacobian(&mut self, system: &mut dyn ImplicitSystem, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         system.jacobian(t, y, yp, &mut self.dy, &mut self.dyp)?;
         self.work.jacobians += 1;
-        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         if !(finite(&self.dy) && finite(&self.dyp)) {
             return Err(Failure::NotFinite { time: t, what: "a derivative of the equations".into() });
         }
+        self.bound_slopes(system, t, y, yp);
         self.has_rate.fill(false);
         for (place, (_, column)) in system.sparsity().entries().enumerate() {
             self.has_rate[column] |= self.dyp[place] != 0.0;
