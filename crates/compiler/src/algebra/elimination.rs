@@ -1,14 +1,17 @@
 //! Sparse exact elimination.
 //!
 //! Pivots are taken class by class; within a class the simplest first (1 and -1, other numbers, parameters, what
-//! depends on the state), then those that fill in least.
+//! depends on the state), then those that fill in least. Where a point is given, a pivot that varies and is small there
+//! beside the rest of its row comes last.
 
+use super::evaluate::Evaluator;
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
-use super::node::{Expr, Node};
+use super::node::{Expr, Node, Symbol};
+use crate::ids::Map;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A linear relation: the sum of coefficient times column is zero. Sorted by column; no coefficient is zero.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -47,6 +50,39 @@ enum Quality {
     Nonzero,
     DoubtfulParameters,
     Doubtful,
+    Vanishing,
+}
+
+/// A pivot that varies is small at a point below this fraction of the greatest entry of its row there.
+const SMALL: f64 = 1e-2;
+
+/// A point: values of symbols, and of the expressions that have been asked for.
+#[derive(Debug, Clone, Default)]
+pub struct NumericPoint {
+    symbols: Map<Symbol, f64>,
+    known: FxHashMap<Expr, f64>,
+}
+
+impl NumericPoint {
+    /// Where the symbols have these values, and all others 1.
+    pub fn new(symbols: Map<Symbol, f64>) -> NumericPoint {
+        NumericPoint { symbols, known: FxHashMap::default() }
+    }
+
+    /// The value of a symbol there.
+    pub fn of(&self, symbol: Symbol) -> f64 {
+        self.symbols.get(&symbol).copied().unwrap_or(1.0)
+    }
+
+    /// The value of an expression there; NaN where it is not defined.
+    pub fn value(&mut self, x: &Exprs, e: Expr) -> f64 {
+        let symbols = &self.symbols;
+        let mut of = |s: Symbol| symbols.get(&s).copied().unwrap_or(1.0);
+        let mut values = Evaluator::knowing(x, &mut of, std::mem::take(&mut self.known));
+        let value = values.value(e);
+        self.known = values.into_known();
+        value
+    }
 }
 
 /// Eliminates columns from rows. `classes` are the columns that may be pivots, those of an earlier class first; other
@@ -77,6 +113,8 @@ pub struct Eliminator {
     column_rows: Vec<Vec<u32>>,
     /// Counts changes of a column, so that old entries of the heap are recognised.
     stamps: Vec<u32>,
+    /// Where pivots should not be small.
+    point: Option<NumericPoint>,
     done: Elimination,
 }
 
@@ -92,6 +130,7 @@ impl Eliminator {
             active: vec![true; rows.len()],
             column_rows: vec![Vec::new(); columns],
             stamps: vec![0; columns],
+            point: None,
             done: Elimination::default(),
         };
         for (i, row) in rows.into_iter().enumerate() {
@@ -101,6 +140,12 @@ impl Eliminator {
             work.rows.push(kept);
         }
         work
+    }
+
+    /// The same, with pivots that are not small at a point, as far as there are any.
+    pub fn near(mut self, point: NumericPoint) -> Eliminator {
+        self.point = Some(point);
+        self
     }
 
     /// Whether a coefficient counts as zero.
@@ -147,6 +192,37 @@ impl Eliminator {
         self.done.pivots.len() - before
     }
 
+    /// The row in which a column weighs most at the point, beside the other columns that have a weight, and how much: 1
+    /// or less, where another one is greater. `None` if no row holds the column with a value that is finite and not 0.
+    pub fn heaviest(&mut self, x: &Exprs, column: usize, weights: &BTreeMap<usize, f64>) -> Option<(f64, u32)> {
+        let mut point = self.point.take()?;
+        let mut best: Option<(f64, u32)> = None;
+        for r in self.rows_of(column) {
+            let row = &self.rows[r as usize];
+            let mut size = |&(c, e): &(usize, Expr)| weights.get(&c).map_or(0.0, |w| (w * point.value(x, e)).abs());
+            let own = row.iter().find(|entry| entry.0 == column).map_or(0.0, &mut size);
+            let most = row.iter().filter(|entry| entry.0 != column).map(size).fold(own, nan_or_greater);
+            let share = own / most;
+            if own > 0.0 && share.is_finite() && best.is_none_or(|(known, _)| share > known) {
+                best = Some((share, r));
+            }
+        }
+        self.point = Some(point);
+        best
+    }
+
+    /// Eliminates a column by a row that holds it.
+    pub fn eliminate_by(&mut self, x: &mut Exprs, column: usize, row: u32) {
+        if let Some(e) = coefficient(&self.rows[row as usize], column)
+            && quality(x, e).0 >= Quality::DoubtfulParameters
+        {
+            self.watch(x, row as usize, column);
+        }
+        for touched in self.eliminate_column(x, row as usize, column) {
+            self.stamps[touched] += 1;
+        }
+    }
+
     /// What a column would be divided by if it were eliminated next; `None` if no row holds it.
     pub fn divisor(&mut self, x: &Exprs, column: usize) -> Option<Expr> {
         let Reverse((.., row)) = self.best_row(x, column)?;
@@ -160,20 +236,28 @@ impl Eliminator {
 
     /// The best row to express the column by.
     fn best_row(&mut self, x: &Exprs, column: usize) -> Option<Candidate> {
-        let (active, rows) = (&self.active, &self.rows);
-        self.column_rows[column].sort_unstable();
-        self.column_rows[column].dedup();
-        self.column_rows[column].retain(|&r| active[r as usize] && coefficient(&rows[r as usize], column).is_some());
-        let list = &self.column_rows[column];
+        let list = self.rows_of(column);
         let others = list.len().saturating_sub(1);
+        let rows = &self.rows;
+        let point = &mut self.point;
         let rated = list.iter().filter_map(|&r| {
             let row = &rows[r as usize];
             let e = coefficient(row, column)?;
             let (quality, size) = quality(x, e);
-            Some((quality, size, others * row.len(), r))
+            let small = quality >= Quality::Nonzero && point.as_mut().is_some_and(|point| is_small(x, point, row, e));
+            Some((if small { Quality::Vanishing } else { quality }, size, others * row.len(), r))
         });
         let (quality, _, fill, row) = rated.min()?;
         Some(Reverse((quality, fill, column, self.stamps[column], Some(row))))
+    }
+
+    /// The rows that hold a column.
+    fn rows_of(&mut self, column: usize) -> Vec<u32> {
+        let (active, rows) = (&self.active, &self.rows);
+        self.column_rows[column].sort_unstable();
+        self.column_rows[column].dedup();
+        self.column_rows[column].retain(|&r| active[r as usize] && coefficient(&rows[r as usize], column).is_some());
+        self.column_rows[column].clone()
     }
 
     fn watch(&mut self, x: &mut Exprs, row: usize, column: usize) {
@@ -250,6 +334,17 @@ impl Eliminator {
 
 fn coefficient(row: &[(usize, Expr)], column: usize) -> Option<Expr> {
     row.binary_search_by_key(&column, |e| e.0).ok().map(|i| row[i].1)
+}
+
+/// Whether an entry is small at a point, beside the greatest of its row.
+fn is_small(x: &Exprs, point: &mut NumericPoint, row: &[(usize, Expr)], e: Expr) -> bool {
+    let own = point.value(x, e).abs();
+    let most = row.iter().map(|&(_, e)| point.value(x, e).abs()).fold(0.0, nan_or_greater);
+    own < SMALL * most || own == 0.0 || most.is_nan()
+}
+
+fn nan_or_greater(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 /// How good a pivot is, and how long it is written.

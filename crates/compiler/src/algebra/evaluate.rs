@@ -30,6 +30,16 @@ impl<'a> Evaluator<'a> {
         Evaluator { pool, symbols, values: FxHashMap::default() }
     }
 
+    /// At such a point, with values that are known from before, of the same pool at the same point.
+    pub fn knowing(pool: &'a Exprs, symbols: &'a mut dyn FnMut(Symbol) -> f64, known: FxHashMap<Expr, f64>) -> Self {
+        Evaluator { pool, symbols, values: known }
+    }
+
+    /// All values that are known now.
+    pub fn into_known(self) -> FxHashMap<Expr, f64> {
+        self.values
+    }
+
     /// The value of an expression; NaN where it is not defined.
     pub fn value(&mut self, e: Expr) -> f64 {
         if let Some(&known) = self.values.get(&e) {

@@ -30,7 +30,9 @@ mod together;
 mod zero;
 
 pub use cost::Cost;
-pub use elimination::{BackSubstitution, Elimination, Eliminator, Pivot, SparseRow, back_substitute, eliminate};
+pub use elimination::{
+    BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,
+};
 pub use evaluate::Evaluator;
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use lowest_terms::LowestTerms;

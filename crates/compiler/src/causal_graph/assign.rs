@@ -2,11 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::by_size::solve_part_by_size;
 use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
 use super::signals::{NodeId, signal_graph};
+use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
-use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, local};
-use crate::algebra::{Exprs, Symbol};
+use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, digits, local};
+use crate::algebra::{Exprs, NumericPoint, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::ids::{Id, Map, Table};
@@ -22,9 +24,10 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     let mut ports = Ports::default();
     let mut faults = Vec::new();
     let mut undrawn = BTreeSet::new();
+    let mut point = start_point(&x, graph);
     for members in parts(graph) {
         let mut part = Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new() };
-        match part.assign_with_fewest_breaks(&mut strokes) {
+        match part.assign_well_conditioned(&mut strokes, &mut point) {
             Ok(solved) => {
                 undrawn.extend(solved.undetermined.iter().copied());
                 merge(&mut ports, solved);
@@ -57,6 +60,30 @@ const TRIED_TOGETHER: usize = 8;
 const TURNED_AT_MOST: usize = 600;
 
 impl Part<'_> {
+    /// Assigns the part; where the causality so found costs digits at the start, inputs are chosen by size instead.
+    fn assign_well_conditioned(
+        &mut self,
+        strokes: &mut Strokes,
+        point: &mut NumericPoint,
+    ) -> Result<Solved, Vec<Diagnostic>> {
+        let mark = strokes.mark();
+        let solved = self.assign_with_fewest_breaks(strokes)?;
+        let (graph, members) = (self.graph, self.members);
+        let cost = digits::cost(self.x, graph, &solved, point);
+        if cost < digits::COSTLY || members.len() > TURNED_AT_MOST || contradiction::is_forced(graph, members) {
+            return Ok(solved);
+        }
+        self.laws.clear();
+        let (_, wishes) = self.solve(&Strokes::new(graph), false);
+        let Some(by_size) = solve_part_by_size(self.x, graph, members, &wishes, point) else { return Ok(solved) };
+        if digits::cost(self.x, graph, &by_size, point) >= cost {
+            return Ok(solved);
+        }
+        strokes.undo(mark);
+        draw_truth(graph, strokes, members, &by_size);
+        Ok(by_size)
+    }
+
     /// Assigns the part; laws on causal loops are turned so that the fewest break variables are left.
     fn assign_with_fewest_breaks(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let mark = strokes.mark();
@@ -181,7 +208,7 @@ impl Part<'_> {
             let ports = local::roles(graph, members, &|p| strokes.at(p));
             return Ok(Solved { ports, definitions, watched, ..Solved::default() });
         }
-        let solved = self.solve(strokes, forced);
+        let (solved, _) = self.solve(strokes, forced);
         let faults = contradiction::demands(self.x, graph, &solved);
         if !faults.is_empty() {
             return Err(faults);
@@ -375,8 +402,9 @@ impl Part<'_> {
         self.x.linear_in(law, &[read]).is_none()
     }
 
-    /// Exact elimination, with virtual speeds where they are combinations of storages and sources.
-    fn solve(&mut self, strokes: &Strokes, forced: bool) -> Solved {
+    /// Exact elimination, with virtual speeds where they are combinations of storages and sources; and what it was asked
+    /// for.
+    fn solve(&mut self, strokes: &Strokes, forced: bool) -> (Solved, Wishes) {
         let (graph, members) = (self.graph, self.members);
         let inside = |e: ElementId| members.binary_search(&e).is_ok();
         let independent = self.wanted.independent.iter().copied().filter(|p| inside(p.element)).collect();
@@ -405,10 +433,10 @@ impl Part<'_> {
         if !speeds.is_empty() {
             wishes.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
             if !wishes.virtual_speeds.is_empty() {
-                return solve_part(self.x, graph, members, &wishes);
+                return (solve_part(self.x, graph, members, &wishes), wishes);
             }
         }
-        first
+        (first, wishes)
     }
 
     /// Sources whose value reads the rate of a storage that they (or others) fix: `Se(1 - 2*c.f)` on the compliance `c`.

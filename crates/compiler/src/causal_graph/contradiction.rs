@@ -20,6 +20,11 @@ struct Demand {
     span: Span,
 }
 
+/// Whether `stroke` or `causality` says anything about a part.
+pub fn is_forced(graph: &BondGraph, members: &[ElementId]) -> bool {
+    !demands_on(graph, members).is_empty()
+}
+
 /// Applies `stroke` and `causality` to one part; tells whether there were any. On conflict the smallest set is reported.
 pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId]) -> Result<bool, Box<Diagnostic>> {
     let demands = demands_on(graph, members);

@@ -5,12 +5,15 @@
 
 mod assign;
 pub mod break_set;
+mod by_size;
 mod contradiction;
+mod digits;
 mod drawn;
 mod local;
 mod ports;
 mod rank;
 pub mod signals;
+mod start_point;
 mod strokes;
 mod text;
 

@@ -57,14 +57,14 @@ pub struct Solved {
 
 /// Which of effort and flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Which {
+pub(super) enum Which {
     Effort,
     Flow,
 }
 
 /// What an element gives to the junction structure, seen by priority.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Offer {
+pub(super) enum Offer {
     /// A variable is imposed.
     Imposed(Which),
     /// A storage with this co-energy variable.
@@ -86,19 +86,22 @@ impl Offer {
     }
 }
 
-struct NetPort {
-    port: Option<PortRef>,
-    effort: usize,
-    flow: usize,
-    offer: Offer,
+/// A port of the junction structure, with the columns of its variables; a virtual speed is on no port of an element.
+pub(super) struct NetPort {
+    pub port: Option<PortRef>,
+    pub effort: usize,
+    pub flow: usize,
+    pub offer: Offer,
 }
 
-struct Net {
-    symbols: Vec<Symbol>,
+/// The rows of a junction structure.
+pub(super) struct Net {
+    pub symbols: Vec<Symbol>,
     column: BTreeMap<Symbol, usize>,
-    rows: Vec<SparseRow>,
-    ports: Vec<NetPort>,
-    inner: Vec<usize>,
+    pub rows: Vec<SparseRow>,
+    pub ports: Vec<NetPort>,
+    /// Columns of bonds between junctions and two-ports.
+    pub inner: Vec<usize>,
 }
 
 /// Solves the junction structure of one connected part.
@@ -111,7 +114,6 @@ pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishe
     let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
     let storages = net.storage_order(wishes);
     let laws = net.ports_where(|o| o == Offer::Law);
-    let mut solved = Solved::default();
     let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
     for &p in &imposed {
         let determined = work.eliminate(x, &[net.ports[p].conjugate()]) == 1;
@@ -130,19 +132,15 @@ pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishe
         let dependent = work.eliminate(x, &[net.ports[p].given()]) == 1;
         outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
     }
-    let done = work.finish();
-    let demands = circuits(x, done.rest.clone());
-    solved.demands = demands.into_iter().map(|(_, row)| net.combination(&row.0)).collect();
-    net.report(done, &outputs, wishes, &mut solved, x);
-    solved
+    net.solved(x, work.finish(), &outputs, wishes)
 }
 
 impl NetPort {
-    fn column(&self, effort: bool) -> usize {
+    pub fn column(&self, effort: bool) -> usize {
         if effort { self.effort } else { self.flow }
     }
     /// The column of the variable that the element gives, if it has its way.
-    fn given(&self) -> usize {
+    pub fn given(&self) -> usize {
         match self.offer {
             Offer::Imposed(which) | Offer::Storage(which) | Offer::Virtual(which) => {
                 self.column(which == Which::Effort)
@@ -150,13 +148,21 @@ impl NetPort {
             Offer::Law => self.effort,
         }
     }
-    fn conjugate(&self) -> usize {
+    pub fn conjugate(&self) -> usize {
         self.effort + self.flow - self.given()
+    }
+    /// The column of the variable that the structure gives.
+    pub fn output(&self, role: Role) -> usize {
+        match role {
+            Role::Source | Role::Redundant | Role::Independent => self.conjugate(),
+            Role::Dependent => self.given(),
+            Role::Algebraic(causality) => self.column(causality == PortCausality::Conductive),
+        }
     }
 }
 
 impl Net {
-    fn new(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Net {
+    pub fn new(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Net {
         let mut net = Net {
             symbols: Vec::new(),
             column: BTreeMap::new(),
@@ -291,12 +297,12 @@ impl Net {
         }
     }
 
-    fn ports_where(&self, test: impl Fn(Offer) -> bool) -> Vec<usize> {
+    pub fn ports_where(&self, test: impl Fn(Offer) -> bool) -> Vec<usize> {
         (0..self.ports.len()).filter(|&p| test(self.ports[p].offer)).collect()
     }
 
     /// Storages from the most wanted independent one to the least.
-    fn storage_order(&self, wishes: &Wishes) -> Vec<usize> {
+    pub fn storage_order(&self, wishes: &Wishes) -> Vec<usize> {
         let mut order = self.ports_where(|o| matches!(o, Offer::Storage(_) | Offer::Virtual(_)));
         order.sort_by_key(|&p| match self.ports[p].port {
             None => (1, 0, p),
@@ -314,6 +320,15 @@ impl Net {
         Combination(terms)
     }
 
+    /// What an elimination has found.
+    pub fn solved(&self, x: &mut Exprs, done: Elimination, outputs: &BTreeMap<usize, Role>, wishes: &Wishes) -> Solved {
+        let demands = circuits(x, done.rest.clone());
+        let demands = demands.into_iter().map(|(_, row)| self.combination(&row.0)).collect();
+        let mut solved = Solved { demands, ..Solved::default() };
+        self.report(done, outputs, wishes, &mut solved, x);
+        solved
+    }
+
     fn report(
         &self,
         done: Elimination,
@@ -324,11 +339,7 @@ impl Net {
     ) {
         for (&p, &role) in outputs {
             let port = &self.ports[p];
-            let output = match role {
-                Role::Source | Role::Redundant | Role::Independent => port.conjugate(),
-                Role::Dependent => port.given(),
-                Role::Algebraic(causality) => port.column(causality == PortCausality::Conductive),
-            };
+            let output = port.output(role);
             let input = port.effort + port.flow - output;
             match port.port {
                 Some(port) => solved.ports.push(PortState {

@@ -1,0 +1,171 @@
+//! Inputs and outputs chosen by the size of pivots at the start, where the usual order of priority costs digits, or
+//! divides by what vanishes there. Source: `method.md`, 5.1 and 5.2.
+
+use std::collections::BTreeMap;
+
+use super::Role;
+use super::digits::slope;
+use super::ports::{Net, Offer, Solved, Wishes};
+use crate::algebra::{Eliminator, Exprs, NumericPoint};
+use crate::bond_graph::{BondGraph, ElementId, PortCausality};
+
+/// A variable is taken as it comes, in the order of priority, if its pivot is at least this part of the greatest that
+/// the others of its class have in that row.
+const GOOD: f64 = 0.1;
+/// The same for variables that are asked for: by the modeller, or since their integrals occur in moduli.
+const ASKED_FOR: f64 = 1e-6;
+
+/// Solves the junction structure of one connected part as [`solve_part`](super::ports::solve_part) does, with storages
+/// and laws chosen by size at a point. `None` if no choice by size is complete.
+pub(super) fn solve_part_by_size(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    wishes: &Wishes,
+    point: &NumericPoint,
+) -> Option<Solved> {
+    let net = Net::new(x, graph, members, wishes);
+    let mut choice = Choice::new(x, graph, &net, point);
+    choice.work.eliminate(x, &net.inner);
+    let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
+    for p in net.ports_where(|o| matches!(o, Offer::Imposed(_))) {
+        let determined = choice.work.eliminate(x, &[net.ports[p].conjugate()]) == 1;
+        outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
+    }
+    let independent = choice.independent(x, wishes);
+    for (p, causality) in choice.laws(x, wishes) {
+        outputs.insert(p, Role::Algebraic(causality));
+    }
+    for p in net.storage_order(wishes) {
+        outputs.insert(p, if independent.contains(&p) { Role::Independent } else { Role::Dependent });
+    }
+    express(x, &net, outputs, wishes, point)
+}
+
+/// Expresses the outputs so chosen, in whatever order has the simplest pivots: what is divided by then vanishes only
+/// where the choice itself is singular.
+fn express(
+    x: &mut Exprs,
+    net: &Net,
+    outputs: BTreeMap<usize, Role>,
+    wishes: &Wishes,
+    point: &NumericPoint,
+) -> Option<Solved> {
+    let wanted = outputs.iter().filter(|(_, role)| **role != Role::Redundant);
+    let columns: Vec<usize> = wanted.map(|(&p, &role)| net.ports[p].output(role)).collect();
+    let both: Vec<usize> = net.inner.iter().chain(&columns).copied().collect();
+    for classes in [vec![both], vec![net.inner.clone(), columns.clone()]] {
+        let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len()).near(point.clone());
+        classes.iter().for_each(|class| _ = work.eliminate(x, class));
+        let done = work.finish();
+        if columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c)) {
+            return Some(net.solved(x, done, &outputs, wishes));
+        }
+    }
+    None
+}
+
+/// Elimination under way.
+struct Choice<'a> {
+    net: &'a Net,
+    work: Eliminator,
+    /// What effort and flow of a port have to be multiplied by to have the unit of the square root of power; of storages
+    /// and laws. Coefficients are divided by it.
+    weights: Vec<Option<(f64, f64)>>,
+}
+
+impl<'a> Choice<'a> {
+    fn new(x: &mut Exprs, graph: &BondGraph, net: &'a Net, point: &NumericPoint) -> Choice<'a> {
+        let weight = |x: &Exprs, p: usize| {
+            let port = &net.ports[p];
+            let size = port.port.and_then(|port| slope(x, graph, point, port)).map_or(1.0, |s| s.size.sqrt());
+            // Of a storage it is the co-energy variable that is multiplied by the root of `X/z`, and its rate divided.
+            match port.offer {
+                Offer::Law => Some((1.0 / size, size)),
+                Offer::Imposed(_) => None,
+                _ if port.given() == port.effort => Some((size, 1.0 / size)),
+                _ => Some((1.0 / size, size)),
+            }
+        };
+        let weights = (0..net.ports.len()).map(|p| weight(x, p)).collect();
+        let work = Eliminator::new(x, net.rows.clone(), net.symbols.len()).near(point.clone());
+        Choice { net, work, weights }
+    }
+
+    /// What a column weighs: entries of it are multiplied by that.
+    fn weight(&self, p: usize, column: usize) -> f64 {
+        let (effort, flow) = self.weights[p].unwrap_or((1.0, 1.0));
+        1.0 / if column == self.net.ports[p].effort { effort } else { flow }
+    }
+
+    /// The storages that become independent: their rates follow from the structure.
+    fn independent(&mut self, x: &mut Exprs, wishes: &Wishes) -> Vec<usize> {
+        let mut open = self.net.storage_order(wishes);
+        let asked = |p: &usize| match self.net.ports[*p].port {
+            None => true,
+            Some(port) => wishes.independent.contains(&port),
+        };
+        let weights: BTreeMap<usize, f64> = open
+            .iter()
+            .map(|&p| (self.net.ports[p].conjugate(), self.weight(p, self.net.ports[p].conjugate())))
+            .collect();
+        let mut found = Vec::new();
+        for patience in [false, true] {
+            let mut at = 0;
+            while at < open.len() {
+                let column = self.net.ports[open[at]].conjugate();
+                let least = if patience {
+                    0.0
+                } else if asked(&open[at]) {
+                    ASKED_FOR
+                } else {
+                    GOOD
+                };
+                match self.work.heaviest(x, column, &weights).filter(|(share, _)| *share >= least) {
+                    Some((_, row)) => {
+                        self.work.eliminate_by(x, column, row);
+                        found.push(open.remove(at));
+                        // What was too small before may be great enough now.
+                        at = 0;
+                    }
+                    None => at += 1,
+                }
+            }
+        }
+        found
+    }
+
+    /// The causality of each law: the one wished for unless its pivot is small.
+    fn laws(&mut self, x: &mut Exprs, wishes: &Wishes) -> Vec<(usize, PortCausality)> {
+        let mut open = self.net.ports_where(|o| o == Offer::Law);
+        let columns = open.iter().flat_map(|&p| [self.net.ports[p].effort, self.net.ports[p].flow].map(|c| (p, c)));
+        let weights: BTreeMap<usize, f64> = columns.map(|(p, c)| (c, self.weight(p, c))).collect();
+        let mut found = Vec::new();
+        for least in [GOOD, 0.0] {
+            let mut at = open.len();
+            while at > 0 {
+                at -= 1;
+                let port = &self.net.ports[open[at]];
+                let wish =
+                    port.port.and_then(|p| wishes.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
+                let other = match wish {
+                    PortCausality::Resistive => PortCausality::Conductive,
+                    _ => PortCausality::Resistive,
+                };
+                let taken = [wish, other].into_iter().find_map(|causality| {
+                    let column = port.column(causality == PortCausality::Conductive);
+                    let (share, row) = self.work.heaviest(x, column, &weights)?;
+                    (share >= least).then_some((causality, column, row))
+                });
+                if let Some((causality, column, row)) = taken {
+                    self.work.eliminate_by(x, column, row);
+                    found.push((open.remove(at), causality));
+                    at = open.len();
+                }
+            }
+        }
+        // A law that the structure leaves alone.
+        found.extend(open.into_iter().map(|p| (p, PortCausality::Resistive)));
+        found
+    }
+}

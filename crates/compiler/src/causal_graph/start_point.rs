@@ -1,0 +1,176 @@
+//! Where a run starts, as far as that can be told before there are equations: which pivots are small there decides
+//! which variables stay independent.
+
+use std::collections::BTreeSet;
+
+use crate::algebra::{Expr, Exprs, NumericPoint, Symbol};
+use crate::bond_graph::{BondGraph, Kind, Meaning, Storage, StorageLaw};
+use crate::ids::Map;
+
+/// Values of all variables of a graph at the start: of positions those that are given, and for the others what closes
+/// the constraints. Efforts and flows without a start value are taken as 1: they are not known yet, and nothing that
+/// is chosen may rest on their being 0.
+pub(super) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
+    let mut values: Map<Symbol, f64> = Map::new();
+    for parameter in graph.parameters.values() {
+        values.insert(parameter.symbol, x.given_value(parameter.value).unwrap_or(1.0));
+    }
+    let mut open = BTreeSet::new();
+    for (&symbol, variable) in &graph.variables {
+        match variable.meaning {
+            Meaning::Signal(_) | Meaning::Stored(_) => {
+                open.insert(symbol);
+                values.insert(symbol, 0.0);
+            }
+            Meaning::Time => _ = values.insert(symbol, 0.0),
+            _ => {}
+        }
+    }
+    let read = |values: &Map<Symbol, f64>, e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
+    for input in graph.inputs.values() {
+        values.insert(input.symbol, read(&values, input.default));
+    }
+    for (symbol, e) in given(graph) {
+        values.insert(symbol, read(&values, e));
+        open.remove(&symbol);
+    }
+    close(x, graph, &open, &mut values);
+    for held in graph.held.values() {
+        values.insert(held.symbol, read(&values, held.source));
+    }
+    for (symbol, displacement) in known_displacements(graph) {
+        values.insert(symbol, read(&values, displacement));
+    }
+    NumericPoint::new(values)
+}
+
+/// Start values as they stand in the model.
+fn given(graph: &BondGraph) -> Vec<(Symbol, Expr)> {
+    let signals = graph.signals.values().filter_map(|s| Some((s.symbol, s.initial?)));
+    let stored = storages(graph).flat_map(|storage| storage.initial.iter().map(|i| (i.symbol, i.value)));
+    signals.chain(stored).collect()
+}
+
+fn storages(graph: &BondGraph) -> impl Iterator<Item = &Storage> {
+    graph.elements.values().filter_map(|element| match &element.kind {
+        Kind::Inertance(storage) | Kind::Compliance(storage) => Some(storage),
+        _ => None,
+    })
+}
+
+fn known_displacements(graph: &BondGraph) -> Vec<(Symbol, Expr)> {
+    let laws = storages(graph).flat_map(|s| s.laws.iter().zip(&s.stored));
+    laws.filter_map(|(law, &stored)| match law {
+        StorageLaw::Known { displacement, .. } => Some((stored, *displacement)),
+        _ => None,
+    })
+    .collect()
+}
+
+/// What the search for open positions begins with, one after the other: where a constraint is flat, another one.
+const BEGINNINGS: [f64; 3] = [0.0, 1e-3, 1.0];
+const ITERATIONS: usize = 60;
+
+/// Finds the open positions that constraints on displacements read.
+fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map<Symbol, f64>) {
+    let constraints: Vec<Expr> = graph.constraints.iter().filter(|c| c.holonomic).map(|c| c.expr).collect();
+    let read: BTreeSet<Symbol> =
+        constraints.iter().flat_map(|&e| x.symbols_of(e)).filter(|s| open.contains(s)).collect();
+    if read.is_empty() {
+        return;
+    }
+    let unknowns: Vec<Symbol> = read.into_iter().collect();
+    let mut x = x.clone();
+    let slopes: Vec<Vec<Expr>> =
+        constraints.iter().map(|&e| unknowns.iter().map(|&s| x.derivative(e, s)).collect()).collect();
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for beginning in BEGINNINGS {
+        unknowns.iter().for_each(|&s| _ = values.insert(s, beginning));
+        let missed = approach(&x, &constraints, &slopes, &unknowns, values);
+        if best.as_ref().is_none_or(|(known, _)| missed < *known) {
+            best = Some((missed, unknowns.iter().map(|s| values[s]).collect()));
+        }
+        if missed < 1e-9 {
+            break;
+        }
+    }
+    if let Some((_, found)) = best {
+        unknowns.iter().zip(found).for_each(|(&s, v)| _ = values.insert(s, v));
+    }
+}
+
+/// Damped steps of least norm towards the constraints; what is missed in the end.
+fn approach(
+    x: &Exprs,
+    constraints: &[Expr],
+    slopes: &[Vec<Expr>],
+    unknowns: &[Symbol],
+    values: &mut Map<Symbol, f64>,
+) -> f64 {
+    let at = |values: &Map<Symbol, f64>, e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
+    let missed = |values: &Map<Symbol, f64>| -> Vec<f64> { constraints.iter().map(|&e| at(values, e)).collect() };
+    let mut residual = missed(values);
+    for _ in 0..ITERATIONS {
+        let jacobian: Vec<Vec<f64>> = slopes.iter().map(|row| row.iter().map(|&e| at(values, e)).collect()).collect();
+        let Some(step) = least_step(&jacobian, &residual) else { break };
+        let mut fraction = 1.0;
+        let (next, left) = loop {
+            let mut next = values.clone();
+            unknowns.iter().zip(&step).for_each(|(&s, d)| _ = next.insert(s, values[&s] - fraction * d));
+            let left = missed(&next);
+            if size(&left) < size(&residual) {
+                break (next, left);
+            }
+            fraction *= 0.5;
+            if fraction < 1e-6 {
+                return size(&residual);
+            }
+        };
+        *values = next;
+        residual = left;
+    }
+    size(&residual)
+}
+
+fn size(residual: &[f64]) -> f64 {
+    let sum: f64 = residual.iter().map(|r| r * r).sum();
+    if sum.is_nan() { f64::INFINITY } else { sum.sqrt() }
+}
+
+/// The shortest step that the equations `jacobian · step = residual` allow: `Jᵀ (J Jᵀ)⁻¹ residual`, a trace of the unit
+/// matrix added where equations repeat each other.
+fn least_step(jacobian: &[Vec<f64>], residual: &[f64]) -> Option<Vec<f64>> {
+    let n = jacobian.len();
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut gram: Vec<Vec<f64>> =
+        (0..n).map(|i| (0..n).map(|j| product(&jacobian[i], &jacobian[j])).collect()).collect();
+    let most = (0..n).fold(0.0f64, |most, i| most.max(gram[i][i]));
+    (0..n).for_each(|i| gram[i][i] += 1e-13 * most);
+    let weights = solve(gram, residual.to_vec())?;
+    let columns = jacobian.first().map_or(0, Vec::len);
+    Some((0..columns).map(|j| (0..n).map(|i| jacobian[i][j] * weights[i]).sum()).collect())
+}
+
+/// Gauss elimination with the greatest pivot of each column; `None` where there is none.
+fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
+    let n = b.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
+        if a[pivot][k] == 0.0 || !a[pivot][k].is_finite() {
+            return None;
+        }
+        a.swap(k, pivot);
+        b.swap(k, pivot);
+        for i in k + 1..n {
+            let factor = a[i][k] / a[k][k];
+            let (above, below) = a.split_at_mut(i);
+            below[0].iter_mut().zip(&above[k]).skip(k).for_each(|(a, p)| *a -= factor * p);
+            b[i] -= factor * b[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let rest: f64 = (k + 1..n).map(|j| a[k][j] * b[j]).sum();
+        b[k] = (b[k] - rest) / a[k][k];
+    }
+    Some(b)
+}
