@@ -208,7 +208,8 @@ fn a_divisor_that_vanishes_stops_the_run() {
     let mut model = s.model();
     assert!(rates(&mut model, 0.0, &[1.0])[0] < 0.0);
     let failure = model.rates(2.0, &[0.0], &mut [0.0]).unwrap_err();
-    assert_eq!(failure, Failure::Singular { time: 2.0, what: "crank".into() });
+    let divisor = "cos(x) - 1".into();
+    assert_eq!(failure, Failure::Vanished { time: 2.0, what: "crank".into(), divisor });
 }
 
 #[test]

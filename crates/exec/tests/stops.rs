@@ -59,12 +59,13 @@ fn a_ring_that_degenerates_on_the_way_stops_the_run() {
     let mut model = model(&ring("1 + s"));
     let (samples, end) = run(&mut model, &["ring.in.f"], &steps(0.25, 2.0));
     let stopped = end.unwrap_err();
-    assert_eq!(stopped.failure, Failure::Singular { time: 1.0, what: "ring".into() });
+    let vanished = Failure::Vanished { time: 1.0, what: "ring".into(), divisor: "s".into() };
+    assert_eq!(stopped.failure, vanished);
     assert_eq!(samples.0.len(), 4);
     assert!(samples.0.iter().all(|(_, v)| v[0].is_finite()));
     // Whoever asks for the value there gets the reason, no number.
     let failure = model.observe(1.0, &[0.0; 3][..model.states()], &mut [0.0]).unwrap_err();
-    assert_eq!(failure, Failure::Singular { time: 1.0, what: "ring".into() });
+    assert_eq!(failure, vanished);
 }
 
 #[test]

@@ -46,7 +46,8 @@ pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
 pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
 pub use linearize::{
-    Linearize, LinearizeReport, Mode, Point, ReachReport, Response, StateAt, SymbolicReport, Terminal, TransferFunction,
+    Linearize, LinearizeReport, Mode, Point, ReachReport, Response, Stability, StateAt, SymbolicReport, Terminal,
+    TransferFunction,
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};

@@ -19,6 +19,15 @@ pub enum Failure {
         /// Which equations, by their elements or unknowns.
         what: String,
     },
+    /// The equations divide by something that vanishes.
+    Vanished {
+        /// When, in s.
+        time: f64,
+        /// Which equations, by their elements or unknowns.
+        what: String,
+        /// What they divide by.
+        divisor: String,
+    },
     /// An iteration did not converge.
     NoConvergence {
         /// When, in s.
@@ -119,6 +128,7 @@ impl Failure {
         match self {
             Failure::NotFinite { time, .. }
             | Failure::Singular { time, .. }
+            | Failure::Vanished { time, .. }
             | Failure::NoConvergence { time, .. }
             | Failure::OutOfDomain { time, .. }
             | Failure::StepTooSmall { time, .. }
@@ -152,6 +162,12 @@ impl fmt::Display for Failure {
             Failure::Singular { time, what } => write!(
                 f,
                 "{} the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there",
+                When(*time)
+            ),
+            Failure::Vanished { time, what, divisor } => write!(
+                f,
+                "{} the equations of {what} have no unique solution: they divide by {divisor}, which vanishes there; the \
+                 machine is in a singular position, unless another variable may stay independent: name it with `prefer`",
                 When(*time)
             ),
             Failure::NoConvergence { time, what, iterations, residual } => write!(

@@ -1,6 +1,6 @@
 //! `linearize`.
 
-use halfarrow::{Linearize, LinearizeReport, Point, ReachReport, SymbolicReport};
+use halfarrow::{Linearize, LinearizeReport, Point, ReachReport, Stability, SymbolicReport};
 use serde_json::json;
 
 use super::picture::{check_names, write_picture};
@@ -72,10 +72,10 @@ fn text(report: &LinearizeReport) -> String {
     });
     text += "\nPoles\n";
     text += &screen::table(["pole in 1/s", "natural frequency in rad/s", "damping", "time constant in s"], modes);
-    text += if report.stable {
-        "All poles are left of the imaginary axis.\n"
-    } else {
-        "Not all poles are left of the imaginary axis.\n"
+    text += match report.stability {
+        Stability::Asymptotic => "All poles are left of the imaginary axis.\n",
+        Stability::Marginal => "No pole is right of the imaginary axis, but not all are left of it.\n",
+        Stability::Unstable => "Not all poles are left of the imaginary axis: motions grow.\n",
     };
     text += &match &report.zeros {
         None => "Zeros: they do not come out\n".to_string(),

@@ -38,6 +38,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
+    ports.unmet = wanted.unmet(&x, &ports);
     ports.kept = wanted.why;
     ports.ports.sort_by_key(|p| p.port);
     let mut strokes = strokes.table();
@@ -264,14 +265,18 @@ struct Wanted {
     independent: Vec<PortRef>,
     virtual_speeds: Vec<Virtual>,
     why: BTreeMap<Symbol, Kept>,
+    /// Of each `prefer` the variables that would meet it.
+    asked: Vec<Vec<Symbol>>,
 }
 
 impl Wanted {
     /// `prefer`, then common variables of junctions whose integrals occur in moduli. Source: `method.md`, 5.2.
     fn of(x: &mut Exprs, graph: &BondGraph) -> Wanted {
-        let mut wanted = Wanted { independent: Vec::new(), virtual_speeds: Vec::new(), why: BTreeMap::new() };
+        let mut wanted =
+            Wanted { independent: Vec::new(), virtual_speeds: Vec::new(), why: BTreeMap::new(), asked: Vec::new() };
         for preference in &graph.preferences {
-            wanted.add(x, graph, preference.symbol, Kept::Preferred);
+            let asked = wanted.add(x, graph, preference.symbol, Kept::Preferred);
+            wanted.asked.push(asked);
         }
         for symbol in integrated_in_moduli(x, graph) {
             wanted.add(x, graph, symbol, Kept::IntegralInModulus);
@@ -279,19 +284,18 @@ impl Wanted {
         wanted
     }
 
-    fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol, why: Kept) {
+    /// Notes that a variable shall stay independent; gives the symbols of which one then does.
+    fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol, why: Kept) -> Vec<Symbol> {
         let (bond, flow) = match graph.variables.get(&symbol).map(|v| v.meaning) {
             Some(Meaning::Flow(bond)) => (bond, true),
             Some(Meaning::Effort(bond)) => (bond, false),
-            _ => return,
+            _ => return Vec::new(),
         };
         let ends = [graph.bonds[bond].from, graph.bonds[bond].to];
         let is_junction = |k: &Kind| matches!((k, flow), (Kind::One, true) | (Kind::Zero, false));
         let Some(junction) = ends.iter().map(|p| p.element).find(|&e| is_junction(&graph.elements[e].kind)) else {
-            for port in ends.into_iter().filter(|&p| gives(graph, p, flow)) {
-                self.keep(graph, port, why);
-            }
-            return;
+            let own = ends.into_iter().filter(|&p| gives(graph, p, flow));
+            return own.filter_map(|port| self.keep(graph, port, why)).collect();
         };
         let own = ends.iter().copied().find(|&p| gives(graph, p, flow));
         let opposite = |bond: BondId| {
@@ -300,8 +304,10 @@ impl Wanted {
         };
         let neighbours = graph.elements[junction].ports.iter().map(|p| opposite(p.bond));
         match own.or_else(|| neighbours.into_iter().find(|&p| gives(graph, p, flow))) {
-            Some(port) => self.keep(graph, port, why),
-            None if self.virtual_speeds.iter().any(|v| v.junction == junction) => {}
+            Some(port) => self.keep(graph, port, why).into_iter().collect(),
+            None if self.virtual_speeds.iter().any(|v| v.junction == junction) => {
+                self.virtual_speeds.iter().filter(|v| v.junction == junction).map(|v| v.speed).collect()
+            }
             None => {
                 let name = &graph.elements[junction].name;
                 let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
@@ -314,15 +320,27 @@ impl Wanted {
                 let reaction = fresh(&format!("{conjugate}*"));
                 self.why.insert(speed, why);
                 self.virtual_speeds.push(Virtual { junction, speed, reaction });
+                vec![speed]
             }
         }
     }
 
-    fn keep(&mut self, graph: &BondGraph, port: PortRef, why: Kept) {
+    fn keep(&mut self, graph: &BondGraph, port: PortRef, why: Kept) -> Option<Symbol> {
+        let z = graph.storage_symbols(port).map(|(z, _)| z);
         if !self.independent.contains(&port) {
             self.independent.push(port);
-            self.why.extend(graph.storage_symbols(port).map(|(z, _)| (z, why)));
+            self.why.extend(z.map(|z| (z, why)));
         }
+        z
+    }
+
+    /// The `prefer`s that are not met, by their numbers.
+    fn unmet(&self, x: &Exprs, ports: &Ports) -> Vec<usize> {
+        let own = |s: Symbol| x.name(s).trim_end_matches('*');
+        let independent = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
+        let kept: BTreeSet<&str> = independent.chain(ports.virtual_speeds.iter().map(|v| v.speed)).map(own).collect();
+        let missed = |asked: &[Symbol]| !asked.is_empty() && !asked.iter().any(|&s| kept.contains(own(s)));
+        (0..self.asked.len()).filter(|&i| missed(&self.asked[i])).collect()
     }
 
     fn concerns(&self, members: &[ElementId]) -> bool {

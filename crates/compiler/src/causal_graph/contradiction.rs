@@ -173,6 +173,7 @@ pub fn warnings(causal: &CausalGraph) -> Vec<Diagnostic> {
     fixed_storages(graph, causal, &mut all);
     circulating(graph, causal, &mut all);
     forced_otherwise(graph, causal, &mut all);
+    preferred_in_vain(graph, causal, &mut all);
     if let Some(&first) = causal.ports.degenerate.first() {
         let text = ascii(&graph.exprs, first, &PlainNames(&graph.exprs));
         let span =
@@ -191,6 +192,26 @@ pub fn warnings(causal: &CausalGraph) -> Vec<Diagnostic> {
         );
     }
     all
+}
+
+/// `prefer` for what does not stay independent.
+fn preferred_in_vain(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
+    for preference in causal.ports.unmet.iter().map(|&i| &graph.preferences[i]) {
+        let name = causal.graph.exprs.name(preference.symbol).trim_end_matches('*');
+        all.push(
+            Diagnostic::warning(
+                codes::C009,
+                format!("{name} does not stay independent"),
+                preference.span,
+                "preferred here",
+            )
+            .note(
+                "it follows from sources or from variables that are preferred before it, or the others divided by what \
+                 vanishes at the start if it were kept",
+            )
+            .hint("leave it out, or put it first; where a modulus vanishes, start elsewhere"),
+        );
+    }
 }
 
 fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {

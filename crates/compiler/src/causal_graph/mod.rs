@@ -73,6 +73,8 @@ pub struct Ports {
     pub virtual_speeds: Vec<Virtual>,
     /// Why variables were asked to be independent ahead of the order of the model.
     pub kept: BTreeMap<Symbol, Kept>,
+    /// The entries of [`BondGraph::preferences`] that could not be met, by their numbers.
+    pub unmet: Vec<usize>,
     /// Relations among imposed variables alone that the structure demands; they hold, else there were an error.
     pub demands: Vec<Combination>,
 }

@@ -43,6 +43,7 @@ codes! {
     C006 "efforts or flows that nothing determines (warning)";
     C007 "the structure degenerates at the given parameters (warning)";
     C008 "a forced causality that the equations cannot follow (warning)";
+    C009 "a preferred variable that does not stay independent (warning)";
     E001 "an equation needs the time derivative of an input";
     E002 "a loop of variables has no unique solution";
     U001 "an unknown unit";

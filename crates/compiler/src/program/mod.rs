@@ -205,6 +205,18 @@ pub struct Watch {
     pub scale: Value,
     /// The elements concerned, for messages.
     pub elements: String,
+    /// The divisor as text, or what it reads if that would be long.
+    pub divisor: String,
+}
+
+/// A list of names for a message: its first ones, and how many more there are.
+pub fn first_of(names: &str) -> String {
+    const MOST: usize = 4;
+    let all: Vec<&str> = names.split(", ").collect();
+    match all.len() > MOST + 1 {
+        true => format!("{} and {} more", all[..MOST].join(", "), all.len() - MOST),
+        false => names.to_string(),
+    }
 }
 
 /// What must hold for a law to have a value.

@@ -6,10 +6,10 @@ use super::sharing::share;
 use super::values::{Op, Reads};
 use super::{
     Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Observed, Parameter,
-    Program, StartCondition, State, Value, Watch,
+    Program, StartCondition, State, Value, Watch, first_of,
 };
-use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, Symbol};
-use crate::bond_graph::{BondGraph, ElementId, ParameterId};
+use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, PlainNames, Symbol, ascii};
+use crate::bond_graph::{BondGraph, ElementId, Meaning, ParameterId};
 use crate::equations::{Equations, Momentum, Step};
 use crate::ids::{Id, Table};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -72,6 +72,9 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
         read = roots.len();
     }
 }
+
+/// A divisor whose text is longer is described in messages by what it reads.
+const SHORT: usize = 60;
 
 struct Schedule<'a> {
     graph: &'a BondGraph,
@@ -222,7 +225,20 @@ impl Schedule<'_> {
             Node::Call(Function::Sin | Function::Cos, _) => self.lower.constant(1.0),
             _ => self.lower.constant(0.0),
         };
-        self.watches.push(Watch { pivot, scale, elements: elements.to_string() });
+        let divisor = self.described(factor);
+        self.watches.push(Watch { pivot, scale, elements: elements.to_string(), divisor });
+    }
+
+    /// An expression as text if it is short, else what varies in it.
+    fn described(&self, e: Expr) -> String {
+        let exprs = &self.graph.exprs;
+        let text = ascii(exprs, e, &PlainNames(exprs));
+        if text.len() <= SHORT {
+            return text;
+        }
+        let fixed = |s: &Symbol| matches!(self.graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
+        let varies: Vec<Symbol> = exprs.symbols_of(e).into_iter().filter(|s| !fixed(s)).collect();
+        format!("an expression in {}", first_of(&self.names_of(&varies).join(", ")))
     }
 
     fn finish(mut self, equations: &Equations, parameters: Vec<Parameter>) -> Program {

@@ -2,14 +2,15 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Domain, DomainKind};
+use halfarrow_compiler::program::{Domain, DomainKind, Watch, first_of};
 
 use super::plan::Plan;
 
 /// Failures, each with the texts of all places where it may happen.
 fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
     let p = plan.program;
-    let block = |text: &dyn Fn(&str) -> String| p.blocks.values().map(|b| text(b.elements())).collect::<Vec<_>>();
+    let block =
+        |text: &dyn Fn(&str) -> String| p.blocks.values().map(|b| text(&first_of(b.elements()))).collect::<Vec<_>>();
     let singular = |what: &str| {
         format!(
             "the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there"
@@ -25,7 +26,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
     };
     vec![
-        ("VANISHED", p.watches.iter().map(|w| singular(&w.elements)).collect()),
+        ("VANISHED", p.watches.iter().map(vanished).collect()),
         ("SINGULAR", block(&singular)),
         (
             "NO_CONVERGENCE",
@@ -68,6 +69,14 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ),
         ("NOT_STARTED", vec!["the model has not been started".into()]),
     ]
+}
+
+fn vanished(watch: &Watch) -> String {
+    format!(
+        "the equations of {} have no unique solution: they divide by {}, which vanishes there; the machine is in a singular position, unless another variable may stay independent: name it with `prefer`",
+        first_of(&watch.elements),
+        watch.divisor
+    )
 }
 
 fn domain(d: &Domain) -> String {

@@ -27,7 +27,9 @@ pub use wide::WideModel;
 use crate::bytecode::{Abreast, Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value};
+use halfarrow_compiler::program::{
+    BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value, first_of,
+};
 use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
@@ -376,11 +378,12 @@ impl Model {
     /// What stopped a routine, for the modeller.
     fn failure(&self, time: f64, trouble: Trouble) -> Failure {
         let block = |block: u32| &self.program.blocks[BlockId(block)];
-        let what = |b: u32| block(b).elements().to_string();
+        let what = |b: u32| first_of(block(b).elements());
         let unknown = |b: u32, unknown: usize| block(b).unknown(unknown).to_string();
         match trouble {
             Trouble::Vanished { watch } => {
-                Failure::Singular { time, what: self.program.watches[watch as usize].elements.clone() }
+                let watch = &self.program.watches[watch as usize];
+                Failure::Vanished { time, what: first_of(&watch.elements), divisor: watch.divisor.clone() }
             }
             Trouble::Singular { block } => Failure::Singular { time, what: what(block) },
             Trouble::NoConvergence { block, iterations, residual } => {

@@ -114,7 +114,9 @@ fn build(text: &str, constant: bool) -> Result<Outcome, Fault> {
     match Model::new(schedule(&equations)) {
         Ok(model) => Ok(Outcome::Built(Box::new(Built { causal, model, states, conserved, dof }))),
         // A modulus that reads what a source fixes: no value fits, or the structure degenerates there.
-        Err(Failure::OutOfDomain { .. } | Failure::Singular { .. }) if !constant => Ok(Outcome::Without),
+        Err(Failure::OutOfDomain { .. } | Failure::Singular { .. } | Failure::Vanished { .. }) if !constant => {
+            Ok(Outcome::Without)
+        }
         Err(failure) => fault("model", failure.to_string()),
     }
 }

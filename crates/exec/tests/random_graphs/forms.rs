@@ -45,7 +45,10 @@ pub fn check_forms(
 
 /// Whether a form has no value at a point: where a modulus vanishes, more equations degenerate than in the minimal form.
 fn is_singular(other: &mut ImplicitModel, t: f64, x: &[f64]) -> bool {
-    matches!(other.start_at(t, x), Err(Failure::Singular { .. } | Failure::OutOfDomain { .. }))
+    matches!(
+        other.start_at(t, x),
+        Err(Failure::Singular { .. } | Failure::Vanished { .. } | Failure::OutOfDomain { .. })
+    )
 }
 
 fn compare(

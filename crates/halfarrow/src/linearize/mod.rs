@@ -2,6 +2,7 @@
 
 mod picture;
 mod response;
+mod stability;
 mod structure;
 mod symbolic;
 mod zeros;
@@ -21,6 +22,7 @@ use crate::model::Model;
 use crate::run::{Run, Start, connect};
 
 pub use response::Response;
+pub use stability::Stability;
 pub use structure::ReachReport;
 pub use symbolic::{SymbolicReport, TransferFunction};
 
@@ -93,6 +95,8 @@ pub struct LinearizeReport {
     pub zeros: Option<Vec<Complex>>,
     /// Whether all poles are left of the imaginary axis.
     pub stable: bool,
+    /// On which side of the imaginary axis the poles are, beyond what rounding leaves open.
+    pub stability: Stability,
     /// What the inputs reach.
     pub controllability: ReachReport,
     /// What the outputs see.
@@ -192,6 +196,8 @@ impl Model {
         let Some(poles) = eigenvalues(&linear.a) else {
             return Err(Problem::NoMatrices { reason: "the eigenvalues do not come out".into() }.into());
         };
+        let (stability, uncertain) = stability::stability(&linear.a, &poles);
+        notes.extend(uncertain);
         notes.extend(self.what_holds(&system, &linear, at));
         let symbolic =
             if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
@@ -209,7 +215,8 @@ impl Model {
                 .collect(),
             modes: modes(&poles),
             zeros: zeros::zeros(&linear),
-            stable: poles.iter().all(|p| p[0] < 0.0),
+            stable: stability == Stability::Asymptotic,
+            stability,
             poles,
             controllability,
             observability,

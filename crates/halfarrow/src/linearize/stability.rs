@@ -1,0 +1,87 @@
+//! On which side of the imaginary axis poles are, and how many of their digits are known.
+
+use serde::Serialize;
+
+use crate::linear_algebra::{Complex, uncertainties};
+
+/// Where the poles are, beyond what rounding leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stability {
+    /// All are left of the imaginary axis: motions die out.
+    Asymptotic,
+    /// None is right of it, and some are on it: nothing drives these motions and nothing damps them.
+    Marginal,
+    /// Some are right of it: motions grow.
+    Unstable,
+}
+
+/// Roundings that every entry of a matrix has seen.
+const ROUNDINGS: f64 = 64.0;
+/// Poles known to fewer digits are told.
+const DIGITS: f64 = 6.0;
+/// Larger matrices are not tried out: a pole counts as it comes.
+const AT_MOST: usize = 200;
+
+/// Where the poles of a matrix are, and a note on those of which few digits are known.
+pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option<String>) {
+    let known = if poles.len() <= AT_MOST { uncertainties(a, poles, ROUNDINGS) } else { None };
+    let off = known.unwrap_or_else(|| vec![0.0; poles.len()]);
+    let size = |p: &Complex| libm::hypot(p[0], p[1]);
+    // A real part below rounding of its own pole is none, however near the neighbours are.
+    let reach = |p: &Complex, off: f64| off.max(4.0 * f64::EPSILON * size(p));
+    let beyond = |(p, off): (&Complex, &f64)| p[0] > reach(p, *off);
+    let within = |(p, off): (&Complex, &f64)| p[0] < -reach(p, *off);
+    let both = || poles.iter().zip(&off);
+    let stability = match (both().any(beyond), both().all(within)) {
+        (true, _) => Stability::Unstable,
+        (false, true) => Stability::Asymptotic,
+        (false, false) => Stability::Marginal,
+    };
+    (stability, worst(poles, &off))
+}
+
+/// The pole of which the fewest digits are known, if these are few.
+fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
+    let digits = |p: &Complex, off: f64| -libm::log10(off / libm::hypot(p[0], p[1]));
+    let moving = poles.iter().zip(off).filter(|(p, off)| p[0] != 0.0 || p[1] != 0.0 || **off > 0.0);
+    let (pole, known) = moving
+        .map(|(p, off)| (p, digits(p, *off)))
+        .filter(|(_, known)| *known < DIGITS)
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let known = known.max(0.0).floor();
+    Some(format!(
+        "of the pole {:.3e} {} {:.3e}i about {known} digits are known: the entries of the matrix are of such different \
+         magnitudes, or the poles so near to each other, that rounding moves it",
+        pole[0],
+        if pole[1] < 0.0 { '-' } else { '+' },
+        pole[1].abs()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_algebra::eigenvalues;
+
+    fn told(a: &[Vec<f64>]) -> (Stability, Option<String>) {
+        stability(a, &eigenvalues(a).unwrap())
+    }
+
+    #[test]
+    fn sides_of_the_axis() {
+        assert_eq!(told(&[vec![0.0, 1.0], vec![-4.0, 0.0]]), (Stability::Marginal, None));
+        assert_eq!(told(&[vec![-1e-9, 1.0], vec![-4.0, 0.0]]), (Stability::Asymptotic, None));
+        assert_eq!(told(&[vec![1e-9, 1.0], vec![-4.0, 0.0]]), (Stability::Unstable, None));
+        assert_eq!(told(&[vec![-6.7e-17]]), (Stability::Asymptotic, None));
+        assert_eq!(told(&[]), (Stability::Asymptotic, None));
+    }
+
+    #[test]
+    fn poles_that_rounding_moves_are_told() {
+        // A row of integrators with feedback: three poles at the third root of 1e-30, of a matrix with entries of 1.
+        let (side, note) = told(&[vec![-1.0, 1.0, 0.0], vec![-1.0, 1.0, 1.0], vec![1e-30, 0.0, 0.0]]);
+        assert_eq!(side, Stability::Marginal);
+        assert!(note.is_some_and(|note| note.contains("0 digits")), "{side:?}");
+    }
+}
