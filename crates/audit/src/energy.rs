@@ -1,10 +1,11 @@
 //! What is stored changes by what flows in.
 
-use crate::Finding;
-use crate::power::relative;
+use crate::laws::sensitivities;
 use crate::quadrature::{gauss, integrate};
 use crate::regions::Classes;
+use crate::scales::{FLOOR, Quantity, Scales, Settled, Terms};
 use crate::values::Values;
+use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, Storage, StorageLaw};
 use std::collections::BTreeSet;
@@ -44,14 +45,27 @@ fn outside(graph: &BondGraph, id: ElementId, element: &Element, storage: &Storag
 }
 
 /// Stored quantities and integrated signals against the integrals of their rates.
-pub(crate) fn rates(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Finding> {
-    let mut greatest = None;
+pub(crate) fn rates(
+    graph: &BondGraph,
+    values: &Values,
+    (scales, settled): (&Scales, &Settled),
+    worst: &mut Worst,
+    unchecked: &mut Vec<String>,
+) {
     for (id, element) in graph.elements.iter() {
         let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { continue };
         for (port, &stored) in storage.stored.iter().enumerate() {
-            let rate = graph.storage_symbols(PortRef { element: id, port: port as u32 }).map(|(_, rate)| rate);
+            let port = PortRef { element: id, port: port as u32 };
+            let rate = graph.storage_symbols(port).map(|(_, rate)| rate);
             match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
-                (Some(x), Some(rate)) => compare(values.times, x, rate, &element.name, &mut greatest),
+                (Some(x), Some(rate)) => {
+                    let terms = vec![
+                        (Quantity::Of(stored), 1.0),
+                        (scales.rate(graph, port), FLOOR * scales.span()),
+                    ];
+                    let held = Held { name: &element.name, x, rate, terms };
+                    held.compare(values.times, settled, worst, || Vec::new());
+                }
                 _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
             }
         }
@@ -61,46 +75,63 @@ pub(crate) fn rates(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Stri
             unchecked.push(format!("the rate of {}: its value is not known", signal.name));
             continue;
         };
-        let mut rate = vec![f64::NAN; x.len()];
-        match values.evaluate(&[signal.rate], |k, v| rate[k] = v[0]) {
-            Ok(()) if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) => {
-                unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
+        let reader = match values.reader(&[signal.rate]) {
+            Ok(reader) => reader,
+            Err(missing) => {
+                unchecked.push(format!("the rate of {}: {missing} is not known", signal.name));
+                continue;
             }
-            Ok(()) => compare(values.times, x, &rate, &signal.name, &mut greatest),
-            Err(missing) => unchecked.push(format!("the rate of {}: {missing} is not known", signal.name)),
+        };
+        let rate: Vec<f64> = (0..x.len()).map(|k| reader.values(k, None).map_or(f64::NAN, |v| v[0])).collect();
+        if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
+            unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
+            continue;
         }
-    }
-    greatest
-}
-
-fn compare(times: &[f64], x: &[f64], rate: &[f64], name: &str, greatest: &mut Option<Finding>) {
-    let integral = integrate(times, rate);
-    let scale = x.iter().chain(&integral.values).fold(0.0f64, |most, v| most.max(v.abs()));
-    for (k, &time) in times.iter().enumerate() {
-        let value = relative(x[k] - x[0] - integral.values[k], scale);
-        let resolution = relative(integral.uncertainty[k], scale);
-        judge(greatest, value, resolution, time, || format!("{name}: what it holds against its rate"));
+        let held = Held { name: &signal.name, x, rate: &rate, terms: vec![(Quantity::Of(signal.symbol), 1.0)] };
+        held.compare(values.times, settled, worst, || {
+            // What its rate reads moves it: the terms that its rate has in the middle of the run.
+            let weight = FLOOR * scales.span();
+            let terms = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
+            terms.into_iter().map(|(quantity, w)| (quantity, weight * w)).collect()
+        });
     }
 }
 
-/// Relative to the greatest magnitude of its kind.
-const ROUNDING: f64 = 1e-14;
+/// Something that changes by its rate.
+struct Held<'a> {
+    name: &'a str,
+    x: &'a [f64],
+    rate: &'a [f64],
+    terms: Terms,
+}
 
-/// Keeps the finding that stands out most above what the samples resolve.
-fn judge(greatest: &mut Option<Finding>, value: f64, resolution: f64, time: f64, place: impl Fn() -> String) {
-    // What stands out by less than rounding does not.
-    let excess = |value: f64, resolution: f64| Some(value - resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
-    let above = |g: &Finding| {
-        let (new, old) = (excess(value, resolution), excess(g.value, g.resolution));
-        value.is_nan() || new > old || (new == old && value > g.value)
-    };
-    if greatest.as_ref().is_none_or(above) {
-        *greatest = Some(Finding { value, time, place: place(), resolution });
+impl Held<'_> {
+    /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
+    fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Terms) {
+        let integral = integrate(times, self.rate);
+        let miss = |k: usize| self.x[k] - self.x[0] - integral.values[k];
+        let excess = |k: usize| miss(k).abs() - integral.uncertainty[k];
+        let beyond = |a: usize, b: usize| excess(b).is_nan() || excess(b) > excess(a);
+        let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
+        let moved = integral.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let mut terms = self.terms.clone();
+        terms.push((Quantity::Number, moved));
+        terms.extend(more());
+        let place = format!("{}: what it holds against its rate", self.name);
+        worst.keep(Raw { miss: miss(k), resolution: integral.uncertainty[k], time: times[k], place, terms }, settled);
     }
+}
+
+/// The energy of the whole model at every sample: what is missing, what the samples leave open, and how much is held or moved
+/// at most.
+pub(crate) struct Balance {
+    missing: Vec<f64>,
+    uncertainty: Vec<f64>,
+    pub moved: f64,
 }
 
 /// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
-pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Finding> {
+pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Balance> {
     let parts = Classes::new(graph, |kind| kind.is_inner());
     let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
     let n = values.times.len();
@@ -126,13 +157,20 @@ pub(crate) fn energy(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Str
             uncertainty[k] += if by_law.is_none() { through.uncertainty[k] } else { 0.0 };
         }
     }
-    let scale = moved.iter().fold(held, |most, v| most.max(*v));
-    let mut greatest = None;
-    for k in 0..if any { n } else { 0 } {
-        let (value, resolution) = (relative(balance[k], scale), relative(uncertainty[k], scale));
-        judge(&mut greatest, value, resolution, values.times[k], || "the whole model".to_string());
+    let moved = moved.into_iter().fold(held, f64::max);
+    any.then_some(Balance { missing: balance, uncertainty, moved })
+}
+
+impl Balance {
+    /// Takes note of where it differs most from zero.
+    pub(crate) fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst) {
+        for (k, &time) in times.iter().enumerate() {
+            let place = "the whole model".to_string();
+            let terms = vec![(Quantity::Energy, 1.0)];
+            let raw = Raw { miss: self.missing[k], resolution: self.uncertainty[k], time, place, terms };
+            worst.keep(raw, settled);
+        }
     }
-    greatest
 }
 
 /// How much energy a storage holds at most, within a factor: `|z X|`.

@@ -1,65 +1,61 @@
 //! Every law of every junction and element, at every sample.
 
-use crate::power::relative;
-use crate::regions::Regions;
-use crate::values::Values;
-use crate::{Finding, keep};
-use halfarrow_compiler::algebra::{Expr, Node};
-use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortRef, ResistorLaw, StorageLaw};
+use crate::scales::{FLOOR, Quantity, Scales, Settled, Terms};
+use crate::values::{Reader, Values};
+use crate::worst::{Raw, Worst};
+use halfarrow_compiler::algebra::{Expr, Node, Symbol};
+use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw};
 
-/// A law in values: what stands against what, and how great its terms are.
+/// A law in values: what stands against what, and the quantity that it is about.
 enum Law<'a> {
-    /// Two recorded columns are equal up to the factor.
-    Equal { left: &'a [f64], right: &'a [f64], what: &'static str, scale: f64 },
-    /// A recorded column has the value of an expression.
-    Value { left: &'a [f64], right: Expr, what: &'static str, scale: f64 },
-    /// A column is an expression times another.
-    Product { left: &'a [f64], factor: Expr, right: &'a [f64], what: &'static str, scale: f64 },
     /// Signed columns sum to zero.
-    Sum { terms: Vec<(f64, &'a [f64])>, what: &'static str, scale: f64 },
+    Sum { terms: Vec<(f64, &'a [f64])>, what: &'static str, of: Quantity },
+    /// A recorded column has the value of an expression.
+    Value { left: &'a [f64], right: Expr, what: &'static str, of: Quantity },
+    /// A column is an expression times another.
+    Product { left: &'a [f64], factor: Expr, right: (&'a [f64], Quantity), what: &'static str, of: Quantity },
     /// An expression vanishes.
     Zero { expr: Expr, what: &'static str },
 }
 
-/// The law whose miss is greatest.
+/// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
     graph: &BondGraph,
     values: &Values,
-    regions: &Regions,
+    (scales, settled): (&Scales, &Settled),
+    worst: &mut Worst,
     unchecked: &mut Vec<String>,
-) -> Option<Finding> {
-    let mut greatest = None;
-    for (name, left, right) in &values.same {
-        let scale = left.iter().chain(*right).fold(0.0f64, |most, v| most.max(v.abs()));
-        let mut miss = Miss { name, times: values.times, greatest: &mut greatest };
-        (0..left.len()).for_each(|i| miss.note(i, left[i] - right[i], scale, "two names of one variable"));
+) {
+    let mut check = Check { graph, values, scales, settled, worst };
+    for (name, symbol, left, right) in &values.same {
+        let of = scales.of(graph, *symbol);
+        check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
     }
-    for (id, element) in graph.elements.iter() {
-        let mut laws = Laws { graph, values, regions, laws: Vec::new(), missing: false };
-        laws.of(id, element);
+    for element in graph.elements.values() {
+        let mut laws = Laws { graph, values, scales, laws: Vec::new(), missing: false };
+        laws.of(element);
         if laws.missing {
             unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
         }
         for law in laws.laws {
-            if let Err(missing) = check(graph, values, &element.name, &law, &mut greatest) {
+            if let Err(missing) = check.law(&element.name, &law) {
                 unchecked.push(format!("a law of {}: {missing} is not known", element.name));
             }
         }
     }
-    greatest
 }
 
 /// Collects the laws of an element.
 struct Laws<'a, 'b> {
     graph: &'b BondGraph,
     values: &'b Values<'a>,
-    regions: &'b Regions,
+    scales: &'b Scales,
     laws: Vec<Law<'a>>,
     missing: bool,
 }
 
 impl<'a> Laws<'a, '_> {
-    fn of(&mut self, id: ElementId, element: &Element) {
+    fn of(&mut self, element: &Element) {
         let bond = |port: usize| element.ports[port].bond;
         match &element.kind {
             Kind::Zero => {
@@ -96,13 +92,12 @@ impl<'a> Laws<'a, '_> {
             Kind::Inertance(storage) | Kind::Compliance(storage) => {
                 let flow_is_z = matches!(element.kind, Kind::Inertance(_));
                 for (port, law) in storage.laws.iter().enumerate() {
-                    let place = PortRef { element: id, port: port as u32 };
                     match *law {
                         StorageLaw::Integral(z) => self.value(bond(port), flow_is_z, z, "its law"),
-                        StorageLaw::Derivative(x) => self.stored(place, storage.stored[port], x),
+                        StorageLaw::Derivative(x) => self.stored(storage.stored[port], x),
                         StorageLaw::Implicit(expr) => self.laws.push(Law::Zero { expr, what: "its law" }),
                         StorageLaw::Known { displacement, law } => {
-                            self.stored(place, storage.stored[port], displacement);
+                            self.stored(storage.stored[port], displacement);
                             self.value(bond(port), flow_is_z, law, "its law");
                         }
                     }
@@ -117,16 +112,12 @@ impl<'a> Laws<'a, '_> {
         column
     }
 
-    fn scale(&self, bond: BondId, flow: bool) -> f64 {
-        if flow { self.regions.flow(bond) } else { self.regions.effort(bond) }
-    }
-
     fn common(&mut self, element: &Element, flow: bool) {
         let what = if flow { "its common flow" } else { "its common effort" };
-        let scale = self.scale(element.ports[0].bond, flow);
+        let of = self.scales.of_bond(element.ports[0].bond, flow);
         let columns: Vec<&[f64]> = element.ports.iter().filter_map(|p| self.column(p.bond, flow)).collect();
         for pair in columns.windows(2) {
-            self.laws.push(Law::Equal { left: pair[0], right: pair[1], what, scale });
+            self.laws.push(Law::Sum { terms: vec![(1.0, pair[0]), (-1.0, pair[1])], what, of });
         }
     }
 
@@ -136,28 +127,29 @@ impl<'a> Laws<'a, '_> {
         let terms: Vec<Option<(f64, &[f64])>> =
             element.ports.iter().map(|p| Some((sign(p.inward), self.column(p.bond, flow)?))).collect();
         if terms.iter().all(Option::is_some) {
-            let scale = self.scale(element.ports[0].bond, flow);
-            self.laws.push(Law::Sum { terms: terms.into_iter().flatten().collect(), what, scale });
+            let of = self.scales.of_bond(element.ports[0].bond, flow);
+            self.laws.push(Law::Sum { terms: terms.into_iter().flatten().collect(), what, of });
         }
     }
 
     fn value(&mut self, bond: BondId, flow: bool, right: Expr, what: &'static str) {
         if let Some(left) = self.column(bond, flow) {
-            self.laws.push(Law::Value { left, right, what, scale: self.scale(bond, flow) });
+            self.laws.push(Law::Value { left, right, what, of: self.scales.of_bond(bond, flow) });
         }
     }
 
     fn vanishes(&mut self, bond: BondId, flow: bool, what: &'static str) {
         if let Some(column) = self.column(bond, flow) {
-            self.laws.push(Law::Sum { terms: vec![(1.0, column)], what, scale: self.scale(bond, flow) });
+            let of = self.scales.of_bond(bond, flow);
+            self.laws.push(Law::Sum { terms: vec![(1.0, column)], what, of });
         }
     }
 
-    fn stored(&mut self, _place: PortRef, symbol: halfarrow_compiler::algebra::Symbol, right: Expr) {
+    fn stored(&mut self, symbol: Symbol, right: Expr) {
         match self.values.column(symbol) {
             Some(left) => {
-                let scale = left.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-                self.laws.push(Law::Value { left, right, what: "its stored quantity", scale });
+                let of = self.scales.of(self.graph, symbol);
+                self.laws.push(Law::Value { left, right, what: "its stored quantity", of });
             }
             None => self.missing = true,
         }
@@ -165,71 +157,139 @@ impl<'a> Laws<'a, '_> {
 
     /// `e_in = m e_out, f_out = m f_in`, or `e_in = r f_out, e_out = r f_in`.
     fn two_port(&mut self, input: BondId, output: BondId, factor: Expr, gyrator: bool) {
-        debug_assert!(self.graph.bonds.get(input).is_some());
         let rows = match gyrator {
             false => [(input, false, output, false), (output, true, input, true)],
             true => [(input, false, output, true), (output, false, input, true)],
         };
         for (left, left_flow, right, right_flow) in rows {
-            let (scale, what) = (self.scale(left, left_flow), if left_flow { "its flows" } else { "its efforts" });
+            let what = if left_flow { "its flows" } else { "its efforts" };
+            let of = self.scales.of_bond(left, left_flow);
+            let other = self.scales.of_bond(right, right_flow);
             if let (Some(left), Some(right)) = (self.column(left, left_flow), self.column(right, right_flow)) {
-                self.laws.push(Law::Product { left, factor, right, what, scale });
+                self.laws.push(Law::Product { left, factor, right: (right, other), what, of });
             }
         }
     }
 }
 
-fn check(
+/// Laws at every sample.
+struct Check<'a, 'b> {
+    graph: &'b BondGraph,
+    values: &'b Values<'a>,
+    scales: &'b Scales,
+    settled: &'b Settled,
+    worst: &'b mut Worst,
+}
+
+impl Check<'_, '_> {
+    fn law(&mut self, name: &str, law: &Law) -> Result<(), String> {
+        match law {
+            Law::Sum { terms, what, of } => {
+                self.sum(name, terms, what, *of);
+                Ok(())
+            }
+            Law::Value { left, right, what, of } => {
+                let reader = self.values.reader(&[*right])?;
+                let miss = |k: usize, v: &[f64]| left[k] - v[0];
+                self.read(name, what, *of, &reader, &miss, &|_, _| Vec::new());
+                Ok(())
+            }
+            Law::Product { left, factor, right: (right, other), what, of } => {
+                let reader = self.values.reader(&[*factor])?;
+                let miss = |k: usize, v: &[f64]| left[k] - v[0] * right[k];
+                self.read(name, what, *of, &reader, &miss, &|_, v| vec![(*other, FLOOR * v[0].abs())]);
+                Ok(())
+            }
+            Law::Zero { expr, what } => self.zero(name, *expr, what),
+        }
+    }
+
+    fn sum(&mut self, name: &str, terms: &[(f64, &[f64])], what: &str, of: Quantity) {
+        let natural = vec![(of, 1.0)];
+        let scale = self.settled.scale(&natural);
+        for (k, &time) in self.values.times.iter().enumerate() {
+            let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
+            self.worst.note(miss, scale, self.settled, || raw(miss, time, name, what, natural.clone()));
+        }
+    }
+
+    /// A law with an expression; `more` gives further terms of its scale.
+    fn read(
+        &mut self,
+        name: &str,
+        what: &str,
+        of: Quantity,
+        reader: &Reader,
+        miss: &dyn Fn(usize, &[f64]) -> f64,
+        more: &dyn Fn(usize, &[f64]) -> Terms,
+    ) {
+        let scale = self.settled.scale(&[(of, 1.0)]);
+        for (k, &time) in self.values.times.iter().enumerate() {
+            let Some(found) = reader.values(k, None) else { continue };
+            let off = miss(k, &found);
+            let (graph, scales, settled) = (self.graph, self.scales, self.settled);
+            self.worst.note(off, scale, settled, || {
+                let mut terms = vec![(of, 1.0)];
+                terms.extend(more(k, &found));
+                let all = sensitivities(graph, scales, settled, reader, k, |v| miss(k, v));
+                terms.extend(all.into_iter().map(|(quantity, weight)| (quantity, FLOOR * weight)));
+                raw(off, time, name, what, terms)
+            });
+        }
+    }
+
+    /// An expression that vanishes: relative to its terms where it has several, else to what its variables make of it.
+    fn zero(&mut self, name: &str, expr: Expr, what: &str) -> Result<(), String> {
+        let parts = match self.graph.exprs.node(expr) {
+            Node::Add(terms) => terms.to_vec(),
+            _ => vec![expr],
+        };
+        let reader = self.values.reader(&parts)?;
+        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(|k| reader.values(k, None)).collect();
+        let size = |v: &Vec<f64>| v.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let greatest = found.iter().flatten().map(size).fold(0.0, f64::max);
+        let natural = if parts.len() > 1 { greatest } else { 0.0 };
+        let weight = if parts.len() > 1 { FLOOR } else { 1.0 };
+        let scale = self.settled.scale(&[(Quantity::Number, natural)]);
+        for (k, found) in found.iter().enumerate() {
+            let Some(found) = found else { continue };
+            let (graph, scales, settled) = (self.graph, self.scales, self.settled);
+            let sum = |v: &[f64]| v.iter().sum::<f64>();
+            self.worst.note(sum(found), scale, settled, || {
+                let mut terms = vec![(Quantity::Number, natural)];
+                let all = sensitivities(graph, scales, settled, &reader, k, sum);
+                terms.extend(all.into_iter().map(|(quantity, w)| (quantity, weight * w)));
+                raw(sum(found), self.values.times[k], name, what, terms)
+            });
+        }
+        Ok(())
+    }
+}
+
+fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Terms) -> Raw {
+    Raw { miss, resolution: 0.0, time, place: format!("{name}: {what}"), terms }
+}
+
+/// Part of its scale by which a variable is moved to see what changes with it.
+const MOVED: f64 = 1e-6;
+
+/// What is read at a sample, with how much `of` it changes with each of its variables.
+pub(crate) fn sensitivities(
     graph: &BondGraph,
-    values: &Values,
-    name: &str,
-    law: &Law,
-    greatest: &mut Option<Finding>,
-) -> Result<(), String> {
-    let mut miss = Miss { name, times: values.times, greatest };
-    match law {
-        Law::Equal { left, right, what, scale } => {
-            (0..left.len()).for_each(|i| miss.note(i, left[i] - right[i], *scale, what));
-        }
-        Law::Sum { terms, what, scale } => {
-            for i in 0..values.times.len() {
-                miss.note(i, terms.iter().map(|(sign, column)| sign * column[i]).sum(), *scale, what);
-            }
-        }
-        Law::Value { left, right, what, scale } => {
-            values.evaluate(&[*right], |i, v| miss.note(i, left[i] - v[0], *scale, what))?;
-        }
-        Law::Product { left, factor, right, what, scale } => {
-            values.evaluate(&[*factor], |i, v| miss.note(i, left[i] - v[0] * right[i], *scale, what))?;
-        }
-        Law::Zero { expr, what } => {
-            let terms = match graph.exprs.node(*expr) {
-                Node::Add(terms) => terms.to_vec(),
-                _ => vec![*expr],
-            };
-            let mut rows = Vec::new();
-            values.evaluate(&terms, |i, v| {
-                rows.push((i, v.iter().sum::<f64>(), v.iter().fold(0.0f64, |most, v| most.max(v.abs()))));
-            })?;
-            let scale = rows.iter().fold(0.0f64, |most, r| most.max(r.2));
-            rows.iter().for_each(|&(i, sum, _)| miss.note(i, sum, scale, what));
-        }
-    }
-    Ok(())
-}
-
-struct Miss<'a> {
-    name: &'a str,
-    times: &'a [f64],
-    greatest: &'a mut Option<Finding>,
-}
-
-impl Miss<'_> {
-    fn note(&mut self, sample: usize, miss: f64, scale: f64, what: &str) {
-        let value = relative(miss, scale);
-        if self.greatest.as_ref().is_none_or(|g| value > g.value || value.is_nan()) {
-            let place = format!("{}: {what}", self.name);
-            keep(self.greatest, Finding { value, time: self.times[sample], place, resolution: 0.0 });
-        }
-    }
+    scales: &Scales,
+    settled: &Settled,
+    reader: &Reader,
+    sample: usize,
+    of: impl Fn(&[f64]) -> f64,
+) -> Terms {
+    let at = |moved: Option<(Symbol, f64)>| reader.values(sample, moved).map(|v| of(&v));
+    let Some(here) = at(None) else { return Vec::new() };
+    let weight = |symbol: Symbol| {
+        let quantity = scales.of(graph, symbol);
+        let by = MOVED * settled.of(quantity);
+        let change = |by: f64| at(Some((symbol, by))).map(|there| (there - here).abs()).filter(|c| c.is_finite());
+        let most = [by, -by].into_iter().filter_map(change).fold(0.0f64, f64::max);
+        (by > 0.0).then(|| (quantity, most / by))
+    };
+    reader.moves().iter().copied().filter_map(weight).collect()
 }

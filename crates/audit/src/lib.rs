@@ -8,6 +8,9 @@
 //!   with an estimate of their own error ([`Finding::resolution`], the difference to quartics): what is found below it
 //!   says nothing about the run. Samples at every step of the integrator resolve about as much as its steps do.
 //!
+//! Every miss counts relative to what there is of its kind around its place during the run; what is zero but for rounding counts
+//! as at least a millionth of what its kind has elsewhere, of what moves it, and of the terms of its law.
+//!
 //! What is undetermined or was not recorded is not checked, and listed in [`Audit::unchecked`]; pseudo-bonds are exempt
 //! from power and energy.
 #![forbid(unsafe_code)]
@@ -17,10 +20,12 @@ mod laws;
 mod power;
 mod quadrature;
 mod regions;
+mod scales;
 mod values;
+mod worst;
 
 use halfarrow_compiler::bond_graph::BondGraph;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 pub use values::wanted;
@@ -39,7 +44,7 @@ pub struct Run<'a> {
 /// The greatest miss of a kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// The miss, relative to the greatest magnitude of its kind around its place.
+    /// The miss, relative to the greatest magnitude of its kind around its place during the run.
     pub value: f64,
     /// When, in s.
     pub time: f64,
@@ -66,30 +71,77 @@ pub struct Audit {
     pub unchecked: Vec<String>,
 }
 
-/// Audits a run.
+/// Audits a run that is given whole.
 ///
 /// # Panics
 /// If a column is not as long as the times.
 pub fn audit(graph: &BondGraph, run: &Run) -> Audit {
-    assert!(run.columns.values().all(|c| c.len() == run.times.len()), "every column has one value a sample");
-    let values = values::Values::new(graph, run);
-    let mut audit = Audit { notes: energy::notes(graph), ..Audit::default() };
-    let regions = regions::Regions::new(graph, &values);
-    audit.power = power::power(graph, &values, &mut audit.unchecked);
-    audit.residual = laws::residual(graph, &values, &regions, &mut audit.unchecked);
-    audit.rates = energy::rates(graph, &values, &mut audit.unchecked);
-    audit.energy = energy::energy(graph, &values, &mut audit.unchecked);
-    audit.unchecked.sort();
-    audit.unchecked.dedup();
-    audit
+    let mut auditor = Auditor::new(graph);
+    auditor.take(run);
+    auditor.finish()
 }
 
-/// Keeps the greater of two findings.
-fn keep(greatest: &mut Option<Finding>, finding: Finding) {
-    // NaN counts as greatest: it is never right.
-    let above = |old: &Finding| finding.value > old.value || (finding.value.is_nan() && !old.value.is_nan());
-    if greatest.as_ref().is_none_or(above) {
-        *greatest = Some(finding);
+/// Audits a run that comes in parts: what a miss counts relative to is known when all of it was seen.
+pub struct Auditor<'g> {
+    graph: &'g BondGraph,
+    scales: scales::Scales,
+    power: worst::Worst,
+    energy: worst::Worst,
+    residual: worst::Worst,
+    rates: worst::Worst,
+    unchecked: BTreeSet<String>,
+}
+
+impl<'g> Auditor<'g> {
+    /// Nothing has been seen yet.
+    pub fn new(graph: &'g BondGraph) -> Auditor<'g> {
+        let none = worst::Worst::default;
+        Auditor {
+            graph,
+            scales: scales::Scales::new(graph),
+            power: none(),
+            energy: none(),
+            residual: none(),
+            rates: none(),
+            unchecked: BTreeSet::new(),
+        }
+    }
+
+    /// Looks at the next part of the run, which begins with the last sample of the one before.
+    ///
+    /// # Panics
+    /// If a column is not as long as the times.
+    pub fn take(&mut self, run: &Run) {
+        assert!(run.columns.values().all(|c| c.len() == run.times.len()), "every column has one value a sample");
+        let graph = self.graph;
+        let values = values::Values::new(graph, run);
+        let mut unchecked = Vec::new();
+        let balance = energy::balance(graph, &values, &mut unchecked);
+        self.scales.absorb(graph, &values);
+        balance.iter().for_each(|balance| self.scales.absorb_energy(balance.moved));
+        let settled = self.scales.settled(graph);
+        let scales = (&self.scales, &settled);
+        power::power(graph, &values, scales, &mut self.power, &mut unchecked);
+        laws::residual(graph, &values, scales, &mut self.residual, &mut unchecked);
+        energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
+        balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
+        for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
+            worst.end_part();
+        }
+        self.unchecked.extend(unchecked);
+    }
+
+    /// What was found.
+    pub fn finish(self) -> Audit {
+        let settled = self.scales.settled(self.graph);
+        Audit {
+            power: self.power.finding(&settled),
+            energy: self.energy.finding(&settled),
+            residual: self.residual.finding(&settled),
+            rates: self.rates.finding(&settled),
+            notes: energy::notes(self.graph),
+            unchecked: self.unchecked.into_iter().collect(),
+        }
     }
 }
 

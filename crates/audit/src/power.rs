@@ -1,13 +1,20 @@
 //! The junction structure makes no power.
 
 use crate::regions::Classes;
+use crate::scales::{Scales, Settled, Terms};
 use crate::values::Values;
-use crate::{Finding, keep};
+use crate::worst::{Raw, Worst};
 use halfarrow_compiler::bond_graph::{BondGraph, PortRef};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Greatest power made or eaten by a connected junction structure, relative to the greatest power at its ports.
-pub(crate) fn power(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Finding> {
+pub(crate) fn power(
+    graph: &BondGraph,
+    values: &Values,
+    (scales, settled): (&Scales, &Settled),
+    worst: &mut Worst,
+    unchecked: &mut Vec<String>,
+) {
     let parts = Classes::new(graph, |kind| kind.is_inner());
     let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
     let mut ports: BTreeMap<usize, Vec<PortRef>> = BTreeMap::new();
@@ -17,7 +24,6 @@ pub(crate) fn power(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Stri
             ports.entry(part).or_default().push(port);
         }
     }
-    let mut greatest = None;
     for ports in ports.values() {
         let powers: Vec<Option<Vec<f64>>> = ports.iter().map(|&port| values.power(port)).collect();
         if let Some(missing) = powers.iter().position(Option::is_none) {
@@ -26,20 +32,26 @@ pub(crate) fn power(graph: &BondGraph, values: &Values, unchecked: &mut Vec<Stri
             continue;
         }
         let powers: Vec<Vec<f64>> = powers.into_iter().flatten().collect();
-        let most = powers.iter().flatten().fold(0.0f64, |most, p| most.max(p.abs()));
+        let place = format!("the part with {}", graph.elements[ports[0].element].name);
+        let natural = (scales.power(graph, ports[0]), 1.0);
+        let scale = settled.scale(&[natural]);
         for (sample, &time) in values.times.iter().enumerate() {
-            let sum: f64 = powers.iter().map(|p| p[sample]).sum();
-            let value = relative(sum, most);
-            let place = format!("the part with {}", graph.elements[ports[0].element].name);
-            if greatest.as_ref().is_none_or(|g: &Finding| value > g.value || value.is_nan()) {
-                keep(&mut greatest, Finding { value, time, place, resolution: 0.0 });
-            }
+            let miss = powers.iter().map(|p| p[sample]).sum();
+            worst.note(miss, scale, settled, || {
+                let mut terms = vec![natural];
+                ports.iter().for_each(|&port| terms.extend(changes(graph, values, scales, port, sample)));
+                Raw { miss, resolution: 0.0, time, place: place.clone(), terms }
+            });
         }
     }
-    greatest
 }
 
-/// The miss against a scale; what misses nothing is 0 even where nothing moves.
-pub(crate) fn relative(miss: f64, scale: f64) -> f64 {
-    if miss == 0.0 { 0.0 } else { miss.abs() / scale.max(f64::MIN_POSITIVE) }
+/// By how much the power at a port changes with its effort and its flow.
+fn changes(graph: &BondGraph, values: &Values, scales: &Scales, port: PortRef, sample: usize) -> Terms {
+    let bond = graph.bond_of(port);
+    let weight = |column: Option<&[f64]>| column.map_or(0.0, |c| c[sample].abs());
+    vec![
+        (scales.of_bond(bond, false), weight(values.flow(bond))),
+        (scales.of_bond(bond, true), weight(values.effort(bond))),
+    ]
 }

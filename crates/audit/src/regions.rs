@@ -1,8 +1,7 @@
 //! Regions: bonds joined by junctions, in which efforts add to efforts and flows to flows.
 
-use crate::values::Values;
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind};
-use halfarrow_compiler::ids::{Id, Table};
+use halfarrow_compiler::ids::Id;
 
 /// Bonds in classes that are joined.
 pub(crate) struct Classes {
@@ -35,38 +34,5 @@ impl Classes {
             bond = self.leader[bond];
         }
         bond
-    }
-}
-
-/// The greatest effort and flow of each region during the run: rounding is measured against them.
-pub(crate) struct Regions {
-    efforts: Table<BondId, f64>,
-    flows: Table<BondId, f64>,
-}
-
-impl Regions {
-    pub fn new(graph: &BondGraph, values: &Values) -> Regions {
-        let classes = Classes::new(graph, |kind| matches!(kind, Kind::Zero | Kind::One));
-        let greatest = |of: &dyn Fn(BondId) -> Option<Vec<f64>>| {
-            let mut most = vec![0.0f64; graph.bonds.len()];
-            for bond in graph.bonds.ids() {
-                let here = of(bond).unwrap_or_default().into_iter().fold(0.0f64, |most, v| most.max(v.abs()));
-                let class = &mut most[classes.of(bond)];
-                *class = class.max(here);
-            }
-            graph.bonds.ids().map(|bond| most[classes.of(bond)]).collect()
-        };
-        Regions {
-            efforts: greatest(&|b| values.effort(b).map(<[f64]>::to_vec)),
-            flows: greatest(&|b| values.flow(b).map(<[f64]>::to_vec)),
-        }
-    }
-
-    pub fn effort(&self, bond: BondId) -> f64 {
-        self.efforts[bond]
-    }
-
-    pub fn flow(&self, bond: BondId) -> f64 {
-        self.flows[bond]
     }
 }

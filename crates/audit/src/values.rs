@@ -65,7 +65,7 @@ pub(crate) struct Values<'a> {
     efforts: Table<BondId, Option<&'a [f64]>>,
     flows: Table<BondId, Option<&'a [f64]>>,
     /// Columns that say the same as that of a symbol, with their names.
-    pub same: Vec<(String, &'a [f64], &'a [f64])>,
+    pub same: Vec<(String, Symbol, &'a [f64], &'a [f64])>,
 }
 
 impl<'a> Values<'a> {
@@ -75,7 +75,7 @@ impl<'a> Values<'a> {
         for (name, symbol) in named(graph) {
             let Some(&column) = run.columns.get(&name) else { continue };
             match columns.get(&symbol) {
-                Some(known) => same.push((name, column, *known)),
+                Some(known) => same.push((name, symbol, column, *known)),
                 None => {
                     columns.insert(symbol, column);
                 }
@@ -136,9 +136,8 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// Values of expressions at every sample, by `visit(sample, values)`; the name of what is missing if they read
-    /// something that was not recorded.
-    pub fn evaluate(&self, wanted: &[Expr], mut visit: impl FnMut(usize, &[f64])) -> Result<(), String> {
+    /// Reads expressions at samples; the name of what is missing if they read something that was not recorded.
+    pub fn reader(&self, wanted: &[Expr]) -> Result<Reader<'_, 'a>, String> {
         let x = &self.graph.exprs;
         let mut read: BTreeSet<Symbol> = wanted.iter().flat_map(|&e| x.symbols_of(e)).collect();
         // A rate of an integrated signal is the expression that it was declared with.
@@ -156,38 +155,29 @@ impl<'a> Values<'a> {
         }
         let known = |s: &Symbol| {
             *s == self.graph.time
-                || self.columns.contains_key(s)
                 || self.parameters.contains_key(s)
                 || rates.contains_key(s)
-                || self.same_as(*s).is_some_and(|s| self.columns.contains_key(&s))
+                || self.recorded(*s).is_some()
         };
         if let Some(missing) = read.iter().find(|s| !known(s)) {
             return Err(x.name(*missing).to_string());
         }
-        let mut results = vec![0.0; wanted.len()];
         let time = self.graph.time;
         let state = |s: Symbol| s != time && !self.parameters.contains_key(&s);
         let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
         let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
-        for sample in 0..self.times.len() {
-            let side = self.side(sample);
-            // At a switch the state stands just beyond the border while the old law still holds.
-            if jumpy && side == Side::Before {
-                continue;
-            }
-            let t = self.times[sample];
-            let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
-            let t = match side {
-                Side::Before if timed => t - reach,
-                Side::After if timed => t + reach,
-                _ => t,
-            };
-            let mut at = |s: Symbol| self.at(s, sample, t, &rates);
-            let mut evaluator = Evaluator::new(x, &mut at);
-            results.iter_mut().zip(wanted).for_each(|(r, &e)| *r = evaluator.value(e));
-            visit(sample, &results);
-        }
-        Ok(())
+        let moves = read.into_iter().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
+        Ok(Reader { values: self, wanted: wanted.to_vec(), rates, moves, jumpy, timed })
+    }
+
+    /// The column of a symbol, or of the effort or flow that it is the rate of a stored quantity as.
+    fn recorded(&self, symbol: Symbol) -> Option<&'a [f64]> {
+        self.column(symbol).or_else(|| self.column(self.same_as(symbol)?))
+    }
+
+    /// All columns by symbol.
+    pub fn columns(&self) -> &BTreeMap<Symbol, &'a [f64]> {
+        &self.columns
     }
 
     /// On which side of a jump a sample stands. The start is the far side of one, and so is a single sample at the time
@@ -226,20 +216,6 @@ impl<'a> Values<'a> {
         false
     }
 
-    fn at(&self, symbol: Symbol, sample: usize, t: f64, rates: &BTreeMap<Symbol, Expr>) -> f64 {
-        if symbol == self.graph.time {
-            return t;
-        }
-        if let Some(rate) = rates.get(&symbol) {
-            return self.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, t, rates));
-        }
-        let column = self.columns.get(&symbol).or_else(|| self.columns.get(&self.same_as(symbol)?));
-        match column {
-            Some(column) => column[sample],
-            None => self.parameters.get(&symbol).copied().unwrap_or(f64::NAN),
-        }
-    }
-
     /// What a rate is: the expression of an integrated signal.
     fn rate_of(&self, symbol: Symbol) -> Option<Expr> {
         let Meaning::Rate(of) = self.graph.variables.get(&symbol)?.meaning else { return None };
@@ -255,6 +231,61 @@ impl<'a> Values<'a> {
         match self.graph.variables.get(&of)?.meaning {
             Meaning::Stored(port) => Some(self.graph.storage_symbols(port)?.1),
             _ => None,
+        }
+    }
+}
+
+/// Expressions at samples.
+pub(crate) struct Reader<'v, 'a> {
+    values: &'v Values<'a>,
+    wanted: Vec<Expr>,
+    /// Rates of integrated signals among what is read.
+    rates: BTreeMap<Symbol, Expr>,
+    /// Recorded symbols among what is read.
+    moves: Vec<Symbol>,
+    /// Whether a value jumps with the state, and with time.
+    jumpy: bool,
+    timed: bool,
+}
+
+impl Reader<'_, '_> {
+    /// What the values depend on, besides time and parameters.
+    pub fn moves(&self) -> &[Symbol] {
+        &self.moves
+    }
+
+    /// The values at a sample, one symbol moved by so much; `None` where the law is not clear: at a switch the state stands
+    /// just beyond the border while the old law still holds.
+    pub fn values(&self, sample: usize, moved: Option<(Symbol, f64)>) -> Option<Vec<f64>> {
+        let values = self.values;
+        let side = values.side(sample);
+        if self.jumpy && side == Side::Before {
+            return None;
+        }
+        let t = values.times[sample];
+        let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
+        let t = match side {
+            Side::Before if self.timed => t - reach,
+            Side::After if self.timed => t + reach,
+            _ => t,
+        };
+        let mut at = |s: Symbol| self.at(s, sample, t, moved);
+        let mut evaluator = Evaluator::new(&values.graph.exprs, &mut at);
+        Some(self.wanted.iter().map(|&e| evaluator.value(e)).collect())
+    }
+
+    fn at(&self, symbol: Symbol, sample: usize, t: f64, moved: Option<(Symbol, f64)>) -> f64 {
+        let values = self.values;
+        if symbol == values.graph.time {
+            return t;
+        }
+        if let Some(rate) = self.rates.get(&symbol) {
+            return values.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, t, moved));
+        }
+        let by = moved.filter(|(s, _)| *s == symbol).map_or(0.0, |(_, by)| by);
+        match values.recorded(symbol) {
+            Some(column) => column[sample] + by,
+            None => values.parameters.get(&symbol).copied().unwrap_or(f64::NAN),
         }
     }
 }

@@ -1,0 +1,86 @@
+//! The greatest miss of a kind, in numbers whose scale is known only when the run is over.
+
+use crate::Finding;
+use crate::scales::{Settled, Terms, relative};
+
+/// A miss before it is measured: what it counts relative to may still grow.
+#[derive(Debug, Clone)]
+pub(crate) struct Raw {
+    /// In the unit of what is missed.
+    pub miss: f64,
+    /// What the samples leave open of it, in the same unit.
+    pub resolution: f64,
+    pub time: f64,
+    pub place: String,
+    /// Its scale is the greatest of these.
+    pub terms: Terms,
+}
+
+/// What stands out above what the samples resolve by less than this does not.
+const ROUNDING: f64 = 1e-14;
+
+impl Raw {
+    fn measured(&self, settled: &Settled) -> Finding {
+        let scale = settled.scale(&self.terms);
+        let (value, resolution) = (relative(self.miss, scale), relative(self.resolution, scale));
+        Finding { value, time: self.time, place: self.place.clone(), resolution }
+    }
+}
+
+/// The greatest misses of the parts of a run, and that of the part being looked at.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Worst {
+    parts: Vec<Raw>,
+    now: Option<(Finding, Raw)>,
+}
+
+impl Worst {
+    /// Takes note of a miss. `scale` is the least that it counts relative to; `raw`, which has all its terms, is asked for only
+    /// where it would stand out.
+    pub fn note(
+        &mut self,
+        miss: f64,
+        scale: f64,
+        settled: &Settled,
+        raw: impl FnOnce() -> Raw,
+    ) {
+        let value = relative(miss, scale);
+        if !self.now.as_ref().is_some_and(|(now, _)| now.value.is_nan() || value <= now.value) {
+            self.keep(raw(), settled);
+        }
+    }
+
+    /// Keeps a miss if it stands out most above what the samples resolve.
+    pub fn keep(&mut self, raw: Raw, settled: &Settled) {
+        let found = raw.measured(settled);
+        if self.now.as_ref().is_none_or(|(now, _)| above(&found, now)) {
+            self.now = Some((found, raw));
+        }
+    }
+
+    /// A part of the run is over.
+    pub fn end_part(&mut self) {
+        self.parts.extend(self.now.take().map(|(_, raw)| raw));
+    }
+
+    /// The greatest miss of the whole run.
+    pub fn finding(&self, settled: &Settled) -> Option<Finding> {
+        let mut greatest: Option<Finding> = None;
+        for found in self.parts.iter().chain(self.now.iter().map(|now| &now.1)).map(|raw| raw.measured(settled)) {
+            if greatest.as_ref().is_none_or(|old| above(&found, old)) {
+                greatest = Some(found);
+            }
+        }
+        greatest
+    }
+}
+
+/// Whether a finding stands out more than another; what is not a number is never right.
+fn above(new: &Finding, old: &Finding) -> bool {
+    let excess = |f: &Finding| Some(f.value - f.resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
+    match (new.value.is_nan(), old.value.is_nan()) {
+        (_, true) => false,
+        (true, false) => true,
+        _ => excess(new) > excess(old) || (excess(new) == excess(old) && new.value > old.value),
+    }
+}
