@@ -305,6 +305,9 @@ pub struct Simulate {
     /// Where to write the trajectory: a .csv or .parquet file, or `-` for CSV on stdout; may be repeated
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Write the units as a second header line of CSV
+    #[arg(long)]
+    pub units: bool,
     /// Where to plot it: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
     pub plot: Vec<PathBuf>,
@@ -439,6 +442,9 @@ pub struct Sweep {
     /// Where to write the rows: a .parquet or .csv file
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Write the units as a second header line of CSV
+    #[arg(long)]
+    pub units: bool,
     /// Begin anew, whatever an interrupted sweep has left
     #[arg(long)]
     pub restart: bool,

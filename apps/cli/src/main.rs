@@ -4,6 +4,7 @@
 mod arguments;
 mod commands;
 mod screen;
+mod stop;
 
 use std::process::ExitCode;
 
@@ -15,7 +16,11 @@ use mimalloc::MiMalloc;
 static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(other) => return help(&other),
+    };
+    let outcome = match arguments.command {
         Command::New(a) => commands::new(&a),
         Command::Check(a) => commands::check(&a),
         Command::Fmt(a) => commands::fmt(&a),
@@ -32,4 +37,13 @@ fn main() -> ExitCode {
         Command::Export(a) => commands::export(&a),
     };
     ExitCode::from(outcome)
+}
+
+/// Prints help, the version, or what is wrong with the arguments.
+fn help(what: &clap::Error) -> ExitCode {
+    if what.use_stderr() {
+        let _ = what.print();
+        return ExitCode::from(u8::try_from(what.exit_code()).unwrap_or(2));
+    }
+    ExitCode::from(screen::printed(screen::print(&what.render().to_string()), 0))
 }

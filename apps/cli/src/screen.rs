@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use comfy_table::{ContentArrangement, Table, presets};
-use halfarrow::{Error, Found};
+use halfarrow::{Error, Found, Problem};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
@@ -13,13 +13,19 @@ use serde_json::Value;
 const PATIENCE: Duration = Duration::from_millis(700);
 
 /// Prints text to stdout; a closed pipe is no error.
-pub fn print(text: &str) {
-    let _ = io::stdout().lock().write_all(text.as_bytes());
+pub fn print(text: &str) -> Result<(), Problem> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(why) if why.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Problem::Unwritable { path: "stdout".into(), why: why.to_string() })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Prints one JSON object.
-pub fn print_json(value: &Value) {
-    print(&format!("{value:#}\n"));
+pub fn print_json(value: &Value) -> Result<(), Problem> {
+    print(&format!("{value:#}\n"))
 }
 
 /// Says something beside the result.
@@ -30,10 +36,21 @@ pub fn note(text: &str) {
 /// Shows an error, with `json` on stdout too, and gives the exit status.
 pub fn fail(error: &Error, json: bool) -> u8 {
     note(error.render(color(&io::stderr())).trim_end());
-    if json {
-        print_json(&error.to_json());
+    match json.then(|| print_json(&error.to_json())) {
+        Some(Err(problem)) => unprinted(&problem, error.exit_status()),
+        _ => error.exit_status(),
     }
-    error.exit_status()
+}
+
+/// The exit status where the result could not be printed, and `status` would be right without that.
+fn unprinted(problem: &Problem, status: u8) -> u8 {
+    note(&format!("error: {problem}"));
+    status.max(Error::Usage(problem.clone()).exit_status())
+}
+
+/// The exit status of a command whose last act is to print.
+pub fn printed(result: Result<(), Problem>, status: u8) -> u8 {
+    result.map_or_else(|problem| unprinted(&problem, status), |()| status)
 }
 
 /// Shows warnings.

@@ -3,7 +3,7 @@
 use crate::laws::sensitivities;
 use crate::quadrature::{gauss, integrate};
 use crate::regions::Classes;
-use crate::scales::{FLOOR, Quantity, Scales, Settled, Terms};
+use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Symbol};
@@ -59,10 +59,7 @@ pub(crate) fn rates(
             let rate = graph.storage_symbols(port).map(|(_, rate)| rate);
             match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
                 (Some(x), Some(rate)) => {
-                    let terms = vec![
-                        (Quantity::Of(stored), 1.0),
-                        (scales.rate(graph, port), FLOOR * scales.span()),
-                    ];
+                    let terms = vec![Term::of(Quantity::Of(stored), 1.0)];
                     let held = Held { name: &element.name, x, rate, terms };
                     held.compare(values.times, settled, worst, || Vec::new());
                 }
@@ -87,12 +84,11 @@ pub(crate) fn rates(
             unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
             continue;
         }
-        let held = Held { name: &signal.name, x, rate: &rate, terms: vec![(Quantity::Of(signal.symbol), 1.0)] };
+        let held = Held { name: &signal.name, x, rate: &rate, terms: vec![Term::of(Quantity::Of(signal.symbol), 1.0)] };
         held.compare(values.times, settled, worst, || {
             // What its rate reads moves it: the terms that its rate has in the middle of the run.
-            let weight = FLOOR * scales.span();
-            let terms = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
-            terms.into_iter().map(|(quantity, w)| (quantity, weight * w)).collect()
+            let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
+            reads.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight * scales.span())).collect()
         });
     }
 }
@@ -102,20 +98,27 @@ struct Held<'a> {
     name: &'a str,
     x: &'a [f64],
     rate: &'a [f64],
-    terms: Terms,
+    terms: Vec<Term>,
 }
 
 impl Held<'_> {
     /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
-    fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Terms) {
+    fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
         let integral = integrate(times, self.rate);
         let miss = |k: usize| self.x[k] - self.x[0] - integral.values[k];
-        let excess = |k: usize| miss(k).abs() - integral.uncertainty[k];
-        let beyond = |a: usize, b: usize| excess(b).is_nan() || excess(b) > excess(a);
+        // What stands out above what the samples resolve, or else what is greatest.
+        let excess = |k: usize| {
+            let excess = miss(k).abs() - integral.uncertainty[k];
+            if excess < 0.0 { 0.0 } else { excess }
+        };
+        let beyond = |a: usize, b: usize| {
+            let (new, old) = (excess(b), excess(a));
+            new.is_nan() || new > old || (new == old && miss(b).abs() > miss(a).abs())
+        };
         let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
         let moved = integral.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let mut terms = self.terms.clone();
-        terms.push((Quantity::Number, moved));
+        terms.push(Term::of(Quantity::Number, moved));
         terms.extend(more());
         let place = format!("{}: what it holds against its rate", self.name);
         worst.keep(Raw { miss: miss(k), resolution: integral.uncertainty[k], time: times[k], place, terms }, settled);
@@ -166,7 +169,7 @@ impl Balance {
     pub(crate) fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst) {
         for (k, &time) in times.iter().enumerate() {
             let place = "the whole model".to_string();
-            let terms = vec![(Quantity::Energy, 1.0)];
+            let terms = vec![Term::of(Quantity::Energy, 1.0)];
             let raw = Raw { miss: self.missing[k], resolution: self.uncertainty[k], time, place, terms };
             worst.keep(raw, settled);
         }

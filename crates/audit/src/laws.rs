@@ -1,6 +1,6 @@
 //! Every law of every junction and element, at every sample.
 
-use crate::scales::{FLOOR, Quantity, Scales, Settled, Terms};
+use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Node, Symbol};
@@ -43,6 +43,46 @@ pub(crate) fn residual(
             }
         }
     }
+}
+
+/// How much the variables of each law make of each other, at the sample in the middle: pairs with weights.
+pub(crate) fn links(graph: &BondGraph, values: &Values, scales: &Scales, settled: &Settled) -> Vec<Link> {
+    let mut links = Vec::new();
+    let middle = values.times.len() / 2;
+    for element in graph.elements.values() {
+        let mut laws = Laws { graph, values, scales, laws: Vec::new(), missing: false };
+        laws.of(element);
+        for law in laws.laws {
+            match law {
+                Law::Value { right, of, .. } => {
+                    let Ok(reader) = values.reader(&[right]) else { continue };
+                    let moved = |by: f64| moved_by(graph, (scales, settled), &reader, (middle, by), |v| v[0]);
+                    let pairs = moved(MOVED).into_iter().zip(moved(1.0));
+                    links.extend(pairs.map(|((from, weight), (_, far))| {
+                        let straight = (weight - far).abs() <= STRAIGHT * weight;
+                        Link { of, from, weight, straight }
+                    }));
+                }
+                Law::Product { factor, right: (_, from), of, .. } => {
+                    let Ok(reader) = values.reader(&[factor]) else { continue };
+                    let weight = reader.values(middle, None).map_or(0.0, |v| v[0].abs());
+                    links.push(Link { of, from, weight, straight: true });
+                }
+                Law::Sum { .. } | Law::Zero { .. } => {}
+            }
+        }
+    }
+    links
+}
+
+/// A law by which one quantity makes so much of another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Link {
+    pub of: Quantity,
+    pub from: Quantity,
+    pub weight: f64,
+    /// Whether the law is a straight line in it, so that it tells the other way round as well.
+    pub straight: bool,
 }
 
 /// Collects the laws of an element.
@@ -197,7 +237,7 @@ impl Check<'_, '_> {
             Law::Product { left, factor, right: (right, other), what, of } => {
                 let reader = self.values.reader(&[*factor])?;
                 let miss = |k: usize, v: &[f64]| left[k] - v[0] * right[k];
-                self.read(name, what, *of, &reader, &miss, &|_, v| vec![(*other, FLOOR * v[0].abs())]);
+                self.read(name, what, *of, &reader, &miss, &|_, v| vec![Term::beside(*other, v[0].abs())]);
                 Ok(())
             }
             Law::Zero { expr, what } => self.zero(name, *expr, what),
@@ -205,7 +245,7 @@ impl Check<'_, '_> {
     }
 
     fn sum(&mut self, name: &str, terms: &[(f64, &[f64])], what: &str, of: Quantity) {
-        let natural = vec![(of, 1.0)];
+        let natural = vec![Term::of(of, 1.0)];
         let scale = self.settled.scale(&natural);
         for (k, &time) in self.values.times.iter().enumerate() {
             let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
@@ -221,18 +261,18 @@ impl Check<'_, '_> {
         of: Quantity,
         reader: &Reader,
         miss: &dyn Fn(usize, &[f64]) -> f64,
-        more: &dyn Fn(usize, &[f64]) -> Terms,
+        more: &dyn Fn(usize, &[f64]) -> Vec<Term>,
     ) {
-        let scale = self.settled.scale(&[(of, 1.0)]);
+        let scale = self.settled.scale(&[Term::of(of, 1.0)]);
         for (k, &time) in self.values.times.iter().enumerate() {
             let Some(found) = reader.values(k, None) else { continue };
             let off = miss(k, &found);
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             self.worst.note(off, scale, settled, || {
-                let mut terms = vec![(of, 1.0)];
+                let mut terms = vec![Term::of(of, 1.0)];
                 terms.extend(more(k, &found));
                 let all = sensitivities(graph, scales, settled, reader, k, |v| miss(k, v));
-                terms.extend(all.into_iter().map(|(quantity, weight)| (quantity, FLOOR * weight)));
+                terms.extend(all.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight)));
                 raw(off, time, name, what, terms)
             });
         }
@@ -249,16 +289,16 @@ impl Check<'_, '_> {
         let size = |v: &Vec<f64>| v.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let greatest = found.iter().flatten().map(size).fold(0.0, f64::max);
         let natural = if parts.len() > 1 { greatest } else { 0.0 };
-        let weight = if parts.len() > 1 { FLOOR } else { 1.0 };
-        let scale = self.settled.scale(&[(Quantity::Number, natural)]);
+        let scale = self.settled.scale(&[Term::of(Quantity::Number, natural)]);
         for (k, found) in found.iter().enumerate() {
             let Some(found) = found else { continue };
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             let sum = |v: &[f64]| v.iter().sum::<f64>();
             self.worst.note(sum(found), scale, settled, || {
-                let mut terms = vec![(Quantity::Number, natural)];
+                let mut terms = vec![Term::of(Quantity::Number, natural)];
                 let all = sensitivities(graph, scales, settled, &reader, k, sum);
-                terms.extend(all.into_iter().map(|(quantity, w)| (quantity, weight * w)));
+                let term = |(quantity, weight)| Term { quantity, weight, beside: parts.len() > 1 };
+                terms.extend(all.into_iter().map(term));
                 raw(sum(found), self.values.times[k], name, what, terms)
             });
         }
@@ -266,9 +306,12 @@ impl Check<'_, '_> {
     }
 }
 
-fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Terms) -> Raw {
+fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Vec<Term>) -> Raw {
     Raw { miss, resolution: 0.0, time, place: format!("{name}: {what}"), terms }
 }
+
+/// A law is a straight line if its slope differs by no more than this part over a distance of a variable's size.
+const STRAIGHT: f64 = 0.1;
 
 /// Part of its scale by which a variable is moved to see what changes with it.
 const MOVED: f64 = 1e-6;
@@ -281,12 +324,23 @@ pub(crate) fn sensitivities(
     reader: &Reader,
     sample: usize,
     of: impl Fn(&[f64]) -> f64,
-) -> Terms {
+) -> Vec<(Quantity, f64)> {
+    moved_by(graph, (scales, settled), reader, (sample, MOVED), of)
+}
+
+/// The same with every variable moved by a part of its scale.
+fn moved_by(
+    graph: &BondGraph,
+    (scales, settled): (&Scales, &Settled),
+    reader: &Reader,
+    (sample, part): (usize, f64),
+    of: impl Fn(&[f64]) -> f64,
+) -> Vec<(Quantity, f64)> {
     let at = |moved: Option<(Symbol, f64)>| reader.values(sample, moved).map(|v| of(&v));
     let Some(here) = at(None) else { return Vec::new() };
     let weight = |symbol: Symbol| {
         let quantity = scales.of(graph, symbol);
-        let by = MOVED * settled.of(quantity);
+        let by = part * settled.of(quantity);
         let change = |by: f64| at(Some((symbol, by))).map(|there| (there - here).abs()).filter(|c| c.is_finite());
         let most = [by, -by].into_iter().filter_map(change).fold(0.0f64, f64::max);
         (by > 0.0).then(|| (quantity, most / by))

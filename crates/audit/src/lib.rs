@@ -9,7 +9,7 @@
 //!   says nothing about the run. Samples at every step of the integrator resolve about as much as its steps do.
 //!
 //! Every miss counts relative to what there is of its kind around its place during the run; what is zero but for rounding counts
-//! as at least a millionth of what its kind has elsewhere, of what moves it, and of the terms of its law.
+//! only beside what its kind has elsewhere, what moves it, and the terms of its law.
 //!
 //! What is undetermined or was not recorded is not checked, and listed in [`Audit::unchecked`]; pseudo-bonds are exempt
 //! from power and energy.
@@ -81,6 +81,22 @@ pub fn audit(graph: &BondGraph, run: &Run) -> Audit {
     auditor.finish()
 }
 
+/// The part of what stands beside it that a variable counts as at least where runs are compared.
+const COMPARED: f64 = 1e-6;
+
+/// How great each recorded variable of the graph counts as at least: what is zero but for rounding has a magnitude from what
+/// stands beside it. In SI units, by name.
+///
+/// # Panics
+/// If a column is not as long as the times.
+pub fn magnitudes(graph: &BondGraph, run: &Run) -> BTreeMap<String, f64> {
+    let mut auditor = Auditor::new(graph);
+    auditor.take(run);
+    let settled = auditor.scales.settled(graph);
+    let recorded = values::named(graph).into_iter().filter(|(name, _)| run.columns.contains_key(name));
+    recorded.map(|(name, symbol)| (name, COMPARED * settled.beside(auditor.scales.of(graph, symbol)))).collect()
+}
+
 /// Audits a run that comes in parts: what a miss counts relative to is known when all of it was seen.
 pub struct Auditor<'g> {
     graph: &'g BondGraph,
@@ -119,6 +135,8 @@ impl<'g> Auditor<'g> {
         let balance = energy::balance(graph, &values, &mut unchecked);
         self.scales.absorb(graph, &values);
         balance.iter().for_each(|balance| self.scales.absorb_energy(balance.moved));
+        let links = laws::links(graph, &values, &self.scales, &self.scales.settled(graph));
+        self.scales.absorb_links(&links);
         let settled = self.scales.settled(graph);
         let scales = (&self.scales, &settled);
         power::power(graph, &values, scales, &mut self.power, &mut unchecked);

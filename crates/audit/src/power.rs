@@ -1,7 +1,7 @@
 //! The junction structure makes no power.
 
 use crate::regions::Classes;
-use crate::scales::{Scales, Settled, Terms};
+use crate::scales::{Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::bond_graph::{BondGraph, PortRef};
@@ -33,7 +33,7 @@ pub(crate) fn power(
         }
         let powers: Vec<Vec<f64>> = powers.into_iter().flatten().collect();
         let place = format!("the part with {}", graph.elements[ports[0].element].name);
-        let natural = (scales.power(graph, ports[0]), 1.0);
+        let natural = Term::of(scales.power(graph, ports[0]), 1.0);
         let scale = settled.scale(&[natural]);
         for (sample, &time) in values.times.iter().enumerate() {
             let miss = powers.iter().map(|p| p[sample]).sum();
@@ -47,11 +47,11 @@ pub(crate) fn power(
 }
 
 /// By how much the power at a port changes with its effort and its flow.
-fn changes(graph: &BondGraph, values: &Values, scales: &Scales, port: PortRef, sample: usize) -> Terms {
+fn changes(graph: &BondGraph, values: &Values, scales: &Scales, port: PortRef, sample: usize) -> [Term; 2] {
     let bond = graph.bond_of(port);
     let weight = |column: Option<&[f64]>| column.map_or(0.0, |c| c[sample].abs());
-    vec![
-        (scales.of_bond(bond, false), weight(values.flow(bond))),
-        (scales.of_bond(bond, true), weight(values.effort(bond))),
+    [
+        Term::beside(scales.of_bond(bond, false), weight(values.flow(bond))),
+        Term::beside(scales.of_bond(bond, true), weight(values.effort(bond))),
     ]
 }

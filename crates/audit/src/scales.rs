@@ -2,9 +2,10 @@
 //!
 //! A miss counts relative to the greatest quantity of its place during the run: efforts to efforts and flows to flows of the
 //! bonds joined by junctions, stored quantities and signals to themselves. What is zero but for rounding has no magnitude of
-//! its own; it counts as at least [`FLOOR`] of what its kind has elsewhere, of what moves it during the run, and of the terms
-//! of its law.
+//! its own: what stands *beside* it, its kind elsewhere, what moves it during the run, the terms of its law, tells how much
+//! of a miss is rounding, and how great it counts as at least.
 
+use crate::laws::Link;
 use crate::regions::Classes;
 use crate::values::Values;
 use halfarrow_compiler::algebra::Symbol;
@@ -12,9 +13,13 @@ use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::unit::Dimension;
 use std::collections::BTreeMap;
 
-/// The part of the greatest quantity of its kind that a quantity counts as at least. Rounding errors are far below it even
-/// where they are amplified ten thousand times; what is smaller than it, and wrong, still stands out.
-pub(crate) const FLOOR: f64 = 1e-6;
+/// The part of what stands beside a quantity that rounding may make of it: errors in the last place, amplified some thousand
+/// times on their way.
+const NOISE: f64 = 1e-12;
+
+/// The part of what stands beside it that a quantity counts as at least. Far below it what is wrong still stands out, and what
+/// rounding makes, amplified even more, is no part of it.
+const FLOOR: f64 = 1e-9;
 
 /// No scale is below this: numbers near the end of the range of `f64` have fewer digits.
 const LEAST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
@@ -36,8 +41,26 @@ pub(crate) enum Quantity {
     Number,
 }
 
-/// Quantities with the weights they have in what is measured.
-pub(crate) type Terms = Vec<(Quantity, f64)>;
+/// What a miss counts relative to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Term {
+    pub quantity: Quantity,
+    pub weight: f64,
+    /// Whether it only stands beside what is missed.
+    pub beside: bool,
+}
+
+impl Term {
+    /// What is missed is of this.
+    pub fn of(quantity: Quantity, weight: f64) -> Term {
+        Term { quantity, weight, beside: false }
+    }
+
+    /// What is missed stands beside this.
+    pub fn beside(quantity: Quantity, weight: f64) -> Term {
+        Term { quantity, weight, beside: true }
+    }
+}
 
 /// What is of like size without a floor of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,6 +76,10 @@ pub(crate) struct Scales {
     regions: Classes,
     parts: Classes,
     seen: BTreeMap<Quantity, f64>,
+    /// What laws make of one quantity, given another: the greatest weights.
+    links: BTreeMap<(Quantity, Quantity), f64>,
+    /// Integrals of the magnitudes of efforts and flows.
+    turnovers: BTreeMap<Quantity, f64>,
     begun: Option<f64>,
     /// Length of the run so far, in s.
     span: f64,
@@ -64,6 +91,8 @@ impl Scales {
             regions: Classes::new(graph, |kind| matches!(kind, Kind::Zero | Kind::One)),
             parts: Classes::new(graph, |kind| kind.is_inner()),
             seen: BTreeMap::new(),
+            links: BTreeMap::new(),
+            turnovers: BTreeMap::new(),
             begun: None,
             span: 0.0,
         }
@@ -74,12 +103,17 @@ impl Scales {
         if let (Some(&first), Some(&last)) = (values.times.first(), values.times.last()) {
             self.span = last - *self.begun.get_or_insert(first);
         }
+        let mut turned: BTreeMap<Quantity, f64> = BTreeMap::new();
         for bond in graph.bonds.ids() {
             for flow in [false, true] {
-                let column = if flow { values.flow(bond) } else { values.effort(bond) };
-                self.note(self.of_bond(bond, flow), greatest(column.unwrap_or_default()));
+                let column = if flow { values.flow(bond) } else { values.effort(bond) }.unwrap_or_default();
+                let quantity = self.of_bond(bond, flow);
+                self.note(quantity, greatest(column));
+                let most = turned.entry(quantity).or_default();
+                *most = most.max(turnover(values.times, column));
             }
         }
+        turned.into_iter().for_each(|(quantity, more)| *self.turnovers.entry(quantity).or_default() += more);
         for (&symbol, column) in values.columns() {
             if let quantity @ Quantity::Of(_) = self.of(graph, symbol) {
                 self.note(quantity, greatest(column));
@@ -94,6 +128,17 @@ impl Scales {
     /// Takes note of an energy.
     pub fn absorb_energy(&mut self, energy: f64) {
         self.note(Quantity::Energy, energy);
+    }
+
+    /// Takes note of what laws make of their variables, both ways.
+    pub fn absorb_links(&mut self, links: &[Link]) {
+        for link in links.iter().filter(|link| link.weight > 0.0 && link.weight.is_finite()) {
+            let back = link.straight.then_some(((link.from, link.of), 1.0 / link.weight));
+            for (pair, weight) in [Some(((link.of, link.from), link.weight)), back].into_iter().flatten() {
+                let known = self.links.entry(pair).or_default();
+                *known = known.max(weight);
+            }
+        }
     }
 
     fn note(&mut self, quantity: Quantity, magnitude: f64) {
@@ -138,28 +183,11 @@ impl Scales {
 
     /// The scales as the run stands.
     pub fn settled(&self, graph: &BondGraph) -> Settled {
-        let seen = |q: Quantity| self.seen.get(&q).copied().unwrap_or(0.0);
-        let mut sorts: BTreeMap<Sort, f64> = BTreeMap::new();
-        let mut note = |sort: Sort, magnitude: f64| {
-            let most = sorts.entry(sort).or_default();
-            *most = most.max(magnitude);
-        };
-        for bond in graph.bonds.ids() {
-            for flow in [false, true] {
-                note(sort_of_bond(graph, bond, flow), seen(self.of_bond(bond, flow)));
-            }
-        }
-        let per_second = if self.span > 0.0 { 1.0 / self.span } else { 0.0 };
-        for (port, stored) in storages(graph) {
-            let rate_is_flow = matches!(self.rate(graph, port), Quantity::Flow(_));
-            note(sort_of_stored(graph, port, stored), seen(Quantity::Of(stored)));
-            // A rate below this changes what is stored by next to nothing.
-            note(sort_of_bond(graph, graph.bond_of(port), rate_is_flow), seen(Quantity::Of(stored)) * per_second);
-        }
-        let mut of = self.seen.clone();
-        let mut raise = |quantity: Quantity, floor: f64| {
-            let scale = of.entry(quantity).or_default();
-            *scale = scale.max(FLOOR * floor);
+        let sorts = self.sorts(graph);
+        let mut beside = self.seen.clone();
+        let mut raise = |quantity: Quantity, least: f64| {
+            let most = beside.entry(quantity).or_default();
+            *most = most.max(least);
         };
         for bond in graph.bonds.ids() {
             for flow in [false, true] {
@@ -167,12 +195,70 @@ impl Scales {
             }
         }
         for (port, stored) in storages(graph) {
-            let moved = self.span * seen(self.rate(graph, port));
-            raise(Quantity::Of(stored), sorts[&sort_of_stored(graph, port, stored)].max(moved));
+            raise(Quantity::Of(stored), sorts[&sort_of_stored(graph, port, stored)].max(self.turnover(graph, port)));
         }
-        let mut settled = Settled { of };
-        settled.raise_energy(self, graph);
-        settled
+        for (&(quantity, from), weight) in &self.links {
+            raise(quantity, weight * self.seen(from));
+        }
+        self.raise_energies(graph, &mut beside);
+        let size = |(&quantity, &beside): (&Quantity, &f64)| {
+            (quantity, Size { own: self.seen(quantity).max(FLOOR * beside), beside })
+        };
+        Settled { of: beside.iter().map(size).collect() }
+    }
+
+    /// The greatest quantity of each sort.
+    fn sorts(&self, graph: &BondGraph) -> BTreeMap<Sort, f64> {
+        let mut sorts: BTreeMap<Sort, f64> = BTreeMap::new();
+        let mut note = |sort: Sort, magnitude: f64| {
+            let most = sorts.entry(sort).or_default();
+            *most = most.max(magnitude);
+        };
+        for bond in graph.bonds.ids() {
+            for flow in [false, true] {
+                note(sort_of_bond(graph, bond, flow), self.seen(self.of_bond(bond, flow)));
+            }
+        }
+        for (port, stored) in storages(graph) {
+            let rate_is_flow = matches!(self.rate(graph, port), Quantity::Flow(_));
+            let held = self.seen(Quantity::Of(stored));
+            note(sort_of_stored(graph, port, stored), held);
+            // A rate below a part of this changes what is stored by no more than that part.
+            note(sort_of_bond(graph, graph.bond_of(port), rate_is_flow), held * self.per_second());
+        }
+        sorts
+    }
+
+    /// Energies stand beside what storages hold at the sizes of their variables, powers beside these energies in the time of the
+    /// run.
+    fn raise_energies(&self, graph: &BondGraph, beside: &mut BTreeMap<Quantity, f64>) {
+        let size = |quantity: Quantity, beside: &BTreeMap<Quantity, f64>| beside.get(&quantity).copied().unwrap_or(0.0);
+        let held = storages(graph).filter_map(|(port, stored)| {
+            let z = graph.storage_symbols(port)?.0;
+            Some(size(self.of(graph, z), beside) * size(Quantity::Of(stored), beside))
+        });
+        let held = held.fold(0.0, f64::max);
+        let ports = graph.outer_ports();
+        let energy = beside.entry(Quantity::Energy).or_default();
+        *energy = energy.max(held);
+        let power = *energy * self.per_second();
+        for port in ports {
+            let most = beside.entry(self.power(graph, port)).or_default();
+            *most = most.max(power);
+        }
+    }
+
+    fn seen(&self, quantity: Quantity) -> f64 {
+        self.seen.get(&quantity).copied().unwrap_or(0.0)
+    }
+
+    fn per_second(&self) -> f64 {
+        if self.span > 0.0 { 1.0 / self.span } else { 0.0 }
+    }
+
+    /// The integral of the magnitude of what moves a stored quantity, or stands where that does.
+    pub fn turnover(&self, graph: &BondGraph, port: PortRef) -> f64 {
+        self.turnovers.get(&self.rate(graph, port)).copied().unwrap_or(0.0)
     }
 }
 
@@ -204,53 +290,74 @@ fn sort_of_stored(graph: &BondGraph, port: PortRef, stored: Symbol) -> Sort {
     }
 }
 
+/// The integral of the magnitude, from below: of what grows without bound the samples tell no more.
+fn turnover(times: &[f64], column: &[f64]) -> f64 {
+    let pieces = times.windows(2).zip(column.windows(2));
+    pieces.map(|(t, v)| (t[1] - t[0]) * v[0].abs().min(v[1].abs())).sum()
+}
+
 fn greatest(column: &[f64]) -> f64 {
     column.iter().fold(0.0, |most, v| most.max(v.abs()))
 }
 
-/// Scales with their floors.
+/// How great a quantity is, and what stands beside it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Size {
+    own: f64,
+    beside: f64,
+}
+
+/// The sizes of all quantities as the run stands.
 pub(crate) struct Settled {
-    of: BTreeMap<Quantity, f64>,
+    of: BTreeMap<Quantity, Size>,
+}
+
+/// What a miss is measured with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scale {
+    own: f64,
+    beside: f64,
 }
 
 impl Settled {
-    /// The greatest of these terms.
-    pub fn scale(&self, terms: &[(Quantity, f64)]) -> f64 {
-        terms.iter().fold(LEAST, |most, &(quantity, weight)| most.max(weight * self.of(quantity)))
+    /// The scale of what has these terms.
+    pub fn scale(&self, terms: &[Term]) -> Scale {
+        terms.iter().fold(Scale { own: LEAST, beside: LEAST }, |most, term| {
+            let Size { own, beside } = self.size(term.quantity);
+            let part = if term.beside { FLOOR } else { 1.0 };
+            Scale { own: most.own.max(part * term.weight * own), beside: most.beside.max(term.weight * beside) }
+        })
     }
 
     /// The magnitude of a quantity.
     pub fn of(&self, quantity: Quantity) -> f64 {
-        match quantity {
-            Quantity::Number => 1.0,
-            quantity => self.of.get(&quantity).copied().unwrap_or(0.0),
-        }
+        self.size(quantity).own
     }
 
-    /// An energy counts as at least the floor of what storages hold and ports move at the scales of their variables.
-    fn raise_energy(&mut self, scales: &Scales, graph: &BondGraph) {
-        let held = storages(graph).filter_map(|(port, stored)| {
-            let z = graph.storage_symbols(port)?.0;
-            Some(self.of(scales.of(graph, z)) * self.of(Quantity::Of(stored)))
-        });
-        let held = held.fold(0.0, f64::max);
-        let powers = graph.outer_ports().into_iter().map(|port| self.of(scales.power(graph, port)));
-        let moved = scales.span * powers.fold(0.0, f64::max);
-        let energy = self.of.entry(Quantity::Energy).or_default();
-        *energy = energy.max(FLOOR * held.max(moved));
-        let per_second = if scales.span > 0.0 { 1.0 / scales.span } else { 0.0 };
-        let least = FLOOR * *energy * per_second;
-        let ids: Vec<Quantity> = graph.outer_ports().into_iter().map(|port| scales.power(graph, port)).collect();
-        for quantity in ids {
-            let power = self.of.entry(quantity).or_default();
-            *power = power.max(least);
+    /// How great a quantity counts as at least, whatever it is.
+    pub fn beside(&self, quantity: Quantity) -> f64 {
+        self.size(quantity).beside
+    }
+
+    fn size(&self, quantity: Quantity) -> Size {
+        match quantity {
+            Quantity::Number => Size { own: 1.0, beside: 1.0 },
+            quantity => self.of.get(&quantity).copied().unwrap_or_default(),
         }
     }
 }
 
-/// The miss against a scale; what misses nothing is 0 whatever the scale.
-pub(crate) fn relative(miss: f64, scale: f64) -> f64 {
-    if miss == 0.0 { 0.0 } else { miss.abs() / scale }
+impl Scale {
+    /// The miss as a part of what is there: what rounding may make of it as a part of what stands beside it.
+    pub fn relative(self, miss: f64) -> f64 {
+        let miss = miss.abs();
+        let noise = NOISE * self.beside;
+        match miss > noise {
+            // NaN stays what it is.
+            false => miss / self.beside,
+            true => NOISE + (miss - noise) / self.own,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -260,10 +367,20 @@ mod tests {
     #[test]
     fn a_miss_of_nothing_is_nothing_and_no_scale_vanishes() {
         let settled = Settled { of: BTreeMap::new() };
-        let scale = settled.scale(&[(Quantity::Energy, 1.0)]);
-        assert!(scale > 0.0 && relative(f64::MIN_POSITIVE, scale) < 1e-15);
-        assert_eq!(relative(0.0, scale), 0.0);
-        assert!(relative(f64::NAN, scale).is_nan());
-        assert_eq!(settled.scale(&[(Quantity::Number, 3.0), (Quantity::Energy, 1.0)]), 3.0);
+        let scale = settled.scale(&[Term::of(Quantity::Energy, 1.0)]);
+        assert!(scale.relative(f64::MIN_POSITIVE) < 1e-15);
+        assert_eq!(scale.relative(0.0), 0.0);
+        assert!(scale.relative(f64::NAN).is_nan());
+        assert_eq!(scale.relative(f64::INFINITY), f64::INFINITY);
+    }
+
+    #[test]
+    fn what_rounding_makes_counts_relative_to_what_stands_beside() {
+        let settled = Settled { of: BTreeMap::new() };
+        let scale = settled.scale(&[Term::of(Quantity::Number, 1e-3), Term::beside(Quantity::Number, 1e3)]);
+        assert!((scale.relative(1e-12) - 1e-15).abs() < 1e-25);
+        assert!((scale.relative(1e-5) - 1e-2).abs() < 1e-5);
+        let grows = [0.0, 1e-12, 1e-9, 2e-9, 1e-3, 1.0].map(|miss| scale.relative(miss));
+        assert!(grows.is_sorted(), "{grows:?}");
     }
 }

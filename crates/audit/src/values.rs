@@ -13,7 +13,8 @@ pub fn wanted(graph: &BondGraph) -> Vec<String> {
     all.into_iter().collect()
 }
 
-fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
+/// The variables that an audit reads, by the names that they are recorded by.
+pub(crate) fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
     let (mut all, mut common) = (Vec::new(), Vec::new());
     for element in graph.elements.values() {
         for (index, port) in element.ports.iter().enumerate() {

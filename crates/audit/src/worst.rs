@@ -1,7 +1,7 @@
 //! The greatest miss of a kind, in numbers whose scale is known only when the run is over.
 
 use crate::Finding;
-use crate::scales::{Settled, Terms, relative};
+use crate::scales::{Scale, Settled, Term};
 
 /// A miss before it is measured: what it counts relative to may still grow.
 #[derive(Debug, Clone)]
@@ -12,8 +12,8 @@ pub(crate) struct Raw {
     pub resolution: f64,
     pub time: f64,
     pub place: String,
-    /// Its scale is the greatest of these.
-    pub terms: Terms,
+    /// What it counts relative to.
+    pub terms: Vec<Term>,
 }
 
 /// What stands out above what the samples resolve by less than this does not.
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 1e-14;
 impl Raw {
     fn measured(&self, settled: &Settled) -> Finding {
         let scale = settled.scale(&self.terms);
-        let (value, resolution) = (relative(self.miss, scale), relative(self.resolution, scale));
+        let (value, resolution) = (scale.relative(self.miss), scale.relative(self.resolution));
         Finding { value, time: self.time, place: self.place.clone(), resolution }
     }
 }
@@ -40,11 +40,11 @@ impl Worst {
     pub fn note(
         &mut self,
         miss: f64,
-        scale: f64,
+        scale: Scale,
         settled: &Settled,
         raw: impl FnOnce() -> Raw,
     ) {
-        let value = relative(miss, scale);
+        let value = scale.relative(miss);
         if !self.now.as_ref().is_some_and(|(now, _)| now.value.is_nan() || value <= now.value) {
             self.keep(raw(), settled);
         }

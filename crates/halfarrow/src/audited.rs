@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow_audit::{self as audit, Audit, Finding, audit, wanted};
-use halfarrow_compiler::bond_graph::BondGraph;
+use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
+use halfarrow_compiler::bond_graph::{BondGraph, Kind};
 use halfarrow_exec as exec;
 use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 use serde::Serialize;
 
 use crate::run::Recording;
+use crate::verdict::Verdict;
 
 /// Samples audited at once: bounds the memory of long runs.
 const CHUNK: usize = 4096;
@@ -16,6 +17,10 @@ const CHUNK: usize = 4096;
 /// Greatest misses that the audit found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AuditReport {
+    /// What they mean for the result.
+    pub verdict: Verdict,
+    /// What is missed by more than may be, with what to do about it.
+    pub warnings: Vec<String>,
     /// Power made or eaten by the junction structure.
     pub power: Option<Miss>,
     /// Stored less initial, supplied plus dissipated energy.
@@ -51,15 +56,20 @@ pub struct Audited<'a, M> {
 
 /// What is recorded.
 struct Book<'a> {
-    graph: &'a BondGraph,
+    auditor: Auditor<'a>,
     parameters: BTreeMap<String, f64>,
     names: Vec<String>,
     times: Vec<f64>,
     columns: Vec<Vec<f64>>,
     /// Where the recorded values of the user stand among all.
     shown: Vec<usize>,
+    /// The order in which a value that is not finite is looked for: what sources give comes first.
+    suspects: Vec<usize>,
+    /// What the user records that was infinite, and when first.
+    infinite: BTreeMap<usize, f64>,
+    /// Where rates had no finite value last.
+    failed: Option<(f64, Vec<f64>)>,
     values: Vec<f64>,
-    report: AuditReport,
 }
 
 impl<'a, M: Recording + Parameters> Audited<'a, M> {
@@ -80,8 +90,10 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             columns: vec![Vec::new(); names.len()],
             values: vec![0.0; count],
             times: Vec::new(),
-            report: AuditReport::default(),
-            graph,
+            auditor: Auditor::new(graph),
+            suspects: suspects(graph, &names),
+            infinite: BTreeMap::new(),
+            failed: None,
             names,
         };
         Audited { model, book }
@@ -90,8 +102,36 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// What was found.
     pub fn finish(mut self) -> AuditReport {
         self.book.audit();
-        self.book.report
+        AuditReport::from(self.book.auditor.finish())
     }
+
+    /// What is to be known of the values recorded, given why the run stopped, if it did.
+    pub fn notes(&self, failure: Option<&Failure>) -> Vec<String> {
+        let program = self.model.program();
+        let name = |i: &usize| &program.observed[self.model.recorded()[self.book.shown[*i]]].name;
+        let infinite = self.book.infinite.iter();
+        let mut notes: Vec<String> =
+            infinite.map(|(i, time)| format!("`{}` is infinite at t = {time} s", name(i))).collect();
+        if let (Some(Failure::StepTooSmall { time, .. }), Some((name, value))) = (failure, self.book.grown()) {
+            notes.push(format!("{name} grows without bound: it is {value:e} at t = {time} s"));
+        }
+        notes
+    }
+}
+
+/// The values of the graph, those that sources give first, then inputs and held signals, then all others.
+fn suspects(graph: &BondGraph, names: &[String]) -> Vec<usize> {
+    let of_source = |name: &String| {
+        graph.elements.values().any(|e| match e.kind {
+            Kind::EffortSource { .. } => *name == format!("{}.e", e.name),
+            Kind::FlowSource { .. } => *name == format!("{}.f", e.name),
+            _ => false,
+        })
+    };
+    let rank = |name: &String| if of_source(name) { 0 } else { 1 + usize::from(name.contains('.')) };
+    let mut all: Vec<usize> = (0..names.len()).collect();
+    all.sort_by_key(|&i| rank(&names[i]));
+    all
 }
 
 /// What knows the values of parameters.
@@ -112,19 +152,52 @@ impl Parameters for exec::ImplicitModel {
     }
 }
 
+/// What has grown this many times over the run before grows without bound.
+const GROWN: f64 = 1e3;
+
 impl Book<'_> {
     /// Keeps the values just observed at `t`.
-    fn keep(&mut self, t: f64) {
+    fn keep(&mut self, t: f64) -> Result<(), Failure> {
+        if let Some(what) = self.not_finite() {
+            return Err(Failure::NotFinite { time: t, what: what.to_string() });
+        }
         self.times.push(t);
         self.columns.iter_mut().zip(&self.values).for_each(|(column, value)| column.push(*value));
         if self.times.len() >= CHUNK {
             self.audit();
         }
+        Ok(())
+    }
+
+    /// A value of the graph that is not finite, of a source if there is one.
+    fn not_finite(&self) -> Option<&str> {
+        let found = self.suspects.iter().find(|&&i| !self.values[i].is_finite());
+        found.map(|&i| self.names[i].as_str())
+    }
+
+    /// What grew most before the end, if it did beyond all it was before, and to what.
+    fn grown(&self) -> Option<(&str, f64)> {
+        let last = self.times.len().checked_sub(1)?;
+        let before = |i: usize| self.columns[i][..=last / 2].iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let grew = |&&i: &&usize| self.columns[i][last].abs() > GROWN * before(i) && before(i) > 0.0;
+        self.suspects.iter().find(grew).map(|&i| (self.names[i].as_str(), self.columns[i][last]))
     }
 
     /// The values that the user asked for.
-    fn hand_out(&self, out: &mut [f64]) {
-        out.iter_mut().zip(&self.shown).for_each(|(value, &i)| *value = self.values[i]);
+    fn hand_out(&mut self, t: f64, out: &mut [f64]) {
+        for (k, (value, &i)) in out.iter_mut().zip(&self.shown).enumerate() {
+            *value = self.values[i];
+            if value.is_infinite() {
+                self.infinite.entry(k).or_insert(t);
+            }
+        }
+    }
+
+    /// Remembers where rates had no finite value.
+    fn note_failure(&mut self, result: &Result<(), Failure>, t: f64, x: &[f64]) {
+        if matches!(result, Err(Failure::NotFinite { .. })) {
+            self.failed = Some((t, x.to_vec()));
+        }
     }
 
     /// Audits what has been recorded, and keeps the last sample to go on from.
@@ -133,34 +206,38 @@ impl Book<'_> {
             return;
         }
         let columns = self.names.iter().cloned().zip(self.columns.iter().map(Vec::as_slice)).collect();
-        let run = audit::Run { times: &self.times, columns: &columns, parameters: &self.parameters };
-        self.report.take(audit(self.graph, &run));
+        self.auditor.take(&audit::Run { times: &self.times, columns: &columns, parameters: &self.parameters });
         let last = self.times.len() - 1;
         self.times.drain(..last);
         self.columns.iter_mut().for_each(|column| drop(column.drain(..last)));
     }
 }
 
-impl AuditReport {
-    /// Keeps the greater misses.
-    fn take(&mut self, audit: Audit) {
-        let pairs = [
-            (&mut self.power, audit.power),
-            (&mut self.energy, audit.energy),
-            (&mut self.residual, audit.residual),
-            (&mut self.rates, audit.rates),
-        ];
-        for (greatest, found) in pairs {
-            let miss = found.map(Miss::from);
-            let above = |m: &Miss| greatest.as_ref().is_none_or(|g| m.value > g.value || m.value.is_nan());
-            if let Some(miss) = miss.filter(above) {
-                *greatest = Some(miss);
-            }
+impl Audited<'_, exec::Model> {
+    /// Names the source behind rates that are not finite, if there is one.
+    pub fn explain(&mut self, failure: Failure) -> Failure {
+        let Failure::NotFinite { time, what } = &failure else { return failure };
+        let Some((t, x)) = self.book.failed.take().filter(|(t, _)| t == time) else { return failure };
+        // It has no value, which is why it is looked at; what has one is written.
+        let _ = self.model.observe(t, &x, &mut self.book.values);
+        match self.book.not_finite() {
+            Some(name) => Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") },
+            None => failure,
         }
-        for (all, more) in [(&mut self.notes, audit.notes), (&mut self.unchecked, audit.unchecked)] {
-            all.extend(more);
-            all.sort();
-            all.dedup();
+    }
+}
+
+impl From<Audit> for AuditReport {
+    fn from(a: Audit) -> AuditReport {
+        let miss = |found: Option<Finding>| found.map(Miss::from);
+        AuditReport {
+            power: miss(a.power),
+            energy: miss(a.energy),
+            residual: miss(a.residual),
+            rates: miss(a.rates),
+            notes: a.notes,
+            unchecked: a.unchecked,
+            ..AuditReport::default()
         }
     }
 }
@@ -188,7 +265,9 @@ impl System for Audited<'_, exec::Model> {
         self.model.scales()
     }
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
-        self.model.rates(t, x, dx)
+        let done = self.model.rates(t, x, dx);
+        self.book.note_failure(&done, t, x);
+        done
     }
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.model.tangent(t, x, v, jv)
@@ -204,7 +283,7 @@ impl System for Audited<'_, exec::Model> {
     }
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.model.observe(t, x, &mut self.book.values)?;
-        self.book.hand_out(out);
+        self.book.hand_out(t, out);
         Ok(())
     }
     fn observed(&self) -> usize {
@@ -216,14 +295,13 @@ impl System for Audited<'_, exec::Model> {
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.model.cross_jump(t, x)?;
         self.model.observe(t, x, &mut self.book.values)?;
-        self.book.keep(t);
-        Ok(())
+        self.book.keep(t)
     }
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.model.accept(t, x)?;
         if self.book.times.last() != Some(&t) {
             self.model.observe(t, x, &mut self.book.values)?;
-            self.book.keep(t);
+            self.book.keep(t)?;
         }
         Ok(())
     }
@@ -271,7 +349,7 @@ impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
     }
     fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.model.observe(t, y, yp, &mut self.book.values)?;
-        self.book.hand_out(out);
+        self.book.hand_out(t, out);
         Ok(())
     }
     fn observed(&self) -> usize {
@@ -283,14 +361,13 @@ impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
     fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
         self.model.cross_jump(t, y, yp)?;
         self.model.observe(t, y, yp, &mut self.book.values)?;
-        self.book.keep(t);
-        Ok(())
+        self.book.keep(t)
     }
     fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.model.accept(t, y, yp)?;
         if self.book.times.last() != Some(&t) {
             self.model.observe(t, y, yp, &mut self.book.values)?;
-            self.book.keep(t);
+            self.book.keep(t)?;
         }
         Ok(())
     }

@@ -18,6 +18,13 @@ pub enum Error {
     Usage(Problem),
     /// A run that stopped before its end, with what was computed so far.
     Run(Box<Stopped>),
+    /// A sweep that was stopped as asked; what is done is kept beside its file.
+    Interrupted {
+        /// Sets that are done.
+        done: usize,
+        /// Sets of the sweep.
+        sets: usize,
+    },
 }
 
 /// Something asked that cannot be.
@@ -108,7 +115,7 @@ impl Error {
             Error::Model(found) if found.diagnostics.0.iter().any(|d| d.is_error() && d.code == codes::N019) => 2,
             Error::Model(_) => 1,
             Error::Usage(_) => 2,
-            Error::Run(_) => 3,
+            Error::Run(_) | Error::Interrupted { .. } => 3,
         }
     }
 
@@ -126,6 +133,7 @@ impl Error {
             Error::Model(found) => {
                 json!({"error": "the model has errors", "diagnostics": to_json(&found.diagnostics, &found.sources)})
             }
+            Error::Interrupted { done, sets } => json!({"error": self.to_string(), "sets": sets, "done": done}),
             other => json!({"error": other.to_string()}),
         }
     }
@@ -149,6 +157,9 @@ impl fmt::Display for Error {
             Error::Model(found) => found.diagnostics.fmt(f),
             Error::Usage(problem) => problem.fmt(f),
             Error::Run(stopped) => stopped.fmt(f),
+            Error::Interrupted { done, sets } => {
+                write!(f, "stopped as asked: {done} of {sets} sets are done; the same command goes on from there")
+            }
         }
     }
 }

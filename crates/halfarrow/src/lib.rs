@@ -29,6 +29,7 @@ mod report;
 mod run;
 mod stage;
 mod sweep;
+mod verdict;
 
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;
@@ -52,7 +53,8 @@ pub use linearize::{
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};
 pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, duration, frequency};
-pub use report::Report;
+pub use report::{Page, Report};
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;
-pub use sweep::{Reduce, Reduction, Samples, SetFailure, Sweep, SweepReport, Vary};
+pub use verdict::Verdict;
+pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};

@@ -4,23 +4,28 @@ use std::io::{BufRead, Write};
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, WallClock, run_real_time};
 use halfarrow_trace::read_inputs;
 use serde::Serialize;
 
+use crate::audited::{AuditReport, Audited};
 use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::run::{Record, Run, Start, choose, connect, units};
+use crate::verdict::Made;
 
 /// Evaluations of a block of nonlinear equations at most in one solution, where none are given.
 const MOST_EVALUATIONS: usize = 50;
+/// Steps that are audited before a run.
+const REHEARSED: f64 = 100.0;
 /// The clock spins for this long before a tick.
 const SPIN: Duration = Duration::from_micros(200);
 /// Bytes of a datagram at most.
@@ -96,6 +101,11 @@ pub struct RealTimeReport {
     pub machine: bool,
     /// Names of the values sent, after `t`.
     pub outputs: Vec<String>,
+    /// What the audit found in the first steps, taken before the run and without its live inputs.
+    pub audit: AuditReport,
+    /// Why it stopped before its end, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
 }
 
 /// How long something took, in s.
@@ -126,27 +136,42 @@ impl Durations {
 }
 
 impl Model {
-    /// Runs the model against the wall clock. `statistics` can be read from another thread meanwhile.
+    /// Runs the model against the wall clock. `statistics` can be read from another thread meanwhile; the run ends in order
+    /// when `stop` becomes true. A run that has begun and stops before its end has its reason in [`RealTimeReport::error`].
     ///
     /// # Errors
-    /// The model has errors, something is asked that cannot be, or the run stops, with time, element and reason.
-    pub fn run_real_time(&self, run: &RealTimeRun, statistics: &Statistics) -> Result<RealTimeReport, Error> {
+    /// The model has errors, something is asked that cannot be, the run cannot start, or its first steps do not satisfy the
+    /// model.
+    pub fn run_real_time(
+        &self,
+        run: &RealTimeRun,
+        statistics: &Statistics,
+        stop: &AtomicBool,
+    ) -> Result<RealTimeReport, Error> {
         let pace = pace(run)?;
         let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
         connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
         choose(&mut system, &run.record)?;
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
+        let audit = self.rehearse(&system, run, &x)?;
         // Without machine code for this processor the bytecode runs on.
         let machine = system.compile_machine().is_ok();
         if machine && run.method.is_implicit() {
             // So do derivatives.
             let _ = system.compile_tangent();
         }
-        let mut ports = Ports::open(run, &system)?;
+        let mut ports = Ports::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
-        end.map_err(|stopped| self.stopped_at(stopped))?;
+        let error = match end {
+            Err(stopped) if statistics.ticks() == 0 => return Err(self.stopped_at(stopped)),
+            Err(stopped) => Some(stopped.to_string()),
+            Ok(()) if pace.ticks.is_some_and(|ticks| statistics.ticks() < ticks) => {
+                Some(Failure::Interrupted { time: statistics.time() }.to_string())
+            }
+            Ok(()) => None,
+        };
         Ok(RealTimeReport {
             model: self.name().to_string(),
             rate: run.rate,
@@ -166,8 +191,39 @@ impl Model {
             lost: ports.lost,
             machine,
             outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
+            audit,
+            error,
         })
     }
+
+    /// Audits the first steps, as they would be without live inputs: in the run itself there is no time for it.
+    fn rehearse(&self, system: &exec::Model, run: &RealTimeRun, x: &[f64]) -> Result<AuditReport, Error> {
+        let (mut system, mut x) = (system.clone(), x.to_vec());
+        // Nothing needs to be recorded, which cannot fail.
+        let _ = system.record(&[]);
+        let step = 1.0 / run.rate;
+        let to = run.length.unwrap_or(f64::INFINITY).min(REHEARSED * step).max(step);
+        let options = Options { method: Method::Fixed(run.method), to, step: Some(step), ..Options::default() };
+        let mut audited = Audited::new(&mut system, &self.graph);
+        // What stops it stops the run itself, which tells it.
+        let _ = simulate(&mut audited, &options, &mut x, &mut Nobody);
+        let mut report = audited.finish();
+        let made = Made::by(&Run { method: options.method, step: options.step, ..Run::default() });
+        report.judge(&made);
+        // Steps that are too long are the modeller's choice; laws that do not hold are nobody's.
+        let laws = AuditReport { power: report.power.clone(), residual: report.residual.clone(), ..AuditReport::default() };
+        match laws.refusal(&made) {
+            Some(failure) => Err(self.stopped(failure)),
+            None => Ok(report),
+        }
+    }
+}
+
+/// Takes no samples.
+struct Nobody;
+
+impl Sink for Nobody {
+    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 /// A frequency in Hz from text such as `1kHz`, `500 Hz` or `500`; `None` if it is none.
@@ -261,7 +317,9 @@ impl Scale {
 }
 
 /// What stands between a run and the outside. All memory is taken when it is opened.
-struct Ports {
+struct Ports<'s> {
+    /// Whether to end the run.
+    stop: &'s AtomicBool,
     names: Vec<String>,
     scales: Vec<Scale>,
     from: Option<UdpSocket>,
@@ -284,8 +342,8 @@ struct Lines {
     rejected: AtomicU64,
 }
 
-impl Ports {
-    fn open(run: &RealTimeRun, system: &exec::Model) -> Result<Ports, Problem> {
+impl<'s> Ports<'s> {
+    fn open(run: &RealTimeRun, system: &exec::Model, stop: &'s AtomicBool) -> Result<Ports<'s>, Problem> {
         let program = system.program();
         let names: Vec<String> = program.inputs.iter().map(|i| i.name.clone()).collect();
         let wants = |wanted: &Source| matches!(wanted, Source::Udp(_) | Source::Stdin);
@@ -296,6 +354,7 @@ impl Ports {
             reason: format!("{what} udp://{at} cannot be opened: {why}"),
         };
         let mut ports = Ports {
+            stop,
             scales: program.inputs.iter().map(|i| Scale::to_si(i.unit.as_ref())).collect(),
             from: None,
             stdin: None,
@@ -357,7 +416,7 @@ impl Ports {
     }
 }
 
-impl Exchange<exec::Model> for Ports {
+impl Exchange<exec::Model> for Ports<'_> {
     fn input(&mut self, _: f64, system: &mut exec::Model) -> bool {
         self.take_datagrams();
         self.take_lines();
@@ -366,7 +425,7 @@ impl Exchange<exec::Model> for Ports {
                 system.set_input(i, scale.of(*value));
             }
         }
-        true
+        !self.stop.load(Relaxed)
     }
 
     fn output(&mut self, t: f64, values: &[f64]) {

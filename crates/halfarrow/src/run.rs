@@ -17,6 +17,7 @@ use serde::Serialize;
 use crate::audited::{AuditReport, Audited};
 use crate::error::{Error, Problem};
 use crate::model::Model;
+use crate::verdict::Made;
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
 /// their declarations give.
@@ -152,16 +153,24 @@ fn floats(names: Vec<String>) -> Option<String> {
     })
 }
 
-/// A law that is missed by more than this, relative to the greatest magnitude of its kind, is not met.
-const MISSED: f64 = 1e-2;
-
-/// A result that satisfies the model: of the other forms that is not certain on singular rings.
-fn trusted(done: Simulated) -> Result<Simulated, Error> {
-    let audit = &done.report.audit;
-    let untrue = [&audit.power, &audit.residual].into_iter().flatten().find(|m| m.value.is_nan() || m.value > MISSED);
-    let Some(miss) = untrue else { return Ok(done) };
-    let failure = Failure::Untrue { time: miss.time, what: miss.place.clone(), miss: miss.value };
-    Err(Error::Run(Box::new(Stopped { failure, trace: done.trace, report: done.report })))
+/// A result that satisfies the model, as the audit found: what is doubtful is said, what is wrong is refused.
+fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, Error> {
+    match outcome {
+        Ok(mut done) => {
+            done.report.audit.judge(made);
+            if let Some(failure) = done.report.audit.refusal(made) {
+                return Err(Error::Run(Box::new(Stopped { failure, trace: done.trace, report: done.report })));
+            }
+            done.report.notes.extend(done.report.audit.warnings.iter().cloned());
+            Ok(done)
+        }
+        Err(Error::Run(mut stopped)) => {
+            stopped.report.audit.judge(made);
+            stopped.report.notes.extend(stopped.report.audit.warnings.iter().cloned());
+            Err(Error::Run(stopped))
+        }
+        error => error,
+    }
 }
 
 impl Model {
@@ -176,7 +185,8 @@ impl Model {
             connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
             let notes = choose(&mut system, &run.record)?;
             let start = self.start(&mut system, run.start)?;
-            return self.integrate(&mut system, start, &options(run)?, notes, progress);
+            let done = self.integrate(&mut system, start, &options(run)?, notes, progress);
+            return judged(done, &Made::by(run));
         }
         let explicit = equations.residuals.is_empty();
         let mut system = self.implicit_system(&equations, run)?;
@@ -188,8 +198,7 @@ impl Model {
             true => self.integrate(&mut system.into_form(), y, &options(run)?, notes, progress),
             false => self.integrate_implicit(&mut system, (y, yp), &implicit_options(run)?, notes, progress),
         };
-        // The form of springs misses the constraints by what its springs give.
-        if run.form == Form::Stiff { done } else { done.and_then(trusted) }
+        judged(done, &Made::by(run))
     }
 
     fn integrate(
@@ -206,7 +215,11 @@ impl Model {
         }
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
-        let outcome = simulate(&mut audited, options, &mut x, &mut sink);
+        let mut outcome = simulate(&mut audited, options, &mut x, &mut sink);
+        if let Err(stopped) = &mut outcome {
+            stopped.failure = audited.explain(stopped.failure.clone());
+        }
+        notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
         self.ended(outcome, options, sink.trace, audit, notes)
@@ -223,6 +236,7 @@ impl Model {
         let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate_implicit(&mut audited, options, &mut y, &mut yp, &mut sink);
+        notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
         self.ended(outcome, options, sink.trace, audit, notes)
@@ -542,10 +556,12 @@ mod tests {
         let text = "model Mass\n1:j -> I:mass(1)\nSe:push(1) -> j\n";
         let model = Model::from_text("mass.bond", text, &[]).expect("a model without errors");
         let run = Run { to: 1.0, ..Run::default() };
-        let mut done = trusted(model.simulate(&run, &mut |_| true).expect("it runs")).expect("its laws are met");
-        let miss = done.report.audit.residual.as_mut().expect("laws are checked");
-        miss.value = 0.5;
-        let Err(Error::Run(stopped)) = trusted(done) else { panic!("half of the effort is missing") };
+        let mut done = model.simulate(&run, &mut |_| true).expect("its laws are met");
+        done.report.audit.residual.as_mut().expect("laws are checked").value = 1e-4;
+        let mut said = judged(Ok(done), &Made::by(&run)).expect("a doubt is said");
+        assert!(said.report.notes.iter().any(|note| note.contains("1e-4")), "{:?}", said.report.notes);
+        said.report.audit.residual.as_mut().expect("laws are checked").value = 0.5;
+        let Err(Error::Run(stopped)) = judged(Ok(said), &Made::by(&run)) else { panic!("half of the effort is missing") };
         assert!(matches!(&stopped.failure, Failure::Untrue { miss, .. } if *miss == 0.5), "{}", stopped.failure);
         assert!(!stopped.trace.times.is_empty(), "what was computed is kept");
     }

@@ -1,9 +1,11 @@
 //! Many runs of one model, each with parameters of its own.
 
+mod audit;
 mod journal;
 mod plan;
 mod reduce;
 
+pub use audit::{SetMiss, SweepAudit};
 pub use plan::{Samples, Vary};
 pub use reduce::{Reduce, Reduction};
 
@@ -43,6 +45,8 @@ pub struct Sweep {
     pub reduce: Vec<Reduce>,
     /// Begins anew, whatever an interrupted sweep has left.
     pub restart: bool,
+    /// Whether CSV has a second line with the units of the columns.
+    pub units: bool,
 }
 
 /// What came of a sweep.
@@ -60,6 +64,8 @@ pub struct SweepReport {
     pub failures: Vec<SetFailure>,
     /// Number of such sets.
     pub failed: usize,
+    /// What the audit found of a sample of the sets.
+    pub audit: SweepAudit,
 }
 
 /// A set that could not be run to the end.
@@ -77,15 +83,15 @@ const TOLD: usize = 100;
 impl Model {
     /// Runs a sweep on all cores and writes a row for each set to `out`, `.parquet` or `.csv`: the number of the set from 1,
     /// its parameters, what is kept of the run, and `failed`, 1 if the run did not come to its end (what is kept is then
-    /// not a number). Rows stand in the order of the sets. `progress` is told how many sets are done and says whether to
+    /// not a number). Rows stand in the order of the sets. A sample of the sets is run once more and audited. `progress` is told how many sets are done and says whether to
     /// go on.
     ///
     /// What is done stands in a file beside `out`, of its name with `.partial` behind; a sweep that was interrupted goes
     /// on from there. It is taken away in the end.
     ///
     /// # Errors
-    /// The model has errors, something is asked that cannot be, a file cannot be written, or `progress` stops it. Sets that
-    /// fail are no error.
+    /// The model has errors, something is asked that cannot be, a file cannot be written, another sweep is writing it, or
+    /// `progress` stops it. Sets that fail are no error.
     pub fn sweep(
         &self,
         sweep: &Sweep,
@@ -105,8 +111,11 @@ impl Model {
         let mut journal = Journal::open(out, &identity, columns.len(), sweep.restart)?;
         let resumed = journal.sets();
         let work = Work { plan: &plan, reducers: &reducers, options: &options, system: &system };
-        self.compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)?;
-        let failures = kind.write(out, &columns, &mut journal).map_err(unwritable)?;
+        if !self.compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)? {
+            return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
+        }
+        let audit = self.audit_sample(&work, &sweep.run);
+        let failures = kind.write(out, &columns, sweep.units, &mut journal).map_err(unwritable)?;
         journal.remove();
         Ok(SweepReport {
             model: self.name().to_string(),
@@ -115,21 +124,23 @@ impl Model {
             columns: columns.into_iter().map(|c| c.0).collect(),
             failed: failures.0,
             failures: failures.1,
+            audit,
         })
     }
 
+    /// Computes what is not done yet; false if it was stopped.
     fn compute(
         &self,
         work: &Work<'_>,
         start: crate::run::Start,
         journal: &mut Journal,
         progress: &mut dyn FnMut(usize, usize) -> bool,
-    ) -> io::Result<()> {
+    ) -> io::Result<bool> {
         let chunks = work.plan.sets().div_ceil(CHUNK);
         let open: Vec<usize> = (0..chunks).filter(|chunk| !journal.has(*chunk)).collect();
         let mut done = journal.sets();
         if open.is_empty() || !progress(done, work.plan.sets()) {
-            return interrupted(open.is_empty());
+            return Ok(open.is_empty());
         }
         // Few results wait to be written: memory stays bounded however many sets there are.
         let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
@@ -145,10 +156,10 @@ impl Model {
                 done += entry.rows;
                 journal.add(&entry)?;
                 if !progress(done, work.plan.sets()) {
-                    return interrupted(false);
+                    return Ok(false);
                 }
             }
-            Ok(())
+            Ok(true)
         })
     }
 
@@ -157,14 +168,6 @@ impl Model {
         // Everything that the rows depend on, as text.
         let graph = format!("{:?}", self.graph);
         format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()), sweep.run)
-    }
-}
-
-fn interrupted(fine: bool) -> io::Result<()> {
-    if fine {
-        Ok(())
-    } else {
-        Err(io::Error::new(io::ErrorKind::Interrupted, "stopped; the same command goes on from here"))
     }
 }
 
@@ -341,6 +344,7 @@ impl Kind {
         self,
         path: &Path,
         columns: &[(String, String)],
+        units: bool,
         journal: &mut Journal,
     ) -> io::Result<(usize, Vec<SetFailure>)> {
         let mut failures = (0, Vec::new());
@@ -355,6 +359,9 @@ impl Kind {
                 Kind::Csv => Table::Csv(CsvTable::new(out, names.iter().map(|(name, _)| *name))?),
                 Kind::Parquet => Table::Parquet(ParquetTable::new(out, &names)?),
             };
+            if let (true, Table::Csv(table)) = (units, &mut table) {
+                table.line(names.iter().map(|(_, unit)| *unit))?;
+            }
             for chunk in 0..journal.chunks() {
                 let entry = journal.entry(chunk)?;
                 note(&entry);

@@ -11,7 +11,7 @@ fn load(name: &str) -> Model {
 
 fn page(name: &str, compare: bool) -> String {
     let report = Report { to: Some(0.5), compare, error: 1e-3, ..Report::default() };
-    load(name).report(&report, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+    load(name).report(&report, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false))).html
 }
 
 #[test]

@@ -18,6 +18,7 @@ fn sweep(method: Method) -> Sweep {
         samples: None,
         reduce: reduce.to_vec(),
         restart: false,
+        units: false,
     }
 }
 

@@ -103,6 +103,8 @@ pub enum Failure {
         what: String,
         /// By how much, relative to the greatest magnitude of its kind.
         miss: f64,
+        /// What may be done about it.
+        remedy: String,
     },
     /// The receiver of the samples asked to stop.
     Interrupted {
@@ -206,10 +208,10 @@ impl fmt::Display for Failure {
                 write!(f, "{option} is {value}, but it must be {expected}")
             }
             Failure::BadMethod { expected } => write!(f, "this method does not fit the equations: use {expected}"),
-            Failure::Untrue { time, what, miss } => write!(
+            Failure::Untrue { time, what, miss, remedy } => write!(
                 f,
                 "at t = {time} s the result does not satisfy the model: {what} is missed by {miss:.0e} of what is there, as the \
-                 audit found; do not use it, and try the minimal form, another solver or tighter tolerances"
+                 audit found; do not use it: {remedy}"
             ),
             Failure::Interrupted { time } => write!(f, "stopped at t = {time} s as asked"),
         }

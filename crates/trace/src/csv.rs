@@ -6,13 +6,13 @@ use std::path::Path;
 
 use crate::{Trace, WriteError, write_whole};
 
-/// Writes a trace as CSV: a header of `t` and the names, then a line for each sample. Numbers have as many digits as
-/// it takes to read the same number back. The file is written whole or not at all.
+/// Writes a trace as CSV: a header of `t` and the names, with `units` a line of the units of the columns, then a line for each
+/// sample. Numbers have as many digits as it takes to read the same number back. The file is written whole or not at all.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_csv(trace: &Trace, path: &Path) -> Result<(), WriteError> {
-    write_whole(path, |out| write(trace, out))
+pub fn write_csv(trace: &Trace, path: &Path, units: bool) -> Result<(), WriteError> {
+    write_whole(path, |out| write(trace, units, out))
 }
 
 /// A trace as CSV text, as [`write_csv`] writes it.
@@ -21,18 +21,22 @@ pub fn write_csv(trace: &Trace, path: &Path) -> Result<(), WriteError> {
 /// use halfarrow_sim::Sink;
 /// let mut trace = halfarrow_trace::Trace::new([("m.p", "N.s")]);
 /// trace.sample(0.1, &[1e-13]);
-/// assert_eq!(halfarrow_trace::csv_text(&trace), "t,m.p\n0.1,1e-13\n");
+/// assert_eq!(halfarrow_trace::csv_text(&trace, false), "t,m.p\n0.1,1e-13\n");
+/// assert_eq!(halfarrow_trace::csv_text(&trace, true), "t,m.p\ns,N.s\n0.1,1e-13\n");
 /// ```
-pub fn csv_text(trace: &Trace) -> String {
+pub fn csv_text(trace: &Trace, units: bool) -> String {
     let mut text = Vec::new();
     // Writing to memory does not fail.
-    let _ = write(trace, &mut text);
+    let _ = write(trace, units, &mut text);
     String::from_utf8_lossy(&text).into_owned()
 }
 
-fn write(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+fn write(trace: &Trace, units: bool, out: &mut dyn Write) -> io::Result<()> {
     let names = std::iter::once("t").chain(trace.columns.iter().map(|column| column.name.as_str()));
     let mut table = CsvTable::new(out, names)?;
+    if units {
+        table.line(std::iter::once("s").chain(trace.columns.iter().map(|column| column.unit.as_str())))?;
+    }
     let columns = std::iter::once(&trace.times).chain(trace.columns.iter().map(|column| &column.values));
     table.rows(&columns.map(Vec::as_slice).collect::<Vec<_>>())
 }
@@ -47,10 +51,19 @@ impl<W: Write> CsvTable<W> {
     ///
     /// # Errors
     /// Nothing can be written to `out`.
-    pub fn new<'n>(mut out: W, names: impl IntoIterator<Item = &'n str>) -> io::Result<Self> {
-        let names: Vec<Cow<str>> = names.into_iter().map(quoted).collect();
-        writeln!(out, "{}", names.join(","))?;
-        Ok(CsvTable { out })
+    pub fn new<'n>(out: W, names: impl IntoIterator<Item = &'n str>) -> io::Result<Self> {
+        let mut table = CsvTable { out };
+        table.line(names)?;
+        Ok(table)
+    }
+
+    /// Adds a line of texts, such as the units of the columns.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn line<'n>(&mut self, texts: impl IntoIterator<Item = &'n str>) -> io::Result<()> {
+        let texts: Vec<Cow<str>> = texts.into_iter().map(quoted).collect();
+        writeln!(self.out, "{}", texts.join(","))
     }
 
     /// Adds rows: the values of each column, all of one length.
@@ -87,7 +100,7 @@ mod tests {
         let numbers = [0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, 1.0 / 3.0, 123456789.0, 1e-13, 1e22];
         let mut trace = Trace::new([("max(a, b)", ""), ("say \"x\"", "")]);
         numbers.iter().for_each(|&x| trace.sample(x, &[x, -x]));
-        let text = csv_text(&trace);
+        let text = csv_text(&trace, false);
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some("t,\"max(a, b)\",\"say \"\"x\"\"\""));
         for (line, x) in lines.zip(numbers) {
@@ -102,7 +115,7 @@ mod tests {
         let path = folder.path().join("x.csv");
         let mut trace = Trace::new([("x", "m")]);
         trace.sample(0.5, &[2.0]);
-        write_csv(&trace, &path).unwrap();
+        write_csv(&trace, &path, false).unwrap();
         assert_eq!(std::fs::read_to_string(path).unwrap(), "t,x\n0.5,2.0\n");
     }
 }

@@ -16,17 +16,18 @@ pub fn check(arguments: &FileArguments) -> u8 {
         Err(error) => return screen::fail(&error, arguments.json),
     };
     screen::warn(&report.found);
-    if arguments.json {
-        screen::print_json(&report.to_json());
+    let printed = if arguments.json {
+        screen::print_json(&report.to_json())
     } else if report.errors == 0 {
         let odd = if report.warnings == 0 { "nothing to say".to_string() } else { counted(report.warnings, "warning") };
-        screen::print(&format!("{}: {odd}\n", arguments.file.display()));
+        screen::print(&format!("{}: {odd}\n", arguments.file.display()))
     } else {
         let errors = counted(report.errors, "error");
         let warnings = counted(report.warnings, "warning");
         screen::note(&format!("{}: {errors}, {warnings}", arguments.file.display()));
-    }
-    u8::from(report.errors > 0)
+        Ok(())
+    };
+    screen::printed(printed, u8::from(report.errors > 0))
 }
 
 fn counted(n: usize, what: &str) -> String {
@@ -44,12 +45,12 @@ pub fn show(arguments: &arguments::Show) -> u8 {
         arguments::Stage::Program => Stage::Program,
     };
     let file: &Path = &arguments.model.model.file;
-    match stage.show(file, &overrides(&arguments.model)) {
+    let printed = match stage.show(file, &overrides(&arguments.model)) {
         Ok(text) if arguments.model.model.json => screen::print_json(&json!({"stage": stage.name(), "text": text})),
         Ok(text) => screen::print(&text),
         Err(error) => return screen::fail(&error, arguments.model.model.json),
-    }
-    0
+    };
+    screen::printed(printed, 0)
 }
 
 /// Zero-order causal paths and their fate.
@@ -59,7 +60,7 @@ pub fn loops(arguments: &arguments::Loops) -> u8 {
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => screen::print(&loops_text(&report)),
-        }
+        }?;
         Ok(0)
     })
 }
@@ -136,7 +137,7 @@ pub fn equations(arguments: &arguments::Equations) -> u8 {
             (true, _) | (_, Format::Json) => screen::print_json(&json!(report)),
             (_, Format::Text) => screen::print(&equations_text(&report)),
             (_, Format::Latex) => screen::print(&latex_text(&report)),
-        }
+        }?;
         Ok(0)
     })
 }

@@ -32,8 +32,15 @@ pub fn compare(arguments: &arguments::Compare) -> u8 {
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => screen::print(&text(&report)),
+        }?;
+        match report.refused()[..] {
+            [] => Ok(0),
+            ref forms => {
+                let forms = forms.join(", ");
+                screen::note(&format!("error: results of {forms} do not satisfy the model, as the audit found"));
+                Ok(3)
+            }
         }
-        Ok(0)
     })
 }
 

@@ -21,10 +21,10 @@ pub fn export(arguments: &arguments::Export) -> u8 {
             true => {
                 let mut object = json!(exported.report);
                 object["written"] = json!(written);
-                screen::print_json(&object);
+                screen::print_json(&object)
             }
             false => screen::print(&summary(&exported.report, &written)),
-        }
+        }?;
         Ok(0)
     })
 }

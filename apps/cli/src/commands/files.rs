@@ -19,13 +19,13 @@ pub fn new(arguments: &arguments::New) -> u8 {
     match write_new(&path) {
         Ok(()) => {
             let shown = path.display();
-            match arguments.json {
+            let printed = match arguments.json {
                 true => screen::print_json(&json!({"written": path})),
                 false => screen::print(&format!(
                     "{shown} is written. Try:\n  halfarrow equations {shown}\n  halfarrow simulate {shown} --to 10\n"
                 )),
-            }
-            0
+            };
+            screen::printed(printed, 0)
         }
         Err(problem) => screen::fail(&Error::Usage(problem), arguments.json),
     }
@@ -81,14 +81,15 @@ fn finish_fmt(arguments: &arguments::Fmt, before: &str, after: &str) -> u8 {
             return screen::fail(&Error::Usage(problem), arguments.model.json);
         }
     }
-    if arguments.model.json {
-        screen::print_json(&json!({"changed": changed, "text": after}));
-    } else if arguments.check && changed {
+    if arguments.check && changed && !arguments.model.json {
         screen::note(&format!("{} is laid out differently: run `halfarrow fmt --write` on it", path.display()));
-    } else if !arguments.check && !arguments.write {
-        screen::print(after);
     }
-    u8::from(arguments.check && changed)
+    let printed = match () {
+        () if arguments.model.json => screen::print_json(&json!({"changed": changed, "text": after})),
+        () if !arguments.check && !arguments.write => screen::print(after),
+        () => Ok(()),
+    };
+    screen::printed(printed, u8::from(arguments.check && changed))
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub fn linearize(arguments: &arguments::Linearize) -> u8 {
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => screen::print(&text(&report)),
-        }
+        }?;
         Ok(0)
     })
 }

@@ -12,6 +12,7 @@ use super::run::{method, record, start};
 use super::with_model;
 use crate::arguments::{self, RunArguments};
 use crate::screen;
+use crate::stop;
 
 /// Time from one look at a run to the next.
 const LOOK: Duration = Duration::from_millis(250);
@@ -20,29 +21,26 @@ const LOOK: Duration = Duration::from_millis(250);
 pub fn run(arguments: &RunArguments) -> u8 {
     with_model(&arguments.model, |model| {
         let run = asked(arguments)?;
+        let stop = stop::on_signals();
         let (statistics, over) = (Statistics::default(), AtomicBool::new(false));
         let outcome = std::thread::scope(|scope| {
             if io::stderr().is_terminal() && !arguments.model.model.json {
                 scope.spawn(|| watch(&statistics, &over));
             }
-            let outcome = model.run_real_time(&run, &statistics);
+            let outcome = model.run_real_time(&run, &statistics, &stop);
             over.store(true, Relaxed);
             outcome
         });
-        let report = match outcome {
-            Ok(report) => report,
-            Err(error) => {
-                if statistics.ticks() > 0 && !arguments.model.model.json {
-                    screen::note(&line(&statistics));
-                }
-                return Err(error);
-            }
-        };
+        let report = outcome?;
+        report.audit.warnings.iter().for_each(|warning| screen::note(&format!("warning: {warning}")));
+        if let Some(error) = &report.error {
+            screen::note(&format!("error: {error}"));
+        }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => screen::print(&text(&report)),
-        }
-        Ok(0)
+        }?;
+        Ok(if report.error.is_some() { 3 } else { 0 })
     })
 }
 

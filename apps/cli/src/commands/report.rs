@@ -28,12 +28,24 @@ pub fn report(arguments: &arguments::Report) -> u8 {
         });
         bar.finish();
         let page = page?;
-        write_whole(path, |out| out.write_all(page.as_bytes()))
+        write_whole(path, |out| out.write_all(page.html.as_bytes()))
             .map_err(|why| Problem::Unwritable { path: path.clone(), why: why.source.to_string() })?;
-        match arguments.model.model.json {
-            true => screen::print_json(&json!({"written": [path]})),
-            false => screen::print(&format!("{} is written\n", path.display())),
+        page.warnings.iter().for_each(|warning| screen::note(&format!("warning: {warning}")));
+        let failure = page.failure.clone().or_else(|| {
+            let forms = page.refused.join(", ");
+            (!forms.is_empty()).then(|| format!("results of {forms} do not satisfy the model, as the audit found"))
+        });
+        if let Some(failure) = &failure {
+            screen::note(&format!("error: {failure}"));
         }
-        Ok(0)
+        let mut object = json!({"written": [path]});
+        if let Some(failure) = &failure {
+            object["error"] = json!(failure);
+        }
+        match arguments.model.model.json {
+            true => screen::print_json(&object),
+            false => screen::print(&format!("{} is written\n", path.display())),
+        }?;
+        Ok(if failure.is_some() { 3 } else { 0 })
     })
 }

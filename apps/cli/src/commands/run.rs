@@ -1,10 +1,11 @@
 //! `simulate`.
 
 use std::path::Path;
+use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start, Trace, csv_text,
-    write_csv, write_parquet,
+    AuditReport, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start, Stopped,
+    Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -13,6 +14,7 @@ use super::picture::{check_names, write_picture};
 use super::with_model;
 use crate::arguments::{self, Simulate, Solver};
 use crate::screen::{self, Progress};
+use crate::stop;
 
 /// A trajectory.
 pub fn simulate(arguments: &Simulate) -> u8 {
@@ -22,24 +24,21 @@ pub fn simulate(arguments: &Simulate) -> u8 {
             write_picture(&model.draw()?, path)?;
         }
         let mut progress = Progress::new(arguments.to);
+        let stop = stop::on_signals();
         let outcome = model.simulate(&run(arguments), &mut |t| {
             progress.reach(t);
-            true
+            !stop.load(Relaxed)
         });
         progress.finish();
         match outcome {
             Ok(done) => {
-                finish(arguments, model, &done)?;
+                finish(arguments, model, &done, None)?;
                 Ok(0)
             }
             Err(Error::Run(stopped)) => {
-                let done = Simulated { trace: stopped.trace.clone(), report: stopped.report.clone() };
-                screen::note(Error::Run(stopped.clone()).render(false).trim_end());
-                if done.trace.samples() > 0 {
-                    finish(arguments, model, &done)?;
-                } else if arguments.model.model.json {
-                    screen::print_json(&Error::Run(stopped).to_json());
-                }
+                let Stopped { failure, trace, report } = *stopped;
+                screen::note(&format!("error: {failure}"));
+                finish(arguments, model, &Simulated { trace, report }, Some(&failure.to_string()))?;
                 Ok(3)
             }
             Err(error) => Err(error),
@@ -116,36 +115,44 @@ fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-fn finish(arguments: &Simulate, model: &Model, done: &Simulated) -> Result<(), Error> {
-    for path in &arguments.out {
-        if is_stdout(path) {
-            screen::print(&csv_text(&done.trace));
-        } else {
-            let write = if extension(path) == "parquet" { write_parquet } else { write_csv };
-            write(&done.trace, path)
-                .map_err(|why| Problem::Unwritable { path: path.clone(), why: why.source.to_string() })?;
-        }
-    }
-    for path in &arguments.plot {
-        write_picture(&model.plot(&done.trace), path)?;
+/// Writes and shows what was computed; `error` says why it stopped, if it did. Of a run that never began there is nothing to
+/// write.
+fn finish(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&str>) -> Result<(), Error> {
+    if done.trace.samples() > 0 || error.is_none() {
+        write_files(arguments, model, &done.trace)?;
     }
     let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
     done.report.notes.iter().for_each(|note| screen::note(&format!("warning: {note}")));
     if arguments.model.model.json {
         if !to_stdout {
-            screen::print_json(&json_of(arguments, done));
+            screen::print_json(&json_of(arguments, done, error))?;
         }
     } else if to_stdout {
         screen::note(summary(&done.report).trim_end());
-    } else {
-        screen::print(&(values(&done.trace) + &summary(&done.report)));
+    } else if done.trace.samples() > 0 || error.is_none() {
+        screen::print(&(values(&done.trace) + &summary(&done.report)))?;
     }
     Ok(())
 }
 
+fn write_files(arguments: &Simulate, model: &Model, trace: &Trace) -> Result<(), Error> {
+    for path in &arguments.out {
+        let unwritable = |why: String| Problem::Unwritable { path: path.clone(), why };
+        match extension(path).as_str() {
+            _ if is_stdout(path) => screen::print(&csv_text(trace, arguments.units))?,
+            "parquet" => write_parquet(trace, path).map_err(|why| unwritable(why.source.to_string()))?,
+            _ => write_csv(trace, path, arguments.units).map_err(|why| unwritable(why.source.to_string()))?,
+        }
+    }
+    arguments.plot.iter().try_for_each(|path| write_picture(&model.plot(trace), path))
+}
+
 /// The report, the columns and, if they are written nowhere else, the values.
-fn json_of(arguments: &Simulate, done: &Simulated) -> Value {
+fn json_of(arguments: &Simulate, done: &Simulated, error: Option<&str>) -> Value {
     let mut object = json!(done.report);
+    if let Some(error) = error {
+        object["error"] = json!(error);
+    }
     let columns = done.trace.columns.iter();
     object["columns"] = columns.clone().map(|c| json!({"name": c.name, "unit": c.unit})).collect();
     object["samples"] = json!(done.trace.samples());
@@ -182,12 +189,15 @@ fn summary(report: &RunReport) -> String {
     if report.jumps + report.switches > 0 {
         text += &format!(", {} jumps and {} switches met", report.jumps, report.switches);
     }
-    text += "\n";
-    let audit = &report.audit;
+    text + &format!("\naudit: {}\n", misses(&report.audit))
+}
+
+/// The greatest miss of each kind.
+pub(super) fn misses(audit: &AuditReport) -> String {
     let parts =
         [("power", &audit.power), ("energy", &audit.energy), ("residual", &audit.residual), ("rates", &audit.rates)];
     let misses = parts.iter().filter_map(|(name, miss)| miss.as_ref().map(|m| format!("{name} {}", missed(m))));
-    text + &format!("audit: {}\n", misses.collect::<Vec<_>>().join(", "))
+    misses.collect::<Vec<_>>().join(", ")
 }
 
 /// A miss; one that the samples cannot resolve is said to be below that.

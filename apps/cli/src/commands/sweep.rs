@@ -1,12 +1,15 @@
 //! `sweep`.
 
-use halfarrow::{Error, Problem, Reduce, Run, Samples, Sweep, SweepReport, Vary};
+use std::sync::atomic::Ordering::Relaxed;
+
+use halfarrow::{Error, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
 use serde_json::json;
 
-use super::run::{method, start};
+use super::run::{method, misses, start};
 use super::with_model;
 use crate::arguments;
 use crate::screen::{self, Progress};
+use crate::stop;
 
 /// Failures that are shown to people.
 const SHOWN: usize = 10;
@@ -16,20 +19,40 @@ pub fn sweep(arguments: &arguments::Sweep) -> u8 {
     with_model(&arguments.model, |model| {
         let sweep = asked(arguments)?;
         let mut bar: Option<Progress> = None;
+        let stop = stop::on_signals();
         let outcome = model.sweep(&sweep, &arguments.out, &mut |done, sets| {
             bar.get_or_insert_with(|| Progress::of_sets(sets)).reach(done as f64);
-            true
+            !stop.load(Relaxed)
         });
         if let Some(bar) = &bar {
             bar.finish();
         }
         let report = outcome?;
+        let wrong = told(&report.audit);
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => screen::print(&text(&report, arguments)),
-        }
-        Ok(if report.failed == report.sets { 3 } else { 0 })
+        }?;
+        Ok(if report.failed == report.sets || wrong { 3 } else { 0 })
     })
+}
+
+/// Says what the audit found wrong; whether rows are not to be used.
+fn told(audit: &SweepAudit) -> bool {
+    for miss in audit.misses.iter().take(SHOWN) {
+        miss.warnings.iter().for_each(|warning| screen::note(&format!("warning: set {}: {warning}", miss.set)));
+    }
+    if audit.misses.len() > SHOWN {
+        screen::note(&format!("warning: ... and {} more sets", audit.misses.len() - SHOWN));
+    }
+    if audit.refused > 0 {
+        screen::note(&format!(
+            "error: {} of the {} sets that were audited do not satisfy the model; do not use the rows of these and of sets like \
+             them",
+            audit.refused, audit.sets
+        ));
+    }
+    audit.refused > 0
 }
 
 fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
@@ -49,6 +72,7 @@ fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
         samples: arguments.samples.as_deref().map(Samples::read).transpose()?,
         reduce: arguments.reduce.iter().map(|text| Reduce::parse(text)).collect::<Result<_, Problem>>()?,
         restart: arguments.restart,
+        units: arguments.units,
     })
 }
 
@@ -67,5 +91,11 @@ fn text(report: &SweepReport, arguments: &arguments::Sweep) -> String {
     if report.failed > 0 {
         text += &format!(", {} failed", report.failed);
     }
-    text + &format!(" -> {}\ncolumns: {}\n", arguments.out.display(), report.columns.join(", "))
+    text += &format!(" -> {}\ncolumns: {}\n", arguments.out.display(), report.columns.join(", "));
+    let audit = &report.audit;
+    text += &format!("audit of {} sets: {}", audit.sets, misses(&audit.greatest));
+    if audit.doubtful + audit.refused > 0 {
+        text += &format!("; {} doubtful, {} refused", audit.doubtful, audit.refused);
+    }
+    text + "\n"
 }

@@ -13,9 +13,11 @@ use halfarrow_compiler::equations::{Form, Step};
 use halfarrow_sim::Method;
 use serde::Serialize;
 
+use crate::audited::AuditReport;
 use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::run::{Run, Start};
+use crate::verdict::Verdict;
 use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
 use reference::{Apart, POINTS, Reference};
 use subject::{Settings, Subject};
@@ -117,6 +119,8 @@ pub struct Row {
     pub energy_error: Option<f64>,
     /// Below this it says nothing: energies are integrated from the ends of steps, which may be far apart.
     pub energy_resolution: Option<f64>,
+    /// What the audit found in that run.
+    pub audit: Option<AuditReport>,
     /// Form `stiff`: measured order of convergence in the stiffness.
     pub order: Option<f64>,
     /// Form `stiff`: stiffness and the error of the motion that it causes.
@@ -368,9 +372,11 @@ impl Measured<'_> {
         if let Some(chosen) = &chosen {
             let subject = rungs.iter().find(|r| r.0 == *chosen).map_or(last, |r| &subjects[r.1]);
             let settings = Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to };
-            if let Some(miss) = subject.audited(settings).energy {
+            let audit = subject.audited(settings, chosen.stiffness);
+            if let Some(miss) = &audit.energy {
                 (row.energy_error, row.energy_resolution) = (Some(miss.value), Some(miss.resolution));
             }
+            row.audit = Some(audit);
             row.solver = Some(solver(chosen.method));
         }
         match best {
@@ -433,6 +439,10 @@ fn notes(report: &CompareReport) -> Vec<String> {
         notes.push(format!(
             "the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little"
         ));
+    }
+    for row in &report.rows {
+        let warnings = row.audit.iter().flat_map(|audit| &audit.warnings);
+        notes.extend(warnings.map(|warning| format!("warning: {}: {warning}", row.form)));
     }
     for row in report.rows.iter().filter(|row| row.form == "stiff" && row.differential.is_some()) {
         if row.convergence.is_empty() {
@@ -501,6 +511,14 @@ fn solver(method: Method) -> &'static str {
         Method::Radau => "radau",
         Method::Auto => "auto",
         Method::Fixed(_) => "fixed",
+    }
+}
+
+impl CompareReport {
+    /// The forms whose results are not to be used, as the audit found.
+    pub fn refused(&self) -> Vec<&'static str> {
+        let refused = |row: &&Row| row.audit.as_ref().is_some_and(|audit| audit.verdict == Verdict::Refused);
+        self.rows.iter().filter(refused).map(|row| row.form).collect()
     }
 }
 

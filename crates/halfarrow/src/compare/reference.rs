@@ -73,7 +73,7 @@ impl Reference {
         };
         let made = |trace: &Trace| Reference {
             to,
-            columns: columns(trace, &known, motion),
+            columns: columns(trace, &known, motion, &minimal.magnitudes(trace)),
             confirmed: f64::NAN,
             by: (Form::Minimal, Method::Auto),
         };
@@ -120,7 +120,13 @@ impl Reference {
     }
 }
 
-fn columns(trace: &Trace, known: &[(String, String)], motion: &[String]) -> BTreeMap<String, Column> {
+/// `least` is how great variables of the graph count as at least: what is zero but for rounding has no magnitude of its own.
+fn columns(
+    trace: &Trace,
+    known: &[(String, String)],
+    motion: &[String],
+    least: &BTreeMap<String, f64>,
+) -> BTreeMap<String, Column> {
     let greatest = |values: &[f64]| values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
     let mut of_unit: BTreeMap<&str, f64> = BTreeMap::new();
     for (column, variable) in trace.columns.iter().zip(known) {
@@ -129,7 +135,8 @@ fn columns(trace: &Trace, known: &[(String, String)], motion: &[String]) -> BTre
     }
     let column = |(column, variable): (&halfarrow_trace::Column, &(String, String))| {
         let name = &variable.0;
-        let scale = greatest(&column.values).max(FLOOR * of_unit[kind(variable)]).max(f64::MIN_POSITIVE);
+        let floor = least.get(name).copied().unwrap_or(0.0).max(FLOOR * of_unit[kind(variable)]);
+        let scale = greatest(&column.values).max(floor).max(f64::MIN_POSITIVE / f64::EPSILON);
         (name.clone(), Column { values: column.values.clone(), scale, motion: motion.contains(name) })
     };
     trace.columns.iter().zip(known).map(column).collect()

@@ -1,5 +1,6 @@
 //! A form of a model, ready to run as often as it takes.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
@@ -13,11 +14,13 @@ use crate::audited::{AuditReport, Audited};
 use crate::error::Error;
 use crate::model::Model;
 use crate::run::{Run, Start, connect, quicken};
+use crate::verdict::Made;
 
 /// A form at its start.
 #[derive(Clone)]
 pub(super) struct Subject<'m> {
     graph: &'m BondGraph,
+    form: Form,
     system: Ready,
 }
 
@@ -61,7 +64,7 @@ impl Model {
             let mut system = self.system(&equations)?;
             connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
             let x = self.start(&mut system, run.start)?;
-            return Ok(Subject { graph, system: Ready::Explicit(system, x) });
+            return Ok(Subject { graph, form: run.form, system: Ready::Explicit(system, x) });
         }
         let explicit = equations.residuals.is_empty();
         let mut system = self.implicit_system(&equations, run)?;
@@ -72,7 +75,7 @@ impl Model {
             true => Ready::Explicit(system.into_form(), y),
             false => Ready::Implicit(system, y, yp),
         };
-        Ok(Subject { graph, system })
+        Ok(Subject { graph, form: run.form, system })
     }
 }
 
@@ -161,10 +164,10 @@ impl Subject<'_> {
         }
     }
 
-    /// Runs it and audits every step.
-    pub(super) fn audited(&self, settings: Settings) -> AuditReport {
+    /// Runs it and audits every step; `stiffness` of the form `stiff`.
+    pub(super) fn audited(&self, settings: Settings, stiffness: Option<f64>) -> AuditReport {
         let options = settings.options(None);
-        match self.system.clone() {
+        let mut report = match self.system.clone() {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(&[]);
                 let mut audited = Audited::new(&mut system, self.graph);
@@ -177,7 +180,23 @@ impl Subject<'_> {
                 let _ = simulate_implicit(&mut audited, &options, &mut y, &mut yp, &mut Nobody);
                 audited.finish()
             }
-        }
+        };
+        let (Settings { method, rtol, .. }, form) = (settings, self.form);
+        report.judge(&Made { form, method, rtol, step: None, stiffness: stiffness.unwrap_or(1e6) });
+        report
+    }
+
+    /// How great each recorded variable counts as at least, by name.
+    pub(super) fn magnitudes(&self, trace: &Trace) -> BTreeMap<String, f64> {
+        let parameter = |name: &str| match &self.system {
+            Ready::Explicit(system, _) => system.parameter(name),
+            Ready::Implicit(system, ..) => system.reference().parameter(name),
+        };
+        let known = self.graph.parameters.values();
+        let parameters = known.filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect();
+        let columns = trace.columns.iter().map(|c| (c.name.clone(), c.values.as_slice())).collect();
+        let run = halfarrow_audit::Run { times: &trace.times, columns: &columns, parameters: &parameters };
+        halfarrow_audit::magnitudes(self.graph, &run)
     }
 
     /// Rates of the motion near the start, in 1/s: the slowest and the fastest that are not zero.

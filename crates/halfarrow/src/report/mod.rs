@@ -41,6 +41,19 @@ impl Default for Report {
     }
 }
 
+/// A report, and what is to be said beside it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Page {
+    /// The text of the page.
+    pub html: String,
+    /// What is to be known of the run.
+    pub warnings: Vec<String>,
+    /// Why the run stopped, or why its result is not to be used.
+    pub failure: Option<String>,
+    /// Forms whose results are not to be used.
+    pub refused: Vec<&'static str>,
+}
+
 /// What the page is made of.
 struct Content {
     title: String,
@@ -88,11 +101,11 @@ struct FormText {
 }
 
 impl Model {
-    /// The report as the text of an HTML page. `progress` is told what is done and what is being done.
+    /// The report as an HTML page. `progress` is told what is done and what is being done.
     ///
     /// # Errors
     /// The model has errors, or an input does not fit. A run that stops is no error: the page says so.
-    pub fn report(&self, report: &Report, progress: &mut dyn FnMut(f64, &str) -> bool) -> Result<String, Error> {
+    pub fn report(&self, report: &Report, progress: &mut dyn FnMut(f64, &str) -> bool) -> Result<Page, Error> {
         progress(0.0, "equations");
         let causal = self.causal_graph()?;
         let loops = self.loops()?;
@@ -121,14 +134,22 @@ impl Model {
         };
         progress(0.9, "run");
         let run = Run { to, every: Some(to / 500.0), inputs: report.inputs.clone(), rtol: 1e-8, ..Run::default() };
+        let mut page = Page::default();
         let run = match self.simulate(&run, &mut |_| true) {
             Ok(done) => {
                 let svg = self.plot(&done.trace).svg;
+                page.warnings.extend(done.report.notes.iter().cloned());
                 Ok((done, svg))
             }
-            Err(Error::Run(stopped)) => Err(stopped.to_string()),
+            Err(Error::Run(stopped)) => {
+                page.failure = Some(stopped.to_string());
+                Err(stopped.to_string())
+            }
             Err(error) => return Err(error),
         };
+        if let Some((compared, _)) = &comparison {
+            page.refused = compared.refused();
+        }
         let content = Content {
             title: if self.graph.doc.is_empty() { self.graph.name.clone() } else { self.graph.doc.clone() },
             name: self.graph.name.clone(),
@@ -146,7 +167,8 @@ impl Model {
             warnings: self.check()?.diagnostics.0.iter().map(|d| d.title.clone()).collect(),
         };
         progress(1.0, "page");
-        Ok(page::page(&content))
+        page.html = page::page(&content);
+        Ok(page)
     }
 
     fn facts(&self, loops: &crate::loops::LoopsReport, states: usize) -> Vec<(&'static str, String)> {

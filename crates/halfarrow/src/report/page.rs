@@ -277,7 +277,7 @@ fn audit(content: &Content) -> Markup {
             h2 { "Audit" }
             p { "Computed from the recorded values and the bond graph alone, by code that shares nothing with the equations." }
             (misses(done))
-            @for list in [&done.report.audit.notes, &done.report.audit.unchecked] {
+            @for list in [&done.report.audit.warnings, &done.report.audit.notes, &done.report.audit.unchecked] {
                 @if !list.is_empty() { ul.plain { @for line in list { li { (line) } } } }
             }
         }

@@ -4,7 +4,7 @@
 //! whether they are whole. What was written last when the program was killed is cut off.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -40,13 +40,14 @@ impl Journal {
         let mut name = out.file_name().unwrap_or_default().to_os_string();
         name.push(".partial");
         let path = out.with_file_name(name);
-        if restart {
-            let _ = fs::remove_file(&path); // it may not be there
-        }
         let unwritable = |why: io::Error| Problem::Unwritable { path: path.clone(), why: why.to_string() };
         let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let mut journal =
-            Journal { file: opened.map_err(unwritable)?, path: path.clone(), places: BTreeMap::new(), end: 0, columns };
+        let file = opened.map_err(unwritable)?;
+        lock(&file, out)?;
+        if restart {
+            file.set_len(0).map_err(unwritable)?;
+        }
+        let mut journal = Journal { file, path: path.clone(), places: BTreeMap::new(), end: 0, columns };
         let header = format!("halfarrow sweep 1 {:016x}\n", fingerprint(identity.as_bytes()));
         let mut found = vec![0; header.len()];
         let there = journal.file.read_exact(&mut found).is_ok();
@@ -141,6 +142,20 @@ impl Journal {
     }
 }
 
+/// Keeps other sweeps away as long as the file is open; where the file system knows no locks there are none.
+fn lock(file: &File, out: &Path) -> Result<(), Problem> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let reason = format!(
+                "another sweep is writing {} just now: wait until it is done, or take another --out",
+                out.display()
+            );
+            Err(Problem::BadOption { reason })
+        }
+        Err(TryLockError::Error(_)) | Ok(()) => Ok(()),
+    }
+}
+
 fn number(reader: &mut impl Read) -> io::Result<u64> {
     let mut bytes = [0; 8];
     reader.read_exact(&mut bytes)?;
@@ -213,6 +228,21 @@ mod tests {
         }
         open(&out).remove();
         assert!(!partial.exists());
+    }
+
+    #[test]
+    fn two_sweeps_do_not_write_one_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("r.csv");
+        let mut first = open(&out);
+        first.add(&entry(0)).unwrap();
+        for restart in [false, true] {
+            let Err(second) = Journal::open(&out, "this one", 2, restart) else { panic!("two at once") };
+            assert!(second.to_string().contains("another sweep is writing"), "{second}");
+        }
+        assert_eq!(bytes(&first.entry(0).unwrap()), bytes(&entry(0)), "what the first has written stays");
+        drop(first);
+        assert_eq!(open(&out).chunks(), 1);
     }
 
     #[test]

@@ -1,16 +1,16 @@
-/* Steps the model and prints its outputs: the time to stop, and how many steps lie between lines, can be given. */
+/* Steps the model and prints its outputs, in the units that the model declares for them, as `halfarrow simulate` does. The time
+ * to stop, how many steps lie between lines, and `units` for a second line with the units can be given. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "NAME.h"
 
+OUTPUT_SCALES
 static void print(const MODEL *m)
 {
-    int i;
     printf("%.17g", m->t);
-    for (i = 0; i < MODEL_OUTPUTS; ++i) {
-        printf(",%.17g", m->y[i]);
-    }
+PRINT_OUTPUTS
     printf("\n");
 }
 
@@ -22,6 +22,9 @@ int main(int argc, char **argv)
     long steps = 0;
     int status = MODEL_reset(&m);
     printf("tOUTPUT_NAMES\n");
+    if (argc > 3 && strcmp(argv[3], "units") == 0) {
+        printf("sOUTPUT_UNITS\n");
+    }
     if (status == MODEL_OK) {
         status = MODEL_start(&m, 0.0);
     }

@@ -1,0 +1,210 @@
+//! What an audit means for a result, in words: one judgement for all forms, methods and commands.
+
+use std::collections::BTreeMap;
+
+use halfarrow_compiler::equations::Form;
+use halfarrow_sim::{Failure, Method};
+use serde::Serialize;
+
+use crate::audited::{AuditReport, Miss};
+use crate::run::Run;
+
+/// A miss above this part of what is there is said.
+pub(crate) const SAID: f64 = 1e-6;
+/// A result that misses a law by more than this part of what is there is refused.
+pub(crate) const REFUSED: f64 = 1e-2;
+/// Errors of steps add up over a run: as many times the tolerance of a step are what was asked for.
+const STEPS: f64 = 300.0;
+/// The form `stiff`: its springs give by so much of the ratio of speeds.
+const GIVE: f64 = 10.0;
+
+/// What an audit means for a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Every law holds, as far as it could be checked.
+    #[default]
+    Holds,
+    /// Something is missed by more than a millionth of what is there, and said.
+    Doubtful,
+    /// Something is missed by more than a hundredth: the result is not to be used.
+    Refused,
+}
+
+/// How a result was made: what misses may come from, and what may be done about them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Made {
+    pub form: Form,
+    pub method: Method,
+    pub rtol: f64,
+    pub step: Option<f64>,
+    /// Form `stiff`: square of the ratio of frequencies.
+    pub stiffness: f64,
+}
+
+impl Made {
+    pub fn by(run: &Run) -> Made {
+        Made {
+            form: run.form,
+            method: run.method,
+            rtol: run.rtol,
+            step: run.step,
+            stiffness: run.stiffness.unwrap_or(1e6),
+        }
+    }
+
+    /// By how much laws may be missed before that is said, and before the result is refused. The springs of the form
+    /// `stiff` give.
+    fn laws(&self) -> (f64, f64) {
+        let give = if self.form == Form::Stiff { GIVE / self.stiffness.sqrt() } else { 0.0 };
+        (SAID.max(give), REFUSED.max(GIVE * give))
+    }
+
+    /// The same for what is integrated: of a tolerance as much as was asked for.
+    fn integrals(&self) -> (f64, f64) {
+        let asked = if matches!(self.method, Method::Fixed(_)) { 0.0 } else { STEPS * self.rtol };
+        (SAID.max(asked), REFUSED.max(asked))
+    }
+
+    /// What to do where laws are missed.
+    fn remedy_for_laws(&self) -> String {
+        match self.form {
+            Form::Stiff => "take a greater --stiffness, or another form".into(),
+            Form::Minimal => "see with `compare` which form holds, take that one with --form, or bring the values of \
+                              parameters nearer to each other"
+                .into(),
+            _ => "take the form minimal, or see with `compare` which form holds".into(),
+        }
+    }
+
+    /// What to do where integrals are missed.
+    fn remedy_for_integrals(&self) -> String {
+        match (self.method, self.step) {
+            (Method::Fixed(_), Some(step)) => {
+                format!("steps of {step} s are too long here: shorten --step, or take a solver with variable step")
+            }
+            _ => "tighten --rtol, or take another --solver".into(),
+        }
+    }
+}
+
+/// A miss beyond what may be.
+struct Beyond<'a> {
+    miss: &'a Miss,
+    verdict: Verdict,
+    remedy: String,
+}
+
+impl AuditReport {
+    /// Judges what was found, and says what is wrong.
+    pub(crate) fn judge(&mut self, made: &Made) {
+        let beyond = self.beyond(made);
+        let verdict = beyond.iter().map(|b| b.verdict).max().unwrap_or_default();
+        let mut by_remedy: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+        for b in &beyond {
+            let Miss { place, value, time, .. } = b.miss;
+            by_remedy.entry(&b.remedy).or_default().push(format!("{place} is missed by {value:.0e} at t = {time} s"));
+        }
+        let said = |(remedy, misses): (&str, Vec<String>)| format!("audit: {}: {remedy}", misses.join("; "));
+        let warnings = by_remedy.into_iter().map(said).collect();
+        (self.verdict, self.warnings) = (verdict, warnings);
+    }
+
+    /// Why the result is not to be used, if it is not.
+    pub(crate) fn refusal(&self, made: &Made) -> Option<Failure> {
+        let refused = self.beyond(made).into_iter().find(|b| b.verdict == Verdict::Refused)?;
+        let Miss { place, value, time, .. } = refused.miss.clone();
+        Some(Failure::Untrue { time, what: place, miss: value, remedy: refused.remedy })
+    }
+
+    /// What is missed by more than may be: laws first.
+    fn beyond(&self, made: &Made) -> Vec<Beyond<'_>> {
+        let laws = [&self.residual, &self.power].map(|m| (m, made.laws(), made.remedy_for_laws()));
+        let integrals = [&self.rates, &self.energy].map(|m| (m, made.integrals(), made.remedy_for_integrals()));
+        let judged = |(miss, (said, refused), remedy): (&'_ Option<Miss>, (f64, f64), String)| {
+            let miss = miss.as_ref()?;
+            // What the samples leave open says nothing about the run.
+            let excess = miss.value - miss.resolution;
+            let verdict = match () {
+                () if excess.is_nan() || excess > refused => Verdict::Refused,
+                () if excess > said => Verdict::Doubtful,
+                () => return None,
+            };
+            Some((verdict, remedy))
+        };
+        let all = laws.into_iter().chain(integrals);
+        all.filter_map(|(miss, bounds, remedy)| {
+            let (verdict, remedy) = judged((miss, bounds, remedy))?;
+            Some(Beyond { miss: miss.as_ref()?, verdict, remedy })
+        })
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halfarrow_sim::fixed_step::FixedMethod;
+
+    fn miss(value: f64, resolution: f64) -> Option<Miss> {
+        Some(Miss { value, time: 1.0, place: "body: its law".into(), resolution })
+    }
+
+    fn made(form: Form, method: Method) -> Made {
+        Made { form, method, rtol: 1e-6, step: Some(0.1), stiffness: 1e6 }
+    }
+
+    fn verdict(report: AuditReport, made: &Made) -> Verdict {
+        let mut report = report;
+        report.judge(made);
+        assert_eq!(report.warnings.is_empty(), report.verdict == Verdict::Holds);
+        assert_eq!(report.refusal(made).is_some(), report.verdict == Verdict::Refused);
+        report.verdict
+    }
+
+    #[test]
+    fn laws_are_judged_alike_for_every_form() {
+        for form in [Form::Minimal, Form::Break, Form::Lagrange, Form::Kane, Form::Inverted, Form::Relaxed] {
+            let made = made(form, Method::Auto);
+            for (value, wanted) in [
+                (1e-9, Verdict::Holds),
+                (1e-5, Verdict::Doubtful),
+                (0.5, Verdict::Refused),
+                (f64::NAN, Verdict::Refused),
+                (f64::INFINITY, Verdict::Refused),
+            ] {
+                let residual = AuditReport { residual: miss(value, 0.0), ..AuditReport::default() };
+                let power = AuditReport { power: miss(value, 0.0), ..AuditReport::default() };
+                assert_eq!((verdict(residual, &made), verdict(power, &made)), (wanted, wanted), "{form:?} {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_samples_leave_open_says_nothing_and_a_tolerance_is_granted() {
+        let rates = |value, resolution| AuditReport { rates: miss(value, resolution), ..AuditReport::default() };
+        let fixed = made(Form::Minimal, Method::Fixed(FixedMethod::Rk4));
+        assert_eq!(verdict(rates(0.5, 0.6), &fixed), Verdict::Holds);
+        assert_eq!(verdict(rates(0.5, 1e-3), &fixed), Verdict::Refused);
+        assert_eq!(verdict(rates(1e-4, 1e-8), &fixed), Verdict::Doubtful);
+        assert_eq!(verdict(rates(1e-4, 1e-8), &made(Form::Minimal, Method::Auto)), Verdict::Holds);
+        assert_eq!(verdict(rates(0.5, 1e-8), &made(Form::Minimal, Method::Auto)), Verdict::Refused);
+    }
+
+    #[test]
+    fn springs_give() {
+        let laws = |value| AuditReport { residual: miss(value, 0.0), ..AuditReport::default() };
+        let stiff = made(Form::Stiff, Method::Auto);
+        assert_eq!(verdict(laws(1e-3), &stiff), Verdict::Holds);
+        assert_eq!(verdict(laws(0.05), &stiff), Verdict::Doubtful);
+        assert_eq!(verdict(laws(0.5), &stiff), Verdict::Refused);
+    }
+
+    #[test]
+    fn words_name_place_time_and_remedy() {
+        let mut report = AuditReport { rates: miss(0.5, 0.0), energy: miss(0.1, 0.0), ..AuditReport::default() };
+        report.judge(&made(Form::Minimal, Method::Fixed(FixedMethod::Euler)));
+        let [said] = &report.warnings[..] else { panic!("one remedy: {:?}", report.warnings) };
+        assert!(said.contains("body") && said.contains("t = 1 s") && said.contains("shorten --step"), "{said}");
+    }
+}
