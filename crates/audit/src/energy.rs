@@ -5,7 +5,7 @@ use crate::quadrature::{gauss, integrate};
 use crate::regions::Classes;
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
-use crate::worst::{Raw, Worst};
+use crate::worst::{Raw, Worst, above};
 use halfarrow_compiler::algebra::{Expr, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, Storage, StorageLaw};
 use std::collections::BTreeSet;
@@ -105,21 +105,15 @@ impl Held<'_> {
     /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
     fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
         let integral = integrate(times, self.rate);
-        let miss = |k: usize| self.x[k] - self.x[0] - integral.values[k];
-        // What stands out above what the samples resolve, or else what is greatest.
-        let excess = |k: usize| {
-            let excess = miss(k).abs() - integral.uncertainty[k];
-            if excess < 0.0 { 0.0 } else { excess }
-        };
-        let beyond = |a: usize, b: usize| {
-            let (new, old) = (excess(b), excess(a));
-            new.is_nan() || new > old || (new == old && miss(b).abs() > miss(a).abs())
-        };
-        let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
         let moved = integral.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let mut terms = self.terms.clone();
         terms.push(Term::of(Quantity::Number, moved));
         terms.extend(more());
+        let scale = settled.scale(&terms);
+        let miss = |k: usize| self.x[k] - self.x[0] - integral.values[k];
+        let stands_out = |k: usize| (scale.relative(miss(k)), scale.relative(integral.uncertainty[k]));
+        let beyond = |a: usize, b: usize| above(stands_out(b), stands_out(a));
+        let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
         let place = format!("{}: what it holds against its rate", self.name);
         worst.keep(Raw { miss: miss(k), resolution: integral.uncertainty[k], time: times[k], place, terms }, settled);
     }

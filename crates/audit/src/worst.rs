@@ -53,7 +53,7 @@ impl Worst {
     /// Keeps a miss if it stands out most above what the samples resolve.
     pub fn keep(&mut self, raw: Raw, settled: &Settled) {
         let found = raw.measured(settled);
-        if self.now.as_ref().is_none_or(|(now, _)| above(&found, now)) {
+        if self.now.as_ref().is_none_or(|(now, _)| above(pair(&found), pair(now))) {
             self.now = Some((found, raw));
         }
     }
@@ -67,7 +67,7 @@ impl Worst {
     pub fn finding(&self, settled: &Settled) -> Option<Finding> {
         let mut greatest: Option<Finding> = None;
         for found in self.parts.iter().chain(self.now.iter().map(|now| &now.1)).map(|raw| raw.measured(settled)) {
-            if greatest.as_ref().is_none_or(|old| above(&found, old)) {
+            if greatest.as_ref().is_none_or(|old| above(pair(&found), pair(old))) {
                 greatest = Some(found);
             }
         }
@@ -75,12 +75,16 @@ impl Worst {
     }
 }
 
-/// Whether a finding stands out more than another; what is not a number is never right.
-fn above(new: &Finding, old: &Finding) -> bool {
-    let excess = |f: &Finding| Some(f.value - f.resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
-    match (new.value.is_nan(), old.value.is_nan()) {
+fn pair(finding: &Finding) -> (f64, f64) {
+    (finding.value, finding.resolution)
+}
+
+/// Whether a value with what the samples resolve of it stands out more than another; what is not a number is never right.
+pub(crate) fn above(new: (f64, f64), old: (f64, f64)) -> bool {
+    let excess = |(value, resolution): (f64, f64)| Some(value - resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
+    match (new.0.is_nan(), old.0.is_nan()) {
         (_, true) => false,
         (true, false) => true,
-        _ => excess(new) > excess(old) || (excess(new) == excess(old) && new.value > old.value),
+        _ => excess(new) > excess(old) || (excess(new) == excess(old) && new.0 > old.0),
     }
 }

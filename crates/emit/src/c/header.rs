@@ -152,7 +152,9 @@ fn enumerators<'a>(letter: &str, names: &[String], about: impl Iterator<Item = (
     let lines = names.iter().zip(about).enumerate().map(|(i, (name, (about, unit)))| {
         let unit = match unit {
             None => String::new(),
-            Some(unit) => format!(", in {}", unit.to_si_unit()),
+            Some(unit) if unit.is_si() => format!(", in {unit}"),
+            // All numbers here are SI numbers.
+            Some(unit) => format!(", in {} (declared in {unit})", unit.to_si_unit()),
         };
         let comma = if i + 1 < names.len() { "," } else { "" };
         format!("    MODEL_{letter}_{name} = {i}{comma} /* {} */", comment(&format!("{about}{unit}")))

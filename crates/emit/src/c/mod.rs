@@ -97,7 +97,7 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     let source = plan.source();
     let cost = plan.cost();
     let header = header::header(export, &plan, &names, &cost);
-    let main = project::main(export, &name, &names);
+    let main = project::main(export, &name);
     let cmake = project::cmake(&name);
     Ok(Written { header, source, main, cmake, cost, names, name })
 }

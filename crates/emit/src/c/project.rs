@@ -1,15 +1,43 @@
 //! A program that steps the model, and how to build it.
 
-use super::{Export, Names, messages, template};
+use std::fmt::Write;
+
+use halfarrow_compiler::program::Observed;
+use halfarrow_compiler::unit::Unit;
+
+use super::{Export, messages, template};
 
 /// `main.c`.
-pub(super) fn main(export: &Export, name: &str, names: &Names) -> String {
-    let outputs = export.recorded.iter().map(|&i| format!(",{}", messages::escaped(&export.program.observed[i].name)));
+pub(super) fn main(export: &Export, name: &str) -> String {
+    let recorded: Vec<&Observed> = export.recorded.iter().map(|&i| &export.program.observed[i]).collect();
+    let field = |text: &str| format!(",{}", messages::escaped(text)).replace('%', "%%");
+    let names: String = recorded.iter().map(|o| field(&o.name)).collect();
+    let unit = |o: &Observed| o.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+    let units: String = recorded.iter().map(|o| field(&unit(o))).collect();
+    let mut lines = String::new();
+    for (i, o) in recorded.iter().enumerate() {
+        let _ = writeln!(lines, "    printf(\",%.17g\", {});", declared(i, o.unit.as_ref()));
+    }
     let text = include_str!("runtime/main.c")
-        .replace("OUTPUT_NAMES", &outputs.collect::<String>().replace('%', "%%"))
+        .replace("PRINT_OUTPUTS\n", &lines)
+        .replace("OUTPUT_NAMES", &names)
+        .replace("OUTPUT_UNITS", &units)
         .replace("NAME.h", &format!("{name}.h"));
-    let _ = names;
     template::name(&text, name)
+}
+
+/// An output in the unit that the model declares for it, as C.
+fn declared(i: usize, unit: Option<&Unit>) -> String {
+    let si = format!("m->y[{i}]");
+    match unit.filter(|unit| !unit.is_si()) {
+        None => si,
+        Some(unit) => {
+            let offset = unit.to_si_f64(0.0);
+            let factor = unit.to_si_f64(1.0) - offset;
+            let shifted = if offset == 0.0 { si } else { format!("({si} - {offset:?})") };
+            format!("{shifted} / {factor:?} /* {} */", unit.to_string().replace("*/", "* /"))
+        }
+    }
 }
 
 /// `CMakeLists.txt`.

@@ -6,7 +6,6 @@
 
 #include "NAME.h"
 
-OUTPUT_SCALES
 static void print(const MODEL *m)
 {
     printf("%.17g", m->t);
@@ -41,6 +40,10 @@ int main(int argc, char **argv)
     if (status != MODEL_OK) {
         fprintf(stderr, "at t = %g s: %s\n", m.failure.time, MODEL_message(&m));
         return 3;
+    }
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        fprintf(stderr, "the output cannot be written\n");
+        return 2;
     }
     return 0;
 }
