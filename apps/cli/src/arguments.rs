@@ -9,7 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 #[derive(Debug, Parser)]
 #[command(name = "halfarrow", version, styles = Styles::plain(), arg_required_else_help = true)]
 #[command(after_help = "\
-Exit status: 0 fine, 1 the model is at fault, 2 wrong usage, 3 the run failed.
+Exit status: 0 fine, 1 the model is at fault, 2 wrong usage or a file that cannot be written, 3 the run failed or its audit refuses it.
 Example:
   halfarrow new car && halfarrow simulate car.bond --to 10 --plot car.svg")]
 pub struct Arguments {

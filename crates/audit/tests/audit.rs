@@ -1,7 +1,7 @@
 //! A true run passes; one wrong value does not.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-use halfarrow_audit::{Audit, Run, audit, wanted};
+use halfarrow_audit::{Audit, Auditor, Run, audit, wanted};
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{self, BondGraph, NoFiles};
 use halfarrow_compiler::diagnostic::{Sources, render};
@@ -130,4 +130,69 @@ fn a_spring_that_stiffens_in_time_is_said_to_make_energy() {
     let graph = graph("model M\nSe:u(1) -> 1:v -> C:spring(k = 1 + t)\nv -> R:d(1)\n");
     let found = check(&graph, &[], &Columns::new());
     assert_eq!(found.notes, ["spring makes or eats energy: its law changes with t"]);
+}
+
+#[test]
+fn an_implicit_law_with_an_if_at_its_root_is_measured_by_what_its_variables_make_of_it() {
+    let graph = graph("model M\nSe:u(1) -> 1:v -> I:mass(1)\nv -> R:r(if f > 0 then e - 2*f else e - 3*f = 0)\n");
+    let times: Vec<f64> = (0..50).map(|k| 0.02 * k as f64).collect();
+    let mut columns = Columns::new();
+    for t in &times {
+        let f = 0.5 * (1.0 - (-2.0 * t).exp()) + 0.1 * (-2.0 * t).exp();
+        let row = [
+            ("u.e", 1.0),
+            ("u.f", f),
+            ("v.f", f),
+            ("mass.e", 1.0 - 2.0 * f),
+            ("mass.f", f),
+            ("mass.p", f),
+            ("r.e", 2.0 * f * (1.0 + 1e-15)),
+            ("r.f", f),
+        ];
+        row.into_iter().for_each(|(name, value)| columns.entry(name.to_string()).or_default().push(value));
+    }
+    let found = check(&graph, &times, &columns);
+    assert!(found.unchecked.is_empty() && found.residual.as_ref().unwrap().value < 1e-13, "{found}");
+    columns.get_mut("r.e").unwrap()[20] *= 1.001;
+    let found = check(&graph, &times, &columns);
+    assert!((1e-4..1e-2).contains(&found.residual.unwrap().value));
+}
+
+#[test]
+fn a_run_in_parts_is_judged_as_the_whole() {
+    let graph = graph(MODEL);
+    let (times, mut columns) = motion(400);
+    columns.get_mut("damper.e").unwrap()[30] += 1e-3;
+    columns.get_mut("spring.e").unwrap()[333] += 1e-5;
+    let whole = check(&graph, &times, &columns);
+    let mut auditor = Auditor::new(&graph);
+    let parameters = BTreeMap::from([("d".to_string(), 0.2)]);
+    for (from, to) in [(0, 100), (99, 250), (249, 401)] {
+        let part = columns.iter().map(|(name, c)| (name.clone(), &c[from..to])).collect();
+        auditor.take(&Run { times: &times[from..to], columns: &part, parameters: &parameters });
+    }
+    let parts = auditor.finish();
+    assert_eq!(parts.residual, whole.residual);
+    assert_eq!(parts.power, whole.power);
+}
+
+#[test]
+fn rest_with_rounding_errors_is_rest() {
+    let graph = graph(MODEL);
+    let times: Vec<f64> = (0..100).map(|k| 0.1 * k as f64).collect();
+    let mut columns = Columns::new();
+    // The spring holds the pull; flows and what they make are rounding errors of one sign or another.
+    let held = [("pull.e", 1.0), ("lever.in.e", 1.0), ("lever.out.e", 2.0), ("n.e", 2.0), ("spring.e", 2.0)];
+    for (k, _) in times.iter().enumerate() {
+        let noise = |i: usize| 1e-17 * ((k * 7 + i * 13) % 11) as f64;
+        for (i, name) in wanted(&graph).into_iter().enumerate() {
+            let value = held.iter().find(|(held, _)| *held == name).map_or(noise(i), |(_, value)| *value);
+            let value = if name == "spring.q" { 0.5 } else { value };
+            columns.entry(name).or_default().push(value);
+        }
+    }
+    let found = check(&graph, &times, &columns);
+    for finding in [found.power, found.energy, found.residual, found.rates] {
+        assert!(finding.as_ref().unwrap().value < 1e-9, "{finding:?}");
+    }
 }

@@ -3,8 +3,9 @@
 use super::{InputError, Model, Operations, ParameterError, RecordError, StartError};
 use crate::bytecode::Trouble;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Implicit, Op, Program, Routine, Value};
+use halfarrow_compiler::program::{Implicit, Op, Program, Routine, Unavailable, Value};
 use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
+use std::collections::BTreeMap;
 
 /// Passes of Newton on states of the minimal form.
 const ITERATIONS: usize = 30;
@@ -17,6 +18,18 @@ const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// Passes of Newton on what is recorded, and unknowns up to which there are any.
 const REFINEMENTS: usize = 4;
 const MOST_REFINED: usize = 60;
+
+/// What takes the rate of an input has no value in any form: in a form whose unknowns it is among it stands for nothing.
+fn without_rates_of_inputs(program: &mut Program, reference: &Program) {
+    let without = reference.observed.iter().filter(|o| matches!(o.value, Err(Unavailable::NeedsRateOf(_))));
+    let without: BTreeMap<&str, &Unavailable> =
+        without.filter_map(|o| Some((o.name.as_str(), o.value.as_ref().err()?))).collect();
+    for observed in &mut program.observed {
+        if let Some(&why) = without.get(observed.name.as_str()) {
+            observed.value = Err(why.clone());
+        }
+    }
+}
 
 /// A form of a graph as a system in implicit form.
 ///
@@ -63,8 +76,9 @@ impl ImplicitModel {
     ///
     /// # Errors
     /// Equations of parameters alone that have no solution.
-    pub fn new(program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
+    pub fn new(mut program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
         let n = program.states.len();
+        without_rates_of_inputs(&mut program, &reference.program);
         let mut form = Model::new(program)?;
         let equations = form.program.implicit.clone().unwrap_or_else(|| Implicit {
             explicit: vec![true; n],
