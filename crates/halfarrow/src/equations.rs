@@ -1,8 +1,8 @@
 //! The equations, as plain data.
 
 use halfarrow_compiler::equations::{
-    Algebraic, Cause, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_expr, print_form,
-    print_meanings, print_symbol, show,
+    Algebraic, Cause, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_definitions,
+    print_expr, print_form, print_meanings, print_symbol, show,
 };
 use serde::Serialize;
 
@@ -27,6 +27,9 @@ pub struct EquationsReport {
     pub unknowns: Vec<String>,
     /// The equations in the model language: one for each state, then what stays implicit.
     pub equations: Vec<String>,
+    /// Names in `equations` for parts of them that would make them too long, each with what it stands for, in names
+    /// before it; in the model language.
+    pub definitions: Vec<String>,
     /// The same in Unicode, for people.
     pub text: Vec<String>,
     /// The same in LaTeX.
@@ -35,8 +38,8 @@ pub struct EquationsReport {
     pub meanings: Vec<String>,
     /// Quantities that stay at their start value, in the model language.
     pub conserved: Vec<String>,
-    /// What the names in `text` stand for, in Unicode: sources that vary in time, states that are no variable of an
-    /// element, conserved quantities.
+    /// What the names in `text` stand for, in Unicode: parts of equations, sources that vary in time, states that are no
+    /// variable of an element, conserved quantities.
     pub legend: Vec<String>,
     /// The same for `latex`.
     pub latex_legend: Vec<String>,
@@ -109,6 +112,7 @@ impl Model {
             algebraic,
             breaks: Breaks { number: equations.breaks.number, at_least: equations.breaks.at_least },
             equations: print(&shown, Style::Ascii),
+            definitions: print_definitions(&shown, Style::Ascii),
             text: print(&shown, Style::Unicode),
             latex: print(&shown, Style::Latex),
             meanings: meanings(&shown, Style::Ascii),

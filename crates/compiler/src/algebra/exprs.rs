@@ -4,6 +4,7 @@ use super::fingerprint::{Fingerprint, mix};
 use super::node::{Comparison, Expr, Facts, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
+use super::short_forms::ShortForms;
 use super::symbol_sets::{SetId, SymbolSets};
 use super::table::{Table1d, TableId};
 use hashbrown::HashTable;
@@ -40,6 +41,7 @@ pub struct Exprs {
     pub(super) tables: Vec<Table1d>,
     pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
     pub(super) slope_tables: FxHashMap<TableId, TableId>,
+    pub(super) short_forms: ShortForms,
 }
 
 /// An expression with what is known of it from birth.
@@ -82,6 +84,7 @@ impl Default for Exprs {
             tables: Vec::new(),
             derivatives: FxHashMap::default(),
             slope_tables: FxHashMap::default(),
+            short_forms: ShortForms::default(),
         };
         for n in [0, 1, -1] {
             pool.int(n);

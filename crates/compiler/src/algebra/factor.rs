@@ -43,6 +43,12 @@ pub(super) fn best_split(polynomial: &Polynomial, lengths: &[u64], varies: &[boo
     best.map(|b| b.1)
 }
 
+/// How many terms the search for a split looks at, about.
+pub(super) fn work_of_split(polynomial: &Polynomial) -> u64 {
+    let count = polynomial.0.len() as u64;
+    if count > MOST_TERMS as u64 { count } else { count * count * count }
+}
+
 /// The polynomial as a sum of products: of parameters alone, and of what varies. Equal factors of parameters are one.
 pub(super) fn collected(polynomial: &Polynomial, varies: &[bool]) -> Vec<(Polynomial, Polynomial)> {
     let mut by_variable: BTreeMap<Monomial, Polynomial> = BTreeMap::new();

@@ -22,6 +22,8 @@ mod polynomial;
 mod precise;
 mod properties;
 mod rational;
+mod share;
+mod short_forms;
 mod simplify;
 mod symbol_sets;
 mod table;
@@ -38,6 +40,7 @@ pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use lowest_terms::LowestTerms;
 pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;
+pub use share::Shared;
 pub use symbol_sets::Symbols;
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
 pub use text::{

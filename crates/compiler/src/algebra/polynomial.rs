@@ -7,18 +7,44 @@ use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
 /// What a polynomial is made of.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Generators {
     pub list: Vec<Expr>,
     index: FxHashMap<Expr, usize>,
+    /// How many terms have been formed or looked at.
+    pub work: u64,
+    /// How many may be.
+    limit: u64,
+}
+
+impl Default for Generators {
+    fn default() -> Self {
+        Generators::within(u64::MAX)
+    }
 }
 
 impl Generators {
+    /// None yet; so many terms may be formed.
+    pub fn within(limit: u64) -> Self {
+        Generators { list: Vec::new(), index: FxHashMap::default(), work: 0, limit }
+    }
+
+    /// Whether so many terms more may be formed.
+    pub fn affords(&self, terms: u64) -> bool {
+        self.work.saturating_add(terms) <= self.limit
+    }
+
     pub fn index_of(&mut self, e: Expr) -> usize {
         *self.index.entry(e).or_insert_with(|| {
             self.list.push(e);
             self.list.len() - 1
         })
+    }
+
+    /// The product; see [`Polynomial::times`]. `None` too if that is beyond the limit.
+    pub fn product(&mut self, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+        self.work += (a.0.len() * b.0.len()) as u64;
+        if self.affords(0) { a.times(b) } else { None }
     }
 }
 
@@ -172,7 +198,9 @@ pub(super) fn expand(x: &Exprs, e: Expr, generators: &mut Generators) -> Option<
         Node::Add(terms) => {
             let mut sum = Polynomial::default();
             for &term in terms {
-                sum = sum.plus(&expand(x, term, generators)?);
+                let term = expand(x, term, generators)?;
+                generators.work += term.0.len() as u64;
+                sum = sum.plus(&term);
                 if sum.0.len() > MOST_TERMS {
                     return None;
                 }
@@ -182,7 +210,8 @@ pub(super) fn expand(x: &Exprs, e: Expr, generators: &mut Generators) -> Option<
         Node::Mul(factors) => {
             let mut product = Polynomial::constant(Rational::from(1));
             for &factor in factors {
-                product = product.times(&expand(x, factor, generators)?)?;
+                let factor = expand(x, factor, generators)?;
+                product = generators.product(&product, &factor)?;
             }
             Some(product)
         }
@@ -203,7 +232,7 @@ fn expand_power(x: &Exprs, e: Expr, base: Expr, n: Expr, generators: &mut Genera
             return None;
         }
         let base = expand(x, base, generators)?;
-        return (1..n).try_fold(base.clone(), |power, _| power.times(&base));
+        return (1..n).try_fold(base.clone(), |power, _| generators.product(&power, &base));
     }
     Some(Polynomial::generator(generators.index_of(base), n))
 }

@@ -92,6 +92,7 @@ impl Exprs {
     /// From now on the expression counts as defined and nonzero: it is watched while the program runs. Its factors are
     /// nonzero too.
     pub fn assume_nonzero(&mut self, e: Expr) {
+        self.short_forms.forget();
         self.assume_total(e);
         let monomial = self.entry(e).monomial;
         let (_, primitive) = self.primitive(monomial);

@@ -4,6 +4,7 @@ use super::exprs::Exprs;
 use super::node::{Expr, Function, Node};
 use super::polynomial::{Generators, Monomial, Polynomial, expand, monomial_expr, times};
 use super::rational::Rational;
+use super::short_forms::Way;
 use rustc_hash::FxHashMap;
 use smallvec::smallvec;
 
@@ -21,7 +22,9 @@ impl Exprs {
     /// The expressions, each in its shortest form; what they share is looked at once.
     pub fn simplify_all(&mut self, roots: &[Expr]) -> Vec<Expr> {
         let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
-        for part in self.below(roots, &|_| true) {
+        let order = self.below(roots, &|_| true);
+        self.spend(order.len() as u64);
+        for part in order {
             let rebuilt = self.rebuild(part, &|c| new[&c]);
             let short = self.shortest_form(rebuilt);
             new.insert(part, short);
@@ -75,18 +78,24 @@ impl Exprs {
         if !self.has_other_forms(e) || u64::from(self.entry(e).size) > LONGEST || self.written_length(e) > LONGEST {
             return e;
         }
+        self.short_form(e, Way::Factored, |x| x.shortest_of_forms(e))
+    }
+
+    /// The shortest form, and how many terms were formed on the way.
+    fn shortest_of_forms(&mut self, e: Expr) -> (Expr, u64) {
         let mut best = (self.written_length(e), e);
         let mut forms = Vec::new();
-        self.expanded_forms(e, &mut forms);
-        forms.extend(self.over_one_denominator(e));
-        forms.extend(self.turned_fraction(e));
+        let mut work = u64::from(self.entry(e).size);
+        self.expanded_forms(e, &mut forms, &mut work);
+        forms.extend(self.over_one_denominator(e, &mut work));
+        forms.extend(self.turned_fraction(e, &mut work));
         for form in forms {
             let length = self.written_length(form);
             if length < best.0 {
                 best = (length, form);
             }
         }
-        best.1
+        (best.1, work)
     }
 
     /// Whether there is anything to multiply out, take out or bring over one denominator.
@@ -107,14 +116,16 @@ impl Exprs {
     }
 
     /// Multiplied out, and with common factors taken out of that.
-    fn expanded_forms(&mut self, e: Expr, forms: &mut Vec<Expr>) {
-        let mut generators = Generators::default();
-        let Some(polynomial) = expand(self, e, &mut generators) else { return };
-        let polynomial = polynomial.tidy(self, &generators);
-        let polynomial = self.reduce_trigonometric(polynomial, &mut generators);
-        forms.push(polynomial.to_expr(self, &generators));
-        forms.push(self.factored(&polynomial, &generators));
-        forms.extend(self.grouped(&polynomial, &generators));
+    fn expanded_forms(&mut self, e: Expr, forms: &mut Vec<Expr>, work: &mut u64) {
+        let mut generators = Generators::within(self.search_left());
+        if let Some(polynomial) = expand(self, e, &mut generators) {
+            let polynomial = polynomial.tidy(self, &generators);
+            let polynomial = self.reduce_trigonometric(polynomial, &mut generators);
+            forms.push(polynomial.to_expr(self, &generators));
+            forms.push(self.factored(&polynomial, &generators));
+            forms.extend(self.grouped(&polynomial, &mut generators));
+        }
+        *work += generators.work;
     }
 
     /// Common factors in front of the sum.
@@ -127,12 +138,13 @@ impl Exprs {
 
     /// The sum split by whether a generator stands in the term, and common factors taken out of both halves: for the
     /// generator for which that is shortest.
-    fn grouped(&mut self, polynomial: &Polynomial, generators: &Generators) -> Option<Expr> {
+    fn grouped(&mut self, polynomial: &Polynomial, generators: &mut Generators) -> Option<Expr> {
         if polynomial.0.len() < 3 || polynomial.0.len() > 24 {
             return None;
         }
         let mut best: Option<(u64, Expr)> = None;
         for i in 0..generators.list.len() {
+            generators.work += 4 * polynomial.0.len() as u64;
             let holds = |m: &Monomial| m.get(i).is_some_and(|&n| n != 0);
             let (with, without): (Vec<_>, Vec<_>) = polynomial.0.clone().into_iter().partition(|(m, _)| holds(m));
             if with.len() < 2 || without.is_empty() {
@@ -150,15 +162,15 @@ impl Exprs {
     }
 
     /// All terms over one denominator, cancelled where the divisor is known to be nonzero.
-    fn over_one_denominator(&mut self, e: Expr) -> Option<Expr> {
-        let (above, below) = self.fraction(e)?;
+    fn over_one_denominator(&mut self, e: Expr, work: &mut u64) -> Option<Expr> {
+        let (above, below) = self.fraction(e, work)?;
         let below: Vec<Expr> = below.into_iter().map(|(b, n)| self.powi(b, n)).collect();
         let below = self.mul(&below);
         Some(self.div(above, below))
     }
 
     /// `1/(a/b + c)` as `b/(a + b c)`, where `b` is nonzero.
-    fn turned_fraction(&mut self, e: Expr) -> Option<Expr> {
+    fn turned_fraction(&mut self, e: Expr, work: &mut u64) -> Option<Expr> {
         let factors = match self.node(e) {
             Node::Mul(factors) => factors.clone(),
             _ => smallvec![e],
@@ -167,7 +179,7 @@ impl Exprs {
         let mut parts = Vec::new();
         for factor in factors {
             let turned = match *self.node(factor) {
-                Node::Pow(base, n) if matches!(self.node(base), Node::Add(_)) => self.turned_power(base, n),
+                Node::Pow(base, n) if matches!(self.node(base), Node::Add(_)) => self.turned_power(base, n, work),
                 _ => None,
             };
             changed |= turned.is_some();
@@ -175,13 +187,13 @@ impl Exprs {
         }
         changed.then(|| {
             let product = self.mul(&parts);
-            self.over_one_denominator(product).unwrap_or(product)
+            self.over_one_denominator(product, work).unwrap_or(product)
         })
     }
 
-    fn turned_power(&mut self, base: Expr, n: Expr) -> Option<Expr> {
+    fn turned_power(&mut self, base: Expr, n: Expr, work: &mut u64) -> Option<Expr> {
         let n = self.is_number(n)?.as_integer().filter(|&n| n < 0)?;
-        let (above, below) = self.fraction(base)?;
+        let (above, below) = self.fraction(base, work)?;
         if !below.iter().all(|&(b, _)| self.nonzero(b)) {
             return None;
         }
@@ -192,7 +204,14 @@ impl Exprs {
     }
 
     /// A sum or product as a polynomial above and powers below.
-    fn fraction(&mut self, e: Expr) -> Option<(Expr, Vec<(Expr, i64)>)> {
+    fn fraction(&mut self, e: Expr, work: &mut u64) -> Option<(Expr, Vec<(Expr, i64)>)> {
+        let mut generators = Generators::within(self.search_left());
+        let fraction = self.fraction_in(e, &mut generators);
+        *work += generators.work;
+        fraction
+    }
+
+    fn fraction_in(&mut self, e: Expr, generators: &mut Generators) -> Option<(Expr, Vec<(Expr, i64)>)> {
         let terms = match self.node(e) {
             Node::Add(terms) => terms.clone(),
             _ => smallvec![e],
@@ -208,24 +227,24 @@ impl Exprs {
         if below.is_empty() {
             return None;
         }
-        let mut generators = Generators::default();
         let mut above = Polynomial::default();
         for (numerator, own) in &split {
-            let mut product = expand(self, *numerator, &mut generators)?;
+            let mut product = expand(self, *numerator, generators)?;
             for &(base, n) in &below {
                 let has = own.iter().find(|b| b.0 == base).map_or(0, |b| b.1);
                 let power = self.powi(base, n - has);
-                product = product.times(&expand(self, power, &mut generators)?)?;
+                let power = expand(self, power, generators)?;
+                product = generators.product(&product, &power)?;
             }
             above = above.plus(&product);
         }
-        let mut above = above.tidy(self, &generators);
-        above = self.reduce_trigonometric(above, &mut generators);
+        let mut above = above.tidy(self, generators);
+        above = self.reduce_trigonometric(above, generators);
         for (base, n) in &mut below {
-            above = self.cancel(above, *base, n, &mut generators);
+            above = self.cancel(above, *base, n, generators);
         }
         below.retain(|b| b.1 > 0);
-        Some((self.factored(&above, &generators), below))
+        Some((self.factored(&above, generators), below))
     }
 
     fn cancel(&self, mut above: Polynomial, base: Expr, n: &mut i64, generators: &mut Generators) -> Polynomial {
@@ -235,6 +254,7 @@ impl Exprs {
         let Some(divisor) = expand(self, base, generators) else { return above };
         let whole = |p: &Polynomial| p.0.keys().flatten().all(|&n| n >= 0);
         while *n > 0 && whole(&above) && whole(&divisor) {
+            generators.work += (above.0.len() * divisor.0.len()) as u64;
             let Some(quotient) = above.divided_by(&divisor) else { break };
             above = quotient;
             *n -= 1;
@@ -263,6 +283,9 @@ impl Exprs {
 
     fn reduce_trigonometric(&mut self, mut polynomial: Polynomial, generators: &mut Generators) -> Polynomial {
         loop {
+            if !generators.affords(0) {
+                return polynomial;
+            }
             let better = self.by_pythagoras(&polynomial, generators).or_else(|| self.by_sums(&polynomial, generators));
             match better {
                 Some(better) => polynomial = better.tidy(self, generators),
@@ -276,6 +299,7 @@ impl Exprs {
         let mut best: Option<Polynomial> = None;
         for (sine, cosine) in self.angles(generators).into_iter().map(|a| (a.1, a.2)) {
             for (from, to) in [(sine, cosine), (cosine, sine)] {
+                generators.work += polynomial.0.len() as u64;
                 let Some(candidate) = replace_square(polynomial, from, to) else { continue };
                 let candidate = candidate.tidy(self, generators);
                 if candidate.0.len() < best.as_ref().unwrap_or(polynomial).0.len() {
@@ -289,12 +313,18 @@ impl Exprs {
     /// With one of `cos a cos b ± sin a sin b` and `sin a cos b ± cos a sin b` replaced.
     fn by_sums(&mut self, polynomial: &Polynomial, generators: &mut Generators) -> Option<Polynomial> {
         let angles = self.angles(generators);
+        let holders = Holders::of(polynomial, generators.list.len());
+        generators.work += (polynomial.0.len() + angles.len() * angles.len()) as u64;
         for (i, &(a, sin_a, cos_a)) in angles.iter().enumerate() {
             for &(b, sin_b, cos_b) in &angles[i + 1..] {
-                for (first, second, f) in [
-                    (unit(cos_a, cos_b), unit(sin_a, sin_b), Function::Cos),
-                    (unit(sin_a, cos_b), unit(cos_a, sin_b), Function::Sin),
-                ] {
+                for (first, second, f) in
+                    [([cos_a, cos_b], [sin_a, sin_b], Function::Cos), ([sin_a, cos_b], [cos_a, sin_b], Function::Sin)]
+                {
+                    if !holders.any(first) || !holders.any(second) {
+                        continue;
+                    }
+                    let (first, second) = (unit(first), unit(second));
+                    generators.work += 2 * polynomial.0.len() as u64;
                     let Some((rest, c, same)) = pair_of_terms(polynomial, &first, &second) else { continue };
                     // cos(a - b) has the sign +, sin(a - b) the sign -.
                     let minus = same == (f == Function::Cos);
@@ -332,8 +362,28 @@ impl Exprs {
     }
 }
 
+/// For each generator the terms in which it stands, as bits.
+struct Holders(Vec<Vec<u64>>);
+
+impl Holders {
+    fn of(polynomial: &Polynomial, generators: usize) -> Holders {
+        let mut bits = vec![vec![0; polynomial.0.len().div_ceil(64)]; generators];
+        for (k, monomial) in polynomial.0.keys().enumerate() {
+            for (i, _) in monomial.iter().enumerate().filter(|(_, n)| **n > 0) {
+                bits[i][k / 64] |= 1 << (k % 64);
+            }
+        }
+        Holders(bits)
+    }
+
+    /// Whether both stand in one term.
+    fn any(&self, pair: [usize; 2]) -> bool {
+        self.0[pair[0]].iter().zip(&self.0[pair[1]]).any(|(a, b)| a & b != 0)
+    }
+}
+
 /// The monomial of two different generators.
-fn unit(a: usize, b: usize) -> Monomial {
+fn unit([a, b]: [usize; 2]) -> Monomial {
     let mut monomial = vec![0; a.max(b) + 1];
     monomial[a] += 1;
     monomial[b] += 1;

@@ -4,6 +4,7 @@ use super::exprs::{Exprs, ONE};
 use super::node::{Expr, Node};
 use super::polynomial::{Generators, Polynomial, monomial_expr};
 use super::rational::Rational;
+use super::short_forms::Way;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Expressions that are written longer than this are left as they are; their parts are not.
@@ -36,6 +37,7 @@ impl Exprs {
     /// ```
     pub fn textbook(&mut self, e: Expr) -> Expr {
         let order = self.below(&[e], &|_| true);
+        self.spend(order.len() as u64);
         let mut whole: FxHashSet<Expr> = [e].into_iter().collect();
         for &part in order.iter().filter(|&&p| !self.is_arithmetic(p)) {
             self.node(part).for_each_child(|c| {
@@ -53,7 +55,7 @@ impl Exprs {
 
     /// What stands below the bar if all is brought over one denominator, as far as it is known to be nonzero.
     pub fn denominator(&mut self, e: Expr) -> Expr {
-        let e = self.over_one(e, false).unwrap_or(e);
+        let e = self.over_one_within_bound(e).unwrap_or(e);
         let factors = match self.node(e) {
             Node::Mul(factors) => factors.to_vec(),
             _ => vec![e],
@@ -107,7 +109,7 @@ impl Exprs {
 
     /// The factors of a product, or of all terms of a sum, that are known to be nonzero.
     fn nonzero_powers(&mut self, e: Expr) -> Vec<(Expr, i64)> {
-        let factored = self.over_one(e, false).unwrap_or(e);
+        let factored = self.over_one_within_bound(e).unwrap_or(e);
         let factors = match self.node(factored) {
             Node::Mul(factors) => factors.to_vec(),
             _ => vec![factored],
@@ -134,10 +136,16 @@ impl Exprs {
         if !self.is_arithmetic(e) || self.printed_length(e) > LONGEST {
             return e;
         }
+        self.short_form(e, Way::OverOne, |x| x.shortest_of_fractions(e))
+    }
+
+    /// The shortest form, and how many terms were formed on the way.
+    fn shortest_of_fractions(&mut self, e: Expr) -> (Expr, u64) {
         let mut best = (self.printed_length(e), e);
-        let mut forms = vec![self.by_denominators(e)];
+        let mut work = u64::from(self.entry(e).size);
+        let mut forms = vec![self.by_denominators(e, &mut work)];
         for open in [true, false] {
-            forms.extend(self.over_one(e, open));
+            forms.extend(self.over_one(e, open, &mut work));
         }
         for form in forms {
             let length = self.printed_length(form);
@@ -145,7 +153,7 @@ impl Exprs {
                 best = (length, form);
             }
         }
-        best.1
+        (best.1, work)
     }
 
     /// How long the expression is in print: a bar counts once, brackets and fractions within fractions count extra.
@@ -214,7 +222,7 @@ impl Exprs {
     }
 
     /// The terms with equal denominators taken together.
-    fn by_denominators(&mut self, e: Expr) -> Expr {
+    fn by_denominators(&mut self, e: Expr, work: &mut u64) -> Expr {
         let Node::Add(terms) = self.node(e) else { return e };
         let mut groups: Vec<(Vec<Expr>, Vec<Expr>)> = Vec::new();
         for term in terms.clone() {
@@ -229,7 +237,7 @@ impl Exprs {
             let sum = self.add(&terms);
             let mut best = (self.printed_length(sum), sum);
             for open in [true, false] {
-                if let Some(form) = self.over_one(sum, open) {
+                if let Some(form) = self.over_one(sum, open, work) {
                     let length = self.printed_length(form);
                     best = best.min((length, form));
                 }
@@ -248,15 +256,32 @@ impl Exprs {
         }
     }
 
+    /// Everything over one denominator, unless the search for short forms is over.
+    fn over_one_within_bound(&mut self, e: Expr) -> Option<Expr> {
+        if self.search_is_over() {
+            return None;
+        }
+        let mut work = u64::from(self.entry(e).size);
+        let form = self.over_one(e, false, &mut work);
+        self.spend(work);
+        form
+    }
+
     /// Everything over one denominator. `open`: powers of sums are multiplied out.
-    fn over_one(&mut self, e: Expr, open: bool) -> Option<Expr> {
-        let mut generators = Generators::default();
-        let ratio = self.quotient(e, open, &mut generators)?;
-        let above = self.numerator(&ratio.above, &generators);
+    fn over_one(&mut self, e: Expr, open: bool, work: &mut u64) -> Option<Expr> {
+        let mut generators = Generators::within(self.search_left());
+        let form = self.over_one_in(e, open, &mut generators);
+        *work += generators.work;
+        form
+    }
+
+    fn over_one_in(&mut self, e: Expr, open: bool, generators: &mut Generators) -> Option<Expr> {
+        let ratio = self.quotient(e, open, generators)?;
+        let above = self.numerator(&ratio.above, generators);
         let mut parts = vec![above];
         for (base, n) in ratio.below {
-            let base = match self.quotient(base, open, &mut generators) {
-                Some(own) if own.below.is_empty() => self.factored_deep(&own.above, &generators),
+            let base = match self.quotient(base, open, generators) {
+                Some(own) if own.below.is_empty() => self.factored_deep(&own.above, generators),
                 _ => base,
             };
             parts.push(self.powi(base, -n));
@@ -285,7 +310,7 @@ impl Exprs {
                 let mut product = Ratio::whole(Polynomial::constant(Rational::from(1)));
                 for factor in factors {
                     let factor = self.quotient(factor, open, generators)?;
-                    product.above = product.above.times(&factor.above)?;
+                    product.above = generators.product(&product.above, &factor.above)?;
                     factor.below.into_iter().for_each(|(base, n)| product.divide(base, n));
                 }
                 Some(self.cancelled(product, open, generators))
@@ -294,7 +319,8 @@ impl Exprs {
                 Some(n) if n < 0 => self.inverse(base, -n, open, generators),
                 Some(n) if (1..=HIGHEST_POWER).contains(&n) && (open || !matches!(self.node(base), Node::Add(_))) => {
                     let base = self.quotient(base, open, generators)?;
-                    let above = (1..n).try_fold(base.above.clone(), |power, _| power.times(&base.above))?;
+                    let above =
+                        (1..n).try_fold(base.above.clone(), |power, _| generators.product(&power, &base.above))?;
                     Some(Ratio { above, below: base.below.into_iter().map(|(b, m)| (b, m * n)).collect() })
                 }
                 _ => Some(Ratio::whole(Polynomial::generator(generators.index_of(e), 1))),
@@ -317,7 +343,8 @@ impl Exprs {
         }
         let mut above = one;
         for &(b, m) in &inner.below {
-            above = above.times(&self.polynomial_power(b, m * n, open, generators)?)?;
+            let power = self.polynomial_power(b, m * n, open, generators)?;
+            above = generators.product(&above, &power)?;
         }
         let content = inner.above.content();
         let rest = inner.above.divided_by_monomial(&content).to_expr(self, generators);
@@ -343,7 +370,7 @@ impl Exprs {
             return None;
         }
         let one = Polynomial::constant(Rational::from(1));
-        (0..n).try_fold(one, |power, _| power.times(&own.above))
+        (0..n).try_fold(one, |power, _| generators.product(&power, &own.above))
     }
 
     fn quotient_sum(&mut self, a: Ratio, b: Ratio, open: bool, generators: &mut Generators) -> Option<Ratio> {
@@ -360,7 +387,8 @@ impl Exprs {
             for &(base, n) in &below {
                 let has = part.below.iter().find(|d| d.0 == base).map_or(0, |d| d.1);
                 if n > has {
-                    product = product.times(&self.polynomial_power(base, n - has, open, generators)?)?;
+                    let power = self.polynomial_power(base, n - has, open, generators)?;
+                    product = generators.product(&product, &power)?;
                 }
             }
             above = above.plus(&product);
@@ -377,6 +405,7 @@ impl Exprs {
             }
             let Some(divisor) = self.quotient(base, open, generators).filter(|r| r.below.is_empty()) else { continue };
             while ratio.below[k].1 > 0 {
+                generators.work += (ratio.above.0.len() * divisor.above.0.len()) as u64;
                 let Some(quotient) = ratio.above.divided_by(&divisor.above) else { break };
                 ratio.above = quotient;
                 ratio.below[k].1 -= 1;
@@ -387,11 +416,14 @@ impl Exprs {
     }
 
     /// A polynomial with common factors taken out again and again, where that makes it shorter.
-    fn factored_deep(&mut self, polynomial: &Polynomial, generators: &Generators) -> Expr {
+    fn factored_deep(&mut self, polynomial: &Polynomial, generators: &mut Generators) -> Expr {
         let content = polynomial.content();
         let inner = polynomial.divided_by_monomial(&content);
         let outer = monomial_expr(self, generators, &content, &Rational::from(1));
-        let inner = match self.best_split(&inner, generators) {
+        let work = super::factor::work_of_split(&inner);
+        let split = if generators.affords(work) { self.best_split(&inner, generators) } else { None };
+        generators.work += work;
+        let inner = match split {
             Some(split) => {
                 let mut product = vec![self.factored_deep(&split.factors.0, generators)];
                 product.push(self.factored_deep(&split.factors.1, generators));
@@ -405,7 +437,7 @@ impl Exprs {
     }
 
     /// The shorter of: factors taken out wherever that helps; one product for each variable, which people like better.
-    fn numerator(&mut self, polynomial: &Polynomial, generators: &Generators) -> Expr {
+    fn numerator(&mut self, polynomial: &Polynomial, generators: &mut Generators) -> Expr {
         let deep = self.factored_deep(polynomial, generators);
         if polynomial.has_zeros() {
             return deep;

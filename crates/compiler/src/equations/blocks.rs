@@ -12,6 +12,9 @@ use crate::algebra::{Expr, Exprs, SparseRow, Symbol};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, rank_given};
 
+/// Terms that may be formed in the search for short forms of the entries of a matrix.
+const WORK: u64 = 1_000_000;
+
 /// A loop that has no unique solution, whatever the values are.
 #[derive(Debug, Clone)]
 pub struct Insoluble {
@@ -118,7 +121,7 @@ fn block(
         return Ok(());
     };
     let x = &mut d.x;
-    let matrix: Vec<Vec<Expr>> = rows.iter().map(|r| r.0.iter().map(|&e| x.simplify(e)).collect()).collect();
+    let matrix = shortened(x, rows.iter().map(|r| &r.0[..]));
     let right: Vec<Expr> = rows.iter().map(|r| x.neg(r.1)).collect();
     if is_singular(x, &matrix) {
         return Err(Insoluble { unknowns: torn, members: symbols, elements });
@@ -141,6 +144,18 @@ fn block(
     }
     ordered.assign(body);
     Ok(())
+}
+
+/// A matrix with its entries in their short forms, as far as the work for each entry goes.
+fn shortened<'a>(x: &mut Exprs, rows: impl ExactSizeIterator<Item = &'a [Expr]>) -> Vec<Vec<Expr>> {
+    let size = rows.len() as u64;
+    let short = |x: &mut Exprs, e: Expr| {
+        x.bound_search(WORK / (size * size));
+        x.simplify(e)
+    };
+    let matrix = rows.map(|row| row.iter().map(|&e| short(x, e)).collect()).collect();
+    x.bound_search(u64::MAX);
+    matrix
 }
 
 impl Ordered {

@@ -263,7 +263,8 @@ fn without_cancelling_terms(
         return;
     }
     let named = display::named_sources(d);
-    let known = display::expansions(d, steps, &states.iter().map(|s| s.rate).collect(), &named);
+    let rates = states.iter().map(|s| s.rate).collect();
+    let Some(known) = display::expansions(d, steps, &rates, &named) else { return };
     let unknown: BTreeSet<Symbol> =
         states.iter().flat_map(|s| [s.symbol, s.rate]).chain(algebraic.iter().map(|a| a.symbol)).collect();
     let reads = |d: &Definitions, e: Expr| {

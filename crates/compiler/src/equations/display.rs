@@ -4,14 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::blocks::{LinearRow, Ordered};
 use super::definitions::{Definition, Definitions};
+use super::named::named_page;
 use super::{Equations, State, Step};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
-use crate::bond_graph::{Kind, Meaning};
+use crate::bond_graph::{BondGraph, Kind, Meaning, Named};
+use crate::unit::Unit;
 
-/// Up to this many steps everything is put in; above, equations are shown in the variables of the steps.
+/// Up to this many steps everything is put in, if that is short; above, names stay.
 const SMALL: usize = 2_000;
 /// Linear blocks up to this size are written out.
 const CLOSED: usize = 3;
+/// Terms that may be formed in the search for the form with everything put in.
+const TEXTBOOK: u64 = 400_000;
+/// A side of an equation that is longer in print than this does not fit a page of a textbook: names stay.
+const LONGEST: u64 = 600;
 
 /// Equations with what a textbook would print of them.
 #[derive(Debug, Clone)]
@@ -26,6 +32,22 @@ pub struct Shown {
     pub sources: Vec<(Symbol, Expr)>,
     /// Names that outputs or `let`s give to states.
     pub aliases: BTreeMap<Symbol, String>,
+    /// Where the equations would be too long: names that stand in them, each with what it stands for, in variables and
+    /// in names before it.
+    pub definitions: Vec<ShownDefinition>,
+}
+
+/// A name for a part of equations.
+#[derive(Debug, Clone, Copy)]
+pub struct ShownDefinition {
+    /// The name: a variable of the bond graph, or one of its own.
+    pub symbol: Symbol,
+    /// What it stands for, with sources that vary in time as symbols.
+    pub value: Expr,
+    /// The same with the values of these sources put in.
+    pub closed: Expr,
+    /// Whether only dependent storages need it, and no equation.
+    pub of_dependent: bool,
 }
 
 /// An equation for people: `left = right`.
@@ -55,57 +77,79 @@ pub fn show(mut equations: Equations) -> Shown {
     d.of = std::mem::take(&mut equations.definitions);
     d.free.extend(equations.free_rates.iter().chain(equations.algebraic.iter().map(|a| &a.symbol)));
     let ordered = Ordered { steps: std::mem::take(&mut equations.steps), rows: std::mem::take(&mut equations.rows) };
-    let Page { display, dependent, sources, aliases } = page(&mut d, &equations, &ordered);
+    let Page { display, dependent, sources, aliases, definitions } = page(&mut d, &equations, &ordered);
     let Definitions { x, of, .. } = d;
     equations.graph.exprs = x;
     equations.definitions = of;
     Ordered { steps: equations.steps, rows: equations.rows } = ordered;
-    Shown { equations, display, dependent, sources, aliases }
+    Shown { equations, display, dependent, sources, aliases, definitions }
 }
 
 /// What is printed; see [`Shown`].
-struct Page {
-    display: Vec<DisplayEquation>,
-    dependent: Vec<Dependent>,
-    sources: Vec<(Symbol, Expr)>,
-    aliases: BTreeMap<Symbol, String>,
+pub struct Page {
+    pub display: Vec<DisplayEquation>,
+    pub dependent: Vec<Dependent>,
+    pub sources: Vec<(Symbol, Expr)>,
+    pub aliases: BTreeMap<Symbol, String>,
+    pub definitions: Vec<ShownDefinition>,
+}
+
+/// Everything put in, if that takes little work and fits a page; else parts keep names.
+fn page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
+    d.x.bound_search(TEXTBOOK);
+    let page = match textbook_page(d, equations, ordered) {
+        Some(page) => page,
+        None => named_page(d, equations, ordered),
+    };
+    d.x.bound_search(u64::MAX);
+    page
 }
 
 /// The shorter page: in the states alone, or with names that the modeller gave to a state and a constant.
-fn page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
-    let plain = page_with(d, equations, ordered, &BTreeMap::new());
-    let explicit = ordered.steps.len() <= SMALL && equations.residuals.is_empty();
+fn textbook_page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Option<Page> {
+    if ordered.steps.len() > SMALL {
+        return None;
+    }
+    let plain = page_with(d, equations, ordered, &BTreeMap::new())?;
+    let explicit = equations.residuals.is_empty();
     let names = if explicit { shifted_states(d, &equations.states) } else { Vec::new() };
     if names.is_empty() {
-        return plain;
+        return Some(plain);
     }
     let shifts = names.iter().map(|n| (n.state, n.by_name)).collect();
-    let mut by_name = page_with(d, equations, ordered, &shifts);
+    let Some(mut by_name) = page_with(d, equations, ordered, &shifts) else { return Some(plain) };
     by_name.sources.extend(names.iter().map(|n| (n.name, n.value)));
     for (equation, plain) in by_name.display.iter_mut().zip(&plain.display) {
         equation.closed = plain.closed;
     }
-    if length(d, &by_name) < length(d, &plain) { by_name } else { plain }
+    Some(if length(d, &by_name) < length(d, &plain) { by_name } else { plain })
 }
 
-/// The page with these expressions in place of states.
-fn page_with(d: &mut Definitions, equations: &Equations, ordered: &Ordered, shifts: &BTreeMap<Symbol, Expr>) -> Page {
+/// The page with these expressions in place of states; `None` if it takes too much work or does not fit.
+fn page_with(
+    d: &mut Definitions,
+    equations: &Equations,
+    ordered: &Ordered,
+    shifts: &BTreeMap<Symbol, Expr>,
+) -> Option<Page> {
     let states = &equations.states;
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
     let named = named_sources(d);
-    let small = ordered.steps.len() <= SMALL;
-    let mut known = if small { expansions(d, &ordered.steps, &rates, &named) } else { BTreeMap::new() };
+    let mut known = expansions(d, &ordered.steps, &rates, &named)?;
     let aliases = aliases(d, states, &known);
     if !shifts.is_empty() {
         known.values_mut().for_each(|value| *value = d.x.substitute(*value, shifts));
         known.extend(shifts);
     }
-    let mut display = self::equations(d, states, ordered, &known);
+    let mut display = self::equations(d, states, ordered, &known)?;
     let mut unknown: Vec<Symbol> = states.iter().map(|s| s.rate).collect();
     unknown.extend(equations.algebraic.iter().map(|a| a.symbol));
     for &residual in &equations.residuals {
         let residual = put_in(&mut d.x, residual, &known);
         display.push(balanced(&mut d.x, residual, &unknown));
+    }
+    if !fits(d, &display) {
+        return None;
     }
     let mut read = BTreeSet::new();
     for equation in &mut display {
@@ -122,7 +166,13 @@ fn page_with(d: &mut Definitions, equations: &Equations, ordered: &Ordered, shif
         }
     }
     let sources = named.into_iter().filter(|(s, _)| read.contains(s)).collect();
-    Page { display, dependent, sources, aliases }
+    Some(Page { display, dependent, sources, aliases, definitions: Vec::new() })
+}
+
+/// Whether the search for short forms came to its end, and no equation is too long.
+fn fits(d: &Definitions, display: &[DisplayEquation]) -> bool {
+    let short = |e: Expr| d.x.printed_length(e) <= LONGEST;
+    !d.x.search_is_over() && display.iter().all(|e| short(e.left) && short(e.right))
 }
 
 /// How long it all is in print.
@@ -144,10 +194,14 @@ struct Shifted {
 /// `let`s and outputs that are a state and a constant: `x = spring.q + rest`.
 fn shifted_states(d: &mut Definitions, states: &[State]) -> Vec<Shifted> {
     let mut found: Vec<Shifted> = Vec::new();
-    let graph = d.graph;
-    for named in graph.lets.iter().chain(&graph.outputs) {
+    for named in d.graph.lets.iter().chain(outputs_with_unit(d)) {
         let symbols = d.x.symbols_of(named.value);
-        let Some(&state) = symbols.iter().find(|s| states.iter().any(|state| state.symbol == **s)) else { continue };
+        let is_state = |symbol: &Symbol| states.iter().find(|state| state.symbol == *symbol);
+        let Some(of) = symbols.iter().find_map(is_state) else { continue };
+        let state = of.symbol;
+        if !is_in_unit_of(named, of) {
+            continue;
+        }
         let own = d.x.sym(state);
         let constant = d.x.sub(named.value, own);
         let fresh = d.x.find_symbol(&named.name).is_none_or(|s| d.meaning(s).is_none());
@@ -183,14 +237,14 @@ pub fn named_sources(d: &Definitions) -> BTreeMap<Symbol, Expr> {
     named
 }
 
-/// Outputs and `let`s that are nothing but a state.
-fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, Expr>) -> BTreeMap<Symbol, String> {
+/// Outputs and `let`s that are nothing but a state, in its unit.
+pub fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, Expr>) -> BTreeMap<Symbol, String> {
     let mut aliases = BTreeMap::new();
-    let graph = d.graph;
-    for named in graph.outputs.iter().chain(&graph.lets) {
+    for named in outputs_with_unit(d).chain(&d.graph.lets) {
         let value = d.x.substitute(named.value, known);
         if let &Node::Symbol(symbol) = d.x.node(value)
-            && states.iter().any(|s| s.symbol == symbol)
+            && let Some(state) = states.iter().find(|s| s.symbol == symbol)
+            && is_in_unit_of(named, state)
         {
             aliases.entry(symbol).or_insert_with(|| named.name.clone());
         }
@@ -198,12 +252,24 @@ fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, Expr>
     aliases
 }
 
+/// Outputs that may give their name to a state: one without a unit does not say what its numbers are.
+fn outputs_with_unit<'a>(d: &Definitions<'a>) -> impl Iterator<Item = &'a Named> + use<'a> {
+    let graph: &'a BondGraph = d.graph;
+    graph.outputs.iter().filter(|output| output.unit.is_some())
+}
+
+/// Whether numbers of the one are numbers of the other: a state is shown in SI units.
+fn is_in_unit_of(named: &Named, state: &State) -> bool {
+    let fits = |unit: &Unit| unit.is_si() && state.unit.as_ref().is_none_or(|own| own.dimension == unit.dimension);
+    named.unit.as_ref().is_none_or(fits)
+}
+
 fn equations(
     d: &mut Definitions,
     states: &[State],
     ordered: &Ordered,
     known: &BTreeMap<Symbol, Expr>,
-) -> Vec<DisplayEquation> {
+) -> Option<Vec<DisplayEquation>> {
     let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
     let mut shown = Vec::new();
     let rows = ordered.rows.iter().filter(|r| r.left.iter().any(|t| rates.contains(&t.0)));
@@ -220,6 +286,9 @@ fn equations(
             }
         };
         shown.push(shown_as);
+        if !fits(d, &shown[shown.len() - 1..]) {
+            return None;
+        }
     }
     let mut implicit = Vec::new();
     for step in &ordered.steps {
@@ -252,7 +321,7 @@ fn equations(
             .partition(|e| d.x.symbols_of(e.left).iter().any(|s| read.contains(s) && d.of.contains_key(s)));
         waiting = later;
         if now.is_empty() {
-            return shown;
+            return Some(shown);
         }
         for equation in now {
             read.extend(d.x.symbols_of(equation.left));
@@ -263,7 +332,7 @@ fn equations(
 }
 
 /// For each state rate the row of its block that shows it best: the one whose position it has.
-fn assign_rows<'a>(
+pub fn assign_rows<'a>(
     rows: impl Iterator<Item = &'a LinearRow>,
     rates: &BTreeSet<Symbol>,
 ) -> BTreeMap<Symbol, &'a LinearRow> {
@@ -288,21 +357,27 @@ fn from_row(x: &mut Exprs, row: &LinearRow, known: &BTreeMap<Symbol, Expr>) -> D
     for e in row.left.iter().map(|t| t.1).chain([row.right]) {
         sides.push(put_in(x, e, known));
     }
+    let symbols: Vec<Symbol> = row.left.iter().map(|t| t.0).collect();
+    from_sides(x, &symbols, sides)
+}
+
+/// `Σ side · symbol = last side`; see [`from_row`].
+pub fn from_sides(x: &mut Exprs, symbols: &[Symbol], mut sides: Vec<Expr>) -> DisplayEquation {
     let plain = shortest_sides(x, &sides);
-    for k in 0..row.left.len() {
+    for k in 0..symbols.len() {
         let below = x.denominator(sides[k]);
         sides = sides.into_iter().map(|e| x.mul(&[e, below])).collect();
     }
     let whole = shortest_sides(x, &sides);
     let length = |sides: &[Expr]| sides.iter().map(|&e| x.printed_length(e)).sum::<u64>();
     let sides = if length(&whole) <= length(&plain) + 4 { whole } else { plain };
-    let mut left = Vec::with_capacity(row.left.len());
-    for (&(symbol, _), &coefficient) in row.left.iter().zip(&sides) {
+    let mut left = Vec::with_capacity(symbols.len());
+    for (&symbol, &coefficient) in symbols.iter().zip(&sides) {
         let symbol = x.sym(symbol);
         left.push(x.mul(&[coefficient, symbol]));
     }
     let left = x.add(&left);
-    equation(left, sides[row.left.len()])
+    equation(left, sides[symbols.len()])
 }
 
 fn shortest_sides(x: &mut Exprs, sides: &[Expr]) -> Vec<Expr> {
@@ -311,7 +386,7 @@ fn shortest_sides(x: &mut Exprs, sides: &[Expr]) -> Vec<Expr> {
     divided.into_iter().map(|e| textbook(x, e)).collect()
 }
 
-fn equation(left: Expr, right: Expr) -> DisplayEquation {
+pub fn equation(left: Expr, right: Expr) -> DisplayEquation {
     DisplayEquation { left, right, closed: (left, right) }
 }
 
@@ -338,25 +413,30 @@ pub fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     x.without_settled_terms(e)
 }
 
-fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
+pub fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     let e = put_in(x, e, known);
     textbook(x, e)
 }
 
-fn textbook(x: &mut Exprs, e: Expr) -> Expr {
+pub fn textbook(x: &mut Exprs, e: Expr) -> Expr {
     let e = x.textbook(e);
     x.without_settled_terms(e)
 }
 
 /// Every variable in terms of states, time, inputs, named sources and what stays implicit.
+///
+/// `None` if the search for short forms is over before all are found: [`Exprs::bound_search`].
 pub fn expansions(
     d: &mut Definitions,
     steps: &[Step],
     rates: &BTreeSet<Symbol>,
     named: &BTreeMap<Symbol, Expr>,
-) -> BTreeMap<Symbol, Expr> {
+) -> Option<BTreeMap<Symbol, Expr>> {
     let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
     for step in steps {
+        if d.x.search_is_over() {
+            return None;
+        }
         match step {
             Step::Assign { symbol, value } if !named.contains_key(symbol) => {
                 let value = put_in(&mut d.x, *value, &known);
@@ -374,7 +454,7 @@ pub fn expansions(
             _ => {}
         }
     }
-    known
+    Some(known)
 }
 
 /// The solution of a small linear system by determinants.

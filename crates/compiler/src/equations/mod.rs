@@ -12,6 +12,7 @@ mod form;
 mod index;
 mod minimal;
 mod momenta;
+mod named;
 mod observed;
 mod places;
 mod stiff;
@@ -29,11 +30,12 @@ use crate::unit::Unit;
 pub use blocks::LinearRow;
 pub use definitions::Definition;
 pub use derive::derive_equations;
-pub use display::{Dependent, DisplayEquation, Shown, show};
+pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
 pub use form::Form;
 pub use momenta::Momentum;
 pub use text::{
-    Style, print, print_certificate, print_dependent, print_expr, print_form, print_meanings, print_sides, print_symbol,
+    Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
+    print_sides, print_symbol,
 };
 
 /// Equations in evaluation order.

@@ -30,6 +30,12 @@ pub fn of(shown: &Shown) -> BTreeMap<Symbol, Place> {
         let sort = if graph.variables.contains_key(&symbol) { Sort::Given } else { Sort::Variable };
         places.insert(symbol, place(sort, 0, index));
     }
+    for (definition, index) in shown.definitions.iter().zip(0..) {
+        let given = |s: Symbol| places.get(&s).is_some_and(|place: &Place| place.sort == Sort::Parameter);
+        let constant = equations.graph.exprs.symbols_of(definition.value).into_iter().all(given);
+        let sort = if constant { Sort::Parameter } else { Sort::Variable };
+        places.insert(definition.symbol, place(sort, 4, u32::MAX / 4 + index));
+    }
     for (conserved, index) in equations.conserved.iter().zip(0..) {
         places.insert(conserved.symbol, place(Sort::Parameter, 4, u32::MAX / 2 + index));
     }

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Cause, Dependent, DisplayEquation, Shown, Step, places};
+use super::{Cause, Dependent, DisplayEquation, Shown, ShownDefinition, Step, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
     unicode_name,
@@ -38,20 +38,37 @@ pub fn print_sides(shown: &Shown, style: Style) -> Vec<(String, String)> {
     shown.display.iter().map(sides).map(|(left, right)| (side(left), side(right))).collect()
 }
 
-/// What stands behind the names in the equations: sources that vary in time, states that are sums of stored quantities,
-/// conserved quantities.
+/// What stands behind the names in the equations: parts of them that would make them too long, sources that vary in
+/// time, states that are sums of stored quantities, conserved quantities.
 pub fn print_meanings(shown: &Shown, style: Style) -> Vec<String> {
     let names = Written::of(shown);
     let conserved = shown.equations.conserved.iter().map(|c| (c.symbol, c.value));
     let all = shown.sources.iter().copied().chain(shown.equations.meanings.iter().copied()).chain(conserved);
-    all.map(|(symbol, value)| definition(symbol, value, &names, style)).collect()
+    let mut lines = print_definitions(shown, style);
+    lines.extend(all.map(|(symbol, value)| definition(symbol, value, &names, style)));
+    lines
 }
 
-/// The dependent storages, each with its row of `S`, one a line.
+/// The names that the equations have for parts of them, each with what it stands for. For people, sources that vary in
+/// time stand by name.
+pub fn print_definitions(shown: &Shown, style: Style) -> Vec<String> {
+    definitions(shown, false, style)
+}
+
+/// The dependent storages, each with its row of `S`, one a line, and behind them the names that only they read.
 pub fn print_dependent(shown: &Shown, style: Style) -> Vec<String> {
     let names = Written::of(shown);
     let line = |d: &Dependent| definition(d.variable, d.value, &names, style);
-    shown.dependent.iter().map(line).collect()
+    let mut lines: Vec<String> = shown.dependent.iter().map(line).collect();
+    lines.extend(definitions(shown, true, style));
+    lines
+}
+
+fn definitions(shown: &Shown, of_dependent: bool, style: Style) -> Vec<String> {
+    let names = Written::of(shown);
+    let value = |d: &ShownDefinition| if style == Style::Ascii { d.closed } else { d.value };
+    let wanted = shown.definitions.iter().filter(|d| d.of_dependent == of_dependent);
+    wanted.map(|d| definition(d.symbol, value(d), &names, style)).collect()
 }
 
 /// A form in few lines: counts, index, unknowns with what they are there for, equations.
