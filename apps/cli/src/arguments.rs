@@ -126,6 +126,14 @@ pub struct ModelArguments {
     pub set: Vec<(String, String)>,
 }
 
+/// How wide what is printed may be.
+#[derive(Debug, Args)]
+pub struct PageArguments {
+    /// Columns that tables and equations take at most [default: COLUMNS, else those of the terminal, else 80]
+    #[arg(long, value_name = "COLUMNS")]
+    pub width: Option<usize>,
+}
+
 /// `new`.
 #[derive(Debug, Args)]
 pub struct New {
@@ -181,6 +189,8 @@ pub enum Stage {
 pub struct Loops {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
 }
 
 /// Forms of the equations.
@@ -218,6 +228,8 @@ pub enum Format {
 pub struct Equations {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
     /// The formulation
     #[arg(long, default_value = "minimal")]
     pub form: Form,
@@ -266,6 +278,8 @@ pub enum Start {
 pub struct Simulate {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
     /// End of the run, in s or with a unit (`10`, `500ms`); it begins at 0
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
@@ -321,6 +335,8 @@ pub struct Simulate {
 pub struct Compare {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
     /// End of the runs, in s [default: ten times the slowest time of the motion near the start]
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: Option<f64>,
@@ -346,6 +362,8 @@ pub struct Compare {
 pub struct Linearize {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
     /// Where: `start`, `equilibrium` (near the start) or the time in s that a run has reached
     #[arg(long, default_value = "start", value_parser = point)]
     pub at: Point,
@@ -464,6 +482,8 @@ pub enum OnMiss {
 pub struct RunArguments {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub page: PageArguments,
     /// Ticks a second, as in `1kHz`, `500 Hz` or `500`
     #[arg(long, value_name = "FREQUENCY")]
     pub rate: String,

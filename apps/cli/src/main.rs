@@ -3,6 +3,7 @@
 
 mod arguments;
 mod commands;
+mod page;
 mod screen;
 mod stop;
 

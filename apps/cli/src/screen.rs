@@ -1,10 +1,9 @@
-//! What the terminal shows: text, JSON, errors, tables, a progress bar.
+//! What the terminal shows: text, JSON, errors, a progress bar.
 
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
-use comfy_table::{ContentArrangement, Table, presets};
 use halfarrow::{Error, Found, Problem};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
@@ -63,24 +62,6 @@ pub fn warn(found: &Found) {
 /// Whether to use colours: on a terminal, unless `NO_COLOR` is set.
 fn color(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
-}
-
-/// A table with a header.
-pub fn table<const N: usize>(header: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(header);
-    rows.into_iter().for_each(|row| _ = table.add_row(row));
-    format!("{table}\n")
-}
-
-/// A table with as many columns as its header.
-pub fn wide_table(header: Vec<String>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(header);
-    rows.into_iter().for_each(|row| _ = table.add_row(row));
-    format!("{table}\n")
 }
 
 /// A number with six digits.

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::{overrides, with_model};
 use crate::arguments::{self, FileArguments, Format};
+use crate::page::Page;
 use crate::screen;
 
 /// All diagnostics.
@@ -59,13 +60,13 @@ pub fn loops(arguments: &arguments::Loops) -> u8 {
         let report = model.loops()?;
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&loops_text(&report)),
+            false => screen::print(&loops_text(&report, Page::of(&arguments.page))),
         }?;
         Ok(0)
     })
 }
 
-fn loops_text(report: &LoopsReport) -> String {
+fn loops_text(report: &LoopsReport, page: Page) -> String {
     let mut text = match report.paths.len() {
         0 => format!("{}: no zero-order causal path\n", report.model),
         n => format!("{}: {}\n", report.model, counted(n, "zero-order causal path")),
@@ -83,20 +84,21 @@ fn loops_text(report: &LoopsReport) -> String {
                 p.resolution.clone(),
             ]
         });
-        text += &screen::table(["class", "between", "gain", "value", "break variables", "in minimal form"], rows);
+        text += &page.table(["class", "between", "gain", "value", "break variables", "in minimal form"], rows);
     }
     if !report.complete {
         text += "There are more paths: shown is one for every break variable.\n";
     }
     for component in report.components.iter().filter(|c| c.singular) {
         let breaks = component.breaks.join(", ");
-        text +=
-            &format!("The determinant of the paths through {breaks} vanishes: alone they have no unique solution.\n");
+        let told =
+            format!("The determinant of the paths through {breaks} vanishes: alone they have no unique solution.");
+        text += &page.line(&told);
     }
-    text + &storages_text(report) + &counts_text(report)
+    text + &storages_text(report, page) + &counts_text(report, page)
 }
 
-fn storages_text(report: &LoopsReport) -> String {
+fn storages_text(report: &LoopsReport, page: Page) -> String {
     if report.storages.is_empty() {
         return String::new();
     }
@@ -105,25 +107,26 @@ fn storages_text(report: &LoopsReport) -> String {
         [s.name.clone(), s.causality.to_string(), independent.to_string(), s.follows.clone().unwrap_or_default()]
     });
     let mut text = "\nStorages\n".to_string();
-    text += &screen::table(["name", "causality", "", "follows from"], rows);
+    text += &page.table(["name", "causality", "", "follows from"], rows);
     for c in &report.conserved {
-        text += &format!("Conserved: {} = {}\n", c.name, c.value);
+        text += &page.line(&format!("Conserved: {} = {}", c.name, c.value));
     }
     text
 }
 
-fn counts_text(report: &LoopsReport) -> String {
+fn counts_text(report: &LoopsReport, page: Page) -> String {
     let c = &report.counts;
     let forms = [("break variables", c.break_form), ("inverted", c.inverted), ("minimal", c.minimal)];
     let rows = forms.map(|(name, n)| [name.to_string(), n.differential.to_string(), n.algebraic.to_string()]);
     let mut text = "\nEquations in each form\n".to_string();
-    text += &screen::table(["form", "differential", "algebraic"], rows);
+    text += &page.table(["form", "differential", "algebraic"], rows);
     text += &format!("Independent storages: {}\n", report.dof);
     match &report.state_matrix {
         Some(a) if a.regular => text + "State matrix: regular, all storages take derivative causality\n",
         Some(a) => {
             let stay = a.integral.join(", ");
-            text + &format!("State matrix: rank {} of {}, {stay} cannot take derivative causality\n", a.rank, a.order)
+            let (rank, order) = (a.rank, a.order);
+            text + &page.line(&format!("State matrix: rank {rank} of {order}, {stay} cannot take derivative causality"))
         }
         None => text,
     }
@@ -135,7 +138,7 @@ pub fn equations(arguments: &arguments::Equations) -> u8 {
         let report = model.equations(form(arguments.form))?;
         match (arguments.model.model.json, arguments.format) {
             (true, _) | (_, Format::Json) => screen::print_json(&json!(report)),
-            (_, Format::Text) => screen::print(&equations_text(&report)),
+            (_, Format::Text) => screen::print(&Page::of(&arguments.page).lines(&equations_text(&report))),
             (_, Format::Latex) => screen::print(&latex_text(&report)),
         }?;
         Ok(0)

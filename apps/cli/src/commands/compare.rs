@@ -6,6 +6,7 @@ use serde_json::json;
 use super::picture::{check_names, write_picture};
 use super::with_model;
 use crate::arguments;
+use crate::page::Page;
 use crate::screen::{self, Progress};
 
 /// All formulations beside each other.
@@ -31,7 +32,7 @@ pub fn compare(arguments: &arguments::Compare) -> u8 {
         }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&text(&report)),
+            false => screen::print(&text(&report, Page::of(&arguments.page))),
         }?;
         match report.refused()[..] {
             [] => Ok(0),
@@ -44,7 +45,7 @@ pub fn compare(arguments: &arguments::Compare) -> u8 {
     })
 }
 
-fn text(report: &CompareReport) -> String {
+fn text(report: &CompareReport, page: Page) -> String {
     let short = screen::short;
     let header = [
         "form",
@@ -60,7 +61,7 @@ fn text(report: &CompareReport) -> String {
     ];
     let rows = report.rows.iter().filter(|row| row.differential.is_some()).map(cells);
     let mut text = format!("{} to {} s, times at an error of {:.0e}\n", report.model, short(report.to), report.error);
-    text += &screen::table(header, rows);
+    text += &page.table(header, rows);
     for row in &report.rows {
         if let Some(reason) = &row.reason {
             text += &format!("{}: {reason}\n", row.form);

@@ -6,6 +6,7 @@ use serde_json::json;
 use super::picture::{check_names, write_picture};
 use super::with_model;
 use crate::arguments;
+use crate::page::Page;
 use crate::screen::{self, short};
 
 /// Matrices, poles, zeros, frequency response.
@@ -22,7 +23,7 @@ pub fn linearize(arguments: &arguments::Linearize) -> u8 {
         }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&text(&report)),
+            false => screen::print(&text(&report, Page::of(&arguments.page))),
         }?;
         Ok(0)
     })
@@ -43,7 +44,7 @@ fn wanted(arguments: &arguments::Linearize) -> Linearize {
     }
 }
 
-fn text(report: &LinearizeReport) -> String {
+fn text(report: &LinearizeReport, page: Page) -> String {
     let at = match report.at {
         "time" => format!("at t = {} s", short(report.t)),
         "start" => "at the start".to_string(),
@@ -52,17 +53,17 @@ fn text(report: &LinearizeReport) -> String {
     let mut text = format!("{} {at}\n", report.model);
     let unit = |u: &Option<String>| u.clone().unwrap_or_default();
     let states = report.states.iter().map(|s| [s.name.clone(), unit(&s.unit), short(s.value), short(s.rate)]);
-    text += &screen::table(["state", "unit", "value", "rate"], states);
+    text += &page.table(["state", "unit", "value", "rate"], states);
     let (inputs, outputs): (Vec<&str>, Vec<&str>) = (
         report.inputs.iter().map(|t| t.name.as_str()).collect(),
         report.outputs.iter().map(|t| t.name.as_str()).collect(),
     );
     let names: Vec<&str> = report.states.iter().map(|s| s.name.as_str()).collect();
     if names.len() <= 12 {
-        text += &matrix("A", &report.a, &names, &names);
-        text += &matrix("B", &report.b, &names, &inputs);
-        text += &matrix("C", &report.c, &outputs, &names);
-        text += &matrix("D", &report.d, &outputs, &inputs);
+        text += &matrix(page, "A", &report.a, &names, &names);
+        text += &matrix(page, "B", &report.b, &names, &inputs);
+        text += &matrix(page, "C", &report.c, &outputs, &names);
+        text += &matrix(page, "D", &report.d, &outputs, &inputs);
     } else {
         text += "The matrices are large: --json has them.\n";
     }
@@ -71,7 +72,7 @@ fn text(report: &LinearizeReport) -> String {
         [complex(m.pole), short(m.natural_frequency), short(m.damping), time]
     });
     text += "\nPoles\n";
-    text += &screen::table(["pole in 1/s", "natural frequency in rad/s", "damping", "time constant in s"], modes);
+    text += &page.table(["pole in 1/s", "natural frequency in rad/s", "damping", "time constant in s"], modes);
     text += match report.stability {
         Stability::Asymptotic => "All poles are left of the imaginary axis.\n",
         Stability::Marginal => "No pole is right of the imaginary axis, but not all are left of it.\n",
@@ -88,7 +89,7 @@ fn text(report: &LinearizeReport) -> String {
     text += &reach("Controllability", &report.controllability);
     text += &reach("Observability", &report.observability);
     if let Some(symbolic) = &report.symbolic {
-        text += &symbolic_text(symbolic, &names, &inputs, &outputs);
+        text += &page.lines(&symbolic_text(symbolic, &names, &inputs, &outputs));
     }
     report.notes.iter().for_each(|note| text += &format!("{note}\n"));
     text
@@ -103,7 +104,7 @@ fn complex([re, im]: [f64; 2]) -> String {
     }
 }
 
-fn matrix(name: &str, rows: &[Vec<f64>], down: &[&str], across: &[&str]) -> String {
+fn matrix(page: Page, name: &str, rows: &[Vec<f64>], down: &[&str], across: &[&str]) -> String {
     if down.is_empty() || across.is_empty() {
         return format!("{name}: empty\n");
     }
@@ -112,7 +113,7 @@ fn matrix(name: &str, rows: &[Vec<f64>], down: &[&str], across: &[&str]) -> Stri
         .iter()
         .zip(down)
         .map(|(row, name)| std::iter::once(name.to_string()).chain(row.iter().map(|&v| short(v))).collect::<Vec<_>>());
-    screen::wide_table(header.collect(), lines)
+    page.wide_table(header.collect(), lines)
 }
 
 fn reach(what: &str, report: &ReachReport) -> String {

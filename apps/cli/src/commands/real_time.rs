@@ -11,6 +11,7 @@ use serde_json::json;
 use super::run::{method, record, start};
 use super::with_model;
 use crate::arguments::{self, RunArguments};
+use crate::page::Page;
 use crate::screen;
 use crate::stop;
 
@@ -38,7 +39,7 @@ pub fn run(arguments: &RunArguments) -> u8 {
         }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&text(&report)),
+            false => screen::print(&text(&report, Page::of(&arguments.page))),
         }?;
         Ok(if report.error.is_some() { 3 } else { 0 })
     })
@@ -106,12 +107,12 @@ fn line(statistics: &Statistics) -> String {
     )
 }
 
-fn text(report: &RealTimeReport) -> String {
+fn text(report: &RealTimeReport, page: Page) -> String {
     let row = |name: &str, d: &Durations| {
         [name.into(), duration(d.median), duration(d.p99), duration(d.p999), duration(d.max)]
     };
     let rows = [row("step", &report.step), row("late by", &report.jitter)];
-    let mut text = screen::table(["", "median", "99 %", "99.9 %", "longest"], rows);
+    let mut text = page.table(["", "median", "99 %", "99.9 %", "longest"], rows);
     text += &bars("how long steps took", &report.step);
     text += &bars("how late ticks began", &report.jitter);
     text += &format!(

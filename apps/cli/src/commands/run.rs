@@ -13,6 +13,7 @@ use super::analyse::form;
 use super::picture::{check_names, write_picture};
 use super::with_model;
 use crate::arguments::{self, Simulate, Solver};
+use crate::page::Page;
 use crate::screen::{self, Progress};
 use crate::stop;
 
@@ -130,7 +131,7 @@ fn finish(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&
     } else if to_stdout {
         screen::note(summary(&done.report).trim_end());
     } else if done.trace.samples() > 0 || error.is_none() {
-        screen::print(&(values(&done.trace) + &summary(&done.report)))?;
+        screen::print(&(values(&done.trace, Page::of(&arguments.page)) + &summary(&done.report)))?;
     }
     Ok(())
 }
@@ -165,7 +166,7 @@ fn json_of(arguments: &Simulate, done: &Simulated, error: Option<&str>) -> Value
 }
 
 /// Start, end, least and greatest value of every column.
-fn values(trace: &Trace) -> String {
+fn values(trace: &Trace, page: Page) -> String {
     let rows = trace.columns.iter().map(|c| {
         let first = c.values.first().copied().unwrap_or(f64::NAN);
         let last = c.values.last().copied().unwrap_or(f64::NAN);
@@ -174,7 +175,7 @@ fn values(trace: &Trace) -> String {
         let [first, last, least, greatest] = [first, last, least, greatest].map(screen::short);
         [c.name.clone(), c.unit.clone(), first, last, least, greatest]
     });
-    screen::table(["variable", "unit", "start", "end", "least", "greatest"], rows)
+    page.table(["variable", "unit", "start", "end", "least", "greatest"], rows)
 }
 
 fn summary(report: &RunReport) -> String {

@@ -163,6 +163,6 @@ fn enumerators<'a>(letter: &str, names: &[String], about: impl Iterator<Item = (
 }
 
 /// A text within a comment.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     text.replace("*/", "* /").replace("/*", "/ *").replace(['\n', '\r'], " ")
 }

@@ -6,12 +6,14 @@
 mod cost;
 mod header;
 mod messages;
+mod obligations;
 mod plan;
 mod project;
 mod slopes;
 mod ssa;
 mod start;
 pub(crate) mod template;
+mod variables;
 mod write;
 
 pub use cost::Cost;
@@ -94,9 +96,9 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
         outputs: list(&mut export.recorded.iter().map(|&i| program.observed[i].name.as_str())),
     };
     let plan = plan::Plan::new(export, &name)?;
-    let source = plan.source();
     let cost = plan.cost();
     let header = header::header(export, &plan, &names, &cost);
+    let source = plan.source(&obligations::lines(&plan, &header));
     let main = project::main(export, &name);
     let cmake = project::cmake(&name);
     Ok(Written { header, source, main, cmake, cost, names, name })

@@ -8,8 +8,10 @@ use halfarrow_compiler::program::{
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::header::comment;
 use super::slopes::{call, power, rate_of};
 use super::ssa::{Act, Arg, Code, Step};
+use super::variables::Variables;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
 const CHUNK: usize = 250;
@@ -65,6 +67,7 @@ pub(super) struct Writer<'a> {
     pub factored: Factored,
     /// Places of the work array taken so far.
     pub crossing: usize,
+    variables: Variables,
 }
 
 /// A number as C reads it back to the bit.
@@ -107,7 +110,8 @@ impl<'a> Writer<'a> {
                 factored.orders += n;
             }
         }
-        Writer { program, layout, derived, constants, factored, crossing: 0 }
+        let variables = Variables::of(program, layout);
+        Writer { program, layout, derived, constants, factored, crossing: 0, variables }
     }
 
     /// A fixed register in C.
@@ -154,6 +158,7 @@ impl<'a> Writer<'a> {
             rate_place: vec![usize::MAX; code.locals as usize],
             chunk: 0,
             turns: FxHashMap::default(),
+            names: self.variables.of_locals(code),
             text: String::new(),
         };
         for (c, steps) in chunks.iter().enumerate() {
@@ -524,7 +529,8 @@ impl<'a> Writer<'a> {
     }
 
     fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
-        let _ = writeln!(f.text, "    const double v{out} = {value};");
+        let name = f.names[out as usize].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
+        let _ = writeln!(f.text, "    const double v{out} = {value};{name}");
         if f.place[out as usize] != usize::MAX {
             let _ = writeln!(f.text, "    m->w[{}] = v{out};", f.place[out as usize]);
         }
@@ -554,6 +560,8 @@ struct Body {
     chunk: usize,
     /// Angles whose sine and cosine are both wanted in this chunk, with the number of the pair once it is computed.
     turns: FxHashMap<Angle, Option<usize>>,
+    /// What the locals are in the model, where they have a name there.
+    names: Vec<Option<String>>,
     text: String,
 }
 
@@ -629,11 +637,12 @@ fn without_the_unused(text: &str) -> String {
     let mut seen: FxHashSet<&str> = FxHashSet::default();
     let mut kept = Vec::new();
     for line in text.lines().rev() {
-        let declared = line.trim_start().strip_prefix("const double ").and_then(|rest| rest.split([' ', '[']).next());
+        let code = line.split(" /* ").next().unwrap_or(line);
+        let declared = code.trim_start().strip_prefix("const double ").and_then(|rest| rest.split([' ', '[']).next());
         if declared.is_some_and(|name| !seen.contains(name)) {
             continue;
         }
-        seen.extend(line.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
+        seen.extend(code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
         kept.push(line);
     }
     kept.reverse();

@@ -329,9 +329,16 @@ impl<'a> Plan<'a> {
         template::fill(text, &words)
     }
 
-    /// The source file.
-    pub fn source(&self) -> String {
-        let (flags, words) = (self.flags(), self.words());
+    /// The functions of the equations.
+    pub fn functions(&self) -> &str {
+        &self.functions
+    }
+
+    /// The source file; at its head stands what it keeps to.
+    pub fn source(&self, obligations: &str) -> String {
+        let (flags, mut words) = (self.flags(), self.words());
+        words.insert("OBLIGATION_LINES".into(), obligations.to_string());
+        words.insert("MODEL_TITLE".into(), super::header::comment(&self.program.name));
         let piece = |text: &str| template::fill(&template::choose(text, &flags), &words);
         let mut text = piece(include_str!("../runtime/top.c"));
         text += math::C_SOURCE;

@@ -1,3 +1,6 @@
+/* MODEL_TITLE, written by halfarrow. What it keeps to:
+OBLIGATION_LINES
+ */
 #include "NAME.h"
 
 #include <float.h>
