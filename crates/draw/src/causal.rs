@@ -8,39 +8,50 @@ use halfarrow_compiler::causal_graph::{CausalGraph, Stroke};
 use halfarrow_compiler::causal_paths::{CausalPaths, Path};
 use halfarrow_compiler::ids::Id;
 
-use crate::DrawOptions;
 use crate::figure::{Figure, Form, Glyph, Line, Loop};
-use crate::text::{shorten, typeset};
+use crate::text::{typeset, wrap};
+use crate::{DrawOptions, DrawnPaths};
 
-/// Longest law and name in characters; the whole stands in the tip.
+/// Longest line of a law in characters, and most lines; longer laws stand in the legend.
 const LAW: usize = 30;
-const NAME: usize = 24;
-/// Longest line of the legend.
-const LEGEND: usize = 96;
+const LINES: usize = 4;
 
 /// What is drawn of a causal graph.
 pub fn figure(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> Figure {
     let graph = &causal.graph;
     let derivative: BTreeSet<ElementId> = paths.dependent.iter().map(|p| p.element).collect();
-    let glyph = |(id, element)| glyph(graph, element, derivative.contains(&id));
-    let (loops, note) = loops(graph, paths, options.paths);
+    let mut laws = Vec::new();
+    let glyph = |(id, element)| glyph(graph, element, derivative.contains(&id), options.laws, &mut laws);
+    let glyphs = graph.elements.iter().map(glyph).collect();
+    let (loops, note) = loops(graph, paths, &options.paths);
     Figure {
         title: graph.name.clone(),
-        doc: shorten(&graph.doc, LEGEND),
-        glyphs: graph.elements.iter().map(glyph).collect(),
+        doc: graph.doc.clone(),
+        glyphs,
         bonds: graph.bonds.ids().map(|id| line(causal, id)).collect(),
         loops,
+        laws,
         note,
     }
 }
 
-fn glyph(graph: &BondGraph, element: &Element, derivative: bool) -> Glyph {
+/// The number of causal paths that can be drawn; those along the same bonds are one.
+pub fn path_count(paths: &CausalPaths) -> usize {
+    courses(paths).len()
+}
+
+fn glyph(graph: &BondGraph, element: &Element, derivative: bool, law: bool, long: &mut Vec<String>) -> Glyph {
     let kind = kind_word(graph, &element.kind);
-    let law = shorten(&typeset(&element.label), LAW);
-    let name = shorten(&element.name, NAME);
-    let (name, law) = match () {
-        _ if name == law => (name, String::new()),
-        _ if name == kind && !law.is_empty() && !element.kind.is_inner() => (law, String::new()),
+    let text = if law { typeset(&element.label) } else { String::new() };
+    let mut law = wrap(&text, LAW);
+    let name = element.name.clone();
+    if law.len() > LINES {
+        long.push(format!("({})  {name}:  {text}", long.len() + 1));
+        law = vec![format!("law ({})", long.len())];
+    }
+    let (name, law) = match &law[..] {
+        [only] if name == *only => (name, Vec::new()),
+        [only] if name == kind && !element.kind.is_inner() => (only.clone(), Vec::new()),
         _ => (name, law),
     };
     let value = if element.label.is_empty() { String::new() } else { format!(" ({})", element.label) };
@@ -104,12 +115,18 @@ struct Course {
     gains: Vec<String>,
 }
 
-/// The paths to draw, at most `most`, and what is to be said about the others.
-fn loops(graph: &BondGraph, paths: &CausalPaths, most: usize) -> (Vec<Loop>, String) {
-    let courses = courses(paths);
-    let drawn = courses.iter().take(most).map(|c| legend(graph, c)).collect();
-    let more = courses.len().saturating_sub(most);
-    let note = match (more, paths.complete) {
+/// The paths to draw, and what is to be said about the others.
+fn loops(graph: &BondGraph, paths: &CausalPaths, wanted: &DrawnPaths) -> (Vec<Loop>, String) {
+    let all: Vec<Loop> = courses(paths).iter().enumerate().map(|(i, c)| legend(graph, c, i + 1)).collect();
+    let count = all.len();
+    let most = match wanted {
+        DrawnPaths::First(most) => *most,
+        DrawnPaths::Numbers(numbers) => {
+            return (all.into_iter().filter(|l| numbers.contains(&l.number)).collect(), String::new());
+        }
+    };
+    let drawn = all.into_iter().take(most).collect();
+    let note = match (count.saturating_sub(most), paths.complete) {
         (0, true) => String::new(),
         (0, false) => "There are more causal paths; one is drawn for every break variable.".to_string(),
         (n, true) => format!("and {n} more causal paths"),
@@ -144,10 +161,10 @@ fn bonds_of(path: &Path) -> Vec<usize> {
     path.signals.iter().map(|s| s.0.index()).filter(|&b| seen.insert(b)).collect()
 }
 
-fn legend(graph: &BondGraph, course: &Course) -> Loop {
+fn legend(graph: &BondGraph, course: &Course, number: usize) -> Loop {
     let names: Vec<&str> = course.elements.iter().map(|&e| graph.elements[e].name.as_str()).collect();
-    let text = format!("{},  gain {}", shorten(&names.join(" – "), LEGEND / 2), gains(&course.gains));
-    Loop { class: course.class, bonds: course.bonds.clone(), text: shorten(&text, LEGEND) }
+    let text = format!("{},  gain {}", names.join(" – "), gains(&course.gains));
+    Loop { number, class: course.class, bonds: course.bonds.clone(), text }
 }
 
 /// Gains of paths along the same bonds: `±G/R1` for a pair of opposite ones.

@@ -1,5 +1,6 @@
 //! A bond graph reduced to what is drawn: glyphs, bonds and paths, as plain text and indices.
 
+use crate::alike::alike;
 use crate::layout::{Network, Node, Role, Room, Side};
 use crate::text::width;
 
@@ -9,6 +10,8 @@ pub const KIND: f64 = 16.0;
 pub const NAME: f64 = 12.5;
 /// Of laws and of the names of junctions.
 pub const LAW: f64 = 10.5;
+/// Of numbers of bonds and names of ports.
+pub const NUMBER: f64 = 9.0;
 /// Height of a line of small text.
 pub const LEADING: f64 = 13.0;
 
@@ -28,6 +31,8 @@ pub struct Figure {
     pub bonds: Vec<Line>,
     /// Causal paths to be drawn.
     pub loops: Vec<Loop>,
+    /// Laws that are too long for their place, each with the mark that stands there.
+    pub laws: Vec<String>,
     /// What is to be said about the paths that are not drawn, if any.
     pub note: String,
 }
@@ -39,8 +44,8 @@ pub struct Glyph {
     pub kind: String,
     /// Its name.
     pub name: String,
-    /// Its law or value, short; may be empty.
-    pub law: String,
+    /// Its law or value in lines; may be empty.
+    pub law: Vec<String>,
     /// What to show when pointed at.
     pub tip: String,
     /// How it is drawn.
@@ -50,7 +55,7 @@ pub struct Glyph {
 }
 
 /// How an element is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Form {
     /// `0`, `1`: a bare sign with a small name beside it.
     Junction,
@@ -80,6 +85,8 @@ pub struct Line {
 /// A causal path, as bonds in order.
 #[derive(Debug, Clone)]
 pub struct Loop {
+    /// Its number among all paths, from 1.
+    pub number: usize,
     /// 1 to 4.
     pub class: u8,
     /// Indices of the bonds in the order in which the path first meets them.
@@ -94,6 +101,7 @@ impl Figure {
         Network {
             nodes: self.glyphs.iter().map(Glyph::node).collect(),
             bonds: self.bonds.iter().map(|b| b.ends).collect(),
+            alike: alike(self),
         }
     }
 }
@@ -114,8 +122,8 @@ impl Glyph {
         match self.form {
             Form::Junction => [9.0, 11.0],
             Form::Field => [
-                self.main_width().max(width(&self.law, LAW, false)) / 2.0 + 4.0,
-                10.0 + if self.law.is_empty() { 0.0 } else { LEADING / 2.0 },
+                self.main_width().max(self.law_width()) / 2.0 + 4.0,
+                10.0 + self.law.len() as f64 * LEADING / 2.0,
             ],
             _ => [width(&self.kind, KIND, true) / 2.0 + 4.0, 10.5],
         }
@@ -131,7 +139,7 @@ impl Glyph {
     }
     /// The small lines of a two-port: modulus, then name.
     pub fn small_lines(&self) -> Vec<&str> {
-        [&self.law, &self.name].into_iter().map(String::as_str).filter(|l| !l.is_empty()).collect()
+        self.law.iter().chain([&self.name]).map(String::as_str).filter(|l| !l.is_empty()).collect()
     }
     /// Width of the longest small line.
     pub fn small_width(&self) -> f64 {
@@ -163,6 +171,10 @@ impl Glyph {
             Side::North | Side::South => Room { east: even.east + text + 2.0, ..even },
         }
     }
+    /// Width of the longest line of the law.
+    pub fn law_width(&self) -> f64 {
+        self.law.iter().map(|l| width(l, LAW, false)).fold(0.0, f64::max)
+    }
     /// Where the law of a one-port begins, from the edge of the sign where its name begins.
     pub fn law_indent(&self, neighbour: Side) -> f64 {
         let sign = width(&self.kind, KIND, true);
@@ -173,9 +185,9 @@ impl Glyph {
         }
     }
     fn one_port_room(&self, even: Room, neighbour: Side) -> Room {
-        let law = if self.law.is_empty() { 0.0 } else { LEADING };
+        let law = self.law.len() as f64 * LEADING;
         let sign = width(&self.kind, KIND, true);
-        let long = self.law_indent(neighbour) + width(&self.law, LAW, false);
+        let long = self.law_indent(neighbour) + self.law_width();
         let text = if self.law.is_empty() { self.main_width() } else { long.max(self.main_width()) };
         let out = even.east.max(text - sign / 2.0 + 2.0);
         let below = Room { south: even.south + law, ..even };

@@ -1,6 +1,4 @@
-//! Lines, boxes and free places on paper. All in px, y downwards.
-
-use std::collections::BTreeMap;
+//! Points, lines and boxes. All in px, y downwards.
 
 /// A point or vector.
 pub type Point = [f64; 2];
@@ -59,6 +57,18 @@ impl Area {
     pub fn around(centre: Point, size: Point) -> Area {
         Area { min: add(centre, -0.5, size), max: add(centre, 0.5, size) }
     }
+    /// The box with this much more on every side.
+    pub fn grown(&self, by: f64) -> Area {
+        Area { min: [self.min[0] - by, self.min[1] - by], max: [self.max[0] + by, self.max[1] + by] }
+    }
+    /// Its corners, in turn.
+    pub fn corners(&self) -> [Point; 4] {
+        [self.min, [self.max[0], self.min[1]], self.max, [self.min[0], self.max[1]]]
+    }
+    /// Whether a point lies inside.
+    pub fn holds(&self, p: Point) -> bool {
+        (0..2).all(|k| self.min[k] < p[k] && p[k] < self.max[k])
+    }
     /// Whether two boxes share more than an edge.
     pub fn overlaps(&self, other: &Area) -> bool {
         (0..2).all(|k| self.min[k] < other.max[k] && other.min[k] < self.max[k])
@@ -82,62 +92,11 @@ impl Area {
     }
 }
 
-/// What is on the paper already, findable by place.
-#[derive(Debug, Default)]
-pub struct Paper {
-    boxes: Vec<Area>,
-    lines: Vec<[Point; 2]>,
-    tiles: BTreeMap<[i64; 2], [Vec<usize>; 2]>,
-}
-
-impl Paper {
-    const TILE: f64 = 64.0;
-
-    /// Takes the place of a box.
-    pub fn add_box(&mut self, area: Area) {
-        let index = self.boxes.len();
-        self.boxes.push(area);
-        Self::tiles(area).for_each(|t| self.tiles.entry(t).or_default()[0].push(index));
-    }
-    /// Takes the place of a line.
-    pub fn add_line(&mut self, from: Point, to: Point) {
-        let index = self.lines.len();
-        self.lines.push([from, to]);
-        let steps = (length(step(from, to)) / Self::TILE).ceil().max(1.0);
-        for i in 0..steps as usize {
-            let [p, q] = [i as f64, i as f64 + 1.0].map(|k| add(from, k / steps, step(from, to)));
-            let part = Area { min: [p[0].min(q[0]), p[1].min(q[1])], max: [p[0].max(q[0]), p[1].max(q[1])] };
-            for t in Self::tiles(part) {
-                let list = &mut self.tiles.entry(t).or_default()[1];
-                if list.last() != Some(&index) {
-                    list.push(index);
-                }
-            }
-        }
-    }
-    /// How much is in the way of a box: 3 for every box, 2 for every line.
-    pub fn crowding(&self, area: Area) -> usize {
-        let mut met: [Vec<usize>; 2] = Default::default();
-        for tile in Self::tiles(area).filter_map(|t| self.tiles.get(&t)) {
-            met[0].extend(tile[0].iter().filter(|&&i| self.boxes[i].overlaps(&area)));
-            met[1].extend(tile[1].iter().filter(|&&i| area.meets(self.lines[i][0], self.lines[i][1])));
-        }
-        met.iter_mut().for_each(|m| {
-            m.sort_unstable();
-            m.dedup();
-        });
-        3 * met[0].len() + 2 * met[1].len()
-    }
-    /// The first of the least crowded centres for a box of this size; its place is taken.
-    pub fn settle(&mut self, centres: &[Point], size: Point) -> Point {
-        let crowding = |c: &&Point| self.crowding(Area::around(**c, size));
-        let best = centres.iter().min_by_key(crowding).copied().unwrap_or_default();
-        self.add_box(Area::around(best, size));
-        best
-    }
-    fn tiles(area: Area) -> impl Iterator<Item = [i64; 2]> {
-        let tile = |x: f64| (x / Self::TILE).floor() as i64;
-        let [x, y] = [0, 1].map(|k| tile(area.min[k])..=tile(area.max[k]));
-        x.flat_map(move |i| y.clone().map(move |j| [i, j]))
-    }
+/// Whether two lines cross at a point inside both.
+pub fn cross(a: Point, b: Point, c: Point, d: Point) -> bool {
+    let turn = |p: Point, q: Point, r: Point| {
+        let [u, v] = [step(p, q), step(p, r)];
+        u[0] * v[1] - u[1] * v[0]
+    };
+    turn(a, b, c) * turn(a, b, d) < 0.0 && turn(c, d, a) * turn(c, d, b) < 0.0
 }

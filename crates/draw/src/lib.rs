@@ -3,32 +3,56 @@
 //! [`layout`] says where everything stands, `svg` draws it. The pictures are self-contained SVG on a white ground.
 #![forbid(unsafe_code)]
 
+mod alike;
 mod causal;
+mod detour;
 pub mod figure;
 mod geometry;
+mod kept;
+mod label;
 pub mod layout;
 mod overlay;
+mod paper;
 mod route;
+mod scene;
 mod svg;
 pub mod text;
 
+use std::collections::BTreeMap;
+
 use causal::figure;
+pub use causal::path_count;
+pub use kept::positions;
 pub use svg::render;
 
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::CausalPaths;
 
 /// What is drawn of a bond graph.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DrawOptions {
-    /// Most causal paths drawn; the legend says how many there are besides.
-    pub paths: usize,
+    /// Which causal paths.
+    pub paths: DrawnPaths,
+    /// Whether laws and values stand at the elements.
+    pub laws: bool,
+    /// Where elements stand already, in px by their names: they stay there, as seen from each other. From
+    /// [`positions`] of an earlier drawing, or from an editor.
+    pub keep: BTreeMap<String, [f64; 2]>,
+}
+
+/// Which causal paths are drawn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DrawnPaths {
+    /// At most so many; the legend says how many there are besides.
+    First(usize),
+    /// Those with these numbers in the legend, from 1; none of an empty list.
+    Numbers(Vec<usize>),
 }
 
 impl Default for DrawOptions {
-    /// 12 causal paths.
+    /// 12 causal paths, laws, nothing kept.
     fn default() -> Self {
-        DrawOptions { paths: 12 }
+        DrawOptions { paths: DrawnPaths::First(12), laws: true, keep: BTreeMap::new() }
     }
 }
 
@@ -38,5 +62,5 @@ impl Default for DrawOptions {
 /// Storages in derivative causality have a dashed frame, bonds whose stroke is undetermined are dotted. Equal graphs
 /// give equal texts.
 pub fn draw(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> String {
-    render(&figure(causal, paths, options))
+    render(&figure(causal, paths, options), &options.keep)
 }

@@ -1,13 +1,16 @@
 //! From a placed figure to SVG.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use crate::figure::{FRAME, Figure, Form, Glyph, KIND, LAW, LEADING, NAME};
-use crate::geometry::{Area, Paper, Point, add, flow_side};
-use crate::layout::{Placement, Side, lay_out};
-use crate::overlay::{COLOURS, course, lanes};
-use crate::route::{Route, routes};
-use crate::text::{FAMILIES, escape, width};
+use crate::figure::{FRAME, Figure, Form, Glyph, KIND, LAW, LEADING, Loop, NAME, NUMBER};
+use crate::geometry::Point;
+use crate::label::{law_lines, main_line};
+use crate::layout::{Placement, Side};
+use crate::overlay::{course, look};
+use crate::route::Route;
+use crate::scene::{Scene, name_size, scene};
+use crate::text::{FAMILIES, escape, width, wrap};
 
 const MARGIN: f64 = 24.0;
 const INK: &str = "#1b1f24";
@@ -15,7 +18,10 @@ const SOFT: &str = "#4b5563";
 const PALE: &str = "#6b7280";
 const DERIVATIVE: &str = "#b45309";
 const JUNCTION: f64 = 18.0;
-const NUMBER: f64 = 9.0;
+/// Longest line above and below the drawing, in characters.
+const LEGEND: usize = 110;
+/// A rim of the ground's colour, so that small texts can be read on coloured paths.
+const HALO: &str = "stroke=\"#ffffff\" stroke-width=\"2.6\" stroke-linejoin=\"round\" paint-order=\"stroke\"";
 
 /// A number for SVG: one decimal, the shortest way.
 pub fn n(x: f64) -> String {
@@ -27,43 +33,47 @@ pub fn n(x: f64) -> String {
     }
 }
 
-/// Draws a figure.
-pub fn render(figure: &Figure) -> String {
-    let head = head_height(figure);
+/// Draws a figure; elements whose places are known by their names stay there, as seen from each other.
+pub fn render(figure: &Figure, keep: &BTreeMap<String, Point>) -> String {
+    let head = head(figure);
     let rows = legend(figure);
-    let mut placed = lay_out(&figure.network());
-    let content = [&rows[..], &[head_row(figure)]].concat().iter().map(|r| r.width).fold(placed.size[0], f64::max);
-    let left = MARGIN + (content - placed.size[0]) / 2.0;
-    placed.anchors.iter_mut().for_each(|a| *a = [a[0] + left, a[1] + MARGIN + head]);
-    let bottom = MARGIN + head + placed.size[1] + if rows.is_empty() { 0.0 } else { 22.0 };
-    let size = [content + 2.0 * MARGIN, bottom + rows.len() as f64 * Row::HEIGHT + MARGIN];
-    let mut svg = Svg::new(figure, size);
-    svg.head(figure);
-    svg.drawing(figure, &placed);
+    let scene = scene(figure, keep);
+    let (low, high) = scene.extent(figure);
+    let size = [high[0] - low[0], high[1] - low[1]];
+    let content = rows.iter().chain(&head).map(|r| r.width).fold(size[0], f64::max);
+    let top = MARGIN + if head.is_empty() { 0.0 } else { 16.0 + head.iter().map(|r| r.height).sum::<f64>() };
+    let move_by = [MARGIN + (content - size[0]) / 2.0 - low[0], top - low[1]];
+    let scene = scene.moved(move_by);
+    let bottom = top + size[1] + if rows.is_empty() { 0.0 } else { 22.0 };
+    let paper = [content + 2.0 * MARGIN, bottom + rows.iter().map(|r| r.height).sum::<f64>() + MARGIN];
+    let mut svg = Svg::new(figure, paper);
+    svg.head(&head);
+    svg.drawing(figure, &scene);
     svg.legend(&rows, bottom);
     svg.finish()
 }
 
-fn head_height(figure: &Figure) -> f64 {
-    let lines = [&figure.title, &figure.doc].iter().filter(|t| !t.is_empty()).count();
-    if lines == 0 { 0.0 } else { 16.0 + 20.0 * lines as f64 }
+/// Title and documentation.
+fn head(figure: &Figure) -> Vec<Row> {
+    let title = Row { mark: Mark::Title, text: figure.title.clone(), width: width(&figure.title, 17.0, true), height: 20.0 };
+    let doc = |text: String| Row { mark: Mark::Doc, width: width(&text, 12.0, false), text, height: 17.0 };
+    let title = (!figure.title.is_empty()).then_some(title);
+    title.into_iter().chain(wrap(&figure.doc, LEGEND).into_iter().map(doc)).collect()
 }
 
-fn head_row(figure: &Figure) -> Row {
-    let wide = width(&figure.title, 17.0, true).max(width(&figure.doc, 12.0, false));
-    Row { mark: Mark::None, text: String::new(), width: wide }
-}
-
-/// A line of the legend.
+/// A line above or below the drawing.
 #[derive(Clone)]
 struct Row {
     mark: Mark,
     text: String,
     width: f64,
+    height: f64,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Mark {
+    Title,
+    Doc,
     None,
     Path(usize),
     Derivative,
@@ -71,28 +81,31 @@ enum Mark {
 }
 
 impl Row {
-    const HEIGHT: f64 = 19.0;
     const INDENT: f64 = 40.0;
 
-    fn new(mark: Mark, text: String) -> Row {
-        let width = Row::INDENT + width(&text, 11.5, false);
-        Row { mark, text, width }
+    /// A text of the legend, in as many lines as it takes.
+    fn lines(mark: Mark, text: &str) -> Vec<Row> {
+        let row = |(i, text): (usize, String)| Row {
+            mark: if i == 0 { mark } else { Mark::None },
+            width: Row::INDENT + width(&text, 11.5, false),
+            text,
+            height: if i == 0 { 19.0 } else { 14.0 },
+        };
+        wrap(text, LEGEND).into_iter().enumerate().map(row).collect()
     }
 }
 
 /// What the drawing needs explained.
 fn legend(figure: &Figure) -> Vec<Row> {
-    let path =
-        |(i, l): (usize, &crate::figure::Loop)| Row::new(Mark::Path(i), format!("class {}:  {}", l.class, l.text));
-    let mut rows: Vec<Row> = figure.loops.iter().enumerate().map(path).collect();
-    if !figure.note.is_empty() {
-        rows.push(Row::new(Mark::None, figure.note.clone()));
-    }
+    let path = |l: &Loop| Row::lines(Mark::Path(l.number), &format!("{}   class {}:  {}", l.number, l.class, l.text));
+    let mut rows: Vec<Row> = figure.loops.iter().flat_map(path).collect();
+    rows.extend(Row::lines(Mark::None, &figure.note));
+    rows.extend(figure.laws.iter().flat_map(|law| Row::lines(Mark::None, law)));
     if figure.glyphs.iter().any(|g| g.derivative) {
-        rows.push(Row::new(Mark::Derivative, "storage in derivative causality".into()));
+        rows.extend(Row::lines(Mark::Derivative, "storage in derivative causality"));
     }
     if figure.bonds.iter().any(|b| b.stroke.is_none()) {
-        rows.push(Row::new(Mark::Undetermined, "bond whose effort and flow are not determined".into()));
+        rows.extend(Row::lines(Mark::Undetermined, "bond whose effort and flow are not determined"));
     }
     rows
 }
@@ -100,7 +113,6 @@ fn legend(figure: &Figure) -> Vec<Row> {
 /// An SVG text under construction.
 struct Svg {
     out: String,
-    paper: Paper,
 }
 
 impl Svg {
@@ -114,31 +126,31 @@ impl Svg {
              <rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n",
             escape(&figure.title)
         );
-        Svg { out, paper: Paper::default() }
+        Svg { out }
     }
     fn finish(mut self) -> String {
         self.out.push_str("</svg>\n");
         self.out
     }
-    fn head(&mut self, figure: &Figure) {
+    fn head(&mut self, rows: &[Row]) {
         let mut y = MARGIN + 13.0;
-        if !figure.title.is_empty() {
-            self.text([MARGIN, y], &format!("font-size=\"17\" font-weight=\"bold\" fill=\"{INK}\""), &figure.title);
-            y += 20.0;
-        }
-        if !figure.doc.is_empty() {
-            self.text([MARGIN, y], &format!("font-size=\"12\" fill=\"{PALE}\""), &figure.doc);
+        for row in rows {
+            let style = match row.mark {
+                Mark::Title => format!("font-size=\"17\" font-weight=\"bold\" fill=\"{INK}\""),
+                _ => format!("font-size=\"12\" fill=\"{PALE}\""),
+            };
+            self.text([MARGIN, y], &style, &row.text);
+            y += row.height;
         }
         self.out.push('\n');
     }
-    fn drawing(&mut self, figure: &Figure, placed: &Placement) {
-        let routes = routes(figure, placed);
-        self.paths(figure, placed, &routes);
-        self.bonds(figure, &routes);
-        self.glyphs(figure, placed);
-        self.moduli(figure, placed);
-        self.junction_names(figure, placed);
-        self.numbers(figure, &routes);
+    fn drawing(&mut self, figure: &Figure, scene: &Scene) {
+        self.paths(figure, scene);
+        self.bonds(figure, &scene.routes);
+        self.glyphs(figure, &scene.placed);
+        self.names(figure, scene, Form::TwoPort, "moduli");
+        self.names(figure, scene, Form::Junction, "junctions");
+        self.numbers(scene);
     }
     fn text(&mut self, at: Point, attributes: &str, text: &str) {
         _ = write!(self.out, "<text x=\"{}\" y=\"{}\" {attributes}>{}</text>", n(at[0]), n(at[1]), escape(text));
@@ -150,19 +162,20 @@ impl Svg {
         self.out.push_str("</g>\n");
     }
 
-    fn paths(&mut self, figure: &Figure, placed: &Placement, routes: &[Route]) {
+    fn paths(&mut self, figure: &Figure, scene: &Scene) {
         if figure.loops.is_empty() {
             return;
         }
+        let width = n(scene.lanes.width());
         self.open(
             "paths",
-            "fill=\"none\" stroke-width=\"4.5\" stroke-linecap=\"round\" stroke-linejoin=\"round\" opacity=\"0.55\"",
+            &format!("fill=\"none\" stroke-width=\"{width}\" stroke-linecap=\"round\" stroke-linejoin=\"round\" opacity=\"0.55\""),
         );
-        for (i, (path, lane)) in figure.loops.iter().zip(lanes(figure)).enumerate() {
-            let colour = COLOURS[i % COLOURS.len()];
-            let data = course(figure, placed, routes, path, lane);
-            let tip = escape(&format!("class {}: {}", path.class, path.text));
-            _ = writeln!(self.out, "<path d=\"{data}\" stroke=\"{colour}\"><title>{tip}</title></path>");
+        for (i, path) in figure.loops.iter().enumerate() {
+            let data = course(figure, &scene.placed, &scene.routes, &scene.lanes, i);
+            let tip = escape(&format!("{}, class {}: {}", path.number, path.class, path.text));
+            let look = stroked(path.number);
+            _ = writeln!(self.out, "<path data-path=\"{}\" d=\"{data}\" {look}><title>{tip}</title></path>", path.number);
         }
         self.close();
     }
@@ -179,20 +192,16 @@ impl Svg {
                 self.stroke(route, end);
             }
             self.out.push_str("</g>\n");
-            self.paper.add_line(route.ends[0], route.ends[1]);
         }
         self.close();
     }
     /// The bond with its half arrow: one barb on the side of the flow.
     fn shaft(&mut self, route: &Route, determined: bool) {
-        let [a, b] = route.ends;
-        let line = match route.bend {
-            Some(c) => format!("M{} {}Q{} {} {} {}", n(a[0]), n(a[1]), n(c[0]), n(c[1]), n(b[0]), n(b[1])),
-            None => format!("M{} {}L{} {}", n(a[0]), n(a[1]), n(b[0]), n(b[1])),
-        };
-        let along = route.arrival(1);
-        let barb = add(add(b, -9.0, along), 5.5, flow_side(along));
-        self.paper.add_line(b, barb);
+        let mut line = String::new();
+        for (i, p) in route.points.iter().enumerate() {
+            _ = write!(line, "{}{} {}", if i == 0 { 'M' } else { 'L' }, n(p[0]), n(p[1]));
+        }
+        let [b, barb] = route.barb();
         let barb = format!("{} {}", n(barb[0]), n(barb[1]));
         if determined {
             _ = write!(self.out, "<path class=\"shaft\" d=\"{line}L{barb}\"/>");
@@ -207,9 +216,7 @@ impl Svg {
     }
     /// The causal stroke at an end of a bond.
     fn stroke(&mut self, route: &Route, end: usize) {
-        let along = route.arrival(end);
-        let across = [-along[1], along[0]];
-        let [p, q] = [6.5, -6.5].map(|k| add(route.ends[end], k, across));
+        let [p, q] = route.stroke(end);
         let side = ["from", "to"][end];
         _ = write!(
             self.out,
@@ -219,34 +226,32 @@ impl Svg {
             n(q[0]),
             n(q[1])
         );
-        self.paper.add_line(p, q);
     }
 
     fn glyphs(&mut self, figure: &Figure, placed: &Placement) {
         self.open("elements", &format!("fill=\"{INK}\""));
         for (v, glyph) in figure.glyphs.iter().enumerate() {
             let at = placed.anchors[v];
-            let tip = escape(&glyph.tip);
-            _ = write!(self.out, "<g class=\"element\" data-name=\"{}\"><title>{tip}</title>", escape(&glyph.name));
+            let (tip, name) = (escape(&glyph.tip), escape(&glyph.name));
+            let [x, y] = at.map(n);
+            _ = write!(self.out, "<g class=\"element\" data-name=\"{name}\" data-at=\"{x} {y}\"><title>{tip}</title>");
             if glyph.derivative {
                 self.frame(at, glyph.core());
             }
             match glyph.form {
-                Form::Junction => self.sign(at, &glyph.kind, JUNCTION, glyph.core()),
-                Form::TwoPort => self.sign(at, &glyph.kind, KIND, glyph.core()),
-                Form::Field => self.field(at, glyph),
-                Form::OnePort | Form::Source => self.one_port(at, glyph, placed.facing[v], placed.mirrored[v]),
+                Form::Junction => self.sign(at, &glyph.kind, JUNCTION),
+                Form::TwoPort => self.sign(at, &glyph.kind, KIND),
+                _ => self.lines(at, glyph, placed.facing[v], placed.mirrored[v]),
             }
             self.out.push_str("</g>\n");
         }
         self.close();
     }
     /// The sign of a kind, centred.
-    fn sign(&mut self, at: Point, kind: &str, size: f64, core: Point) {
+    fn sign(&mut self, at: Point, kind: &str, size: f64) {
         let y = at[1] + 0.36 * size;
         let style = format!("font-size=\"{size}\" font-weight=\"bold\" text-anchor=\"middle\"");
         self.text([at[0], y], &style, kind);
-        self.paper.add_box(Area::around(at, [2.0 * core[0], 2.0 * core[1]]));
     }
     /// The mark of a storage in derivative causality.
     fn frame(&mut self, at: Point, core: Point) {
@@ -260,26 +265,13 @@ impl Svg {
             n(2.0 * core[1])
         );
     }
-    fn small(&mut self, at: Point, anchor: &str, italic: bool, text: &str) {
-        let slant = if italic { " font-style=\"italic\"" } else { "" };
-        let style = format!("font-size=\"{LAW}\"{slant} text-anchor=\"{anchor}\" fill=\"{SOFT}\"");
-        self.text(at, &style, text);
-        let wide = width(text, LAW, false);
-        let centre = match anchor {
-            "start" => at[0] + wide / 2.0,
-            "end" => at[0] - wide / 2.0,
-            _ => at[0],
-        };
-        self.paper.add_box(Area::around([centre, at[1] - 4.0], [wide, LEADING - 1.0]));
-    }
-    fn field(&mut self, at: Point, glyph: &Glyph) {
-        let lift = if glyph.law.is_empty() { 0.0 } else { LEADING / 2.0 };
-        let y = at[1] + 0.36 * KIND - lift;
-        self.main_line([at[0], y], "middle", glyph);
-        let [w, h] = glyph.core();
-        self.paper.add_box(Area::around(at, [2.0 * w, 2.0 * h]));
-        if !glyph.law.is_empty() {
-            self.small([at[0], y + LEADING], "middle", true, &glyph.law);
+    /// `Kind : name` with the law below or above it.
+    fn lines(&mut self, at: Point, glyph: &Glyph, facing: Side, mirrored: bool) {
+        let main = main_line(glyph, at, facing, mirrored);
+        self.main_line(main.at, main.anchor, glyph);
+        for (line, place) in glyph.law.iter().zip(law_lines(glyph, at, facing, mirrored)) {
+            let style = format!("font-size=\"{LAW}\" font-style=\"italic\" text-anchor=\"{}\" fill=\"{SOFT}\"", place.anchor);
+            self.text(place.at, &style, line);
         }
     }
     /// `Kind : name`, or `name : Kind` if it ends at the bond.
@@ -300,73 +292,32 @@ impl Svg {
             n(at[1])
         );
     }
-    fn one_port(&mut self, at: Point, glyph: &Glyph, facing: Side, mirrored: bool) {
-        let half = width(&glyph.kind, KIND, true) / 2.0;
-        let y = at[1] + 0.36 * KIND;
-        let to_left = facing == Side::East || mirrored;
-        let (x, anchor, out) = if to_left { (at[0] + half, "end", -1.0) } else { (at[0] - half, "start", 1.0) };
-        self.main_line([x, y], anchor, glyph);
-        let [w, h] = glyph.core();
-        self.paper.add_box(Area::around(at, [2.0 * w, 2.0 * h]));
-        let text = glyph.name_width();
-        self.paper.add_box(Area::around([at[0] + out * (half + text / 2.0), at[1]], [text, 16.0]));
-        if !glyph.law.is_empty() {
-            let row = if facing == Side::South { y - LEADING - 3.0 } else { y + LEADING };
-            let indent = glyph.law_indent(facing);
-            self.small([x + out * indent, row], anchor, true, &glyph.law);
-        }
-    }
-
-    /// Modulus and name of each two-port, beside it where there is room.
-    fn moduli(&mut self, figure: &Figure, placed: &Placement) {
-        self.open("moduli", &format!("font-size=\"{LAW}\" fill=\"{SOFT}\" text-anchor=\"middle\""));
-        for (v, glyph) in figure.glyphs.iter().enumerate().filter(|g| g.1.form == Form::TwoPort) {
-            let lines = glyph.small_lines();
-            let size = [glyph.small_width() + 2.0, lines.len() as f64 * LEADING];
-            let centre =
-                self.paper.settle(&beside_two_port(placed.anchors[v], glyph.core(), size, placed.facing[v]), size);
-            for (i, line) in lines.iter().enumerate() {
-                let slant = if i == 0 && !glyph.law.is_empty() { "font-style=\"italic\"" } else { "" };
-                self.text([centre[0], centre[1] - size[1] / 2.0 + 10.0 + i as f64 * LEADING], slant, line);
+    /// Modulus and name of two-ports, or small names of junctions.
+    fn names(&mut self, figure: &Figure, scene: &Scene, form: Form, class: &str) {
+        self.open(class, &format!("font-size=\"{LAW}\" fill=\"{SOFT}\" text-anchor=\"middle\" {HALO}"));
+        for &(v, centre) in scene.names.iter().filter(|(v, _)| figure.glyphs[*v].form == form) {
+            let glyph = &figure.glyphs[v];
+            if form == Form::Junction {
+                self.text([centre[0], centre[1] + 4.0], "", &glyph.name);
+            } else {
+                let top = centre[1] - name_size(figure, v)[1] / 2.0 + 10.0;
+                for (i, line) in glyph.small_lines().into_iter().enumerate() {
+                    let slant = if i < glyph.law.len() { "font-style=\"italic\"" } else { "" };
+                    self.text([centre[0], top + i as f64 * LEADING], slant, line);
+                }
             }
             self.out.push('\n');
         }
         self.close();
     }
-    /// Small names in a free corner of each junction.
-    fn junction_names(&mut self, figure: &Figure, placed: &Placement) {
-        self.open("junctions", &format!("font-size=\"{LAW}\" fill=\"{SOFT}\" text-anchor=\"middle\""));
-        for (v, glyph) in figure.glyphs.iter().enumerate() {
-            if glyph.form == Form::Junction && !glyph.name.is_empty() && glyph.name != glyph.kind {
-                let size = [width(&glyph.name, LAW, false) + 2.0, 11.0];
-                let centre = self.paper.settle(&corners(placed.anchors[v], glyph.core(), size), size);
-                self.text([centre[0], centre[1] + 4.0], "", &glyph.name);
-                self.out.push('\n');
-            }
+    /// Bond numbers and port names.
+    fn numbers(&mut self, scene: &Scene) {
+        self.open("numbers", &format!("font-size=\"{NUMBER}\" fill=\"{SOFT}\" text-anchor=\"middle\" {HALO}"));
+        for (text, centre) in &scene.numbers {
+            self.text([centre[0], centre[1] + 0.36 * NUMBER], "", text);
+            self.out.push('\n');
         }
         self.close();
-    }
-    /// Bond numbers and port names beside the bonds.
-    fn numbers(&mut self, figure: &Figure, routes: &[Route]) {
-        self.open("numbers", &format!("font-size=\"{NUMBER}\" fill=\"{PALE}\" text-anchor=\"middle\""));
-        for (i, (bond, route)) in figure.bonds.iter().zip(routes).enumerate() {
-            for (end, port) in bond.ports.iter().enumerate().filter(|p| !p.1.is_empty()) {
-                self.beside(route, if end == 0 { [0.16, 0.3] } else { [0.84, 0.7] }, port);
-            }
-            self.beside(route, [0.5, 0.36], &(i + 1).to_string());
-        }
-        self.close();
-    }
-    /// A small text beside a bond, at the first of these fractions of the way if it is free there.
-    fn beside(&mut self, route: &Route, ways: [f64; 2], text: &str) {
-        let size = [width(text, NUMBER, false) + 1.5, NUMBER];
-        let flow = flow_side(route.arrival(1));
-        let away = 3.0 + (flow[0] * size[0]).abs() / 2.0 + (flow[1] * size[1]).abs() / 2.0;
-        let places = |t: f64| [-1.0, 1.0].map(|k| add(route.at(t), k * away, flow));
-        let centres = [ways[0], ways[1], 1.0 - ways[1]].map(places).concat();
-        let centre = self.paper.settle(&centres, size);
-        self.text([centre[0], centre[1] + 0.36 * NUMBER], "", text);
-        self.out.push('\n');
     }
 
     fn legend(&mut self, rows: &[Row], top: f64) {
@@ -374,24 +325,22 @@ impl Svg {
             return;
         }
         self.open("legend", &format!("font-size=\"11.5\" fill=\"{INK}\""));
-        for (i, row) in rows.iter().enumerate() {
-            let y = top + (i as f64 + 0.5) * Row::HEIGHT;
-            self.mark(row.mark, y);
-            self.text([MARGIN + Row::INDENT, y + 4.0], "", &row.text);
+        let mut y = top;
+        for row in rows {
+            self.mark(row.mark, y + 9.5);
+            self.text([MARGIN + Row::INDENT, y + row.height - 5.5], "", &row.text);
             self.out.push('\n');
+            y += row.height;
         }
         self.close();
     }
     fn mark(&mut self, mark: Mark, y: f64) {
         let line = format!("<path d=\"M{} {y}h28\" fill=\"none\" ", MARGIN + 2.0, y = n(y));
         match mark {
-            Mark::None => {}
-            Mark::Path(i) => {
-                let colour = COLOURS[i % COLOURS.len()];
-                _ = write!(
-                    self.out,
-                    "{line}stroke=\"{colour}\" stroke-width=\"4.5\" stroke-linecap=\"round\" opacity=\"0.55\"/>"
-                );
+            Mark::None | Mark::Title | Mark::Doc => {}
+            Mark::Path(number) => {
+                let look = stroked(number);
+                _ = write!(self.out, "{line}{look} stroke-width=\"4.5\" stroke-linecap=\"round\" opacity=\"0.55\"/>");
             }
             Mark::Derivative => self.frame([MARGIN + 16.0, y], [11.0, 7.0]),
             Mark::Undetermined => {
@@ -409,24 +358,9 @@ fn called(glyph: &Glyph) -> String {
     if glyph.name.is_empty() { glyph.kind.clone() } else { format!("{}:{}", glyph.kind, glyph.name) }
 }
 
-/// Places for the text of a two-port, best first: above or to the right, then around it.
-fn beside_two_port(at: Point, core: Point, size: Point, facing: Side) -> Vec<Point> {
-    let [x, y] = [core[0] + size[0] / 2.0, core[1] + size[1] / 2.0];
-    let mut straight = [[0.0, -y], [0.0, y], [x, 0.0], [-x, 0.0]];
-    if matches!(facing, Side::North | Side::South) {
-        straight.rotate_left(2);
-    }
-    let corners = [[x - 4.0, -y], [x - 4.0, y], [4.0 - x, -y], [4.0 - x, y]];
-    straight.iter().chain(&corners).map(|s| [at[0] + s[0], at[1] + s[1]]).collect()
-}
-
-/// Places for a junction's name, best first: the four corners, then further out.
-fn corners(at: Point, core: Point, size: Point) -> Vec<Point> {
-    let corner = |far: f64| {
-        let x = core[0] - 2.0 + size[0] / 2.0;
-        let y = core[1] - 1.0 + size[1] / 2.0 - 2.0 + far;
-        [[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|s| [at[0] + s[0] * x, at[1] + s[1] * y])
-    };
-    let straight = [[at[0], at[1] - core[1] - 6.0], [at[0], at[1] + core[1] + 6.0]];
-    [corner(0.0).to_vec(), corner(5.0).to_vec(), straight.to_vec()].concat()
+/// Colour and dashes of a path, as attributes.
+fn stroked(number: usize) -> String {
+    let (colour, dashes) = look(number);
+    let dashes = if dashes.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{dashes}\"") };
+    format!("stroke=\"{colour}\"{dashes}")
 }

@@ -53,13 +53,27 @@ pub fn escape(text: &str) -> String {
     safe
 }
 
-/// At most `most` characters; a longer text ends in an ellipsis.
-pub fn shorten(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
-        return text.to_string();
+/// What [`escape`] has written out, as it was.
+pub fn unescape(text: &str) -> String {
+    let text = text.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"");
+    text.replace("&amp;", "&")
+}
+
+/// A text in lines of at most `most` characters, broken at spaces, else behind signs of expressions; nothing is lost.
+pub fn wrap(text: &str, most: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut rest: Vec<char> = text.trim().chars().collect();
+    while rest.len() > most.max(1) {
+        let sign = |c: char| matches!(c, '·' | '/' | ',' | ')' | '(' | '+' | '−');
+        let space = (most / 3..=most).rev().find(|&i| rest[i] == ' ');
+        let cut = space.or_else(|| (most / 3..=most).rev().find(|&i| sign(rest[i - 1]))).unwrap_or(most);
+        lines.push(rest[..cut].iter().collect::<String>().trim_end().to_string());
+        rest = rest[cut..].iter().copied().skip_while(|c| *c == ' ').collect();
     }
-    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
-    format!("{}…", kept.trim_end())
+    if !rest.is_empty() {
+        lines.push(rest.into_iter().collect());
+    }
+    lines
 }
 
 /// An expression as written by the modeller, in the signs of print: `a*cos(phi)^2` becomes `a·cos(φ)²`.
@@ -148,8 +162,12 @@ mod tests {
     }
 
     #[test]
-    fn long_text_ends_in_an_ellipsis() {
-        assert_eq!((shorten("spring", 6), shorten("springs", 6)), ("spring".into(), "sprin…".into()));
+    fn long_text_is_broken_and_nothing_is_lost() {
+        assert_eq!(wrap("lb·cos(al) − cu·sin(ph) − xa − la·cos(au)", 24), ["lb·cos(al) − cu·sin(ph)", "− xa − la·cos(au)"]);
+        assert_eq!(wrap("a·b·c·d", 4), ["a·b·", "c·d"]);
+        assert_eq!(wrap("abcdefgh", 3), ["abc", "def", "gh"]);
+        assert_eq!(wrap("spring", 6), ["spring"]);
+        assert!(wrap("", 6).is_empty());
     }
 
     #[test]

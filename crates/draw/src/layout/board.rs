@@ -3,6 +3,9 @@
 //! A good drawing has short bonds, horizontal or vertical, none across another or through a node; two-ports in line;
 //! one-ports above and below; power from left to right.
 
+use std::collections::BTreeMap;
+
+use super::blocks::membership;
 use super::{Cell, Network, Role};
 
 /// Free cells around the first placement.
@@ -14,6 +17,9 @@ pub struct Board<'a> {
     pub incident: Vec<Vec<usize>>,
     pub at: Vec<Cell>,
     hangs: Vec<bool>,
+    /// The block of equal ones that a node is in, and the number of nodes of each.
+    pub block: Vec<Option<usize>>,
+    blocks: Vec<usize>,
     /// The two inner neighbours of a node that has exactly two: a chain runs through it.
     run: Vec<Option<[usize; 2]>>,
     corner: Cell,
@@ -40,8 +46,11 @@ impl<'a> Board<'a> {
         let hangs: Vec<bool> = net.hosts(&incident).iter().map(Option::is_some).collect();
         let run = (0..net.nodes.len()).map(|v| run(net, &incident, &hangs, v)).collect();
         let seen = [vec![0; net.bonds.len()], vec![0; net.nodes.len()]];
+        let (block, blocks) = membership(net);
         let mut board = Board {
             net,
+            block,
+            blocks,
             incident,
             at,
             hangs,
@@ -77,6 +86,23 @@ impl<'a> Board<'a> {
     /// The node in a cell.
     pub fn node_in(&self, c: Cell) -> Option<usize> {
         self.node[self.index(c)].map(|v| v as usize)
+    }
+    /// Whether moves leave the shape of every block as it is.
+    pub fn keeps_blocks(&self, moves: &[(usize, Cell)]) -> bool {
+        if self.blocks.is_empty() {
+            return true;
+        }
+        let mut moved: BTreeMap<usize, (Cell, usize)> = BTreeMap::new();
+        for &(v, to) in moves {
+            let Some(block) = self.block[v] else { continue };
+            let by = [to[0] - self.at[v][0], to[1] - self.at[v][1]];
+            let known = moved.entry(block).or_insert((by, 0));
+            if known.0 != by {
+                return false;
+            }
+            known.1 += 1;
+        }
+        moved.iter().all(|(&block, &(_, count))| count == self.blocks[block])
     }
     /// Moves nodes to cells that are free or left by these nodes.
     pub fn place(&mut self, moves: &[(usize, Cell)]) {

@@ -92,7 +92,8 @@ fn squeeze(board: &mut Board) {
             let beyond: Vec<usize> = (0..board.at.len()).filter(|&v| board.at[v][axis] >= line).collect();
             let mut by = [0, 0];
             by[axis] = -1;
-            while carry(board, &beyond, |c| [c[0] + by[0], c[1] + by[1]]).is_some_and(|m| attempt(board, &m, 0)) {}
+            while carry(board, &beyond, |c| [c[0] + by[0], c[1] + by[1]])
+                .is_some_and(|m| board.keeps_blocks(&m) && attempt(board, &m, 0)) {}
         }
     }
 }
@@ -110,17 +111,35 @@ fn attempt(board: &mut Board, moves: &[(usize, Cell)], threshold: i64) -> bool {
     kept
 }
 
-/// A random move: one node, two nodes swapped, a node with its one-ports, or a branch.
+/// A random move: one node, two nodes swapped, a node with its one-ports, a block of equal ones, or a branch.
 fn propose(board: &Board, branches: &[Branch], dice: &mut Dice) -> Option<Vec<(usize, Cell)>> {
     let v = dice.below(board.net.nodes.len());
     if board.incident[v].len() > 24 {
         return None;
     }
-    match dice.below(8) {
+    let moves = match dice.below(8) {
+        _ if board.block[v].is_some() => shift(board, v, dice),
         0 | 1 => cluster(board, v, dice),
         2 if !branches.is_empty() => swing(board, &branches[dice.below(branches.len())], dice),
         _ => single(board, v, dice),
-    }
+    };
+    moves.filter(|moves| board.keeps_blocks(moves))
+}
+
+/// A block to where one of its nodes is in line with a neighbour outside, or a few cells on.
+fn shift(board: &Board, v: usize, dice: &mut Dice) -> Option<Vec<(usize, Cell)>> {
+    let block = board.block[v]?;
+    let near = board.incident[v].iter().map(|&b| board.net.across(b, v)).find(|&u| board.block[u] != Some(block));
+    let by = match (near, dice.below(3)) {
+        (Some(u), 0 | 1) => {
+            let far = 1 + dice.below(2) as i32;
+            let [x, y] = [[far, 0], [-far, 0], [0, far], [0, -far]][dice.below(4)];
+            [board.at[u][0] + x - board.at[v][0], board.at[u][1] + y - board.at[v][1]]
+        }
+        _ => [dice.step(2), dice.step(2)],
+    };
+    let nodes: Vec<usize> = (0..board.at.len()).filter(|&u| board.block[u] == Some(block)).collect();
+    carry(board, &nodes, |c| [c[0] + by[0], c[1] + by[1]])
 }
 
 /// One node to a cell near one of its neighbours; if that is taken, the two change places.

@@ -5,12 +5,15 @@
 //! (`start`) is improved by small moves (`improve`), then rows and columns get the room that the labels need
 //! (`space`). All choices are made in integers, so the same graph gives the same picture everywhere.
 
+mod beside;
+mod blocks;
 mod board;
 mod improve;
 mod parts;
 mod space;
 mod start;
 
+pub use beside::place_beside;
 pub use parts::parts;
 
 /// A graph to lay out.
@@ -21,6 +24,9 @@ pub struct Network {
     /// The bonds, from and to; the half arrow is at the second. Parallel bonds and bonds from a node to itself are
     /// allowed.
     pub bonds: Vec<[usize; 2]>,
+    /// Groups of equal parts, which are laid out alike: for each group its parts, for each part its nodes in the same
+    /// order. No node is in two of them; each part is connected.
+    pub alike: Vec<Vec<Vec<usize>>>,
 }
 
 /// A node, as far as the layout is concerned.
@@ -44,6 +50,8 @@ pub enum Role {
     Source,
     /// Any other one-port, above or below its junction if possible.
     OnePort,
+    /// The place of something outside: a bond goes on there.
+    Open,
 }
 
 /// A compass direction.
@@ -81,7 +89,9 @@ pub struct Placement {
     pub facing: Vec<Side>,
     /// Whether the text of a one-port above or below its neighbour stands to the left of its anchor: `room` mirrored.
     pub mirrored: Vec<bool>,
-    /// Size of the whole, in px; every node with its room lies between 0 and this.
+    /// Upper left corner of the whole, in px; 0, 0 unless something was placed before.
+    pub corner: [f64; 2],
+    /// Size of the whole, in px; every node with its room lies between the corner and this far from it.
     pub size: [f64; 2],
 }
 
@@ -90,15 +100,48 @@ type Cell = [i32; 2];
 
 /// Lays out a graph. Deterministic; the effort grows linearly with the size beyond a few hundred nodes.
 pub fn lay_out(net: &Network) -> Placement {
-    let whole = parts(net.nodes.len(), &net.bonds);
-    let laid = whole.iter().map(|part| (part, lay_out_part(&part_of(net, part)))).collect::<Vec<_>>();
-    pack(net.nodes.len(), &laid)
+    Plan::new(net).placement(1.0)
 }
 
-/// Lays out a connected graph.
-fn lay_out_part(net: &Network) -> Placement {
-    let cells = improve::improve(net, start::start(net));
-    space::space(net, &cells)
+/// Lays out a graph of which some nodes have a place already, in px: these stay there. If there are none, everything is
+/// laid out anew.
+pub fn layout(net: &Network, pinned: &[Option<[f64; 2]>]) -> Placement {
+    match pinned.iter().any(Option::is_some) {
+        true => place_beside(net, pinned),
+        false => lay_out(net),
+    }
+}
+
+/// A graph on a grid, before it gets its measures.
+pub struct Plan {
+    nodes: usize,
+    /// The connected parts: their nodes, each part as a graph, its cells.
+    parts: Vec<(Vec<usize>, Network, Vec<Cell>)>,
+}
+
+impl Plan {
+    /// Puts every node into a cell.
+    pub fn new(net: &Network) -> Plan {
+        let cells = |nodes: Vec<usize>| {
+            let part = part_of(net, &nodes);
+            let cells = cells(&part);
+            (nodes, part, cells)
+        };
+        Plan { nodes: net.nodes.len(), parts: parts(net.nodes.len(), &net.bonds).into_iter().map(cells).collect() }
+    }
+    /// Turns cells into px; bonds get more room by this factor.
+    pub fn placement(&self, wider: f64) -> Placement {
+        let laid: Vec<_> = self.parts.iter().map(|(nodes, net, cells)| (nodes, space::space(net, cells, wider))).collect();
+        pack(self.nodes, &laid)
+    }
+}
+
+/// The cells of a connected graph: equal parts first, then all together.
+fn cells(net: &Network) -> Vec<Cell> {
+    let start = start::start(net);
+    let shapes: Vec<Vec<Cell>> = net.alike.iter().map(|group| cells(&blocks::with_ends(net, &group[0]))).collect();
+    let start = blocks::gather(net, &shapes, start);
+    improve::improve(net, start)
 }
 
 /// The part of `net` on these nodes, renumbered in their order.
@@ -112,14 +155,23 @@ fn part_of(net: &Network, part: &[usize]) -> Network {
     Network {
         nodes: part.iter().map(|&v| net.nodes[v].clone()).collect(),
         bonds: net.bonds.iter().filter(inside).map(|b| [index[b[0]], index[b[1]]]).collect(),
+        alike: alike_in(net, &index),
     }
+}
+
+/// The groups of equal parts that lie in a part of the graph, by the new numbers of its nodes.
+fn alike_in(net: &Network, index: &[usize]) -> Vec<Vec<Vec<usize>>> {
+    let inside = |nodes: &&Vec<usize>| nodes.iter().all(|&v| index[v] != usize::MAX);
+    let renumbered = |nodes: &Vec<usize>| nodes.iter().map(|&v| index[v]).collect();
+    let group = |group: &Vec<Vec<usize>>| group.iter().filter(inside).map(renumbered).collect::<Vec<Vec<usize>>>();
+    net.alike.iter().map(group).filter(|group| !group.is_empty()).collect()
 }
 
 /// Sets separate parts beside and below each other, like words on a page.
 fn pack(nodes: usize, laid: &[(&Vec<usize>, Placement)]) -> Placement {
     const GAP: f64 = 36.0;
     let (anchors, facing, mirrored) = (vec![[0.0; 2]; nodes], vec![Side::East; nodes], vec![false; nodes]);
-    let mut whole = Placement { anchors, facing, mirrored, size: [0.0; 2] };
+    let mut whole = Placement { anchors, facing, mirrored, corner: [0.0; 2], size: [0.0; 2] };
     let widest = laid.iter().map(|(_, p)| p.size[0]).fold(0.0, f64::max);
     let area: f64 = laid.iter().map(|(_, p)| (p.size[0] + GAP) * (p.size[1] + GAP)).sum();
     let line = widest.max((1.6 * area).sqrt());
@@ -164,7 +216,7 @@ impl Network {
             let u = self.across(bond, v);
             let pair = incident[u].len() == 1;
             let centre = |w: usize| matches!(self.nodes[w].role, Role::Centre | Role::TwoPort);
-            let keeps = u == v || (pair && (centre(v), u) > (centre(u), v));
+            let keeps = u == v || self.nodes[v].role == Role::Open || (pair && (centre(v), u) > (centre(u), v));
             (!keeps).then_some(u)
         };
         (0..self.nodes.len()).map(host).collect()

@@ -11,25 +11,21 @@ const ALONG: f64 = 46.0;
 const DOWN: f64 = 36.0;
 /// Between text and anything else.
 const CLEAR: f64 = 9.0;
+/// Texts less than this above each other count as side by side.
+const LEVEL: f64 = 5.0;
 
-/// Turns cells into positions: as close as possible without a bond through a text. What cannot be freed by turning
-/// texts to the other side is given more room.
-pub fn space(net: &Network, cells: &[Cell]) -> Placement {
-    let mut grid = Grid::new(net, cells);
+/// Turns cells into positions: as close as possible without a bond through a text, as far as turning texts to the other
+/// side will do. Bonds get more room by the factor `wider`.
+pub fn space(net: &Network, cells: &[Cell], wider: f64) -> Placement {
+    let mut grid = Grid::new(net, cells, wider);
     let mut best: Option<(usize, Placement)> = None;
-    for wider in [1.0, 1.25, 1.6] {
-        grid.wider = wider;
-        for _ in 0..2 {
-            let anchors = grid.anchors();
-            let struck = grid.struck(&anchors);
-            if best.as_ref().is_none_or(|b| struck.len() < b.0) {
-                best = Some((struck.len(), grid.fit(anchors)));
-            }
-            if struck.is_empty() || !grid.mirror(&struck) {
-                break;
-            }
+    for _ in 0..2 {
+        let anchors = grid.anchors();
+        let struck = grid.struck(&anchors);
+        if best.as_ref().is_none_or(|b| struck.len() < b.0) {
+            best = Some((struck.len(), grid.fit(anchors)));
         }
-        if best.as_ref().is_some_and(|b| b.0 == 0) {
+        if struck.is_empty() || !grid.mirror(&struck) {
             break;
         }
     }
@@ -51,7 +47,7 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(net: &'a Network, cells: &[Cell]) -> Grid<'a> {
+    fn new(net: &'a Network, cells: &[Cell], wider: f64) -> Grid<'a> {
         let index = |k: usize| -> BTreeMap<i32, i32> {
             let used: BTreeSet<i32> = cells.iter().map(|c| c[k]).collect();
             used.into_iter().zip(0..).collect()
@@ -68,7 +64,7 @@ impl<'a> Grid<'a> {
         let rooms = net.nodes.iter().zip(&facing).map(|(n, &f)| n.room[f as usize]).collect();
         let bonded = net.bonds.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect();
         let mirrored = vec![false; net.nodes.len()];
-        Grid { net, cells, rooms, facing, mirrored, wider: 1.0, bonded, size: [columns.len(), rows.len()] }
+        Grid { net, cells, rooms, facing, mirrored, wider, bonded, size: [columns.len(), rows.len()] }
     }
     fn anchors(&self) -> Vec<[f64; 2]> {
         let rows = self.rows();
@@ -83,7 +79,7 @@ impl<'a> Grid<'a> {
         anchors.iter_mut().for_each(|a| *a = [a[0] - left, a[1] - top]);
         let most = |f: &dyn Fn(usize) -> f64| (0..rooms.len()).map(f).fold(0.0, f64::max);
         let size = [most(&|v| anchors[v][0] + rooms[v].east), most(&|v| anchors[v][1] + rooms[v].south)];
-        Placement { anchors, facing: self.facing.clone(), mirrored: self.mirrored.clone(), size }
+        Placement { anchors, facing: self.facing.clone(), mirrored: self.mirrored.clone(), corner: [0.0; 2], size }
     }
     /// The nodes whose room a foreign bond runs through. Not looked for in very large graphs.
     fn struck(&self, anchors: &[[f64; 2]]) -> Vec<usize> {
@@ -146,7 +142,7 @@ impl<'a> Grid<'a> {
         match (self.bonded(a, b), self.cells[a][0] == self.cells[b][0]) {
             (true, true) => DOWN * self.wider,
             (true, false) => 22.0 * self.wider,
-            (false, true) => CLEAR,
+            (false, true) => CLEAR * self.wider,
             (false, false) => 0.0,
         }
     }
@@ -172,7 +168,7 @@ impl<'a> Grid<'a> {
             for item in &items[column] {
                 let near = item.row.saturating_sub(2)..(item.row + 3).min(self.size[1]);
                 for (c, left) in last[near].iter().flatten() {
-                    if left.top < item.bottom + 2.0 && item.top < left.bottom + 2.0 {
+                    if left.top < item.bottom + LEVEL && item.top < left.bottom + LEVEL {
                         place = place.max(x[*c] + left.room.east + item.room.west + self.gap_along(left, item));
                     }
                 }
@@ -215,7 +211,7 @@ impl<'a> Grid<'a> {
                     20.0 * self.wider
                 }
             }
-            _ => CLEAR,
+            _ => CLEAR * self.wider,
         }
     }
 }

@@ -19,7 +19,7 @@ fn network(junctions: usize) -> impl Strategy<Value = Network> {
         let rings = proptest::collection::vec((0..n, 0..n), 0..=n / 3);
         let ones = proptest::collection::vec((0..n, any::<bool>(), any::<bool>()), 0..=2 * n);
         (tree, rings, ones).prop_map(move |(tree, rings, ones)| {
-            let mut net = Network { nodes: vec![node(Role::Centre); n], bonds: Vec::new() };
+            let mut net = Network { nodes: vec![node(Role::Centre); n], ..Network::default() };
             for (i, (parent, two_port, forth)) in tree.into_iter().enumerate() {
                 let ends = [parent.index(i + 1), i + 1];
                 let ends = if forth { ends } else { [ends[1], ends[0]] };
@@ -97,7 +97,7 @@ fn a_chain_is_drawn_in_line_from_left_to_right() {
 #[test]
 fn a_ring_is_drawn_as_a_rectangle() {
     let bonds = (0..6).map(|i| [i, (i + 1) % 6]).collect();
-    let placed = lay_out(&Network { nodes: vec![node(Role::Centre); 6], bonds });
+    let placed = lay_out(&Network { nodes: vec![node(Role::Centre); 6], bonds, alike: vec![] });
     for i in 0..6 {
         let [a, b] = [placed.anchors[i], placed.anchors[(i + 1) % 6]];
         assert!(a[0] == b[0] || a[1] == b[1], "bond {i} is oblique: {placed:?}");
@@ -107,12 +107,12 @@ fn a_ring_is_drawn_as_a_rectangle() {
 #[test]
 fn odd_graphs_are_drawn_too() {
     check(&Network::default());
-    check(&Network { nodes: vec![node(Role::OnePort)], bonds: vec![] });
-    check(&Network { nodes: vec![node(Role::OnePort); 2], bonds: vec![[0, 1]] });
-    check(&Network { nodes: vec![node(Role::Centre); 2], bonds: vec![[0, 0], [0, 1], [1, 0], [0, 1]] });
-    let star = Network { nodes: vec![node(Role::OnePort); 40], bonds: (1..40).map(|i| [0, i]).collect() };
+    check(&Network { nodes: vec![node(Role::OnePort)], bonds: vec![], alike: vec![] });
+    check(&Network { nodes: vec![node(Role::OnePort); 2], bonds: vec![[0, 1]], alike: vec![] });
+    check(&Network { nodes: vec![node(Role::Centre); 2], bonds: vec![[0, 0], [0, 1], [1, 0], [0, 1]], alike: vec![] });
+    let star = Network { nodes: vec![node(Role::OnePort); 40], bonds: (1..40).map(|i| [0, i]).collect(), alike: vec![] };
     check(&star);
-    let parts = Network { nodes: vec![node(Role::OnePort); 20], bonds: (0..10).map(|i| [2 * i, 2 * i + 1]).collect() };
+    let parts = Network { nodes: vec![node(Role::OnePort); 20], bonds: (0..10).map(|i| [2 * i, 2 * i + 1]).collect(), alike: vec![] };
     check(&parts);
 }
 
