@@ -8,6 +8,8 @@ use super::{Cell, Network, parts};
 const MOVES: usize = 300_000;
 /// Upper bound on the cells and bonds looked at in one round.
 const WORK: u64 = 60_000_000;
+/// Largest graph that is drawn in a moment: fewer moves find as good a drawing.
+const SMALL: usize = 16;
 /// Largest graph whose branches are moved as a whole.
 const BRANCHED: usize = 400;
 
@@ -15,7 +17,7 @@ const BRANCHED: usize = 400;
 pub fn improve(net: &Network, start: Vec<Cell>) -> Vec<Cell> {
     let n = net.nodes.len();
     let branches = if n <= BRANCHED { branches(net) } else { Vec::new() };
-    let tries = (n * 1500).min(MOVES);
+    let tries = (n * if n <= SMALL { 200 } else { 1500 }).min(MOVES);
     let mut best: Option<(i64, Vec<Cell>)> = None;
     let mut again = 0;
     for (round, &threshold) in thresholds(n).iter().enumerate() {
@@ -39,7 +41,8 @@ pub fn improve(net: &Network, start: Vec<Cell>) -> Vec<Cell> {
 /// The worst deterioration accepted at the start of each round.
 fn thresholds(nodes: usize) -> &'static [i64] {
     match nodes {
-        0..=24 => &[0, 24, 48, 48, 48, 72],
+        0..=SMALL => &[24, 48, 24, 48, 72, 72],
+        ..=24 => &[0, 24, 48, 48, 48, 72],
         25..=60 => &[0, 12, 24, 48],
         61..=BRANCHED => &[0, 16],
         _ => &[0],
