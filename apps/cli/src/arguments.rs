@@ -93,7 +93,11 @@ Examples:
   halfarrow run car.bond --rate 500Hz --input road=road.csv --solver rosenbrock --json")]
     Run(Box<RunArguments>),
     /// Draw the bond graph with its causal strokes and paths
-    #[command(after_help = "Example:\n  halfarrow draw car.bond --out car.svg")]
+    #[command(after_help = "\
+Examples:
+  halfarrow draw car.bond --out car.svg
+  halfarrow draw car.bond --out plain.svg --no-paths --no-laws
+  halfarrow draw car.bond --out new.svg --keep car.svg --paths 1,3")]
     Draw(Draw),
     /// Write the model as code for elsewhere
     #[command(after_help = "\
@@ -325,9 +329,33 @@ pub struct Simulate {
     /// Where to plot it: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
     pub plot: Vec<PathBuf>,
+    /// What to plot instead of all that is recorded: names with commas between them
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "plot")]
+    pub plot_vars: Vec<String>,
+    /// What goes to the right in the plot instead of the time: a name
+    #[arg(long, value_name = "NAME", requires = "plot")]
+    pub plot_x: Option<String>,
+    /// Axes of the plot that are logarithmic
+    #[arg(long, requires = "plot")]
+    pub plot_log: Option<PlotLog>,
+    /// A run to plot over this one: a .csv file of an earlier run, or the same run with other parameters, as in
+    /// `ks=20e3,b=500`; may be repeated
+    #[arg(long, value_name = "RUN", requires = "plot")]
+    pub overlay: Vec<String>,
     /// Where to draw the bond graph: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
     pub draw: Vec<PathBuf>,
+}
+
+/// Axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PlotLog {
+    /// The one to the right
+    X,
+    /// The one upwards
+    Y,
+    /// Both
+    Xy,
 }
 
 /// `compare`.
@@ -352,6 +380,9 @@ pub struct Compare {
     /// Time of a run, in s, beyond which no tighter tolerance is tried
     #[arg(long, value_name = "TIME", default_value = "20", value_parser = duration, allow_hyphen_values = true)]
     pub patience: f64,
+    /// Time for all of it, in s: what it does not suffice for is left out [default: as long as it takes]
+    #[arg(long, value_name = "TIME")]
+    pub budget: Option<f64>,
     /// Where to plot work against error: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
     pub plot: Vec<PathBuf>,
@@ -416,6 +447,9 @@ pub struct Report {
     /// Error at which forms are compared, relative to the greatest magnitude of each variable
     #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub error: f64,
+    /// Time for comparing forms, in s: what it does not suffice for is left out, and said in the page
+    #[arg(long, value_name = "TIME", default_value_t = 10.0)]
+    pub compare_budget: f64,
     /// Leave out the comparison of forms, which takes time
     #[arg(long)]
     pub without_comparison: bool,
@@ -522,6 +556,18 @@ pub struct Draw {
     /// Where to draw it: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,
+    /// Draw no causal paths
+    #[arg(long, conflicts_with = "paths")]
+    pub no_paths: bool,
+    /// Draw these causal paths, by their numbers in the drawing, as in `1,3` [default: the first 12]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    pub paths: Vec<usize>,
+    /// Leave out laws and values of the elements
+    #[arg(long)]
+    pub no_laws: bool,
+    /// An earlier drawing, as .svg: elements that are in it stay where they are there, as seen from each other
+    #[arg(long, value_name = "FILE")]
+    pub keep: Option<PathBuf>,
 }
 
 /// What can be written.

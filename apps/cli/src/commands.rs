@@ -6,6 +6,7 @@ mod export;
 mod files;
 mod linearize;
 mod picture;
+mod plots;
 mod real_time;
 mod report;
 mod run;

@@ -79,9 +79,14 @@ pub fn short(x: f64) -> String {
     }
 }
 
-/// The progress of a run, on stderr if that is a terminal.
+/// Time between two lines of progress where stderr is no terminal.
+const SPELL: Duration = Duration::from_secs(5);
+
+/// The progress of a run on stderr: a bar on a terminal, else a line now and then.
 pub struct Progress {
     bar: Option<ProgressBar>,
+    /// When a line is due where there is no bar.
+    due: Duration,
     to: f64,
     /// What is told, from how far it has come and how far it goes.
     told: fn(f64, f64) -> String,
@@ -105,11 +110,13 @@ impl Progress {
             let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
-        Progress { bar, to, told, begun: Instant::now() }
+        Progress { bar, due: SPELL, to, told, begun: Instant::now() }
     }
 
     /// It has come to `t`.
     pub fn reach(&mut self, t: f64) {
+        let told = self.told;
+        self.tell(t, |to| told(t, to));
         let Some(bar) = &self.bar else { return };
         if bar.is_hidden() {
             if self.begun.elapsed() < PATIENCE {
@@ -121,8 +128,18 @@ impl Progress {
         bar.set_message((self.told)(t, self.to));
     }
 
+    /// Says how far it has come where there is no bar, if a line is due.
+    fn tell(&mut self, t: f64, what: impl Fn(f64) -> String) {
+        let elapsed = self.begun.elapsed();
+        if self.bar.is_none() && elapsed >= self.due {
+            self.due = elapsed + SPELL;
+            note(&format!("{:.0} %, after {:.0} s: {}", 100.0 * t / self.to, elapsed.as_secs_f64(), what(self.to)));
+        }
+    }
+
     /// A part of the work is done, and this is being done.
     pub fn part(&mut self, part: f64, what: &str) {
+        self.tell(part * self.to, |_| what.to_string());
         self.reach(part * self.to);
         if let Some(bar) = &self.bar {
             bar.set_message(what.to_string());

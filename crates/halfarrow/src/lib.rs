@@ -34,18 +34,21 @@ mod verdict;
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;
 pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
-pub use draw::Picture;
+pub use draw::{NamedRuns, Picture};
 pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
 pub use error::{Error, Problem};
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
 pub use halfarrow_compiler::bond_graph::Override;
 pub use halfarrow_compiler::compile::Found;
 pub use halfarrow_compiler::equations::Form;
+pub use halfarrow_draw::{DrawOptions, DrawnPaths, positions};
 pub use halfarrow_emit::File;
 pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
-pub use halfarrow_trace::{Column, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
+pub use halfarrow_trace::{
+    Column, PlotOptions, Trace, WriteError, csv_text, read_trace, write_csv, write_parquet, write_whole,
+};
 pub use linearize::{
     Linearize, LinearizeReport, Mode, Point, ReachReport, Response, Stability, StateAt, SymbolicReport, Terminal,
     TransferFunction,

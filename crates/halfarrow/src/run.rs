@@ -63,6 +63,8 @@ pub enum Start {
 pub enum Record {
     /// States and outputs.
     Default,
+    /// States and outputs, and these variables.
+    Also(Vec<String>),
     /// Everything that has a value.
     All,
     /// These variables, in this order.
@@ -519,6 +521,14 @@ pub(crate) fn connect(
 pub(crate) fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec<String>, Problem> {
     match record {
         Record::Default => Ok(left_out(system, true)),
+        Record::Also(more) => {
+            let observed = system.program().observed.iter().filter(|o| o.default && o.value.is_ok());
+            let mut names: Vec<String> = observed.map(|o| o.name.clone()).collect();
+            more.iter().for_each(|name| if !names.contains(name) { names.push(name.clone()) });
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let notes = left_out(system, true);
+            system.record(&names).map_err(|error| refused(system, error)).map(|()| notes)
+        }
         Record::All => {
             system.record_all();
             Ok(left_out(system, false))

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::plot::Axis;
+use crate::plot::{Axis, SAME};
 use crate::svg::{COLOURS, FAMILIES, escape, n, shorten};
 
 /// Width of the area of a panel, in px.
@@ -18,6 +18,8 @@ const GAP: f64 = 22.0;
 const FOOT: f64 = 52.0;
 /// Longest name in the legend, in characters.
 const NAME: usize = 28;
+/// A rim of the ground's colour around texts on curves.
+const HALO: &str = "stroke=\"#ffffff\" stroke-width=\"2.6\" stroke-linejoin=\"round\" paint-order=\"stroke\"";
 
 /// A chart: a title and panels. Curves of one name have one colour, and one line in the legend.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,6 +93,15 @@ pub enum Guide {
     Y(f64, String),
     /// A cross at a point, with a name.
     Point([f64; 2], String),
+    /// A line straight up at `x` between two values, with a name: a margin.
+    Span {
+        /// Where.
+        x: f64,
+        /// From, to.
+        y: [f64; 2],
+        /// What it is.
+        name: String,
+    },
 }
 
 /// Draws a chart as SVG on a white ground. Equal charts give equal texts.
@@ -154,6 +165,15 @@ impl Area<'_> {
         [self.x.place(x), self.panel.height - self.y.place(y)]
     }
 
+    /// Whether two curves look like one.
+    fn same(&self, a: &Curve, b: &Curve) -> bool {
+        let near = |p: &[f64; 2], q: &[f64; 2]| match (self.holds(*p), self.holds(*q)) {
+            (true, true) => (0..2).all(|k| (self.place(*p)[k] - self.place(*q)[k]).abs() < SAME),
+            (a, b) => a == b,
+        };
+        a.points.len() == b.points.len() && a.points.iter().zip(&b.points).all(|(p, q)| near(p, q))
+    }
+
     /// Whether a point can be drawn at all.
     fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let fits =
@@ -169,6 +189,7 @@ fn area(panel: &Panel) -> Area<'_> {
             Guide::X(x, _) => horizontal.then_some(*x),
             Guide::Y(y, _) => (!horizontal).then_some(*y),
             Guide::Point([x, y], _) => Some(if horizontal { *x } else { *y }),
+            Guide::Span { x, y, .. } => Some(if horizontal { *x } else { y[0] }),
         })
     };
     let x = axis(&panel.x, points().map(|p| p[0]).chain(guided(true)), WIDTH);
@@ -210,10 +231,14 @@ impl Page {
         let area = area(panel);
         _ = writeln!(self.out, "<g class=\"panel\" transform=\"translate({LEFT} {})\">", n(top));
         self.grid(&area, labelled);
-        area.panel.guides.iter().for_each(|guide| self.guide(&area, guide));
-        for curve in &panel.curves {
-            self.curve(&area, curve);
+        let (above, below): (Vec<&Guide>, Vec<&Guide>) =
+            panel.guides.iter().partition(|guide| matches!(guide, Guide::Span { .. }));
+        below.into_iter().for_each(|guide| self.guide(&area, guide));
+        for (i, curve) in panel.curves.iter().enumerate() {
+            let hidden = panel.curves[..i].iter().any(|earlier| area.same(earlier, curve));
+            self.curve(&area, curve, hidden);
         }
+        above.into_iter().for_each(|guide| self.guide(&area, guide));
         self.out.push_str("</g>\n");
     }
 
@@ -264,6 +289,14 @@ impl Page {
                 _ = writeln!(self.out, "<path d=\"{cross}\" stroke=\"#b22222\" stroke-width=\"1.5\" fill=\"none\"/>");
                 self.text([x + 7.0, y - 5.0], "font-size=\"10\" fill=\"#6b7280\"", name);
             }
+            Guide::Span { x, y, name } => {
+                let [from, to] = [area.place([*x, y[0]]), area.place([*x, y[1]])];
+                let bar = format!("M{} {}h8m-4 0V{}m-4 0h8", n(from[0] - 4.0), n(from[1]), n(to[1]));
+                _ = writeln!(self.out, "<path class=\"margin\" d=\"{bar}\" stroke=\"#b22222\" stroke-width=\"1.4\" fill=\"none\"/>");
+                let (anchor, off) = if from[0] > 0.6 * WIDTH { ("end", -8.0) } else { ("start", 8.0) };
+                let style = format!("font-size=\"10\" fill=\"#b22222\" text-anchor=\"{anchor}\" {HALO}");
+                self.text([from[0] + off, 0.5 * (from[1] + to[1]) + 3.6], &style, name);
+            }
         }
         self.out.push('\n');
     }
@@ -273,7 +306,7 @@ impl Page {
         COLOURS[index % COLOURS.len()]
     }
 
-    fn curve(&mut self, area: &Area, curve: &Curve) {
+    fn curve(&mut self, area: &Area, curve: &Curve, hidden: bool) {
         let colour = self.colour(curve);
         let (mut data, mut pen, mut marks) = (String::new(), false, String::new());
         for &point in &curve.points {
@@ -288,7 +321,11 @@ impl Page {
             }
             pen = true;
         }
-        let dashes = if curve.dashed { " stroke-dasharray=\"6 4\"" } else { "" };
+        let dashes = match (curve.dashed, hidden) {
+            (true, _) => " stroke-dasharray=\"6 4\"",
+            (_, true) => " stroke-dasharray=\"7 7\"",
+            _ => "",
+        };
         _ = writeln!(
             self.out,
             "<path class=\"curve\" d=\"{data}\" stroke=\"{colour}\" stroke-width=\"1.7\" stroke-linejoin=\"round\" \

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use halfarrow_sim::{Signal, SignalError};
 
+use crate::{Column, Trace};
+
 /// Faults reported of one file; more say nothing new.
 const MOST_ERRORS: usize = 20;
 
@@ -68,6 +70,19 @@ pub enum InputError {
         /// Their time, in s.
         time: f64,
     },
+}
+
+/// Reads what an earlier run has written to a CSV file. The columns are in the order of their names and have no units.
+///
+/// # Errors
+/// All faults found, in the order of their lines.
+pub fn read_trace(path: &Path) -> Result<Trace, Vec<InputError>> {
+    let signals = read_inputs(path)?;
+    let times = signals.values().next().map(|s| s.times().to_vec()).unwrap_or_default();
+    let column = |(name, signal): (&String, &Signal)| {
+        Column { name: name.clone(), unit: String::new(), values: signal.values().to_vec() }
+    };
+    Ok(Trace { times, columns: signals.iter().map(column).collect() })
 }
 
 /// Reads the signals of a CSV file, by name. See [`parse_inputs`].

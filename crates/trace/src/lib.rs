@@ -16,10 +16,10 @@ mod whole;
 
 pub use chart::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
 pub use csv::{CsvTable, csv_text, write_csv};
-pub use input::{InputError, parse_inputs, read_inputs};
+pub use input::{InputError, parse_inputs, read_inputs, read_trace};
 #[cfg(feature = "parquet")]
 pub use parquet::{ParquetTable, write_parquet};
-pub use plot::plot;
+pub use plot::{PlotOptions, plot, plot_runs};
 #[cfg(feature = "png")]
 pub use png::{PngError, png};
 pub use trace::{Column, Trace};

@@ -2,6 +2,7 @@
 
 mod axis;
 mod decimate;
+mod runs;
 
 use std::fmt::Write;
 
@@ -9,6 +10,7 @@ use crate::svg::{COLOURS, FAMILIES, escape, n, shorten};
 use crate::{Column, Trace};
 pub(crate) use axis::Axis;
 use decimate::decimate;
+pub use runs::{PlotOptions, plot_runs};
 
 /// Size of the area of one panel, in px.
 const AREA: [f64; 2] = [640.0, 160.0];
@@ -22,6 +24,8 @@ const HEAD: f64 = 34.0;
 /// Panels drawn in all, and curves in each.
 const PANELS: usize = 12;
 const CURVES: usize = COLOURS.len();
+/// Curves nearer to each other than this, in px, look like one.
+pub(crate) const SAME: f64 = 0.75;
 /// Longest name in the legend, in characters.
 const NAME: usize = 28;
 
@@ -29,7 +33,7 @@ const NAME: usize = 28;
 ///
 /// Columns of one unit share a panel with a legend; the panels share the time axis. Of long columns first, least,
 /// greatest and last value of every pixel are drawn, so that nothing visible is lost. Values that are not finite leave a
-/// gap. At most 12 panels of 10 curves are drawn; the plot says what it leaves out. Equal traces give equal texts.
+/// gap; a curve that lies on an earlier one is dashed, so that both are seen. At most 12 panels of 10 curves are drawn; the plot says what it leaves out. Equal traces give equal texts.
 ///
 /// ```
 /// use halfarrow_sim::Sink;
@@ -62,6 +66,20 @@ fn panels(trace: &Trace) -> Vec<Vec<&Column>> {
         }
     }
     panels
+}
+
+/// For each column whether it lies on an earlier one all along.
+fn hidden(columns: &[&Column], axis: &Axis) -> Vec<bool> {
+    let place = |x: f64| if x.is_finite() { axis.place(x) } else { f64::NEG_INFINITY };
+    let same = |a: &Column, b: &Column| {
+        let mut pairs = a.values.iter().zip(&b.values);
+        pairs.all(|(a, b)| a == b || (place(*a) - place(*b)).abs() < SAME)
+    };
+    (0..columns.len()).map(|i| columns[..i].iter().any(|earlier| same(earlier, columns[i]))).collect()
+}
+
+fn dashes(hidden: bool) -> &'static str {
+    if hidden { " stroke-dasharray=\"7 7\"" } else { "" }
 }
 
 /// An SVG text under construction.
@@ -110,11 +128,12 @@ impl Page {
         self.text([0.0, -7.0], "fill=\"#4b5563\"", &format!("{name}{}", values.unit(&columns[0].unit)));
         self.grid(time, &values, last);
         self.out.push_str("<g fill=\"none\" stroke-width=\"1.5\" stroke-linejoin=\"round\">\n");
+        let hidden = hidden(drawn, &values);
         for (i, column) in drawn.iter().enumerate() {
-            self.curve(COLOURS[i], column, &decimate(&trace.times, &column.values, AREA[0] as usize), time, &values);
+            self.curve([COLOURS[i], dashes(hidden[i])], column, &decimate(&trace.times, &column.values, AREA[0] as usize), time, &values);
         }
         self.out.push_str("</g>\n");
-        self.legend(columns);
+        self.legend(columns, &hidden);
         self.out.push_str("</g>\n");
     }
     fn grid(&mut self, time: &Axis, values: &Axis, last: bool) {
@@ -136,35 +155,36 @@ impl Page {
         }
         self.out.push('\n');
     }
-    fn curve(&mut self, colour: &str, column: &Column, runs: &[Vec<[f64; 2]>], time: &Axis, values: &Axis) {
-        let mut data = String::new();
+    fn curve(&mut self, [colour, dashes]: [&str; 2], column: &Column, runs: &[Vec<[f64; 2]>], time: &Axis, values: &Axis) {
+        let (mut data, mut dots) = (String::new(), String::new());
         for run in runs {
             let place = |p: &[f64; 2]| [time.place(p[0]), AREA[1] - values.place(p[1])];
             let mut points = run.iter().map(place);
             let Some([x, y]) = points.next() else { continue };
             _ = write!(data, "M{} {}", n(x), n(y));
-            // A lone value is a dot.
+            // A lone value is a dot that can be seen.
             if run.len() == 1 {
-                data.push_str("h0.1");
+                _ = write!(dots, "<circle cx=\"{}\" cy=\"{}\" r=\"2.4\" fill=\"{colour}\"/>", n(x), n(y));
             }
             points.for_each(|[x, y]| _ = write!(data, "L{} {}", n(x), n(y)));
         }
         let name = escape(&column.name);
         _ = writeln!(
             self.out,
-            "<path class=\"curve\" d=\"{data}\" stroke=\"{colour}\" stroke-linecap=\"round\"><title>{name}</title></path>"
+            "<path class=\"curve\" d=\"{data}\" stroke=\"{colour}\" stroke-linecap=\"round\"{dashes}><title>{name}</title></path>{dots}"
         );
     }
-    fn legend(&mut self, columns: &[&Column]) {
+    fn legend(&mut self, columns: &[&Column], hidden: &[bool]) {
         for (i, column) in columns.iter().take(CURVES).enumerate() {
             let y = 8.0 + 15.0 * i as f64;
             let at = AREA[0] + 14.0;
             _ = write!(
                 self.out,
-                "<path d=\"M{} {}h16\" stroke=\"{}\" stroke-width=\"2\" fill=\"none\"/>",
+                "<path d=\"M{} {}h16\" stroke=\"{}\" stroke-width=\"2\" fill=\"none\"{}/>",
                 n(at),
                 n(y),
-                COLOURS[i]
+                COLOURS[i],
+                dashes(hidden[i])
             );
             self.text([at + 22.0, y + 3.8], "", &shorten(&column.name, NAME));
             self.out.push('\n');

@@ -19,6 +19,7 @@ pub fn compare(arguments: &arguments::Compare) -> u8 {
             inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
             repeats: arguments.repeats,
             patience: arguments.patience,
+            budget: arguments.budget,
         };
         let mut bar = Progress::new(1.0);
         let compared = model.compare(&wanted, &mut |part, form| {

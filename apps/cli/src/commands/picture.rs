@@ -1,8 +1,9 @@
 //! `draw`, and the writing of pictures.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use halfarrow::{Error, Picture, Problem, write_whole};
+use halfarrow::{DrawOptions, DrawnPaths, Error, Picture, Problem, positions, write_whole};
 use serde_json::json;
 
 use super::with_model;
@@ -12,7 +13,7 @@ use crate::screen;
 /// The bond graph.
 pub fn draw(arguments: &arguments::Draw) -> u8 {
     with_model(&arguments.model, |model| {
-        let picture = model.draw()?;
+        let picture = model.draw(&options(arguments)?)?;
         arguments.out.iter().try_for_each(|path| write_picture(&picture, path))?;
         match arguments.model.model.json {
             true => screen::print_json(&json!({"written": arguments.out})),
@@ -23,6 +24,31 @@ pub fn draw(arguments: &arguments::Draw) -> u8 {
         }?;
         Ok(0)
     })
+}
+
+/// What the command line asks for.
+fn options(arguments: &arguments::Draw) -> Result<DrawOptions, Problem> {
+    let paths = match (arguments.no_paths, &arguments.paths[..]) {
+        (true, _) => DrawnPaths::Numbers(Vec::new()),
+        (_, []) => DrawOptions::default().paths,
+        (_, numbers) => DrawnPaths::Numbers(numbers.to_vec()),
+    };
+    let keep = arguments.keep.as_deref().map(kept).transpose()?.unwrap_or_default();
+    Ok(DrawOptions { paths, laws: !arguments.no_laws, keep })
+}
+
+/// Where elements stand in an earlier drawing.
+fn kept(path: &Path) -> Result<BTreeMap<String, [f64; 2]>, Problem> {
+    let svg = std::fs::read_to_string(path)
+        .map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })?;
+    let found = positions(&svg);
+    match found.is_empty() {
+        true => Err(Problem::BadInput {
+            path: path.into(),
+            faults: vec!["it is no drawing by `halfarrow draw`, as SVG: no element has a place in it".to_string()],
+        }),
+        false => Ok(found),
+    }
 }
 
 /// Writes a picture as SVG or PNG, as the name says.

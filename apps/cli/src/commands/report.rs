@@ -20,6 +20,7 @@ pub fn report(arguments: &arguments::Report) -> u8 {
             inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
             compare: !arguments.without_comparison,
             error: arguments.error,
+            compare_budget: arguments.compare_budget,
         };
         let mut bar = Progress::new(1.0);
         let page = model.report(&wanted, &mut |part, what| {

@@ -4,13 +4,14 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start, Stopped,
-    Trace, csv_text, write_csv, write_parquet,
+    AuditReport, DrawOptions, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start,
+    Stopped, Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
 use super::analyse::form;
 use super::picture::{check_names, write_picture};
+use super::plots::{recorded, write_plots};
 use super::with_model;
 use crate::arguments::{self, Simulate, Solver};
 use crate::page::Page;
@@ -22,7 +23,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
     with_model(&arguments.model, |model| {
         check_files(arguments)?;
         for path in &arguments.draw {
-            write_picture(&model.draw()?, path)?;
+            write_picture(&model.draw(&DrawOptions::default())?, path)?;
         }
         let mut progress = Progress::new(arguments.to);
         let stop = stop::on_signals();
@@ -60,7 +61,7 @@ fn run(arguments: &Simulate) -> Run {
         atol: arguments.atol,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
-        record: record(&arguments.record),
+        record: recorded(arguments, record(&arguments.record)),
     }
 }
 
@@ -120,7 +121,8 @@ fn is_stdout(path: &Path) -> bool {
 /// write.
 fn finish(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&str>) -> Result<(), Error> {
     if done.trace.samples() > 0 || error.is_none() {
-        write_files(arguments, model, &done.trace)?;
+        write_files(arguments, &done.trace)?;
+        write_plots(arguments, model, &run(arguments), done)?;
     }
     let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
     done.report.notes.iter().for_each(|note| screen::note(&format!("warning: {note}")));
@@ -136,7 +138,7 @@ fn finish(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&
     Ok(())
 }
 
-fn write_files(arguments: &Simulate, model: &Model, trace: &Trace) -> Result<(), Error> {
+fn write_files(arguments: &Simulate, trace: &Trace) -> Result<(), Error> {
     for path in &arguments.out {
         let unwritable = |why: String| Problem::Unwritable { path: path.clone(), why };
         match extension(path).as_str() {
@@ -145,7 +147,7 @@ fn write_files(arguments: &Simulate, model: &Model, trace: &Trace) -> Result<(),
             _ => write_csv(trace, path, arguments.units).map_err(|why| unwritable(why.source.to_string()))?,
         }
     }
-    arguments.plot.iter().try_for_each(|path| write_picture(&model.plot(trace), path))
+    Ok(())
 }
 
 /// The report, the columns and, if they are written nowhere else, the values.

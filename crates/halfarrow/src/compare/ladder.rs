@@ -1,11 +1,11 @@
 //! Runs of one form at tighter and tighter tolerances: what an error costs.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use halfarrow_sim::Method;
 
 use super::reference::Reference;
-use super::subject::{Settings, Subject};
+use super::subject::{Settings, Subject, is_over};
 
 /// Loosest and tightest power of ten of the tolerances.
 const RTOLS: std::ops::RangeInclusive<i32> = 2..=12;
@@ -40,6 +40,8 @@ pub(super) struct Effort {
     pub error: f64,
     /// A run that takes longer ends its ladder.
     pub patience: Duration,
+    /// When measuring this form ends.
+    pub until: Option<Instant>,
 }
 
 /// The ladder of a form with a method, timed once. `go_on` is asked before every run.
@@ -52,10 +54,10 @@ pub(super) fn ladder(
 ) -> Vec<Rung> {
     let mut rungs: Vec<Rung> = Vec::new();
     for power in RTOLS {
-        if !go_on() {
+        if !go_on() || is_over(effort.until) {
             break;
         }
-        let settings = Settings { method, rtol: ten_to(-power), to: reference.to };
+        let settings = Settings { method, rtol: ten_to(-power), to: reference.to, until: effort.until };
         let Some(rung) = rung(subject, reference, settings) else { continue };
         let enough = rung.error <= BEYOND * effort.error && rungs.len() > 1;
         let slow = rung.single > effort.patience;
@@ -84,21 +86,29 @@ pub(super) fn rung(subject: &Subject, reference: &Reference, settings: Settings)
 }
 
 /// Times all rungs in turn, again and again, so that a machine that gets slower for a while is so for all of them; medians.
-pub(super) fn time(rungs: &mut [(Rung, &Subject)], to: f64, repeats: usize, go_on: &mut dyn FnMut(f64) -> bool) {
+pub(super) fn time(
+    rungs: &mut [(Rung, &Subject)],
+    to: f64,
+    repeats: usize,
+    until: Option<Instant>,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) {
     let mut times: Vec<Vec<f64>> = vec![Vec::with_capacity(repeats); rungs.len()];
     for round in 0..repeats {
         if !go_on(round as f64 / repeats as f64) {
             break;
         }
         for ((rung, subject), times) in rungs.iter().zip(&mut times) {
-            if rung.single > LONG && round >= 2 {
+            if rung.single > LONG && round >= 2 || is_over(until) {
                 continue;
             }
-            let settings = Settings { method: rung.method, rtol: rung.rtol, to };
+            let settings = Settings { method: rung.method, rtol: rung.rtol, to, until };
             let batch = (SHORT.as_secs_f64() / rung.single.as_secs_f64().max(1e-7)).ceil().clamp(1.0, 1000.0) as usize;
             let runs = (0..batch).map_while(|_| subject.timed(settings).ok());
-            let taken: Duration = runs.map(|(duration, _)| duration).sum();
-            times.push(taken.as_secs_f64() / batch as f64);
+            let taken: Vec<f64> = runs.map(|(duration, _)| duration.as_secs_f64()).collect();
+            if !taken.is_empty() {
+                times.push(taken.iter().sum::<f64>() / taken.len() as f64);
+            }
         }
     }
     for ((rung, _), times) in rungs.iter_mut().zip(times.iter_mut()) {

@@ -6,11 +6,11 @@ mod reference;
 mod subject;
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use halfarrow_compiler::algebra::Expr;
 use halfarrow_compiler::equations::{Form, Step};
-use halfarrow_sim::Method;
+use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
 use crate::audited::AuditReport;
@@ -20,7 +20,7 @@ use crate::run::{Run, Start};
 use crate::verdict::Verdict;
 use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
 use reference::{Apart, POINTS, Reference};
-use subject::{Settings, Subject};
+use subject::{Settings, Subject, is_over};
 
 /// Tolerance of the runs whose agreement is told.
 const TIGHT: f64 = 1e-11;
@@ -28,6 +28,12 @@ const TIGHT: f64 = 1e-11;
 const STIFFNESSES: std::ops::RangeInclusive<i32> = 2..=12;
 /// Why a form has no times.
 const STOPS: &str = "its runs stop before their end";
+/// Why a form was not measured.
+const LEFT_OUT: &str = "left out: the time for comparing was over";
+/// Parts of a budget at whose end the reference, all ladders and all times have to be there.
+const REFERENCE: f64 = 0.4;
+const LADDERS: f64 = 0.75;
+const TIMES: f64 = 0.85;
 /// Errors of the form `stiff` from which its order is read: above rounding, below where springs are soft.
 const ORDERLY: std::ops::Range<f64> = 1e-9..3e-2;
 
@@ -44,12 +50,14 @@ pub struct Compare {
     pub repeats: usize,
     /// Processor time of a run, in s, beyond which no tighter tolerance is tried.
     pub patience: f64,
+    /// Time for all of it, in s; what it does not suffice for is left out, and said. `None`: as long as it takes.
+    pub budget: Option<f64>,
 }
 
 impl Default for Compare {
-    /// At an error of 1e-6, medians of 7 runs, of at most 20 s.
+    /// At an error of 1e-6, medians of 7 runs, of at most 20 s each, as long as it takes.
     fn default() -> Compare {
-        Compare { to: None, error: 1e-6, inputs: Vec::new(), repeats: 7, patience: 20.0 }
+        Compare { to: None, error: 1e-6, inputs: Vec::new(), repeats: 7, patience: 20.0, budget: None }
     }
 }
 
@@ -186,13 +194,21 @@ impl Model {
     /// The model has errors, options make no sense, or the reference run stops.
     pub fn compare(&self, compare: &Compare, progress: Progress) -> Result<CompareReport, Error> {
         check(compare)?;
+        let budget = Budget::new(compare.budget);
         let mut run = Run { inputs: compare.inputs.clone(), start: Start::Given, ..Run::default() };
         let minimal = self.subject(&run)?;
         let to = compare.to.unwrap_or_else(|| typical_time(&minimal));
         run.to = to;
-        let made = |form: Form| (form, self.subject(&Run { form, ..run.clone() }));
-        let subjects: Vec<(Form, Result<Subject, Error>)> = Form::ALL.into_iter().map(made).collect();
-        progress(0.0, "reference");
+        let made = |form: Form| {
+            progress(0.0, form.name());
+            let over = form != Form::Minimal && is_over(budget.part(REFERENCE));
+            let subject = if over { Err(LEFT_OUT.to_string()) } else {
+                self.subject(&Run { form, ..run.clone() }).map_err(|error| short(&error))
+            };
+            (form, subject)
+        };
+        let subjects: Vec<(Form, Result<Subject, String>)> = Form::ALL.into_iter().map(made).collect();
+        progress(0.02, "reference");
         let motion = motion(&minimal);
         let confirming = [Form::Lagrange, Form::Break, Form::Inverted, Form::Kane, Form::Relaxed];
         let usable = |form: &Form| {
@@ -203,16 +219,21 @@ impl Model {
         // What is integrated in another way confirms more.
         others.sort_by_key(|(_, subject)| subject.is_explicit());
         let reference =
-            Reference::new(&minimal, &others, &motion, to).map_err(|stopped| self.stopped(stopped.failure))?;
+            Reference::new(&minimal, &others, &motion, to, budget.part(REFERENCE))
+                .map_err(|stopped| match stopped.failure {
+                    Failure::Interrupted { .. } => budget.too_short(),
+                    failure => self.stopped(failure),
+                })?;
         let patience = Duration::from_secs_f64(compare.patience.clamp(1e-3, 1e6));
-        let effort = Effort { error: compare.error, patience };
         let mut forms: Vec<Measured> = Vec::with_capacity(subjects.len());
         let count = subjects.len() as f64;
         for (i, (form, subject)) in subjects.into_iter().enumerate() {
             let mut go_on = || progress(0.05 + 0.45 * i as f64 / count, form.name());
+            let until = budget.share(LADDERS, Form::ALL.len() - i);
+            let effort = Effort { error: compare.error, patience, until };
             let mut measured = Measured { row: Row { form: form.name(), ..Row::default() }, ..Measured::default() };
             match subject {
-                Err(error) => measured.row.reason = Some(short(&error)),
+                Err(reason) => measured.row.reason = Some(reason),
                 Ok(_) if form == Form::Stiff && self.has_springs()? => {
                     self.climb_stiff(&mut measured, &run, &reference, effort, &mut go_on)?;
                     self.describe(&mut measured.row, form)?;
@@ -227,11 +248,17 @@ impl Model {
                     self.describe(&mut measured.row, form)?;
                 }
             }
+            measured.cut = is_over(until);
             forms.push(measured);
         }
-        measure(&mut forms, to, compare.repeats.max(1), &mut |part| progress(0.5 + 0.45 * part, "times"));
+        let until = budget.part(TIMES);
+        measure(&mut forms, to, compare.repeats.max(1), until, &mut |part| progress(0.5 + 0.45 * part, "times"));
         progress(0.95, "agreement");
-        let mut rows: Vec<Row> = forms.into_iter().map(|form| form.finish(&reference, effort)).collect();
+        let count = forms.len();
+        let finished = |(i, form): (usize, Measured)| {
+            form.finish(&reference, Effort { error: compare.error, patience, until: budget.share(1.0, count - i) })
+        };
+        let mut rows: Vec<Row> = forms.into_iter().enumerate().map(finished).collect();
         relate(&mut rows);
         let mut report = CompareReport {
             model: self.name().to_string(),
@@ -242,6 +269,7 @@ impl Model {
             notes: Vec::new(),
         };
         report.notes = notes(&report);
+        report.notes.extend(budget.note());
         Ok(report)
     }
 
@@ -289,16 +317,17 @@ impl Model {
     ) -> Result<(), Error> {
         let mut methods = vec![(Method::Radau, 0.3), (Method::Radau, 0.03), (Method::Bdf, 0.03)];
         for power in STIFFNESSES {
-            if !go_on() {
+            if !go_on() || is_over(effort.until) {
                 break;
             }
             let stiffness = ten_to(power);
             let subject = self.subject(&Run { form: Form::Stiff, stiffness: Some(stiffness), ..run.clone() })?;
-            let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to };
+            let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to, until: effort.until };
             let Some(error) = error_of(&subject, reference, exact) else { continue };
             let mut rungs: Vec<Rung> = Vec::new();
             for &(method, part) in &methods {
-                let settings = Settings { method, rtol: (part * error).clamp(1e-11, 1e-3), to: reference.to };
+                let rtol = (part * error).clamp(1e-11, 1e-3);
+                let settings = Settings { method, rtol, to: reference.to, until: effort.until };
                 if rungs.iter().all(|r| (r.method, r.rtol) != (method, settings.rtol))
                     && let Some(found) = rung(&subject, reference, settings)
                 {
@@ -331,17 +360,64 @@ impl Model {
 #[derive(Default)]
 struct Measured<'m> {
     row: Row,
+    /// Whether the time was over before all was measured.
+    cut: bool,
     rungs: Vec<(Rung, usize)>,
     subjects: Vec<Subject<'m>>,
 }
 
+/// The time that comparing may take.
+#[derive(Clone, Copy)]
+struct Budget {
+    begun: Instant,
+    whole: Option<Duration>,
+}
+
+impl Budget {
+    fn new(seconds: Option<f64>) -> Budget {
+        let whole = seconds.map(|s| Duration::from_secs_f64(s.clamp(0.0, 1e7)));
+        Budget { begun: Instant::now(), whole }
+    }
+    /// When this part of it is over.
+    fn part(&self, part: f64) -> Option<Instant> {
+        self.whole.map(|whole| self.begun + whole.mul_f64(part))
+    }
+    /// When one of so many that share what is left until then has had its time.
+    fn share(&self, part: f64, among: usize) -> Option<Instant> {
+        let now = Instant::now();
+        self.part(part).map(|end| now + end.saturating_duration_since(now) / among.max(1) as u32)
+    }
+    /// That it does not even suffice for the reference.
+    fn too_short(&self) -> Error {
+        let seconds = self.whole.unwrap_or_default().as_secs_f64();
+        let reason = format!(
+            "the {seconds} s for comparing do not suffice for the run that all others are measured against: give more time, \
+             or a shorter run"
+        );
+        Problem::BadOption { reason }.into()
+    }
+    /// What is to be said if it was spent before everything was measured.
+    fn note(&self) -> Option<String> {
+        let seconds = self.whole.filter(|_| is_over(self.part(REFERENCE)))?.as_secs_f64();
+        Some(format!(
+            "comparing had {seconds} s: runs that would have taken longer are left out, and so are their times and errors"
+        ))
+    }
+}
+
 /// Times the runs of all forms.
-fn measure(forms: &mut [Measured], to: f64, repeats: usize, go_on: &mut dyn FnMut(f64) -> bool) {
+fn measure(
+    forms: &mut [Measured],
+    to: f64,
+    repeats: usize,
+    until: Option<Instant>,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) {
     let of = |form: &Measured| form.rungs.len();
     let counts: Vec<usize> = forms.iter().map(of).collect();
     let all = forms.iter().flat_map(|form| form.rungs.iter().map(|(rung, at)| (rung.clone(), &form.subjects[*at])));
     let mut all: Vec<(Rung, &Subject)> = all.collect();
-    ladder::time(&mut all, to, repeats, go_on);
+    ladder::time(&mut all, to, repeats, until, go_on);
     let mut timed = all.into_iter().map(|(rung, _)| rung).collect::<Vec<_>>().into_iter();
     for (form, count) in forms.iter_mut().zip(counts) {
         form.rungs.iter_mut().zip(timed.by_ref().take(count)).for_each(|((rung, _), timed)| *rung = timed);
@@ -351,14 +427,14 @@ fn measure(forms: &mut [Measured], to: f64, repeats: usize, go_on: &mut dyn FnMu
 impl Measured<'_> {
     /// What follows from the runs.
     fn finish(self, reference: &Reference, effort: Effort) -> Row {
-        let Measured { mut row, rungs, subjects } = self;
+        let Measured { mut row, cut, rungs, subjects } = self;
         let Some(last) = subjects.last() else {
             row.reason = row.reason.or(Some(STOPS.into()));
             return row;
         };
         row.take_operations(last);
         if rungs.is_empty() {
-            row.reason = Some(STOPS.into());
+            row.reason = Some(if cut { LEFT_OUT } else { STOPS }.into());
             return row;
         }
         let of = |method: Method| -> Vec<Rung> {
@@ -371,12 +447,12 @@ impl Measured<'_> {
         let chosen = best.as_ref().map_or(exactest.cloned(), |b| Some(b.1.clone()));
         if let Some(chosen) = &chosen {
             let subject = rungs.iter().find(|r| r.0 == *chosen).map_or(last, |r| &subjects[r.1]);
-            let settings = Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to };
+            let settings = Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to, until: effort.until };
             let audit = subject.audited(settings, chosen.stiffness);
-            if let Some(miss) = &audit.energy {
+            if let Some(miss) = audit.as_ref().and_then(|audit| audit.energy.as_ref()) {
                 (row.energy_error, row.energy_resolution) = (Some(miss.value), Some(miss.resolution));
             }
-            row.audit = Some(audit);
+            row.audit = audit;
             row.solver = Some(solver(chosen.method));
         }
         match best {
@@ -386,20 +462,20 @@ impl Measured<'_> {
             }
             None => row.reason = chosen.map(|r| format!("no run comes nearer than {:.0e}", r.error)),
         }
-        agreement(&mut row, last, reference);
+        agreement(&mut row, last, reference, effort.until);
         row.runs = rungs.iter().map(|r| timed(&r.0)).collect();
         row
     }
 }
 
 /// How far all variables are off at a tight tolerance.
-fn agreement(row: &mut Row, subject: &Subject, reference: &Reference) {
+fn agreement(row: &mut Row, subject: &Subject, reference: &Reference, until: Option<Instant>) {
     let variables = subject.variables();
     let names = reference.common(&variables);
     let tried = [Method::Radau, Method::Auto].into_iter().take(if subject.methods().len() > 2 { 2 } else { 1 });
     let found: Vec<(Apart, f64)> = tried
         .filter_map(|method| {
-            let settings = Settings { method, rtol: TIGHT, to: reference.to };
+            let settings = Settings { method, rtol: TIGHT, to: reference.to, until };
             let trace = subject.sampled(settings, reference.to / POINTS, &names).ok()?;
             Some((reference.apart(&trace, false), reference.apart(&trace, true).value))
         })
@@ -489,6 +565,9 @@ fn check(compare: &Compare) -> Result<(), Problem> {
     let bad = |reason: String| Err(Problem::BadOption { reason });
     if let Some(to) = compare.to.filter(|to| !(to.is_finite() && *to > 0.0)) {
         return bad(format!("to is {to}: it has to be a time above zero, in s"));
+    }
+    if let Some(budget) = compare.budget.filter(|budget| !(budget.is_finite() && *budget > 0.0)) {
+        return bad(format!("the budget is {budget}: it has to be a time above zero, in s"));
     }
     if !(1e-10..=1e-1).contains(&compare.error) {
         return bad(format!("error is {}: it has to be from 1e-10 to 0.1", compare.error));

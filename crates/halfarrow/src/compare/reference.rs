@@ -1,12 +1,13 @@
 //! What a run is measured against: the same motion at the tightest tolerance, confirmed by another form.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use halfarrow_compiler::equations::Form;
 use halfarrow_sim::{Method, Stopped};
 use halfarrow_trace::Trace;
 
-use super::subject::{Settings, Subject};
+use super::subject::{Settings, Subject, is_over};
 
 /// Tolerance of the reference.
 const TIGHTEST: f64 = 1e-12;
@@ -47,16 +48,17 @@ impl Reference {
         others: &[(Form, &Subject)],
         motion: &[String],
         to: f64,
+        until: Option<Instant>,
     ) -> Result<Reference, Box<Stopped>> {
         let known = minimal.variables();
         let names: Vec<&str> = known.iter().map(|v| v.0.as_str()).collect();
-        let settings = |method| Settings { method, rtol: TIGHTEST, to };
+        let settings = |method| Settings { method, rtol: TIGHTEST, to, until };
         let run = |subject: &Subject, method, names: &[&str]| {
             subject.sampled(settings(method), to / POINTS, names).map_err(Box::new)
         };
         let auto = run(minimal, Method::Auto, &names);
         let radau = run(minimal, Method::Radau, &names);
-        let confirming = others.iter().find_map(|(form, subject)| {
+        let confirming = others.iter().take_while(|_| !is_over(until)).find_map(|(form, subject)| {
             let theirs = subject.variables();
             let common: Vec<&str> = names
                 .iter()

@@ -1,13 +1,14 @@
 //! A form of a model, ready to run as often as it takes.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
 use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec::{self as exec, Operations};
-use halfarrow_sim::{ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit};
+use halfarrow_sim::{Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit};
 use halfarrow_trace::Trace;
 
 use crate::audited::{AuditReport, Audited};
@@ -40,6 +41,8 @@ pub(super) struct Settings {
     pub method: Method,
     pub rtol: f64,
     pub to: f64,
+    /// When the run is given up, if at all.
+    pub until: Option<Instant>,
 }
 
 impl Settings {
@@ -48,11 +51,45 @@ impl Settings {
     }
 }
 
-/// Takes no samples.
-struct Nobody;
+/// Whether the time for something is over.
+pub(super) fn is_over(until: Option<Instant>) -> bool {
+    until.is_some_and(|until| Instant::now() >= until)
+}
 
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
+/// Steps between two looks at the clock.
+const LOOK: usize = 32;
+
+/// Takes samples if somebody wants them, and gives up when the time is over.
+struct Patient<'t> {
+    trace: Option<&'t mut Trace>,
+    until: Option<Instant>,
+    steps: usize,
+}
+
+impl<'t> Patient<'t> {
+    fn new(trace: Option<&'t mut Trace>, settings: Settings) -> Patient<'t> {
+        Patient { trace, until: settings.until, steps: 0 }
+    }
+}
+
+impl Sink for Patient<'_> {
+    fn sample(&mut self, t: f64, values: &[f64]) {
+        if let Some(trace) = &mut self.trace {
+            trace.sample(t, values);
+        }
+    }
+
+    fn progress(&mut self, _: f64) -> ControlFlow<()> {
+        self.steps += 1;
+        if self.steps % LOOK == 0 && is_over(self.until) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// An audit, unless its run was given up.
+#[allow(clippy::result_large_err, reason = "a run fails once")]
+fn given(ended: Result<Summary, Stopped>, audit: AuditReport) -> Option<AuditReport> {
+    let given_up = matches!(ended, Err(stopped) if matches!(stopped.failure, Failure::Interrupted { .. }));
+    (!given_up).then_some(audit)
 }
 
 impl Model {
@@ -134,11 +171,11 @@ impl Subject<'_> {
         match self.system.clone() {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(names);
-                simulate(&mut system, &options, &mut x, &mut trace)?;
+                simulate(&mut system, &options, &mut x, &mut Patient::new(Some(&mut trace), settings))?;
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(names);
-                simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut trace)?;
+                simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(Some(&mut trace), settings))?;
             }
         }
         Ok(trace)
@@ -152,38 +189,39 @@ impl Subject<'_> {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(&[]);
                 let begun = ThreadTime::now();
-                let summary = simulate(&mut system, &options, &mut x, &mut Nobody)?;
+                let summary = simulate(&mut system, &options, &mut x, &mut Patient::new(None, settings))?;
                 Ok((begun.elapsed(), summary))
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(&[]);
                 let begun = ThreadTime::now();
-                let summary = simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Nobody)?;
+                let summary = simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(None, settings))?;
                 Ok((begun.elapsed(), summary))
             }
         }
     }
 
-    /// Runs it and audits every step; `stiffness` of the form `stiff`.
-    pub(super) fn audited(&self, settings: Settings, stiffness: Option<f64>) -> AuditReport {
+    /// Runs it and audits every step; `stiffness` of the form `stiff`. `None` if the time is over before.
+    pub(super) fn audited(&self, settings: Settings, stiffness: Option<f64>) -> Option<AuditReport> {
         let options = settings.options(None);
         let mut report = match self.system.clone() {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(&[]);
                 let mut audited = Audited::new(&mut system, self.graph);
-                let _ = simulate(&mut audited, &options, &mut x, &mut Nobody);
-                audited.finish()
+                let ended = simulate(&mut audited, &options, &mut x, &mut Patient::new(None, settings));
+                given(ended, audited.finish())
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(&[]);
                 let mut audited = Audited::new(&mut system, self.graph);
-                let _ = simulate_implicit(&mut audited, &options, &mut y, &mut yp, &mut Nobody);
-                audited.finish()
+                let ended =
+                    simulate_implicit(&mut audited, &options, &mut y, &mut yp, &mut Patient::new(None, settings));
+                given(ended, audited.finish())
             }
-        };
+        }?;
         let (Settings { method, rtol, .. }, form) = (settings, self.form);
         report.judge(&Made { form, method, rtol, step: None, stiffness: stiffness.unwrap_or(1e6) });
-        report
+        Some(report)
     }
 
     /// How great each recorded variable counts as at least, by name.

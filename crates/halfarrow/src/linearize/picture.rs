@@ -2,6 +2,7 @@
 
 use halfarrow_trace::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
 
+use super::response::Margin;
 use super::{LinearizeReport, Response};
 use crate::draw::Picture;
 
@@ -11,24 +12,36 @@ const MOST: usize = 10;
 const FAR: f64 = 30.0;
 
 impl LinearizeReport {
-    /// Magnitude and phase over frequency, one curve for each input and output.
+    /// Magnitude in dB and phase over frequency in Hz, one curve for each input and output. Where one loop is drawn, or
+    /// responses without unit, their margins are marked: how far the phase is from -180° where the magnitude is 1, and
+    /// the magnitude below 1 where the phase is -180°.
     pub fn bode(&self) -> Picture {
         let responses = self.drawn();
+        let unit = self.common_unit(&responses);
         let scale = |label: &str, unit: &str, kind| Scale { label: label.into(), unit: unit.into(), kind };
-        let frequency = || scale("angular frequency", "rad/s", ScaleKind::Logarithmic);
+        let frequency = || scale("frequency", "Hz", ScaleKind::Logarithmic);
         let over =
-            |values: Vec<f64>, r: &Response| r.frequencies.iter().copied().zip(values).map(|(w, v)| [w, v]).collect();
+            |values: Vec<f64>, r: &Response| r.hertz().into_iter().zip(values).map(|(f, v)| [f, v]).collect();
         let curve = |r: &Response, values: Vec<f64>| Curve {
             name: self.curve_name(r),
             points: over(values, r),
             ..Curve::default()
         };
-        let magnitudes = responses.iter().map(|r| curve(r, r.magnitudes())).collect();
+        let magnitudes = responses.iter().map(|r| curve(r, r.decibels())).collect();
         let phases = responses.iter().map(|r| curve(r, r.phases())).collect();
-        let panel = |y, curves, height| Panel { x: frequency(), y, height, equal: false, curves, guides: vec![] };
+        let margins: Vec<Margin> = match responses.len() == 1 || unit.is_empty() {
+            true => responses.iter().flat_map(Response::margins).collect(),
+            false => Vec::new(),
+        };
+        let guides = |of_gain: bool| {
+            let own = margins.iter().filter(move |m| m.of_gain == of_gain);
+            own.map(|m| Guide::Span { x: m.hertz, y: [m.limit, m.value], name: m.text() }).collect()
+        };
+        let panel = |y, curves, height, guides| Panel { x: frequency(), y, height, equal: false, curves, guides };
+        let decibel = if unit.is_empty() { "dB".to_string() } else { format!("dB of {unit}") };
         let panels = vec![
-            panel(scale("magnitude", &self.common_unit(&responses), ScaleKind::Logarithmic), magnitudes, 220.0),
-            panel(scale("phase", "degrees", ScaleKind::Angle), phases, 170.0),
+            panel(scale("magnitude", &decibel, ScaleKind::Linear), magnitudes, 220.0, guides(true)),
+            panel(scale("phase", "degrees", ScaleKind::Angle), phases, 170.0, guides(false)),
         ];
         Picture {
             svg: chart(&Chart { title: format!("{}: frequency response", self.model), note: self.place(), panels }),

@@ -80,7 +80,77 @@ impl LinearizeReport {
     }
 }
 
+/// How far a loop is from the limit of stability at a frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margin {
+    /// Whether it is one of gain, in dB, where the phase is -180°; else of phase, in degrees, where the magnitude is 1.
+    pub of_gain: bool,
+    /// The frequency, in Hz.
+    pub hertz: f64,
+    /// Where the limit is: 0 dB, or an odd multiple of 180°.
+    pub limit: f64,
+    /// Magnitude in dB or phase in degrees there.
+    pub value: f64,
+}
+
+impl Margin {
+    /// The margin: positive where the closed loop has room.
+    pub fn size(&self) -> f64 {
+        if self.of_gain { self.limit - self.value } else { self.value - self.limit }
+    }
+    /// As it is told.
+    pub fn text(&self) -> String {
+        let size = format!("{:.1}", self.size()).replace('-', "−");
+        let frequency = short_hertz(self.hertz);
+        match self.of_gain {
+            true => format!("gain margin {size} dB at {frequency}"),
+            false => format!("phase margin {size}° at {frequency}"),
+        }
+    }
+}
+
+fn short_hertz(f: f64) -> String {
+    let digits = (2 - libm::floor(libm::log10(f)) as i32).clamp(0, 6) as usize;
+    if (1e-4..1e5).contains(&f) { format!("{f:.digits$} Hz") } else { format!("{f:.2e} Hz") }
+}
+
 impl Response {
+    /// Frequencies in Hz.
+    pub fn hertz(&self) -> Vec<f64> {
+        self.frequencies.iter().map(|w| w / std::f64::consts::TAU).collect()
+    }
+
+    /// Magnitudes in dB: 20 times the logarithm of the magnitude.
+    pub fn decibels(&self) -> Vec<f64> {
+        self.magnitudes().into_iter().map(|m| if m > 0.0 { 20.0 * libm::log10(m) } else { f64::NAN }).collect()
+    }
+
+    /// The margins of this response as an open loop, closed with negative feedback: at every frequency at which the
+    /// magnitude passes 1 or the phase an odd multiple of 180°, between two points along straight lines.
+    pub fn margins(&self) -> Vec<Margin> {
+        let (hertz, gain, phase) = (self.hertz(), self.decibels(), self.phases());
+        let mut margins = Vec::new();
+        for i in 1..hertz.len() {
+            let at = |part: f64, of: &[f64]| of[i - 1] + part * (of[i] - of[i - 1]);
+            let logs = [hertz[i - 1], hertz[i]].map(libm::log);
+            let frequency = |part: f64| libm::exp(logs[0] + part * (logs[1] - logs[0]));
+            let finite = [gain[i - 1], gain[i], phase[i - 1], phase[i]].iter().all(|x| x.is_finite());
+            if finite && (gain[i - 1] < 0.0) != (gain[i] < 0.0) {
+                let part = gain[i - 1] / (gain[i - 1] - gain[i]);
+                let value = at(part, &phase);
+                let limit = 360.0 * libm::ceil(value / 360.0) - 180.0;
+                margins.push(Margin { of_gain: false, hertz: frequency(part), limit, value });
+            }
+            let turn = |phase: f64| libm::floor((phase - 180.0) / 360.0);
+            if finite && turn(phase[i - 1]) != turn(phase[i]) && (phase[i] - phase[i - 1]).abs() < 90.0 {
+                let limit = 360.0 * turn(phase[i - 1]).max(turn(phase[i])) + 180.0;
+                let part = (limit - phase[i - 1]) / (phase[i] - phase[i - 1]);
+                margins.push(Margin { of_gain: true, hertz: frequency(part), limit: 0.0, value: at(part, &gain) });
+            }
+        }
+        margins
+    }
+
     /// Magnitudes.
     pub fn magnitudes(&self) -> Vec<f64> {
         self.values.iter().map(|v| libm::hypot(v[0], v[1])).collect()

@@ -1,6 +1,7 @@
 //! Everything about a model in one page that opens anywhere: self-contained, offline, printable.
 
 mod causality;
+mod curves;
 mod page;
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::equations::{
     Cause, Form, StateKind, Style, print_certificate, print_dependent, print_meanings, print_sides, print_symbol, show,
 };
+use halfarrow_draw::DrawOptions;
 
 use crate::compare::{Compare, CompareReport};
 use crate::error::Error;
@@ -32,12 +34,14 @@ pub struct Report {
     pub compare: bool,
     /// The error at which they are compared.
     pub error: f64,
+    /// Time for comparing, in s; what it does not suffice for is left out, and said.
+    pub compare_budget: f64,
 }
 
 impl Default for Report {
-    /// With a comparison at an error of 1e-6.
+    /// With a comparison at an error of 1e-6 within 10 s.
     fn default() -> Report {
-        Report { to: None, inputs: Vec::new(), compare: true, error: 1e-6 }
+        Report { to: None, inputs: Vec::new(), compare: true, error: 1e-6, compare_budget: 10.0 }
     }
 }
 
@@ -66,7 +70,8 @@ struct Content {
     dependent: Vec<String>,
     conserved: Vec<String>,
     forms: Vec<FormPart>,
-    comparison: Option<(CompareReport, String)>,
+    /// The comparison and its picture, or why there is none; `None` if it was not wanted.
+    comparison: Option<Result<(CompareReport, String), String>>,
     run: Result<(Simulated, String), String>,
     to: f64,
     warnings: Vec<String>,
@@ -84,12 +89,13 @@ struct PathRow {
     fate: String,
 }
 
-/// The equations of a form, or why there are none.
+/// The equations of forms that have the same, or why there are none.
 struct FormPart {
-    form: Form,
+    forms: Vec<Form>,
     content: Result<FormText, String>,
 }
 
+#[derive(PartialEq)]
 struct FormText {
     counts: String,
     /// Unknowns, with what each is there for.
@@ -122,17 +128,18 @@ impl Model {
                     inputs: report.inputs.clone(),
                     repeats: 3,
                     patience: 2.0,
+                    budget: Some(report.compare_budget),
                 };
-                let compared = self.compare(&wanted, &mut |part, what| progress(0.05 + 0.85 * part, what));
-                // A model that does not come to its end has no comparison; the run below says why.
-                compared.ok().map(|report| {
+                let compared = self.compare(&wanted, &mut |part, what| progress(0.1 + 0.6 * part, &format!("comparing: {what}")));
+                let with_picture = |report: CompareReport| {
                     let svg = report.plot().svg;
                     (report, svg)
-                })
+                };
+                Some(compared.map(with_picture).map_err(|error| crate::compare::short(&error)))
             }
             false => None,
         };
-        progress(0.9, "run");
+        progress(0.7, "run");
         let run = Run { to, every: Some(to / 500.0), inputs: report.inputs.clone(), rtol: 1e-8, ..Run::default() };
         let mut page = Page::default();
         let run = match self.simulate(&run, &mut |_| true) {
@@ -150,17 +157,24 @@ impl Model {
         if let Some((compared, _)) = &comparison {
             page.refused = compared.refused();
         }
+        progress(0.8, "drawing");
+        let drawing = self.draw(&DrawOptions::default())?.svg;
+        let mut form_part = |(i, form): (usize, Form)| {
+            progress(0.85 + 0.02 * i as f64, &format!("equations of the form {}", form.name()));
+            self.form_part(form)
+        };
+        let forms = Form::ALL.into_iter().enumerate().map(&mut form_part).collect();
         let content = Content {
-            title: if self.graph.doc.is_empty() { self.graph.name.clone() } else { self.graph.doc.clone() },
+            title: self.title().to_string(),
             name: self.graph.name.clone(),
             facts: self.facts(&loops, minimal.equations.states.len()),
-            drawing: self.draw()?.svg,
+            drawing,
             decided: causality::decided(&causal, &loops),
             paths: path_rows(&causal, &loops),
             paths_complete: loops.complete,
             dependent: print_dependent(&minimal, Style::MathMl),
             conserved: loops.conserved.iter().map(|c| format!("{} = {}", c.name, c.value)).collect(),
-            forms: Form::ALL.into_iter().map(|form| self.form_part(form)).collect(),
+            forms: together(forms),
             comparison,
             run,
             to,
@@ -216,8 +230,20 @@ impl Model {
                 certificate: print_certificate(&shown),
             }
         });
-        FormPart { form, content }
+        FormPart { forms: vec![form], content }
     }
+}
+
+/// Forms with the same equations as one part, at the place of the first.
+fn together(parts: Vec<FormPart>) -> Vec<FormPart> {
+    let mut kept: Vec<FormPart> = Vec::new();
+    for part in parts {
+        match kept.iter_mut().find(|k| k.content == part.content) {
+            Some(same) => same.forms.extend(part.forms),
+            None => kept.push(part),
+        }
+    }
+    kept
 }
 
 fn path_rows(causal: &CausalGraph, loops: &crate::loops::LoopsReport) -> Vec<PathRow> {

@@ -2,14 +2,16 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::curves::{LIBRARY, LIBRARY_STYLE, SCRIPT, data};
 use super::{Content, FormPart, FormText, PathRow};
+use halfarrow_compiler::equations::Form;
 use crate::audited::Miss;
 use crate::compare::{CompareReport, Row};
 use crate::run::Simulated;
 
 const STYLE: &str = include_str!("page.css");
 
-/// Nothing in it points outside: style, pictures and formulas stand in the text.
+/// Nothing in it points outside: style, pictures, formulas and the program that zooms curves stand in the text.
 pub(super) fn page(content: &Content) -> String {
     let page = html! {
         (DOCTYPE)
@@ -18,7 +20,7 @@ pub(super) fn page(content: &Content) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (content.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(LIBRARY_STYLE)) }
             }
             body {
                 (head(content))
@@ -31,6 +33,7 @@ pub(super) fn page(content: &Content) -> String {
                     (run(content))
                     (audit(content))
                 }
+                (scripts(content))
                 footer { "Written by halfarrow " (env!("CARGO_PKG_VERSION")) "." }
             }
         }
@@ -119,8 +122,8 @@ fn paths(content: &Content) -> Markup {
             } @else {
                 div.wide { table {
                     thead { tr {
-                        th { "class" } th { "between" } th { "route" } th { "bonds" } th { "gain" } th.number { "value" }
-                        th { "break variables" } th { "fate in the minimal form" }
+                        th { "class" } th { "between" } th { "gain" } th.number { "value" } th { "break variables" }
+                        th { "fate in the minimal form" }
                     } }
                     tbody { @for path in &content.paths { (path_row(path)) } }
                 } }
@@ -134,12 +137,16 @@ fn paths(content: &Content) -> Markup {
     }
 }
 
+/// A path, and below it its way, over the whole width.
 fn path_row(path: &PathRow) -> Markup {
-    html! { tr {
-        td { (path.class) } td.name { (path.between) } td { (path.route) } td { (path.bonds) } td { (math(&path.gain)) }
-        td.number { @match path.value { Some(value) => (number(value)), None => "–" } }
-        td { code { (path.breaks) } } td { (path.fate) }
-    } }
+    html! {
+        tr.path {
+            td { (path.class) } td.name { (path.between) } td { (math(&path.gain)) }
+            td.number { @match path.value { Some(value) => (number(value)), None => "–" } }
+            td { code { (path.breaks) } } td { (path.fate) }
+        }
+        tr.route { td {} td colspan="5" { (path.route) span.bonds { "bonds " (path.bonds) } } }
+    }
 }
 
 fn equations(content: &Content) -> Markup {
@@ -152,7 +159,28 @@ fn equations(content: &Content) -> Markup {
 }
 
 fn form_part(part: &FormPart) -> Markup {
-    let what = match part.form.name() {
+    let names: Vec<&str> = part.forms.iter().map(|form| described(*form)).collect();
+    html! {
+        div.form {
+            @match &part.content {
+                Err(reason) => { (headings(&names, "")) p.soft { "Does not apply: " (reason) } }
+                Ok(text) => { (headings(&names, &text.counts)) (form_text(text)) }
+            }
+        }
+    }
+}
+
+/// The names of forms whose equations are the same, and their size.
+fn headings(names: &[&str], counts: &str) -> Markup {
+    html! {
+        @for (i, name) in names.iter().enumerate() {
+            h3.same[i > 0] { (name) @if i + 1 == names.len() && !counts.is_empty() { span.count { (counts) } } }
+        }
+    }
+}
+
+fn described(form: Form) -> &'static str {
+    match form.name() {
         "minimal" => "Minimal form: independent variables, nothing else",
         "kane" => "Kane’s form: an equation for each independent speed",
         "inverted" => "Inverted form: storages on zero-order paths in derivative causality",
@@ -160,14 +188,6 @@ fn form_part(part: &FormPart) -> Markup {
         "relaxed" => "Classical form with relaxed causality: resistors first",
         "lagrange" => "Lagrange’s form: a multiplier for every constraint",
         _ => "Stiff form: a spring with a damper for every constraint",
-    };
-    html! {
-        div.form {
-            @match &part.content {
-                Err(reason) => { h3 { (what) } p.soft { "Does not apply: " (reason) } }
-                Ok(text) => { h3 { (what) span.count { (text.counts) } } (form_text(text)) }
-            }
-        }
     }
 }
 
@@ -197,7 +217,13 @@ fn form_text(text: &FormText) -> Markup {
 }
 
 fn comparison(content: &Content) -> Markup {
-    let Some((report, svg)) = &content.comparison else { return html! {} };
+    let (report, svg) = match &content.comparison {
+        None => return html! {},
+        Some(Err(reason)) => {
+            return html! { section id="comparison" { h2 { "Comparison of the forms" } p { "There is none: " (reason) "." } } };
+        }
+        Some(Ok(compared)) => compared,
+    };
     html! {
         section id="comparison" {
             h2 { "Comparison of the forms" }
@@ -257,7 +283,8 @@ fn run(content: &Content) -> Markup {
             h2 { "Motion" }
             @match &content.run {
                 Ok((done, svg)) => {
-                    (figure(svg, "plot"))
+                    div id="curves" {}
+                    (figure(svg, "plot still"))
                     p.soft { "Minimal form to " (number(content.to)) " s: " (done.report.steps) " steps, "
                         (done.report.evaluations) " evaluations." }
                     @if !done.report.notes.is_empty() {
@@ -267,6 +294,15 @@ fn run(content: &Content) -> Markup {
                 Err(reason) => p { "The run stopped: " (reason) }
             }
         }
+    }
+}
+
+/// The curves of the run as data, and what draws them so that they can be zoomed and read off.
+fn scripts(content: &Content) -> Markup {
+    let Ok((done, _)) = &content.run else { return html! {} };
+    html! {
+        script { (PreEscaped(LIBRARY.trim_start_matches(|c| c != '\n'))) }
+        script { "const runs = " (PreEscaped(data(&done.trace))) ";\n" (PreEscaped(SCRIPT)) }
     }
 }
 
