@@ -254,6 +254,7 @@ impl Model {
         let until = budget.part(TIMES);
         measure(&mut forms, to, compare.repeats.max(1), until, &mut |part| progress(0.5 + 0.45 * part, "times"));
         progress(0.95, "agreement");
+        let cut = forms.iter().any(|form| form.cut) || is_over(until);
         let count = forms.len();
         let finished = |(i, form): (usize, Measured)| {
             form.finish(&reference, Effort { error: compare.error, patience, until: budget.share(1.0, count - i) })
@@ -269,7 +270,7 @@ impl Model {
             notes: Vec::new(),
         };
         report.notes = notes(&report);
-        report.notes.extend(budget.note());
+        report.notes.extend(budget.note(cut));
         Ok(report)
     }
 
@@ -397,10 +398,10 @@ impl Budget {
         Problem::BadOption { reason }.into()
     }
     /// What is to be said if it was spent before everything was measured.
-    fn note(&self) -> Option<String> {
-        let seconds = self.whole.filter(|_| is_over(self.part(REFERENCE)))?.as_secs_f64();
+    fn note(&self, cut: bool) -> Option<String> {
+        let seconds = self.whole.filter(|_| cut || is_over(self.part(1.0)))?.as_secs_f64();
         Some(format!(
-            "comparing had {seconds} s: runs that would have taken longer are left out, and so are their times and errors"
+            "comparing was given {seconds} s: runs that would have taken longer are left out, with their times and errors"
         ))
     }
 }

@@ -8,6 +8,8 @@ use crate::draw::Picture;
 
 /// Curves in a picture.
 const MOST: usize = 10;
+/// What is farther than so many dB from the median is not drawn in a Bode plot.
+const REACH: f64 = 160.0;
 /// What is farther from the origin than so many times the median is not drawn in a Nyquist plot.
 const FAR: f64 = 30.0;
 
@@ -27,10 +29,10 @@ impl LinearizeReport {
             points: over(values, r),
             ..Curve::default()
         };
-        let magnitudes = responses.iter().map(|r| curve(r, r.decibels())).collect();
+        let magnitudes = responses.iter().map(|r| curve(r, shown(r))).collect();
         let phases = responses.iter().map(|r| curve(r, r.phases())).collect();
         let margins: Vec<Margin> = match responses.len() == 1 || unit.is_empty() {
-            true => responses.iter().flat_map(Response::margins).collect(),
+            true => responses.iter().flat_map(worst).collect(),
             false => Vec::new(),
         };
         let guides = |of_gain: bool| {
@@ -110,6 +112,25 @@ impl LinearizeReport {
         let first = units.next().unwrap_or_default();
         if units.all(|unit| unit == first) { first } else { "SI units".into() }
     }
+}
+
+/// The least margin of each kind of a response: what decides.
+fn worst(response: &Response) -> Vec<Margin> {
+    let all = response.margins();
+    let least = |of_gain: bool| {
+        let own = all.iter().filter(|m| m.of_gain == of_gain);
+        own.min_by(|a, b| a.size().abs().total_cmp(&b.size().abs())).copied()
+    };
+    [least(true), least(false)].into_iter().flatten().collect()
+}
+
+/// Magnitudes in dB as far as a picture can show them: a pole on the imaginary axis leaves a gap.
+fn shown(response: &Response) -> Vec<f64> {
+    let all = response.decibels();
+    let mut finite: Vec<f64> = all.iter().copied().filter(|x| x.is_finite()).collect();
+    finite.sort_by(f64::total_cmp);
+    let middle = finite.get(finite.len() / 2).copied().unwrap_or(0.0);
+    all.into_iter().map(|x| if (x - middle).abs() <= REACH { x } else { f64::NAN }).collect()
 }
 
 /// The median of all magnitudes; 1 where there are none.

@@ -22,7 +22,7 @@
       scales: { x: { time: false } },
       axes: [
         { ...axis, label: i + 1 === runs.panels.length ? "t in s" : undefined, labelSize: 22 },
-        { ...axis, label: panel.unit ? "in " + panel.unit : " ", labelSize: 22, size: 68 }
+        { ...axis, label: panel.unit && panel.unit !== "1" ? "in " + panel.unit : " ", labelSize: 22, size: 68 }
       ],
       series: [{ label: "t", value: (u, x) => read(x) }].concat(panel.names.map((label, k) => ({
         label, stroke: colours[k % colours.length], width: 1.6, value: (u, x) => read(x),

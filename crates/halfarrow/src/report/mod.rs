@@ -93,6 +93,8 @@ struct PathRow {
 struct FormPart {
     forms: Vec<Form>,
     content: Result<FormText, String>,
+    /// What is said about how the equations came about, by form.
+    remarks: Vec<(Form, Vec<String>)>,
 }
 
 #[derive(PartialEq)]
@@ -103,7 +105,6 @@ struct FormText {
     equations: Vec<(String, String)>,
     left_out: usize,
     meanings: Vec<String>,
-    certificate: Vec<String>,
 }
 
 impl Model {
@@ -199,8 +200,10 @@ impl Model {
     }
 
     fn form_part(&self, form: Form) -> FormPart {
+        let mut remarks = Vec::new();
         let content = self.equations_in(form).map_err(|error| crate::compare::short(&error)).map(|equations| {
             let shown = show(equations);
+            remarks = print_certificate(&shown);
             let equations = &shown.equations;
             let counts = equations.counts;
             let storage = |kind| if kind == StateKind::Signal { "integrated signal" } else { "storage" };
@@ -227,10 +230,9 @@ impl Model {
                 equations: lines,
                 left_out,
                 meanings: print_meanings(&shown, Style::MathMl).into_iter().take(MOST).collect(),
-                certificate: print_certificate(&shown),
             }
         });
-        FormPart { forms: vec![form], content }
+        FormPart { forms: vec![form], content, remarks: vec![(form, remarks)] }
     }
 }
 
@@ -239,7 +241,10 @@ fn together(parts: Vec<FormPart>) -> Vec<FormPart> {
     let mut kept: Vec<FormPart> = Vec::new();
     for part in parts {
         match kept.iter_mut().find(|k| k.content == part.content) {
-            Some(same) => same.forms.extend(part.forms),
+            Some(same) => {
+                same.forms.extend(part.forms);
+                same.remarks.extend(part.remarks);
+            }
             None => kept.push(part),
         }
     }

@@ -164,8 +164,18 @@ fn form_part(part: &FormPart) -> Markup {
         div.form {
             @match &part.content {
                 Err(reason) => { (headings(&names, "")) p.soft { "Does not apply: " (reason) } }
-                Ok(text) => { (headings(&names, &text.counts)) (form_text(text)) }
+                Ok(text) => { (headings(&names, &text.counts)) (form_text(text)) (remarked(part)) }
             }
+        }
+    }
+}
+
+/// How the equations came about; where several forms have them, with the name of the form.
+fn remarked(part: &FormPart) -> Markup {
+    let of = |form: Form| if part.forms.len() > 1 { format!("{}: ", form.name()) } else { String::new() };
+    html! {
+        @if part.remarks.iter().any(|r| !r.1.is_empty()) {
+            ul.plain { @for (form, lines) in &part.remarks { @for line in lines { li { (of(*form)) (line) } } } }
         }
     }
 }
@@ -174,7 +184,7 @@ fn form_part(part: &FormPart) -> Markup {
 fn headings(names: &[&str], counts: &str) -> Markup {
     html! {
         @for (i, name) in names.iter().enumerate() {
-            h3.same[i > 0] { (name) @if i + 1 == names.len() && !counts.is_empty() { span.count { (counts) } } }
+            h3 class=[(i > 0).then_some("same")] { (name) @if i + 1 == names.len() && !counts.is_empty() { span.count { (counts) } } }
         }
     }
 }
@@ -209,9 +219,6 @@ fn form_text(text: &FormText) -> Markup {
                 @if i > 0 { ", " }
                 math { (PreEscaped(symbol)) } " " (cause)
             } }
-        }
-        @if !text.certificate.is_empty() {
-            ul.plain { @for line in &text.certificate { li { (line) } } }
         }
     }
 }
