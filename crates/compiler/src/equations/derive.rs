@@ -10,8 +10,8 @@ use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::stiff::parameters;
 use super::{
-    Algebraic, BreakBound, Conserved, Equations, Form, State, StateKind, Step, Unavailable, conserved, display,
-    domains, index, observed,
+    Algebraic, BreakBound, Conserved, Equations, Form, Relations, State, StateKind, Step, Unavailable, conserved,
+    display, domains, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -43,7 +43,8 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     let conserved = if momenta { conserved::eliminate(&mut assembled, causal) } else { Vec::new() };
-    let draft = Draft { assembled, closures: Vec::new(), conserved, breaks: BreakBound::default() };
+    let relations = relations::relations(&mut assembled, causal);
+    let draft = Draft { conserved, relations, ..Draft::of(assembled, Vec::new()) };
     finish(causal, causal, form, draft)
 }
 
@@ -82,19 +83,14 @@ fn along(
     let closed = rates.into_iter().chain(d.derived_rates()).collect();
     let (breaks, bound) = open_loops(d, strokes, &wanted, &closed);
     closures.extend(breaks);
-    finish(&drawn, causal, form, Draft { assembled, closures, conserved: Vec::new(), breaks: bound })
+    finish(&drawn, causal, form, Draft { breaks: bound, ..Draft::of(assembled, closures) })
 }
 
 /// All storages and constraints in the solved structure, each relation among them with a multiplier.
 fn lagrange(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
     let open = without_constraints(causal);
     let (assembled, closures) = constrained(&open)?;
-    finish(
-        &open,
-        causal,
-        Form::Lagrange,
-        Draft { assembled, closures, conserved: Vec::new(), breaks: BreakBound::default() },
-    )
+    finish(&open, causal, Form::Lagrange, Draft::of(assembled, closures))
 }
 
 /// The same with a stiff spring and a damper for each multiplier.
@@ -103,12 +99,7 @@ fn stiff(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
     let springs = parameters(&mut open);
     let (mut assembled, closures) = constrained(&open)?;
     let closures = assembled.relax(&open, &springs, closures);
-    finish(
-        &open,
-        causal,
-        Form::Stiff,
-        Draft { assembled, closures, conserved: Vec::new(), breaks: BreakBound::default() },
-    )
+    finish(&open, causal, Form::Stiff, Draft::of(assembled, closures))
 }
 
 fn constrained(open: &CausalGraph) -> Result<(Assembled<'_>, Vec<Closure>), Diagnostics> {
@@ -124,13 +115,27 @@ struct Draft<'a> {
     assembled: Assembled<'a>,
     closures: Vec<Closure>,
     conserved: Vec<Conserved>,
+    relations: Relations,
     breaks: BreakBound,
+}
+
+impl<'a> Draft<'a> {
+    /// Nothing conserved, no relations known, no break variables.
+    fn of(assembled: Assembled<'a>, closures: Vec<Closure>) -> Draft<'a> {
+        Draft {
+            assembled,
+            closures,
+            conserved: Vec::new(),
+            relations: Relations::default(),
+            breaks: BreakBound::default(),
+        }
+    }
 }
 
 /// Puts everything into order. `truth` is the graph with its exact ports.
 fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
-    let Draft { mut assembled, closures, conserved, breaks } = draft;
+    let Draft { mut assembled, closures, conserved, relations, breaks } = draft;
     let momenta = assembled.momenta(truth);
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
@@ -210,6 +215,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         algebraic,
         residuals,
         conserved,
+        relations,
         steps: ordered.steps,
         observed,
         conditions,

@@ -15,6 +15,7 @@ mod momenta;
 mod named;
 mod observed;
 mod places;
+mod relations;
 mod stiff;
 mod text;
 
@@ -33,6 +34,7 @@ pub use derive::derive_equations;
 pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
 pub use form::Form;
 pub use momenta::Momentum;
+pub use relations::{Moved, Relations};
 pub use text::{
     Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
     print_sides, print_symbol,
@@ -62,6 +64,8 @@ pub struct Equations {
     pub residuals: Vec<Expr>,
     /// Quantities that stay at their start value, each in place of a state.
     pub conserved: Vec<Conserved>,
+    /// How states move together whatever laws say, for the search of equilibria.
+    pub relations: Relations,
     /// The steps.
     pub steps: Vec<Step>,
     /// What can be recorded: every effort, flow, `q`, `p` under element names, junction variables, signals, lets and outputs.

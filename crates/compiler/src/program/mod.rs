@@ -92,6 +92,8 @@ pub struct Program {
     pub kept: Vec<(u32, Value)>,
     /// Constants fixed by the start values.
     pub conserved: Vec<String>,
+    /// How states move together whatever laws say.
+    pub relations: Relations,
     /// What can be recorded.
     pub observed: Vec<Observed>,
     /// What the start of a run has to satisfy.
@@ -164,6 +166,32 @@ pub struct State {
     pub rate: Value,
     /// SI unit, where known.
     pub unit: Option<Unit>,
+}
+
+/// How states move together, whatever the laws of elements say: rows that share all their drives with others.
+#[derive(Debug, Clone, Default)]
+pub struct Relations {
+    /// The rows.
+    pub rows: Vec<Moved>,
+    /// Number of drives.
+    pub drives: usize,
+}
+
+/// One row: `Σ factor · quantity' = Σ coefficient · drive`.
+#[derive(Debug, Clone)]
+pub struct Moved {
+    /// Factors and quantities.
+    pub quantity: Vec<(Value, Value)>,
+    /// Drives, by their number, and their coefficients.
+    pub by: Vec<(usize, Value)>,
+}
+
+impl Relations {
+    /// Everything that the rows are made of.
+    pub fn values(&self) -> impl Iterator<Item = Value> + '_ {
+        let quantities = self.rows.iter().flat_map(|r| r.quantity.iter().flat_map(|&(factor, x)| [factor, x]));
+        quantities.chain(self.rows.iter().flat_map(|r| r.by.iter().map(|b| b.1)))
+    }
 }
 
 /// A variable that can be recorded.

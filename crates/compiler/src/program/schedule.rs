@@ -5,8 +5,8 @@ use super::lower::Lowering;
 use super::sharing::share;
 use super::values::{Op, Reads};
 use super::{
-    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Observed, Parameter,
-    Program, StartCondition, State, Value, Watch, first_of,
+    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Moved, Observed,
+    Parameter, Program, Relations, StartCondition, State, Value, Watch, first_of,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Meaning, ParameterId};
@@ -306,6 +306,7 @@ impl Schedule<'_> {
                 })
                 .collect(),
             domains: equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect(),
+            relations: relations(lower, graph, &equations.relations),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
             parameters,
             blocks: self.blocks,
@@ -375,6 +376,26 @@ fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Do
         asked: domain.asked.and_then(|s| Some((name(s), lower.defined(s)?))),
         limit: domain.limit.map(|limit| lower.value(limit)),
     })
+}
+
+/// The rows of which all is evaluated.
+fn relations(lower: &mut Lowering, graph: &BondGraph, of: &crate::equations::Relations) -> Relations {
+    let known = |lower: &Lowering, e: Expr| graph.exprs.symbols_of(e).iter().all(|&s| lower.defined(s).is_some());
+    let mut rows = Vec::new();
+    for row in &of.rows {
+        let quantities = row.quantity.iter().all(|(factor, x)| known(lower, *factor) && lower.defined(*x).is_some());
+        if !quantities || !row.by.iter().all(|b| known(lower, b.1)) {
+            continue;
+        }
+        let quantity = |lower: &mut Lowering, (factor, x): (Expr, Symbol)| {
+            (lower.value(factor), lower.defined(x).expect("what is known has a value"))
+        };
+        rows.push(Moved {
+            quantity: row.quantity.iter().map(|&q| quantity(lower, q)).collect(),
+            by: row.by.iter().map(|&(drive, c)| (drive, lower.value(c))).collect(),
+        });
+    }
+    Relations { rows, drives: of.drives }
 }
 
 /// The factors of a divisor that vary or could vanish.

@@ -1,5 +1,6 @@
 //! Where everything is at rest.
 
+use super::leaf::{Leaf, Ways};
 use super::minimum_norm;
 use super::{EquilibriumError, Model};
 use halfarrow_sim::{Failure, System};
@@ -7,11 +8,10 @@ use halfarrow_sim::{Failure, System};
 const ITERATIONS: usize = 200;
 /// Rates below this fraction of the terms they are made of count as zero.
 const AT_REST: f64 = 1e-9;
-/// Strides along a curve of equilibria, and states up to which one is followed.
-const STRIDES: usize = 400;
-const MOST_FOLLOWED: usize = 200;
 /// More states than this are not searched: the equations are dense.
 const LARGEST: usize = 2000;
+/// A constraint counts as kept if it is missed by less than this fraction of what its displacements come to.
+const KEPT: f64 = 1e-8;
 
 /// A state at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,174 +25,157 @@ pub struct Equilibrium {
     pub iterations: usize,
 }
 
+/// A state with its rates, their derivatives row by row, and the ways that lead on from it.
+struct Point {
+    x: Vec<f64>,
+    rates: Vec<f64>,
+    jacobian: Vec<f64>,
+    ways: Ways,
+    /// The derivatives along the ways.
+    along: Vec<f64>,
+}
+
+/// The least rates that a search has seen, all weighed as at its beginning.
+struct Nearest {
+    weights: Vec<f64>,
+    least: f64,
+    rates: Vec<f64>,
+}
+
+impl Nearest {
+    fn new(weights: Vec<f64>) -> Nearest {
+        Nearest { weights, least: f64::INFINITY, rates: Vec::new() }
+    }
+
+    fn see(&mut self, rates: &[f64]) {
+        let size = rates.iter().zip(&self.weights).fold(0.0f64, |most, (r, w)| most.max((r * w).abs()));
+        if size < self.least {
+            (self.least, self.rates) = (size, rates.to_vec());
+        }
+    }
+}
+
 impl Model {
     /// The equilibrium nearest to `x` at time `t`, with inputs and conditions as they are then: Newton with the exact
     /// Jacobian, by way of a damped motion where Newton alone does not get there; where that fails as well, the loads
     /// that would hold `x` at rest are taken away little by little, and the equilibrium is followed, round folds too.
     ///
+    /// The search goes only where the junction structure lets the states go from `x`: relations of displacements hold at
+    /// the equilibrium as they do at `x`, those of constraints and those that the graph implies. `x` should keep the
+    /// constraints.
+    ///
     /// # Errors
     /// There is none near, or the model has no value on the way.
     pub fn equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         self.restart();
-        let refused = match self.settle(t, x) {
-            Err(EquilibriumError::None(left)) => EquilibriumError::None(left),
-            settled => return settled,
+        if x.len() > LARGEST {
+            return Err(EquilibriumError::TooLarge(x.len()));
+        }
+        let leaf = self.leaf(t, x);
+        let leaf = leaf.as_ref();
+        let refused = match self.settle(leaf, t, x).and_then(|found| self.audited(leaf, t, found)) {
+            Err(EquilibriumError::Failure(failure)) => return Err(EquilibriumError::Failure(failure)),
+            Err(refused) => refused,
+            found => return found,
         };
-        let released = self.release_loads(t, x);
-        released.and_then(|near| self.settle(t, &near).ok()).ok_or(refused)
+        let released = self.release_loads(leaf, t, x);
+        let settled = released.and_then(|near| self.settle(leaf, t, &near).ok());
+        settled.and_then(|found| self.audited(leaf, t, found).ok()).ok_or(refused)
     }
 
-    /// A point near the equilibrium that the start `x` is joined to by equilibria under smaller and smaller loads:
-    /// `f(x) = (1 - λ) f(start)` from `λ = 0` to 1, along the curve. `None` if the curve does not lead there.
-    fn release_loads(&mut self, t: f64, start: &[f64]) -> Option<Vec<f64>> {
-        let n = start.len();
-        if n > MOST_FOLLOWED {
-            return None;
-        }
-        let (load, _) = self.at_rest(t, start).ok()?;
-        // States in parts of their magnitude, so that a length along the curve means something.
-        let size = self.magnitudes(t, start);
-        let least = size.iter().copied().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
-        let size: Vec<f64> = size.into_iter().map(|s| if s > 0.0 { s } else { least.min(1.0) }).collect();
-        let (mut z, mut part) = (vec![0.0; n], 0.0);
-        let mut along: Vec<f64> = (0..=n).map(|i| f64::from(u8::from(i == n))).collect();
-        let mut stride = 0.05;
-        for _ in 0..STRIDES {
-            let slopes = self.held(t, start, &size, &load, &z, part)?.1;
-            along = tangent(&slopes, &along, n)?;
-            let trial = |stride: f64| -> (Vec<f64>, f64) {
-                let moved = z.iter().zip(&along).map(|(z, a)| z + stride * a).collect();
-                (moved, part + stride * along[n])
-            };
-            // Not beyond the end.
-            let reach = if part + stride * along[n] > 1.0 { (1.0 - part) / along[n] } else { stride };
-            let (mut at, mut lambda) = trial(reach);
-            match self.correct(t, start, &size, &load, &mut at, &mut lambda) {
-                Some(iterations) => {
-                    (z, part) = (at, lambda);
-                    if part >= 1.0 - 1e-9 {
-                        return Some(start.iter().zip(&size).zip(&z).map(|((x, s), z)| x + s * z).collect());
-                    }
-                    stride = if iterations <= 3 { (1.6 * stride).min(5.0) } else { stride };
-                }
-                None if stride > 1e-7 => stride *= 0.4,
-                None => return None,
-            }
-        }
-        None
-    }
-
-    /// Newton of least steps back to the curve; how many iterations it took.
-    fn correct(
+    /// What was found, if the constraints are kept there.
+    fn audited(
         &mut self,
+        leaf: Option<&Leaf>,
         t: f64,
-        start: &[f64],
-        size: &[f64],
-        load: &[f64],
-        z: &mut [f64],
-        part: &mut f64,
-    ) -> Option<usize> {
-        let n = start.len();
-        let mut last = f64::INFINITY;
-        for iteration in 1..=8 {
-            let (miss, slopes) = self.held(t, start, size, load, z, *part)?;
-            let step = minimum_norm::step(&slopes, &miss, n + 1)?.step;
-            z.iter_mut().zip(&step).for_each(|(z, s)| *z += s);
-            *part += step[n];
-            let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-            if length < 1e-10 {
-                return Some(iteration);
-            }
-            if !length.is_finite() || length > 2.0 * last {
-                return None;
-            }
-            last = length;
+        found: Equilibrium,
+    ) -> Result<Equilibrium, EquilibriumError> {
+        let constraints = self.constraints();
+        match self.missed_constraint(&constraints, t, &found.x, leaf.map_or(&[], |leaf| &leaf.size), KEPT) {
+            Some((name, miss)) => Err(EquilibriumError::Missed(name, miss)),
+            None => Ok(found),
         }
-        None
-    }
-
-    /// `f(x) - (1 - λ) load` and its derivatives by the scaled states and `λ`, row by row.
-    fn held(
-        &mut self,
-        t: f64,
-        start: &[f64],
-        size: &[f64],
-        load: &[f64],
-        z: &[f64],
-        part: f64,
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
-        let n = start.len();
-        let x: Vec<f64> = start.iter().zip(size).zip(z).map(|((x, s), z)| x + s * z).collect();
-        let (rates, jacobian) = self.at_rest(t, &x).ok()?;
-        let miss = rates.iter().zip(load).map(|(r, l)| r - (1.0 - part) * l).collect();
-        let entry = |i: usize, j: usize| if j < n { jacobian[i * n + j] * size[j] } else { load[i] };
-        let slopes = (0..n).flat_map(|i| (0..=n).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect();
-        Some((miss, slopes))
     }
 
     /// Newton from `x`, by way of a damped motion.
-    fn settle(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+    fn settle(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let n = x.len();
-        if n > LARGEST {
-            return Err(EquilibriumError::TooLarge(n));
-        }
-        let mut x = x.to_vec();
         let mut scale = vec![0.0f64; n];
         let mut pull = f64::INFINITY;
-        let (mut rates, mut jacobian) = self.at_rest(t, &x).map_err(EquilibriumError::Failure)?;
+        let mut nearest: Option<Nearest> = None;
+        let mut at = self.point(leaf, t, x.to_vec()).map_err(EquilibriumError::Failure)?;
         for iteration in 0..ITERATIONS {
+            let Point { x, rates, jacobian, ways, along } = &at;
             for (i, row) in jacobian.chunks(n.max(1)).enumerate() {
-                let terms: f64 = row.iter().zip(&x).map(|(j, x)| (j * x).abs()).sum();
+                let terms: f64 = row.iter().zip(x).map(|(j, x)| (j * x).abs()).sum();
                 scale[i] = scale[i].max(rates[i].abs()).max(terms);
             }
-            let newton = minimum_norm::step(&jacobian, &rates, n);
+            let newton = minimum_norm::step(along, rates, ways.count(n));
             let Some(newton) = newton else { break };
+            let step = ways.step(&newton.step);
             // A rate that changes nothing in the shortest time that the model knows is none.
-            let fastest = (0..n).map(|i| jacobian[i * n + i].abs()).fold(fastest_pair(&jacobian, n), f64::max);
+            let fastest = (0..n).map(|i| jacobian[i * n + i].abs()).fold(fastest_pair(jacobian, n), f64::max);
             let idle = |i: usize, part: f64| rates[i].abs() <= part * x[i].abs() * fastest;
-            let stays = |i: usize| newton.step[i].abs() <= 1e-13 * x[i].abs();
+            let stays = |i: usize| step[i].abs() <= 1e-13 * x[i].abs();
             let rests = |i: usize| rates[i].abs() <= 1e-15 * scale[i] || idle(i, 1e-15);
             if (0..n).all(stays) || (0..n).all(rests) {
                 if (0..n).all(|i| rates[i].abs() <= AT_REST * scale[i] || idle(i, 1e-13)) {
-                    return Ok(Equilibrium { x, free: n - newton.rank, iterations: iteration });
+                    return Ok(Equilibrium { x: x.clone(), free: ways.count(n) - newton.rank, iterations: iteration });
                 }
                 if pull.is_infinite() {
                     break;
                 }
             }
             let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
-            let before = norm(&rates);
+            let before = norm(rates);
+            let nearest = nearest.get_or_insert_with(|| Nearest::new(newton.weights.clone()));
+            nearest.see(rates);
             let step = match pull.is_infinite() {
-                true => newton.step.clone(),
-                false => damped_motion(&jacobian, &rates, pull, n).unwrap_or_else(|| newton.step.clone()),
+                true => step,
+                false => damped_motion(&at, pull, n).unwrap_or(step),
             };
             let shortest = if pull.is_infinite() { 1e-3 } else { 1e-9 };
             let mut fraction = 1.0;
             let moved = loop {
-                let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + fraction * s).collect();
-                match self.at_rest(t, &trial) {
-                    Ok(next) if norm(&next.0) < before || !pull.is_infinite() => break Some((trial, next)),
+                let part: Vec<f64> = step.iter().map(|s| fraction * s).collect();
+                let trial = self.moved(leaf, t, &at.x, &part);
+                let kept = trial.filter(|trial| !self.strays(leaf, t, trial));
+                match kept.and_then(|trial| self.point(leaf, t, trial).ok()) {
+                    Some(next) if norm(&next.rates) < before || !pull.is_infinite() => break Some(next),
                     _ if fraction < shortest => break None,
                     _ => fraction *= 0.5,
                 }
             };
             match moved {
-                Some((trial, next)) => {
-                    let gain = (before / norm(&next.0).max(f64::MIN_POSITIVE)).clamp(0.3, 10.0);
+                Some(next) => {
+                    let gain = (before / norm(&next.rates).max(f64::MIN_POSITIVE)).clamp(0.3, 10.0);
                     pull *= gain;
                     pull = if pull > 1e12 { f64::INFINITY } else { pull };
-                    x = trial;
-                    (rates, jacobian) = next;
+                    at = next;
                 }
                 // Newton is stuck: follow the motion, strongly damped at first.
                 None if pull.is_infinite() => {
-                    let fastest = jacobian.iter().fold(0.0f64, |most, j| most.max(j.abs()));
+                    let fastest = at.jacobian.iter().fold(0.0f64, |most, j| most.max(j.abs()));
                     pull = if fastest > 0.0 { 0.1 / fastest } else { break };
                 }
                 None => break,
             }
         }
-        self.nowhere(&rates, &scale)
+        self.nowhere(nearest.as_ref().map_or(&at.rates, |nearest| &nearest.rates), &scale)
+    }
+
+    /// Whether a move has left a constraint: near a position where a form is singular a long one may.
+    fn strays(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
+        leaf.is_some_and(|leaf| self.missed_constraint(&leaf.constraints, t, x, &leaf.size, KEPT).is_some())
+    }
+
+    /// Rates and ways at a state.
+    fn point(&mut self, leaf: Option<&Leaf>, t: f64, x: Vec<f64>) -> Result<Point, Failure> {
+        let (rates, jacobian) = self.at_rest(t, &x)?;
+        let without = || Failure::NotFinite { time: t, what: "what the states keep together".into() };
+        let ways = self.ways(leaf, t, &x).ok_or_else(without)?;
+        let along = ways.along(&jacobian, x.len());
+        Ok(Point { x, rates, jacobian, ways, along })
     }
 
     fn nowhere(&self, rates: &[f64], scale: &[f64]) -> Result<Equilibrium, EquilibriumError> {
@@ -225,24 +208,17 @@ fn fastest_pair(jacobian: &[f64], n: usize) -> f64 {
     (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)))
 }
 
-/// The direction in which the curve goes on from where it went along `before`: what is left of that when all is taken away
-/// that the slopes see.
-fn tangent(slopes: &[f64], before: &[f64], n: usize) -> Option<Vec<f64>> {
-    let seen: Vec<f64> =
-        slopes.chunks(n + 1).map(|row| row.iter().zip(before).map(|(s, b)| s * b).sum::<f64>()).collect();
-    let back = minimum_norm::step(slopes, &seen, n + 1)?.step;
-    let along: Vec<f64> = before.iter().zip(&back).map(|(a, b)| a + b).collect();
-    let length = along.iter().map(|a| a * a).sum::<f64>().sqrt();
-    (length > 1e-12 && length.is_finite()).then(|| along.iter().map(|a| a / length).collect())
-}
-
 /// An implicit Euler step of length `pull` along the motion.
-fn damped_motion(jacobian: &[f64], rates: &[f64], pull: f64, n: usize) -> Option<Vec<f64>> {
-    let mut lu = crate::bytecode::Lu::new(n, false);
-    lu.matrix().iter_mut().zip(jacobian).for_each(|(a, j)| *a = -j);
-    (0..n).for_each(|i| lu.matrix()[i * n + i] += 1.0 / pull);
+fn damped_motion(at: &Point, pull: f64, n: usize) -> Option<Vec<f64>> {
+    let k = at.ways.count(n);
+    let mut lu = crate::bytecode::Lu::new(k, false);
+    for j in 0..k {
+        let column: Vec<f64> = (0..n).map(|i| at.along[i * k + j]).collect();
+        at.ways.parts(&column).iter().enumerate().for_each(|(i, a)| lu.matrix()[i * k + j] = -a);
+        lu.matrix()[j * k + j] += 1.0 / pull;
+    }
     lu.factor().ok()?;
-    let mut step = rates.to_vec();
+    let mut step = at.ways.parts(&at.rates);
     lu.solve(&mut step);
-    step.iter().all(|s| s.is_finite()).then_some(step)
+    step.iter().all(|s| s.is_finite()).then(|| at.ways.step(&step))
 }

@@ -129,6 +129,8 @@ impl std::error::Error for StartError {}
 pub enum EquilibriumError {
     /// Something always moves: the states with the greatest rates at the nearest point found, with these rates.
     None(Vec<(String, f64)>),
+    /// Where all is at rest, this constraint is missed by so much.
+    Missed(String, f64),
     /// So many states are beyond the dense equations that the search solves.
     TooLarge(usize),
     /// The model has no value on the way.
@@ -149,6 +151,10 @@ impl fmt::Display for EquilibriumError {
                 }
                 write!(f, "; a source that drives it for ever, or a spring that is missing, may be the reason")
             }
+            EquilibriumError::Missed(constraint, miss) => write!(
+                f,
+                "no equilibrium was found: where all rates vanish the constraint {constraint} is missed by {miss:e}; start nearer to the position that is meant"
+            ),
             EquilibriumError::Failure(failure) => failure.fmt(f),
         }
     }

@@ -64,7 +64,7 @@ fn greatest(values: &mut dyn Iterator<Item = f64>) -> f64 {
     values.fold(0.0f64, |most, v| most.max(v.abs()))
 }
 
-fn inverse(most: f64) -> f64 {
+pub(super) fn inverse(most: f64) -> f64 {
     if most > 0.0 { 1.0 / most } else { 1.0 }
 }
 

@@ -9,7 +9,9 @@ mod implicit;
 mod inputs;
 mod jacobian;
 mod jumps;
+mod leaf;
 mod linear;
+mod loads;
 mod machine;
 mod minimum_norm;
 mod operations;
@@ -112,8 +114,8 @@ impl Model {
     }
 
     fn made_of(program: Program, entries: Option<Vec<Entry>>) -> Result<Model, Failure> {
-        let derivatives: Vec<Value> = entries.iter().flatten().map(|e| e.value).collect();
-        let layout = program.layout_with(&derivatives);
+        let derivatives = entries.iter().flatten().map(|e| e.value);
+        let layout = program.layout_with(&derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = program.watched_routine(&layout, &rates);
         let preamble = program.preamble(&layout);

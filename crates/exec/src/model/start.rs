@@ -34,6 +34,12 @@ struct Routed<'a> {
     group: &'a StartGroup,
 }
 
+/// A constraint on displacements, with the routine that computes its residual.
+pub(super) struct Constraint {
+    group: StartGroup,
+    routine: Routine,
+}
+
 impl Model {
     /// The state at the start of a run at `t`, which meets all start conditions; unknowns that they leave free are as
     /// near to zero as they allow. Fixes the conserved constants. The run starts anew.
@@ -320,6 +326,43 @@ impl Model {
         }
         let values = involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect();
         Some(StartError::Conflict(StartConflict { values }))
+    }
+
+    /// The constraints on displacements.
+    pub(super) fn constraints(&mut self) -> Vec<Constraint> {
+        let firm = |c: &usize| self.program.start[*c].firm;
+        let firm: Vec<usize> = (0..self.program.start.len()).filter(firm).collect();
+        firm.into_iter()
+            .map(|c| Constraint {
+                group: StartGroup { conditions: vec![c], unknowns: self.program.start[c].reads.clone() },
+                routine: self.routine_for(&[self.program.start[c].residual]),
+            })
+            .collect()
+    }
+
+    /// The constraint that is missed most at a state, by which part of what its displacements come to, if that is more
+    /// than `most`; with its miss. `size` is what states count as one of.
+    pub(super) fn missed_constraint(
+        &mut self,
+        constraints: &[Constraint],
+        t: f64,
+        x: &[f64],
+        size: &[f64],
+        most: f64,
+    ) -> Option<(String, f64)> {
+        let z: Vec<f64> = x.iter().chain(&self.conserved.clone()).copied().collect();
+        let mut worst: Option<(f64, String, f64)> = None;
+        for Constraint { group, routine } in constraints {
+            let name = self.program.start[group.conditions[0]].name.clone();
+            let Some((miss, slopes)) = self.linearised(t, routine, group, &z) else { return Some((name, f64::NAN)) };
+            let moved = |u: u32| z[u as usize].abs().max(size.get(u as usize).copied().unwrap_or(0.0));
+            let terms = group.unknowns.iter().zip(&slopes).map(|(&u, j)| j.abs() * moved(u));
+            let part = miss[0].abs() / terms.sum::<f64>().max(f64::MIN_POSITIVE);
+            if miss[0].abs() > 0.0 && part > most && worst.as_ref().is_none_or(|w| part > w.0) {
+                worst = Some((part, name, miss[0]));
+            }
+        }
+        worst.map(|(_, name, miss)| (name, miss))
     }
 
     fn start_value(&mut self, t: f64, condition: usize, z: &[f64], residual: f64) -> StartValue {

@@ -149,6 +149,7 @@ impl Sketch {
             certificate: None,
             states: self.states,
             conserved: self.conserved,
+            relations: Default::default(),
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,

@@ -1,0 +1,286 @@
+//! How the states of a form move together, whatever the laws of elements say. Source: `method.md`, 5.1.
+//!
+//! Storages take, and integrated signals integrate, what the junction structure makes of the efforts and flows that
+//! elements give: `Σ factor · X' = Σ coefficient · drive`. Where fewer drives than states stand in such rows, the states
+//! keep relations that no law and no motion changes: positions that are integrals of one speed, a spring behind a
+//! transformer whose modulus reads an angle, the flux of a coil without resistance. Few of them have a closed form; all
+//! of them hold along any path that the drives allow.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::definitions::Definitions;
+use super::minimal::{Assembled, Chosen};
+use crate::algebra::{Expr, Exprs, ONE, Symbol};
+use crate::bond_graph::{Kind, Meaning};
+use crate::causal_graph::{CausalGraph, Combination, PortState, Role};
+
+/// The rows that share all their drives with others.
+#[derive(Debug, Clone, Default)]
+pub struct Relations {
+    /// The rows, in the order of the states.
+    pub rows: Vec<Moved>,
+    /// Number of drives.
+    pub drives: usize,
+}
+
+/// One row: `Σ factor · quantity' = Σ coefficient · drive`.
+#[derive(Debug, Clone)]
+pub struct Moved {
+    /// Factors and quantities: states, or stored quantities that follow from states.
+    pub quantity: Vec<(Expr, Symbol)>,
+    /// Drives, by their number, and their coefficients.
+    pub by: Vec<(usize, Expr)>,
+}
+
+/// Who may set a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Drive {
+    /// The element that gives this variable.
+    Element(Symbol),
+    /// Whatever this state integrates that is no combination of efforts and flows.
+    Own(Symbol),
+}
+
+/// A row before its drives are numbered.
+struct Row {
+    quantity: Vec<(Expr, Symbol)>,
+    by: BTreeMap<Drive, Expr>,
+}
+
+/// Finds the rows of all states, and keeps those that are not free by themselves.
+pub(super) fn relations(assembled: &mut Assembled, causal: &CausalGraph) -> Relations {
+    let ports = Ports::of(&assembled.d, causal);
+    let states = assembled.states.clone();
+    let mut rows: Vec<Row> = states.iter().filter_map(|state| row(assembled, &ports, state)).collect();
+    without_free_rows(&mut rows);
+    let drives: BTreeSet<Drive> = rows.iter().flat_map(|r| r.by.keys().copied()).collect();
+    let number: BTreeMap<Drive, usize> = drives.into_iter().zip(0..).collect();
+    let numbered =
+        |r: Row| Moved { quantity: r.quantity, by: r.by.into_iter().map(|(drive, c)| (number[&drive], c)).collect() };
+    Relations { drives: number.len(), rows: rows.into_iter().map(numbered).collect() }
+}
+
+/// What the ports are to the rows.
+struct Ports<'a> {
+    causal: &'a CausalGraph,
+    /// Rates of dependent storages, with what they are rates of.
+    dependent: BTreeMap<Symbol, Symbol>,
+    /// What elements are free to give: co-energies of independent storages, algebraic laws, sources that read what moves.
+    free: BTreeSet<Symbol>,
+    /// Flows given by sources that read what moves, with their values.
+    sources: BTreeMap<Symbol, Expr>,
+    /// Independent storages, by co-energy variable and by stored quantity.
+    independent: BTreeMap<Symbol, &'a PortState>,
+}
+
+impl<'a> Ports<'a> {
+    fn of(d: &Definitions, causal: &'a CausalGraph) -> Ports<'a> {
+        let mut ports = Ports {
+            causal,
+            dependent: BTreeMap::new(),
+            free: BTreeSet::new(),
+            sources: BTreeMap::new(),
+            independent: BTreeMap::new(),
+        };
+        for port in &causal.ports.ports {
+            if port.role == Role::Independent {
+                ports.independent.extend([(port.input, port)]);
+                ports.independent.extend(stored(causal, port).map(|stored| (stored, port)));
+            }
+            match port.role {
+                Role::Dependent => {
+                    ports.dependent.extend(stored(causal, port).map(|stored| (port.input, stored)));
+                }
+                Role::Independent | Role::Algebraic(_) => _ = ports.free.insert(port.input),
+                Role::Source | Role::Redundant => {
+                    let Some(value) = d.of.get(&port.input).map(|given| given.expr()) else { continue };
+                    if !varies(d, value) {
+                        continue;
+                    }
+                    ports.free.insert(port.input);
+                    if matches!(causal.graph.elements[port.port.element].kind, Kind::FlowSource { .. }) {
+                        ports.sources.insert(port.input, value);
+                    }
+                }
+            }
+        }
+        ports.free.extend(causal.ports.virtual_speeds.iter().map(|v| v.speed));
+        ports
+    }
+}
+
+fn stored(causal: &CausalGraph, port: &PortState) -> Option<Symbol> {
+    match &causal.graph.elements[port.port.element].kind {
+        Kind::Inertance(storage) | Kind::Compliance(storage) => {
+            storage.stored.get(port.port.port as usize).copied()
+        }
+        _ => None,
+    }
+}
+
+/// Whether an expression may change while time stands still.
+fn varies(d: &Definitions, e: Expr) -> bool {
+    let still = |s: Symbol| {
+        d.constants.contains(&s)
+            || matches!(
+                d.meaning(s),
+                Some(Meaning::Parameter(_) | Meaning::Time | Meaning::Input(_) | Meaning::Held(_))
+            )
+    };
+    d.x.depends_on_any(e, &|s| !still(s))
+}
+
+/// The row of a state; `None` if nothing is known of it, so that it moves as it likes.
+fn row(assembled: &mut Assembled, ports: &Ports, state: &Chosen) -> Option<Row> {
+    let causal = ports.causal;
+    if let Some(Meaning::Signal(signal)) = assembled.d.meaning(state.symbol) {
+        let rate = causal.graph.signals[signal].rate;
+        let mut sum = Sum { assembled, ports, row: Row { quantity: Vec::new(), by: BTreeMap::new() } };
+        sum.row.quantity.push((ONE, state.symbol));
+        sum.add_rate(state.symbol, rate)?;
+        return sum.finish();
+    }
+    let port = ports.independent.get(&state.symbol).or_else(|| ports.independent.get(&state.tracked)).copied();
+    let virtual_speed = causal.ports.virtual_speeds.iter().find(|v| v.speed == state.tracked);
+    let rate = port.map(|p| p.output).or(virtual_speed.map(|v| v.reaction))?;
+    let combination = assembled.rows.get(&rate)?.clone();
+    let mut sum = Sum { assembled, ports, row: Row { quantity: Vec::new(), by: BTreeMap::new() } };
+    sum.row.quantity.extend(port.and_then(|p| stored(causal, p)).map(|stored| (ONE, stored)));
+    sum.add(&combination, ONE);
+    sum.finish()
+}
+
+/// A row that is being added up.
+struct Sum<'s, 'a> {
+    assembled: &'s mut Assembled<'a>,
+    ports: &'s Ports<'s>,
+    row: Row,
+}
+
+impl Sum<'_, '_> {
+    /// Adds `factor · combination`: rates of dependent storages to the quantities, what elements give to the drives.
+    fn add(&mut self, combination: &Combination, factor: Expr) {
+        for &(symbol, coefficient) in &combination.0 {
+            let x = &mut self.assembled.d.x;
+            let c = x.mul(&[factor, coefficient]);
+            if let Some(&stored) = self.ports.dependent.get(&symbol) {
+                let c = x.neg(c);
+                self.row.quantity.push((c, stored));
+            } else if self.ports.sources.contains_key(&symbol) {
+                self.add_source(symbol, c);
+            } else if self.ports.free.contains(&symbol) {
+                self.drive(Drive::Element(symbol), c);
+            }
+        }
+    }
+
+    /// A flow that a source takes from other flows moves with these; one that follows a law moves freely.
+    fn add_source(&mut self, symbol: Symbol, factor: Expr) {
+        let value = self.ports.sources[&symbol];
+        let flow = |s: Symbol| matches!(self.assembled.d.meaning(s), Some(Meaning::Flow(_)));
+        let flows = self.assembled.d.x.symbols_of(value).into_iter().filter(|&s| flow(s)).collect();
+        match self.split(value, flows) {
+            Some((combination, rest)) if !varies(&self.assembled.d, rest) && !self.reads(&combination, symbol) => {
+                self.add(&combination, factor);
+            }
+            _ => self.drive(Drive::Element(symbol), factor),
+        }
+    }
+
+    fn reads(&self, combination: &Combination, source: Symbol) -> bool {
+        combination.0.iter().any(|t| t.0 == source || self.ports.sources.contains_key(&t.0))
+    }
+
+    /// Adds the rate of a signal.
+    fn add_rate(&mut self, signal: Symbol, rate: Expr) -> Option<()> {
+        let d = &self.assembled.d;
+        let of_a_bond = |s: Symbol| matches!(d.meaning(s), Some(Meaning::Effort(_) | Meaning::Flow(_)));
+        let variables = d.x.symbols_of(rate).into_iter().filter(|&s| of_a_bond(s)).collect();
+        let (combination, rest) = self.split(rate, variables)?;
+        self.add(&combination, ONE);
+        if varies(&self.assembled.d, rest) {
+            self.drive(Drive::Own(signal), ONE);
+        }
+        Some(())
+    }
+
+    /// An expression as a combination of what elements give, and what is left; `None` if it is none, or if the factors read
+    /// efforts or flows.
+    fn split(&mut self, e: Expr, variables: Vec<Symbol>) -> Option<(Combination, Expr)> {
+        let (coefficients, rest) = self.assembled.d.x.linear_in(e, &variables)?;
+        let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
+        for (variable, coefficient) in variables.into_iter().zip(coefficients) {
+            let d = &mut self.assembled.d;
+            let reads_bonds =
+                d.x.depends_on_any(coefficient, &|s| matches!(d.meaning(s), Some(Meaning::Effort(_) | Meaning::Flow(_))));
+            let known = self.ports.free.contains(&variable) || self.ports.dependent.contains_key(&variable);
+            let row = match self.assembled.rows.get(&variable) {
+                Some(row) => row.clone(),
+                None if known => Combination(vec![(variable, ONE)]),
+                None if d.of.get(&variable).is_some_and(|of| !varies(d, of.expr())) => continue,
+                None => return None,
+            };
+            if reads_bonds {
+                return None;
+            }
+            let x = &mut self.assembled.d.x;
+            for (symbol, c) in row.0 {
+                let term = x.mul(&[coefficient, c]);
+                add_to(x, &mut sum, symbol, term);
+            }
+        }
+        Some((Combination(sum.into_iter().collect()), rest))
+    }
+
+    fn drive(&mut self, drive: Drive, coefficient: Expr) {
+        add_to(&mut self.assembled.d.x, &mut self.row.by, drive, coefficient);
+    }
+
+    /// The row, unless something in it has no value.
+    fn finish(self) -> Option<Row> {
+        let missing = &self.assembled.d.missing;
+        let x = &self.assembled.d.x;
+        let without_value = |e: Expr| x.depends_on_any(e, &|s| missing.contains_key(&s));
+        let unknown = self.row.quantity.iter().any(|(f, s)| missing.contains_key(s) || without_value(*f))
+            || self.row.by.values().any(|&c| without_value(c));
+        (!unknown).then_some(self.row)
+    }
+}
+
+/// Adds a term to the coefficient of a key; coefficients that cancel are gone.
+fn add_to<K: Ord>(x: &mut Exprs, sum: &mut BTreeMap<K, Expr>, key: K, term: Expr) {
+    let Some(&old) = sum.get(&key) else {
+        sum.insert(key, term);
+        return;
+    };
+    let value = x.add(&[old, term]);
+    let value = x.simplify(value);
+    if x.is_zero(value) {
+        sum.remove(&key);
+    } else {
+        sum.insert(key, value);
+    }
+}
+
+/// Takes rows with a drive of their own away, again and again: they go wherever the others go.
+fn without_free_rows(rows: &mut Vec<Row>) {
+    let mut holders: BTreeMap<Drive, BTreeSet<usize>> = BTreeMap::new();
+    for (r, row) in rows.iter().enumerate() {
+        row.by.keys().for_each(|&drive| _ = holders.entry(drive).or_default().insert(r));
+    }
+    let mut gone = vec![false; rows.len()];
+    let mut single: Vec<Drive> = holders.iter().filter(|(_, h)| h.len() == 1).map(|(&drive, _)| drive).collect();
+    while let Some(drive) = single.pop() {
+        let Some(&row) = holders[&drive].iter().next() else { continue };
+        gone[row] = true;
+        for other in rows[row].by.keys() {
+            let left = holders.get_mut(other).expect("every drive has its rows");
+            left.remove(&row);
+            if left.len() == 1 {
+                single.push(*other);
+            }
+        }
+    }
+    let mut gone = gone.into_iter();
+    rows.retain(|_| gone.next() == Some(false));
+}

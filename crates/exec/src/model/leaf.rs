@@ -1,0 +1,351 @@
+//! Relations among states that hold whatever the laws of elements say, and moves that keep them.
+//!
+//! A state may go wherever the junction structure lets its rate point, `Σ factor · X' = Σ coefficient · drive`, for any
+//! values of the drives. Starting from one state that is a leaf of the states, with fewer dimensions than states where
+//! relations hold. Closed forms of the relations are not needed: a direction is carried along the leaf by integrating what
+//! of it lies in the leaf.
+
+use super::start::Constraint;
+use super::{Model, minimum_norm};
+use faer::Mat;
+use halfarrow_compiler::program::{Op, Routine};
+use std::ops::Range;
+
+/// Singular values below this fraction of the greatest count as zero.
+const RANK: f64 = 1e-10;
+/// Error of a move, as a part of it.
+const ERROR: f64 = 1e-13;
+/// Pieces of a move, and columns of the extrapolation of one piece.
+const PIECES: usize = 100;
+const COLUMNS: usize = 9;
+/// From this column on, a piece with more error than this is too long.
+const HOPELESS: (usize, f64) = (4, 1e-3);
+/// Pieces that are a smaller part of a move are too many.
+const SHORTEST: f64 = 1e-4;
+/// Magnitudes of states below this part of the greatest are what rounding left.
+const NOISE: f64 = 1e-14;
+
+/// The leaf that a state is on.
+pub(super) struct Leaf {
+    routine: Routine,
+    rows: Vec<Row>,
+    drives: usize,
+    /// What a state counts as one of.
+    pub size: Vec<f64>,
+    /// The constraints on displacements, whose closed form is known.
+    pub constraints: Vec<Constraint>,
+}
+
+/// Where the values of a row stand among the outputs of the routine: a factor and a quantity in turn; coefficients.
+struct Row {
+    quantity: Range<usize>,
+    /// The state that a quantity is, if it is one.
+    state: Vec<Option<usize>>,
+    by: Range<usize>,
+    drives: Vec<usize>,
+}
+
+/// Directions in which states may go: all of them, or the columns of a matrix that are orthonormal where each state counts
+/// in parts of its size.
+pub(super) enum Ways {
+    /// Every state by itself.
+    All,
+    /// Row by row, a row for each state.
+    Few { columns: usize, basis: Vec<f64>, size: Vec<f64> },
+}
+
+impl Ways {
+    /// How many there are.
+    pub fn count(&self, states: usize) -> usize {
+        match self {
+            Ways::All => states,
+            Ways::Few { columns, .. } => *columns,
+        }
+    }
+
+    /// Derivatives along the ways, from those by the states: row by row.
+    pub fn along(&self, jacobian: &[f64], states: usize) -> Vec<f64> {
+        let Ways::Few { columns, basis, size } = self else { return jacobian.to_vec() };
+        let entry = |row: &[f64], k: usize| -> f64 {
+            (0..states).filter(|&j| row[j] != 0.0).map(|j| row[j] * size[j] * basis[j * columns + k]).sum()
+        };
+        jacobian.chunks(states.max(1)).flat_map(|row| (0..*columns).map(move |k| entry(row, k))).collect()
+    }
+
+    /// The states' part of a step along the ways.
+    pub fn step(&self, along: &[f64]) -> Vec<f64> {
+        let Ways::Few { columns, basis, size } = self else { return along.to_vec() };
+        let part = |(row, size): (&[f64], &f64)| row.iter().zip(along).map(|(b, a)| b * a).sum::<f64>() * size;
+        basis.chunks((*columns).max(1)).zip(size).map(part).collect()
+    }
+
+    /// How far a step of the states goes along each way.
+    pub fn parts(&self, step: &[f64]) -> Vec<f64> {
+        let Ways::Few { columns, basis, size } = self else { return step.to_vec() };
+        let scaled: Vec<f64> = step.iter().zip(size).map(|(s, size)| s / size).collect();
+        let part = |k: usize| scaled.iter().enumerate().map(|(j, s)| basis[j * columns + k] * s).sum();
+        (0..*columns).map(part).collect()
+    }
+}
+
+impl Model {
+    /// The leaf of `x`, if states keep relations at all.
+    pub(super) fn leaf(&mut self, t: f64, x: &[f64]) -> Option<Leaf> {
+        if self.program.relations.rows.is_empty() {
+            return None;
+        }
+        let mut wanted = Vec::new();
+        let mut rows = Vec::new();
+        for row in &self.program.relations.rows {
+            let first = wanted.len();
+            wanted.extend(row.quantity.iter().flat_map(|&(factor, quantity)| [factor, quantity]));
+            let second = wanted.len();
+            wanted.extend(row.by.iter().map(|b| b.1));
+            let state = |&(_, quantity): &(_, _)| match self.program.values.op(quantity) {
+                Op::State(i) => Some(i as usize),
+                _ => None,
+            };
+            rows.push(Row {
+                quantity: first..second,
+                state: row.quantity.iter().map(state).collect(),
+                by: second..wanted.len(),
+                drives: row.by.iter().map(|b| b.0).collect(),
+            });
+        }
+        let routine = self.routine_for(&wanted);
+        let mut leaf = Leaf { routine, rows, drives: self.program.relations.drives, size: vec![1.0; x.len()], constraints: self.constraints() };
+        let own = self.sizes(t, x);
+        leaf.size = match self.structure(&leaf, t, x) {
+            Some((moves, drives)) => (0..x.len()).map(|j| reach(&moves, &drives, j).unwrap_or(own[j])).collect(),
+            None => own,
+        };
+        Some(leaf)
+    }
+
+    /// What each state counts as one of: its magnitude; where nothing but rounding tells it, the least of the others or 1.
+    pub(super) fn sizes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let size = self.magnitudes(t, x);
+        let noise = NOISE * size.iter().fold(0.0f64, |most, s| most.max(*s));
+        let least = size.iter().copied().filter(|s| *s > noise).fold(f64::INFINITY, f64::min);
+        size.into_iter().map(|s| if s > noise { s } else { least.min(1.0) }).collect()
+    }
+
+    /// The ways from `x` along the leaf. `None` if something has no value there.
+    pub(super) fn ways(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Option<Ways> {
+        let Some(leaf) = leaf else { return Some(Ways::All) };
+        let kept = self.kept(leaf, t, x)?;
+        let n = x.len();
+        let svd = kept.svd().ok()?;
+        let (values, v) = (svd.S().column_vector(), svd.V());
+        let rank = rank_of(&values.iter().copied().collect::<Vec<_>>());
+        let basis = (0..n).flat_map(|j| (rank..n).map(move |k| (j, k))).map(|(j, k)| v[(j, k)]).collect();
+        Some(Ways::Few { columns: n - rank, basis, size: leaf.size.clone() })
+    }
+
+    /// Where `x` comes to along `step`: there, or along the leaf. `None` if the way does not lead so far.
+    pub(super) fn moved(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64], step: &[f64]) -> Option<Vec<f64>> {
+        let Some(leaf) = leaf else { return Some(x.iter().zip(step).map(|(x, s)| x + s).collect()) };
+        let direction: Vec<f64> = step.iter().zip(&leaf.size).map(|(s, size)| s / size).collect();
+        let (mut z, mut gone, mut piece) = (vec![0.0; x.len()], 0.0f64, 1.0f64);
+        for _ in 0..PIECES {
+            let length = piece.min(1.0 - gone);
+            match self.piece(leaf, t, x, &direction, &z, length) {
+                Some((next, columns)) => {
+                    z = next;
+                    gone += length;
+                    if 1.0 - gone <= f64::EPSILON {
+                        return Some(x.iter().zip(&z).zip(&leaf.size).map(|((x, z), size)| x + z * size).collect());
+                    }
+                    piece = if columns < COLUMNS - 1 { 2.0 * length } else { length };
+                }
+                None if length > SHORTEST => piece = 0.25 * length,
+                None => return None,
+            }
+        }
+        None
+    }
+
+    /// A piece of a move by extrapolation of the midpoint rule, with the number of columns that it took. `None` if it is
+    /// too long.
+    fn piece(
+        &mut self,
+        leaf: &Leaf,
+        t: f64,
+        x: &[f64],
+        direction: &[f64],
+        z: &[f64],
+        length: f64,
+    ) -> Option<(Vec<f64>, usize)> {
+        let mut table: Vec<Vec<f64>> = Vec::new();
+        let first = self.within(leaf, t, x, direction, z)?;
+        let whole = length * direction.iter().fold(f64::MIN_POSITIVE, |most, d| most.max(d.abs()));
+        for column in 0..COLUMNS {
+            let count = 2 * (column + 1);
+            let mut row = self.midpoints(leaf, t, x, direction, (z, &first), length, count)?;
+            let mut next = Vec::with_capacity(column + 1);
+            for (k, before) in table.iter().enumerate() {
+                let ratio = count as f64 / (2 * (column - k)) as f64;
+                let better: Vec<f64> =
+                    row.iter().zip(before).map(|(new, old)| new + (new - old) / (ratio * ratio - 1.0)).collect();
+                next.push(std::mem::replace(&mut row, better));
+            }
+            next.push(row);
+            let [.., last, best] = &next[..] else {
+                table = next;
+                continue;
+            };
+            let error = last.iter().zip(best).map(|(a, b)| (a - b).abs() / whole).fold(0.0f64, f64::max);
+            if error <= ERROR {
+                return Some((best.clone(), column));
+            }
+            if !error.is_finite() || (column >= HOPELESS.0 && error > HOPELESS.1) {
+                return None;
+            }
+            table = next;
+        }
+        None
+    }
+
+    /// The midpoint rule in `count` strides.
+    #[allow(clippy::too_many_arguments, reason = "a point, a direction and a length")]
+    fn midpoints(
+        &mut self,
+        leaf: &Leaf,
+        t: f64,
+        x: &[f64],
+        direction: &[f64],
+        (z, first): (&[f64], &[f64]),
+        length: f64,
+        count: usize,
+    ) -> Option<Vec<f64>> {
+        let stride = length / count as f64;
+        let onward = |z: &[f64], rate: &[f64], by: f64| -> Vec<f64> {
+            z.iter().zip(rate).map(|(z, rate)| z + by * rate).collect()
+        };
+        let (mut before, mut here) = (z.to_vec(), onward(z, first, stride));
+        for _ in 1..count {
+            let rate = self.within(leaf, t, x, direction, &here)?;
+            let next = onward(&before, &rate, 2.0 * stride);
+            before = std::mem::replace(&mut here, next);
+        }
+        Some(here)
+    }
+
+    /// What of a direction lies in the leaf at `x + z`.
+    fn within(&mut self, leaf: &Leaf, t: f64, x: &[f64], direction: &[f64], z: &[f64]) -> Option<Vec<f64>> {
+        let at: Vec<f64> = x.iter().zip(z).zip(&leaf.size).map(|((x, z), size)| x + z * size).collect();
+        let kept = self.kept(leaf, t, &at)?;
+        let svd = kept.thin_svd().ok()?;
+        let (values, v) = (svd.S().column_vector(), svd.V());
+        let mut inside = direction.to_vec();
+        for k in 0..rank_of(&values.iter().copied().collect::<Vec<_>>()) {
+            let part: f64 = direction.iter().enumerate().map(|(j, d)| v[(j, k)] * d).sum();
+            inside.iter_mut().enumerate().for_each(|(j, d)| *d -= v[(j, k)] * part);
+        }
+        Some(inside)
+    }
+
+    /// The rows whose product with any way vanishes, by states in parts of their size.
+    fn kept(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<Mat<f64>> {
+        let (mut moves, mut drives) = self.structure(leaf, t, x)?;
+        let (m, n) = (leaf.rows.len(), x.len());
+        for i in 0..m {
+            let most = (0..n).fold(0.0f64, |most, j| most.max(moves[(i, j)].abs()));
+            if most > 0.0 {
+                (0..n).for_each(|j| moves[(i, j)] /= most);
+                (0..leaf.drives).for_each(|k| drives[(i, k)] /= most);
+            }
+        }
+        for k in 0..leaf.drives {
+            let most = (0..m).fold(0.0f64, |most, i| most.max(drives[(i, k)].abs()));
+            if most > 0.0 {
+                (0..m).for_each(|i| drives[(i, k)] /= most);
+            }
+        }
+        if leaf.drives == 0 {
+            return Some(moves);
+        }
+        // What the drives cannot do: combinations of rows from which all of them vanish.
+        let svd = drives.svd().ok()?;
+        let rank = rank_of(&svd.S().column_vector().iter().copied().collect::<Vec<_>>());
+        let u = svd.U();
+        let sum = |a: usize, j: usize| (0..m).map(|i| u[(i, rank + a)] * moves[(i, j)]).sum();
+        Some(Mat::from_fn(m - rank, n, sum))
+    }
+
+    /// Quantities by states in parts of their size, and by drives: both sides of the rows.
+    fn structure(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<(Mat<f64>, Mat<f64>)> {
+        let (m, n) = (leaf.rows.len(), x.len());
+        self.place(t, x);
+        self.frame.run(&leaf.routine).ok()?;
+        let values: Vec<f64> = leaf.routine.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
+        if values.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let (mut moves, mut drives) = (Mat::zeros(m, n), Mat::zeros(m, leaf.drives));
+        for (i, row) in leaf.rows.iter().enumerate() {
+            row.by.clone().zip(&row.drives).for_each(|(at, &k)| drives[(i, k)] += values[at]);
+            for (at, state) in row.quantity.clone().step_by(2).zip(&row.state) {
+                if let Some(j) = *state {
+                    moves[(i, j)] += values[at] * leaf.size[j];
+                }
+            }
+        }
+        if leaf.rows.iter().all(|row| row.state.iter().all(Option::is_some)) {
+            return Some((moves, drives));
+        }
+        for j in 0..n {
+            self.place(t, x);
+            self.still();
+            self.frame.d[self.layout.states as usize + j] = 1.0;
+            self.frame.run_along(&leaf.routine).ok()?;
+            for (i, row) in leaf.rows.iter().enumerate() {
+                for (at, state) in row.quantity.clone().step_by(2).zip(&row.state) {
+                    if state.is_none() {
+                        let slope = self.frame.d[leaf.routine.outputs[at + 1] as usize];
+                        moves[(i, j)] += values[at] * slope * leaf.size[j];
+                    }
+                }
+            }
+        }
+        let finite = (0..m).all(|i| (0..n).all(|j| moves[(i, j)].is_finite()));
+        finite.then_some((moves, drives))
+    }
+}
+
+/// How far the drives, each by 1, take a state that stands in a row with them.
+fn reach(moves: &Mat<f64>, drives: &Mat<f64>, state: usize) -> Option<f64> {
+    let most = |i: usize| (0..drives.ncols()).fold(0.0f64, |most, k| most.max(drives[(i, k)].abs()));
+    let rows = (0..moves.nrows()).filter(|&i| moves[(i, state)] != 0.0).map(|i| most(i) / moves[(i, state)].abs());
+    let reach = rows.fold(0.0f64, f64::max);
+    (reach > 0.0 && reach.is_finite()).then_some(reach)
+}
+
+fn rank_of(values: &[f64]) -> usize {
+    let limit = RANK * values.iter().fold(0.0f64, |most, s| most.max(*s));
+    values.iter().filter(|&&s| s > limit).count()
+}
+
+/// The rows of a matrix that determine a step along all its columns best: as many as columns, or fewer.
+pub(super) fn leading_rows(matrix: &[f64], columns: usize) -> Vec<usize> {
+    let rows = matrix.len() / columns.max(1);
+    let mut left: Vec<Vec<f64>> = (0..rows).map(|i| matrix[i * columns..][..columns].to_vec()).collect();
+    for row in &mut left {
+        let most = row.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        row.iter_mut().for_each(|v| *v *= minimum_norm::inverse(most));
+    }
+    let mut chosen = Vec::new();
+    while chosen.len() < columns {
+        let length = |i: usize| left[i].iter().map(|v| v * v).sum::<f64>();
+        let best = (0..rows).filter(|i| !chosen.contains(i)).max_by(|&a, &b| length(a).total_cmp(&length(b)).then(b.cmp(&a)));
+        let Some(best) = best.filter(|&i| length(i) > 1e-20) else { break };
+        let unit: Vec<f64> = left[best].iter().map(|v| v / length(best).sqrt()).collect();
+        for row in &mut left {
+            let part: f64 = row.iter().zip(&unit).map(|(a, b)| a * b).sum();
+            row.iter_mut().zip(&unit).for_each(|(v, u)| *v -= part * u);
+        }
+        chosen.push(best);
+    }
+    chosen.sort_unstable();
+    chosen
+}

@@ -1,0 +1,273 @@
+//! Starts and equilibria that were wrong without a word, and the classes that they are examples of.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use halfarrow::{Error, Form, Linearize, LinearizeReport, Model, Point, Problem, Record, Run, Start};
+
+fn fault(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(format!("{name}.bond"));
+    fs::read_to_string(path).expect("the model is there")
+}
+
+fn model(text: &str) -> Model {
+    Model::from_text("test.bond", text, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn at_rest(model: &Model) -> LinearizeReport {
+    let wanted = Linearize { at: Point::Equilibrium, ..Linearize::default() };
+    model.linearize(&wanted).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+/// All variables at the start of a run.
+fn start_of(model: &Model, form: Form, start: Start) -> BTreeMap<String, f64> {
+    let run = Run { to: 1e-9, form, start, record: Record::All, ..Run::default() };
+    let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{form:?}: {}", e.render(false)));
+    done.trace.columns.iter().map(|c| (c.name.clone(), c.values[0])).collect()
+}
+
+fn refused(text: &str) -> String {
+    let wanted = Linearize { at: Point::Equilibrium, ..Linearize::default() };
+    match model(text).linearize(&wanted) {
+        Err(error @ Error::Usage(Problem::NoEquilibrium { .. })) => error.render(false),
+        Err(other) => panic!("{}", other.render(false)),
+        Ok(report) => panic!("{:?}", report.states.iter().map(|s| (&s.name, s.value)).collect::<Vec<_>>()),
+    }
+}
+
+fn near(what: &str, found: f64, wanted: f64) {
+    assert!((found - wanted).abs() <= 1e-10 * wanted.abs().max(1e-2), "{what}: {found} is not {wanted}");
+}
+
+fn rests_at(report: &LinearizeReport, wanted: &[(&str, f64)]) {
+    for &(name, value) in wanted {
+        let state = report.states.iter().find(|s| s.name == name).unwrap_or_else(|| panic!("no state {name}"));
+        near(name, state.value, value);
+    }
+    assert!(report.states.iter().all(|s| s.rate.abs() < 1e-9), "{:?}", report.states);
+}
+
+/// `T = k l² sin θ cos θ`: `sin 2θ = 0.8`. The spring is `l sin θ` long though nothing says so but the transformer.
+#[test]
+fn a_spring_behind_a_lever_rests_where_its_lever_does() {
+    let report = at_rest(&model(&fault("equilibrium_lever")));
+    let th = 0.8f64.asin() / 2.0;
+    rests_at(&report, &[("th", th), ("spring.q", 0.5 * th.sin()), ("J.f", 0.0)]);
+    let fastest = report.modes.iter().map(|m| m.natural_frequency).fold(0.0, f64::max);
+    near("natural frequency", fastest, 300.0f64.sqrt());
+    assert!(report.notes.is_empty(), "it stands alone: {:?}", report.notes);
+    let values = start_of(&model(&fault("equilibrium_lever")), Form::Minimal, Start::Equilibrium);
+    near("th of a run", values["th"], th);
+}
+
+#[test]
+fn all_forms_start_at_the_same_rest() {
+    for name in ["equilibrium_lever", "equilibrium_two_links", "wishbone"] {
+        let model = model(&fault(name));
+        let minimal = start_of(&model, Form::Minimal, Start::Equilibrium);
+        for form in [Form::Kane, Form::Break, Form::Lagrange, Form::Inverted] {
+            for (variable, value) in start_of(&model, form, Start::Equilibrium) {
+                let same = minimal.get(&variable).is_none_or(|m| (m - value).abs() <= 1e-9 * m.abs().max(1.0));
+                assert!(same, "{name}, {form:?}: {variable} = {value}, not {:?}", minimal.get(&variable));
+            }
+        }
+    }
+}
+
+/// The end of the links hangs below the pivot: positions that only constraints join go along.
+#[test]
+fn links_hang_down() {
+    let report = at_rest(&model(&fault("equilibrium_two_links")));
+    rests_at(&report, &[("th1", 0.0), ("x1", 0.0), ("y1", -0.5), ("J.f", 0.0)]);
+    let inertia = 0.1 + 0.25;
+    near("frequency", report.modes[0].natural_frequency, (9.81f64 * 0.5 / inertia).sqrt());
+}
+
+/// Values by `mpmath`: the potential energy on the constraints is stationary.
+#[test]
+fn a_double_wishbone_rests_on_its_springs() {
+    let report = at_rest(&model(&fault("wishbone")));
+    let wanted = [
+        ("zs", -0.162191678247791541),
+        ("al", 0.433717254075664913),
+        ("au", 0.596396374534962978),
+        ("ph", 0.218711639176588094),
+        ("spring.q", 0.084049354226579437),
+        ("tread.q", 0.0161865),
+    ];
+    rests_at(&report, &wanted);
+}
+
+/// A torque on a crank that nothing holds: the words say what still moves.
+#[test]
+fn a_driven_crank_is_never_at_rest() {
+    let words = refused(&fault("equilibrium_crank"));
+    assert!(words.contains("no equilibrium was found") && words.contains("J.f still changes"), "{words}");
+}
+
+/// `k q1 l1 cos θ = k q2 l2 sin θ` and both springs follow the angle, from an angle that is not 0.
+#[test]
+fn two_springs_on_one_lever_follow_its_angle() {
+    let text = "model Two
+param l1 = 0.4, l2 = 0.7
+state th' = w.f from 0.3
+1:w -> I:J(0.2)
+w -> R:b(0.5)
+Se:T(3) -> w
+w -> TF:one(l1*cos(th)) -> C:s1(k = 80, q0 = 0.05)
+w -> TF:two(-l2*sin(th)) -> C:s2(k = 50, q0 = -0.02)";
+    let report = at_rest(&model(text));
+    let of = |name: &str| report.states.iter().find(|s| s.name == name).expect(name).value;
+    let th = of("th");
+    near("s1", of("s1.q"), 0.05 + 0.4 * (th.sin() - 0.3f64.sin()));
+    near("s2", of("s2.q"), -0.02 + 0.7 * (th.cos() - 0.3f64.cos()));
+    near("torque", 80.0 * of("s1.q") * 0.4 * th.cos() - 50.0 * of("s2.q") * 0.7 * th.sin(), 3.0);
+}
+
+/// A coil without resistance keeps `p + ∫ k(θ) dθ`; beside it a mesh of capacitors keeps its charge.
+#[test]
+fn flux_and_charge_are_kept() {
+    let text = "model Flux
+state th' = w.f from 0.2
+1:loop -> I:coil(0.5, f0 = 4)
+1:w -> I:J(0.1)
+w -> R:b(0.3)
+w -> C:stiff(k = 10)
+loop -> GY:machine(2*cos(th)) -> w
+0:n -> C:c1(2, q0 = 3)
+n -> R:leak(5) -> 0:m
+m -> C:c2(4)";
+    let text = text.replace("n -> R:leak(5) -> 0:m", "n -> 1:j -> R:leak(5)\nj -> 0:m");
+    let report = at_rest(&model(&text));
+    let all = start_of(&model(&text), Form::Minimal, Start::Equilibrium);
+    let th = all["th"];
+    // Along the bond the flux falls by what the machine takes: p' = -2 cos θ w.
+    near("flux", all["coil.p"], 0.5 * 4.0 - 2.0 * (th.sin() - 0.2f64.sin()));
+    near("spring", all["stiff.q"], th - 0.2);
+    near("torque", 2.0 * th.cos() * all["coil.f"], 10.0 * all["stiff.q"]);
+    near("charge", all["c1.q"] + all["c2.q"], 3.0);
+    near("voltage", all["c1.e"], all["c2.e"]);
+    assert!(report.states.iter().all(|s| s.rate.abs() < 1e-9));
+}
+
+/// Sources and laws that move a displacement freely leave it free: a servo, a spring with a damper in series.
+#[test]
+fn what_moves_by_a_law_of_its_own_is_not_tied() {
+    let servo = "model Servo
+state th' = w.f from 0.5
+Sf:drive(3*(0.2 - th)) -> 1:w -> C:s(k = 4)
+w -> R:b(1)";
+    rests_at(&at_rest(&model(servo)), &[("th", 0.2)]);
+    let creep = "model Creep
+state x' = v.f from 0.1
+Se:pull(6) -> 1:v -> I:m(1)
+v -> C:hold(k = 20)
+v -> 0:n -> C:s(k = 5, q0 = 0.4)
+n -> R:pot(2)";
+    rests_at(&at_rest(&model(creep)), &[("x", 0.4), ("hold.q", 0.3), ("s.q", 0.0)]);
+}
+
+/// A speed controller with an integrator, without offset: where the load is held, the angle has gone as far as the
+/// integral says.
+#[test]
+fn an_integral_of_a_speed_goes_with_the_angle() {
+    let text = "model Loop
+state th' = w.f from 0
+state s' = -2*w.f from 1
+Se:motor(s - 3*w.f) -> 1:w -> I:J(0.1)
+w -> C:load(k = 4)";
+    rests_at(&at_rest(&model(text)), &[("th", 1.0 / 6.0), ("s", 2.0 / 3.0), ("load.q", 1.0 / 6.0)]);
+}
+
+/// What a generator of random numbers says next, in -1 .. 1.
+fn next(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// `g(θ) = Σ a_i sin(θ_i + b_i) + c θ_0 θ_last`, for springs that sit behind transformers and for constraints.
+struct Reach {
+    a: Vec<f64>,
+    b: Vec<f64>,
+    c: f64,
+}
+
+impl Reach {
+    fn random(n: usize, seed: &mut u64) -> Reach {
+        let mut some = |_| (0..n).map(|_| next(seed)).collect::<Vec<f64>>();
+        let (a, b) = (some(0), some(1));
+        Reach { a, b, c: if n > 1 { 0.3 * next(seed) } else { 0.0 } }
+    }
+    fn at(&self, th: &[f64]) -> f64 {
+        let bend: f64 = th.iter().zip(&self.a).zip(&self.b).map(|((t, a), b)| a * (t + b).sin()).sum();
+        bend + self.c * th[0] * th[th.len() - 1]
+    }
+    fn slope(&self, th: &[f64], i: usize) -> f64 {
+        let last = th.len() - 1;
+        let cross = if i == 0 { th[last] } else if i == last { th[0] } else { 0.0 };
+        self.a[i] * (th[i] + self.b[i]).cos() + self.c * cross
+    }
+    fn slope_text(&self, n: usize, i: usize) -> String {
+        let cross = if i == 0 { format!("th{}", n - 1) } else { "th0".to_string() };
+        let cross = if i == 0 || i == n - 1 { format!(" + {:?}*{cross}", self.c) } else { String::new() };
+        format!("{:?}*cos(th{i} + {:?}){cross}", self.a[i], self.b[i])
+    }
+    fn text(&self, n: usize) -> String {
+        let terms: Vec<String> =
+            (0..n).map(|i| format!("{:?}*sin(th{i} + {:?})", self.a[i], self.b[i])).collect();
+        format!("{} + {:?}*th0*th{}", terms.join(" + "), self.c, n - 1)
+    }
+}
+
+/// Angles with springs, dampers and torques of their own; springs behind transformers that read the angles, and masses
+/// behind constraints. At rest each spring is as long as the angles make it and all torques balance.
+#[test]
+fn random_mechanisms_rest_where_their_relations_hold() {
+    let mut seed = 20;
+    for round in 0..24 {
+        let n = 1 + round % 3;
+        let (springs, masses) = (1 + round % 2, (round / 2) % 2);
+        let start: Vec<f64> = (0..n).map(|_| 0.5 * next(&mut seed)).collect();
+        let torque: Vec<f64> = (0..n).map(|_| 4.0 * next(&mut seed)).collect();
+        let reach: Vec<Reach> = (0..springs + masses).map(|_| Reach::random(n, &mut seed)).collect();
+        let mut text = format!("model Random{round}\n");
+        for i in 0..n {
+            text += &format!(
+                "state th{i}' = w{i}.f from {:?}\nSe:T{i}({:?}) -> 1:w{i} -> I:J{i}(1)\nw{i} -> C:k{i}(k = 5)\nw{i} -> R:b{i}(1)\n",
+                start[i], torque[i]
+            );
+        }
+        for (j, reach) in reach.iter().enumerate() {
+            match j < springs {
+                true => {
+                    text += &format!("0:n{j} -> C:s{j}(k = 3)\n");
+                    for i in 0..n {
+                        text += &format!("w{i} -> TF:t{j}_{i}({}) -> n{j}\n", reach.slope_text(n, i));
+                    }
+                }
+                false => {
+                    text += &format!(
+                        "state x{j}' = v{j}.f\nSe:weight{j}(-2) -> 1:v{j} -> I:m{j}(0.5)\nconstraint c{j}: x{j} - ({}) = 0\n",
+                        reach.text(n)
+                    );
+                }
+            }
+        }
+        let all = start_of(&model(&text), Form::Minimal, Start::Equilibrium);
+        let th: Vec<f64> = (0..n).map(|i| all[&format!("th{i}")]).collect();
+        for (j, reach) in reach.iter().enumerate() {
+            match j < springs {
+                true => near(&format!("{text}s{j}"), all[&format!("s{j}.q")], reach.at(&th) - reach.at(&start)),
+                false => near(&format!("{text}x{j}"), all[&format!("x{j}")], reach.at(&th)),
+            }
+        }
+        for i in 0..n {
+            near(&format!("{text}k{i}"), all[&format!("k{i}.q")], th[i] - start[i]);
+            let force = |j: usize| if j < springs { 3.0 * all[&format!("s{j}.q")] } else { 2.0 };
+            let taken: f64 = reach.iter().enumerate().map(|(j, r)| force(j) * r.slope(&th, i)).sum();
+            let left = torque[i] - 5.0 * (th[i] - start[i]) - taken;
+            assert!(left.abs() < 1e-9, "{text}torque {i} is left: {left}");
+        }
+    }
+}
