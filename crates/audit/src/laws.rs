@@ -1,5 +1,6 @@
 //! Every law of every junction and element, at every sample.
 
+use crate::constraints::Share;
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
@@ -12,15 +13,15 @@ enum Law<'a> {
     Sum { terms: Vec<(f64, &'a [f64])>, what: &'static str, of: Quantity },
     /// A recorded column has the value of an expression.
     Value { left: &'a [f64], right: Expr, what: &'static str, of: Quantity },
-    /// A column is an expression times another.
-    Product { left: &'a [f64], factor: Expr, right: (&'a [f64], Quantity), what: &'static str, of: Quantity },
+    /// Signed columns sum to an expression times another.
+    Product { left: Vec<(f64, &'a [f64])>, factor: Expr, right: (&'a [f64], Quantity), what: &'static str, of: Quantity },
     /// An expression vanishes.
     Zero { expr: Expr, what: &'static str },
 }
 
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
-    graph: &BondGraph,
+    (graph, shares): (&BondGraph, &[Share]),
     values: &Values,
     (scales, settled): (&Scales, &Settled),
     worst: &mut Worst,
@@ -43,6 +44,26 @@ pub(crate) fn residual(
             }
         }
     }
+    for share in shares {
+        let name = &graph.elements[share.junction].name;
+        let checked = match share_of_constraint(values, scales, share) {
+            Some(law) => check.law(name, &law).map_err(|missing| format!("{missing} is not known")),
+            None => Err("not all of its efforts are known".to_string()),
+        };
+        if let Err(why) = checked {
+            unchecked.push(format!("a constraint at {name}: {why}"));
+        }
+    }
+}
+
+/// What a constraint puts on a junction.
+fn share_of_constraint<'a>(values: &Values<'a>, scales: &Scales, share: &Share) -> Option<Law<'a>> {
+    let column = |&(sign, bond): &(f64, BondId)| Some((sign, values.effort(bond)?));
+    let left = share.bonds.iter().map(column).collect::<Option<_>>()?;
+    let multiplier = scales.of_bond(share.multiplier, false);
+    let of = share.bonds.first().map_or(multiplier, |b| scales.of_bond(b.1, false));
+    let right = (values.effort(share.multiplier)?, multiplier);
+    Some(Law::Product { left, factor: share.factor, right, what: "what a constraint puts on it", of })
 }
 
 /// How much the variables of each law make of each other, at the sample in the middle: pairs with weights.
@@ -206,7 +227,7 @@ impl<'a> Laws<'a, '_> {
             let of = self.scales.of_bond(left, left_flow);
             let other = self.scales.of_bond(right, right_flow);
             if let (Some(left), Some(right)) = (self.column(left, left_flow), self.column(right, right_flow)) {
-                self.laws.push(Law::Product { left, factor, right: (right, other), what, of });
+                self.laws.push(Law::Product { left: vec![(1.0, left)], factor, right: (right, other), what, of });
             }
         }
     }
@@ -236,7 +257,8 @@ impl Check<'_, '_> {
             }
             Law::Product { left, factor, right: (right, other), what, of } => {
                 let reader = self.values.reader(&[*factor])?;
-                let miss = |k: usize, v: &[f64]| left[k] - v[0] * right[k];
+                let sum = |k: usize| left.iter().map(|(sign, column)| sign * column[k]).sum::<f64>();
+                let miss = |k: usize, v: &[f64]| sum(k) - v[0] * right[k];
                 self.read(name, what, *of, &reader, &miss, &|_, v| vec![Term::beside(*other, v[0].abs())]);
                 Ok(())
             }

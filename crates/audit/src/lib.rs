@@ -15,6 +15,7 @@
 //! from power and energy.
 #![forbid(unsafe_code)]
 
+mod constraints;
 mod energy;
 mod laws;
 mod power;
@@ -98,8 +99,9 @@ pub fn magnitudes(graph: &BondGraph, run: &Run) -> BTreeMap<String, f64> {
 }
 
 /// Audits a run that comes in parts: what a miss counts relative to is known when all of it was seen.
-pub struct Auditor<'g> {
-    graph: &'g BondGraph,
+pub struct Auditor {
+    graph: BondGraph,
+    shares: Vec<constraints::Share>,
     scales: scales::Scales,
     power: worst::Worst,
     energy: worst::Worst,
@@ -108,13 +110,15 @@ pub struct Auditor<'g> {
     unchecked: BTreeSet<String>,
 }
 
-impl<'g> Auditor<'g> {
+impl Auditor {
     /// Nothing has been seen yet.
-    pub fn new(graph: &'g BondGraph) -> Auditor<'g> {
+    pub fn new(graph: &BondGraph) -> Auditor {
         let none = worst::Worst::default;
+        let (graph, shares) = constraints::shares(graph);
         Auditor {
+            scales: scales::Scales::new(&graph),
             graph,
-            scales: scales::Scales::new(graph),
+            shares,
             power: none(),
             energy: none(),
             residual: none(),
@@ -129,7 +133,7 @@ impl<'g> Auditor<'g> {
     /// If a column is not as long as the times.
     pub fn take(&mut self, run: &Run) {
         assert!(run.columns.values().all(|c| c.len() == run.times.len()), "every column has one value a sample");
-        let graph = self.graph;
+        let graph = &self.graph;
         let values = values::Values::new(graph, run);
         let mut unchecked = Vec::new();
         let balance = energy::balance(graph, &values, &mut unchecked);
@@ -140,7 +144,7 @@ impl<'g> Auditor<'g> {
         let settled = self.scales.settled(graph);
         let scales = (&self.scales, &settled);
         power::power(graph, &values, scales, &mut self.power, &mut unchecked);
-        laws::residual(graph, &values, scales, &mut self.residual, &mut unchecked);
+        laws::residual((graph, &self.shares), &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
         for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
@@ -151,13 +155,13 @@ impl<'g> Auditor<'g> {
 
     /// What was found.
     pub fn finish(self) -> Audit {
-        let settled = self.scales.settled(self.graph);
+        let settled = self.scales.settled(&self.graph);
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
-            notes: energy::notes(self.graph),
+            notes: energy::notes(&self.graph),
             unchecked: self.unchecked.into_iter().collect(),
         }
     }

@@ -5,8 +5,10 @@ mod support;
 use std::collections::BTreeSet;
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
-use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, ResistorLaw};
-use halfarrow_compiler::causal_graph::{CausalGraph, Ports, Stroke, assign_causality};
+use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, Preference, ResistorLaw};
+use halfarrow_compiler::causal_graph::{
+    CausalGraph, Ports, Stroke, as_drawn, assign_causality, by_hand, kept_junctions, verify,
+};
 use halfarrow_compiler::causal_paths::{CausalPaths, Count, counts, find_paths, invert};
 use halfarrow_compiler::ids::Table;
 use proptest::prelude::*;
@@ -254,6 +256,31 @@ proptest! {
         let counted = counts(&causal, &paths);
         prop_assert!(counted.inverted.differential <= counted.break_form.differential);
         prop_assert_eq!(counted.break_form.algebraic, paths.dependent.len() + breaks.len());
+    }
+
+    #[test]
+    fn strokes_obey_their_rules_where_junctions_are_asked_to_keep_their_variables(
+        bonds in random_graph(),
+        asked in proptest::collection::vec(0usize..8, 1..4),
+    ) {
+        let mut graph = bond_graph(&sketch(&bonds, |at| 0.6 + 0.37 * at as f64));
+        let junctions: Vec<ElementId> =
+            graph.elements.iter().filter(|(_, e)| matches!(e.kind, Kind::Zero | Kind::One)).map(|(id, _)| id).collect();
+        for at in asked {
+            let element = &graph.elements[junctions[at % junctions.len()]];
+            let bond = &graph.bonds[element.ports[0].bond];
+            let symbol = if matches!(element.kind, Kind::Zero) { bond.effort } else { bond.flow };
+            graph.preferences.push(Preference { symbol, span: element.span });
+        }
+        let Ok(causal) = assign_causality(&graph) else { return Ok(()) };
+        prop_assert_eq!(verify(&causal), Ok(()), "{}", bonds);
+        let hand = CausalGraph { strokes: by_hand(&causal), ..causal.clone() };
+        prop_assert!(hand.graph.elements.ids().all(|e| !kept_junctions(&hand).contains(&e)) || hand.strokes == causal.strokes);
+        // What the strokes say of the ports is what elimination has found.
+        let drawn = as_drawn(&causal, &causal.strokes);
+        for state in &drawn.ports.ports {
+            prop_assert_eq!(causal.ports.of(state.port).map(|p| p.role), Some(state.role), "{}", bonds);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use halfarrow_compiler::algebra::{Expr, PlainNames, unicode};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef};
-use halfarrow_compiler::causal_graph::{CausalGraph, Stroke};
+use halfarrow_compiler::causal_graph::{CausalGraph, Stroke, kept_junctions};
 use halfarrow_compiler::causal_paths::{CausalPaths, Path};
 use halfarrow_compiler::ids::Id;
 
@@ -21,7 +21,11 @@ pub fn figure(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) 
     let graph = &causal.graph;
     let derivative: BTreeSet<ElementId> = paths.dependent.iter().map(|p| p.element).collect();
     let mut laws = Vec::new();
-    let glyph = |(id, element)| glyph(graph, element, derivative.contains(&id), options.laws, &mut laws);
+    let kept = kept_junctions(causal);
+    let glyph = |(id, element)| Glyph {
+        kept: kept.contains(&id),
+        ..glyph(graph, element, derivative.contains(&id), options.laws, &mut laws)
+    };
     let glyphs = graph.elements.iter().map(glyph).collect();
     let (loops, note) = loops(graph, paths, &options.paths);
     Figure {
@@ -57,7 +61,7 @@ fn glyph(graph: &BondGraph, element: &Element, derivative: bool, law: bool, long
     let value = if element.label.is_empty() { String::new() } else { format!(" ({})", element.label) };
     let causality = if derivative { ", derivative causality" } else { "" };
     let tip = format!("{}:{}{value}{causality}", element.kind.word(), element.name);
-    Glyph { kind, name, law, tip, form: form(element), derivative }
+    Glyph { kind, name, law, tip, form: form(element), derivative, kept: false }
 }
 
 fn form(element: &Element) -> Form {

@@ -52,6 +52,8 @@ pub struct Glyph {
     pub form: Form,
     /// Whether it is a storage in derivative causality.
     pub derivative: bool,
+    /// Whether it is a junction whose variable no bond sets: it is independent, as if a source gave it.
+    pub kept: bool,
 }
 
 /// How an element is drawn.

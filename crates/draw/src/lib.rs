@@ -59,7 +59,8 @@ impl Default for DrawOptions {
 /// Draws a bond graph with its strokes and causal paths, as SVG.
 ///
 /// Half arrows have their barb on the side of the flow, strokes sit where the effort runs to, bonds are numbered from 1.
-/// Storages in derivative causality have a dashed frame, bonds whose stroke is undetermined are dotted. Equal graphs
+/// Storages in derivative causality have a dashed frame, junctions whose variable is independent without a storage a
+/// ring, bonds whose stroke is undetermined are dotted. Equal graphs
 /// give equal texts.
 pub fn draw(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> String {
     render(&figure(causal, paths, options), &options.keep)

@@ -17,6 +17,7 @@ const INK: &str = "#1b1f24";
 const SOFT: &str = "#4b5563";
 const PALE: &str = "#6b7280";
 const DERIVATIVE: &str = "#b45309";
+const KEPT: &str = "#1d4ed8";
 const JUNCTION: f64 = 18.0;
 /// Longest line above and below the drawing, in characters.
 const LEGEND: usize = 110;
@@ -77,6 +78,7 @@ enum Mark {
     None,
     Path(usize),
     Derivative,
+    Kept,
     Undetermined,
 }
 
@@ -103,6 +105,10 @@ fn legend(figure: &Figure) -> Vec<Row> {
     rows.extend(figure.laws.iter().flat_map(|law| Row::lines(Mark::None, law)));
     if figure.glyphs.iter().any(|g| g.derivative) {
         rows.extend(Row::lines(Mark::Derivative, "storage in derivative causality"));
+    }
+    if figure.glyphs.iter().any(|g| g.kept) {
+        let text = "junction whose flow (1) or effort (0) is independent: no bond sets it, it acts as a source there";
+        rows.extend(Row::lines(Mark::Kept, text));
     }
     if figure.bonds.iter().any(|b| b.stroke.is_none()) {
         rows.extend(Row::lines(Mark::Undetermined, "bond whose effort and flow are not determined"));
@@ -238,6 +244,9 @@ impl Svg {
             if glyph.derivative {
                 self.frame(at, glyph.core());
             }
+            if glyph.kept {
+                self.ring(at, glyph.core());
+            }
             match glyph.form {
                 Form::Junction => self.sign(at, &glyph.kind, JUNCTION),
                 Form::TwoPort => self.sign(at, &glyph.kind, KIND),
@@ -263,6 +272,18 @@ impl Svg {
             n(at[1] - core[1]),
             n(2.0 * core[0]),
             n(2.0 * core[1])
+        );
+    }
+    /// The mark of a junction that keeps its variable.
+    fn ring(&mut self, at: Point, core: Point) {
+        _ = write!(
+            self.out,
+            "<ellipse class=\"kept\" cx=\"{}\" cy=\"{}\" rx=\"{}\" ry=\"{}\" fill=\"#eff6ff\" stroke=\"{KEPT}\" \
+             stroke-width=\"1.2\"/>",
+            n(at[0]),
+            n(at[1]),
+            n(core[0]),
+            n(core[1])
         );
     }
     /// `Kind : name` with the law below or above it.
@@ -343,6 +364,7 @@ impl Svg {
                 _ = write!(self.out, "{line}{look} stroke-width=\"4.5\" stroke-linecap=\"round\" opacity=\"0.55\"/>");
             }
             Mark::Derivative => self.frame([MARGIN + 16.0, y], [11.0, 7.0]),
+            Mark::Kept => self.ring([MARGIN + 16.0, y], [7.0, 8.0]),
             Mark::Undetermined => {
                 _ = write!(
                     self.out,

@@ -132,3 +132,18 @@ fn the_pendulum_shows_its_paths_and_dependent_storages() {
     let none = draw(&causal, &paths, &DrawOptions { paths: DrawnPaths::First(0), ..DrawOptions::default() });
     assert!(none.contains("and 2 more causal paths") && !none.contains("class=\"paths\""));
 }
+
+#[test]
+fn a_junction_that_keeps_its_flow_is_marked() {
+    for (model, kept) in [("double_pendulum", 2), ("point_pendulum", 1), ("pendulum", 0)] {
+        let (causal, paths) = causal(&folder(model).join("model.bond"));
+        let svg = draw(&causal, &paths, &DrawOptions::default());
+        check(&svg, &causal);
+        let xml = Document::parse(&svg).unwrap();
+        let rings = |name: &str| {
+            let groups = xml.descendants().filter(|n| class(n, name));
+            groups.flat_map(|g| g.children()).filter(|n| class(n, "kept")).count()
+        };
+        assert_eq!((rings("element"), rings("legend")), (kept, kept.min(1)), "{model}");
+    }
+}

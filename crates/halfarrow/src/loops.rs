@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::{Exprs, Names, PlainNames, Symbol, ZERO, ascii};
-use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, PortRef};
-use halfarrow_compiler::causal_graph::{CausalGraph, Combination, PortState, Role, Stroke, state_rank};
+use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind};
+use halfarrow_compiler::causal_graph::{
+    CausalGraph, Combination, PortState, Role, Stroke, by_hand, kept_junctions, state_rank,
+};
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
 use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
 use halfarrow_compiler::ids::{Id, Map};
@@ -18,6 +20,9 @@ use crate::model::Model;
 pub struct LoopsReport {
     /// Name of the model.
     pub model: String,
+    /// Variables that are independent although no storage has them, such as `w.f`. The drawing takes each as a source at
+    /// its junction; `paths` are then those of the strokes that are given by hand, storages first.
+    pub kept: Vec<String>,
     /// Zero-order causal paths, by class.
     pub paths: Vec<LoopReport>,
     /// Whether `paths` holds every simple path; if not, one for every break variable.
@@ -143,13 +148,15 @@ impl Model {
     /// The model has errors.
     pub fn loops(&self) -> Result<LoopsReport, Error> {
         let causal = self.causal_graph()?;
-        let paths = find_paths(&causal);
+        let counted = counts(&causal, &find_paths(&causal));
+        let drawn = CausalGraph { strokes: by_hand(&causal), ..causal.clone() };
+        let paths = find_paths(&drawn);
         let equations = derive_equations(&causal, Form::Minimal).map_err(|errors| self.fault(errors))?;
         let start = self.values_at_start(&equations);
-        let counted = counts(&causal, &paths);
         let report = |path| loop_report(&causal.graph, &paths, path, &equations, &start);
         Ok(LoopsReport {
             model: self.graph.name.clone(),
+            kept: kept_variables(&causal),
             paths: paths.paths.iter().map(report).collect(),
             complete: paths.complete,
             components: components(&paths),
@@ -165,10 +172,20 @@ impl Model {
                 order: found.order,
                 rank: found.rank,
                 regular: found.integral.is_empty(),
-                integral: found.integral.iter().map(|&port| causal_paths::port_name(&causal.graph, port)).collect(),
+                integral: found.integral.iter().map(|&port| causal.graph.port_name(port)).collect(),
             }),
         })
     }
+}
+
+/// What junctions keep although no storage has it.
+fn kept_variables(causal: &CausalGraph) -> Vec<String> {
+    let name = |junction: ElementId| {
+        let element = &causal.graph.elements[junction];
+        let variable = if matches!(element.kind, Kind::Zero) { "e" } else { "f" };
+        format!("{}.{variable}", element.name)
+    };
+    kept_junctions(causal).into_iter().map(name).collect()
 }
 
 /// Storage states and what stays implicit.
@@ -264,7 +281,7 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
             format!("{} = {}", x.name(co_energy), ascii(&x, value, &OneName(&x)))
         });
         StorageReport {
-            name: port_name(graph, state.port),
+            name: graph.port_name(state.port),
             causality: if integral(causal, state) { "integral" } else { "derivative" },
             independent: state.role == Role::Independent,
             follows,
@@ -307,15 +324,6 @@ fn integral(causal: &CausalGraph, state: &PortState) -> bool {
         Stroke::From => graph.bonds[bond].from == state.port,
     };
     at_storage == matches!(graph.elements[state.port.element].kind, Kind::Inertance(_))
-}
-
-/// `body`, or `gap.el` for a port of a field.
-fn port_name(graph: &BondGraph, port: PortRef) -> String {
-    let element = &graph.elements[port.element];
-    match element.ports[port.port as usize].name.as_str() {
-        "" => element.name.clone(),
-        name => format!("{}.{name}", element.name),
-    }
 }
 
 fn conserved(equations: &Equations) -> Vec<ConservedReport> {

@@ -71,6 +71,15 @@ fn loops_text(report: &LoopsReport, page: Page) -> String {
         0 => format!("{}: no zero-order causal path\n", report.model),
         n => format!("{}: {}\n", report.model, counted(n, "zero-order causal path")),
     };
+    if !report.kept.is_empty() {
+        let (are, each) = if report.kept.len() == 1 { ("is", "it") } else { ("are", "each") };
+        text += &format!(
+            "{} {are} independent, and no storage has {}: the drawing and the equations take {each} as a source at its \
+             junction.\nThese are the paths with strokes given by hand, storages first:\n",
+            report.kept.join(", "),
+            if report.kept.len() == 1 { "it" } else { "them" },
+        );
+    }
     if !report.paths.is_empty() {
         let value = |v: Option<f64>| v.map_or("-".to_string(), screen::short);
         let rows = report.paths.iter().map(|p| {

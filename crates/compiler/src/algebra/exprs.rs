@@ -124,6 +124,16 @@ impl Exprs {
         Symbol(id)
     }
 
+    /// A new symbol of that name, or of that name with the first free number from 2 behind it.
+    pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
+        let free = |x: &Exprs, name: &str| x.find_symbol(name).is_none();
+        if free(self, name) {
+            return self.symbol(name, facts);
+        }
+        let numbered = (2..).map(|n| format!("{name}_{n}")).find(|name| free(self, name));
+        self.symbol(&numbered.expect("numbers without end"), facts)
+    }
+
     /// The symbol of that name, if there is one.
     pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
         self.named(name, hash_name(name))

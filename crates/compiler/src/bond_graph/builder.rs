@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
+use super::common::representatives;
 use super::dimension::{Clash, Dimensions, Quantity, Reason};
 use super::files::Files;
-use super::flatten::{Flat, Part, Word};
+use super::flatten::{Flat, Part};
 use super::scope::DeclId;
 use super::wire::Wiring;
 use super::{
@@ -104,6 +105,11 @@ pub(super) struct Builder<'a, 'f> {
     pub meanings: Vec<Option<(Meaning, Quantity)>>,
     /// Variables of every bond.
     pub pairs: Vec<Pair>,
+    /// The bond that stands for each junction, by part.
+    pub common: Vec<Option<usize>>,
+    /// Efforts of 0-junctions that differ from that of the bond which stands for them, since a constraint acts in it: by
+    /// bond, with the junction.
+    pub beyond: BTreeMap<usize, (usize, Symbol)>,
     /// Variables of the bond of every constraint.
     pub reactions: Vec<Pair>,
     /// Dimensions of the moduli of two-ports.
@@ -154,6 +160,8 @@ impl<'a, 'f> Builder<'a, 'f> {
             meanings: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
             moduli: BTreeMap::new(),
+            common: representatives(flat, wiring),
+            beyond: BTreeMap::new(),
             reactions: Vec::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
@@ -203,17 +211,7 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// A new symbol of that name, or of one like it if that is taken.
     pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
-        if self.exprs.find_symbol(name).is_none() {
-            return self.exprs.symbol(name, facts);
-        }
-        let mut n = 2;
-        loop {
-            let other = format!("{name}_{n}");
-            if self.exprs.find_symbol(&other).is_none() {
-                return self.exprs.symbol(&other, facts);
-            }
-            n += 1;
-        }
+        self.exprs.fresh(name, facts)
     }
 
     /// A part of the flat model.
@@ -226,20 +224,9 @@ impl<'a, 'f> Builder<'a, 'f> {
         self.wiring.ports[part].get(port).copied().flatten().map(|(wire, _)| wire)
     }
 
-    /// The bond whose variable stands for the common one of a junction: at a 1 that of an `I`, at a 0 that of a `C`, else
-    /// one inside the junction structure, else the first.
+    /// The bond whose variable stands for the common one of a junction.
     pub fn representative(&self, junction: usize) -> Option<usize> {
-        let favourite = if self.part(junction).word == Word::One { Word::I } else { Word::C };
-        let wires = || self.wiring.ports[junction].iter().flatten().map(|(wire, _)| *wire);
-        let other = |wire: usize| {
-            let w = &self.wiring.wires[wire];
-            self.part(if w.from.0 == junction { w.to.0 } else { w.from.0 }).word
-        };
-        let inner = |word: Word| word.is_junction() || word.is_two_port();
-        wires()
-            .find(|w| other(*w) == favourite)
-            .or_else(|| wires().find(|w| inner(other(*w))))
-            .or_else(|| wires().next())
+        self.common[junction]
     }
 
     /// Requires two quantities to have one dimension; reports a clash in general words. While values of names are read

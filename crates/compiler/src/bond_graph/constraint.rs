@@ -35,6 +35,13 @@ pub(super) struct Relation {
     span: Span,
 }
 
+impl Relation {
+    /// The flows that it reads.
+    pub fn flows(&self) -> impl Iterator<Item = Symbol> + '_ {
+        self.terms.iter().map(|t| t.0)
+    }
+}
+
 impl Builder<'_, '_> {
     /// Reads the sides of all constraints.
     pub fn constraint_sides(&mut self) -> Vec<Sides> {
@@ -196,19 +203,17 @@ impl Builder<'_, '_> {
 
     /// The 1-junction to which the flow of a bond belongs; a new one in the bond if it belongs to none.
     fn one_junction(&mut self, graph: &mut BondGraph, bond: BondId, name: &str, span: Span) -> ElementId {
-        let (from, to) = (graph.bonds[bond].from, graph.bonds[bond].to);
-        if let Some(end) = [from, to].into_iter().find(|p| matches!(graph.elements[p.element].kind, Kind::One)) {
-            return end.element;
+        if let Some(junction) = graph.junction_of(bond, true) {
+            return junction;
         }
+        let (from, to) = (graph.bonds[bond].from, graph.bonds[bond].to);
         let mut n = 1;
         let free = |n: usize| format!("{name}.1{}", if n == 1 { String::new() } else { format!("_{n}") });
         while graph.elements.values().any(|e| e.span == span && e.name == free(n)) {
             n += 1;
         }
         let junction = new_element(graph, free(n), Kind::One, span, String::new());
-        // The drawn bond stays at the element outside of the junction structure, whose variables have its name.
-        let inner = |end: PortRef| graph.elements[end.element].kind.is_inner();
-        let keeps_from = inner(to) && !inner(from);
+        let keeps_from = self.left_end(bond.index()).0 == to.element.index();
         let at = PortRef { element: junction, port: 0 };
         let new = BondId::new(graph.bonds.len());
         let moved = if keeps_from { to } else { from };
@@ -223,7 +228,13 @@ impl Builder<'_, '_> {
         graph.elements[moved.element].ports[moved.port as usize].bond = new;
         let (new_from, new_to) = if keeps_from { (far, moved) } else { (moved, far) };
         let like = (graph.bonds[bond].effort, graph.bonds[bond].flow);
-        let pair = self.internal_pair(new, like);
+        let mut pair = self.internal_pair(new, like);
+        if let Some(&(_, known)) = self.beyond.get(&bond.index()) {
+            self.meanings[pair.effort.0 as usize] = None;
+            self.mean(known, Meaning::Effort(new), pair.effort_in.clone());
+            pair.effort = known;
+        }
+        graph.common.entry(moved.element).and_modify(|common| *common = if *common == bond { new } else { *common });
         let pseudo = graph.bonds[bond].pseudo;
         graph.bonds.push(Bond {
             from: new_from,

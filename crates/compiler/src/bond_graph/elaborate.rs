@@ -1,6 +1,6 @@
 //! The stage: from syntax trees to a bond graph.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::builder::Builder;
 use super::dimension::Quantity;
@@ -51,7 +51,8 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     overrides::apply(&given, &mut flat, &mut faults);
     let mut wiring = wire(&flat);
     faults.append(&mut wiring.faults);
-    let (graph, more) = build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error));
+    let (graph, more) =
+        build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &BTreeSet::new());
     faults.extend(more);
     in_order(&mut faults);
     let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error)).map(|mut graph| {
@@ -71,16 +72,18 @@ fn in_order(faults: &mut Vec<Diagnostic>) {
     faults.dedup();
 }
 
-/// Builds the graph of a flat model, as far as its faults allow.
+/// Builds the graph of a flat model, as far as its faults allow. `parted`: the bonds in which a constraint acts; they
+/// are found on the way, and then all is done again with the efforts at their two ends told apart.
 fn build(
     flat: &Flat<'_>,
     wiring: &Wiring,
     sources: &Sources,
     files: &dyn Files,
     faulty: bool,
+    parted: &BTreeSet<usize>,
 ) -> (Option<BondGraph>, Vec<Diagnostic>) {
     let mut b = Builder::new(flat, wiring, sources, files);
-    b.make_symbols();
+    b.make_symbols(parted);
     b.later = Some(Vec::new());
     b.make_values();
     let later = b.later.take();
@@ -94,6 +97,10 @@ fn build(
     let sides = b.constraint_sides();
     let rates = b.rates_of_signals();
     let relations = b.relations(&sides, &rates);
+    let found = b.parted(&relations);
+    if b.faults.is_empty() && found != *parted {
+        return build(flat, wiring, sources, files, faulty, &found);
+    }
     b.forgive_unwritten_units();
     let complete = !faulty && !b.incomplete && b.faults.is_empty() && kinds.iter().all(Option::is_some);
     if !complete {
@@ -126,6 +133,7 @@ impl Builder<'_, '_> {
             variables: Map::new(),
             elements,
             bonds,
+            common: self.common_bonds(),
             parameters: std::mem::take(&mut self.parameters),
             inputs: std::mem::take(&mut self.inputs),
             signals: std::mem::take(&mut self.signals),

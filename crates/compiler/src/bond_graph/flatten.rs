@@ -82,6 +82,10 @@ impl Word {
     pub fn is_two_port(self) -> bool {
         matches!(self, Word::Tf | Word::Gy)
     }
+    /// Whether it belongs to the junction structure.
+    pub fn is_inner(self) -> bool {
+        self.is_junction() || self.is_two_port()
+    }
     /// Whether it is an `I`, `C` or `R`: power is positive into it, and it may be a field.
     pub fn is_law(self) -> bool {
         matches!(self, Word::I | Word::C | Word::R)

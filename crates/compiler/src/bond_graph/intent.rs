@@ -80,7 +80,10 @@ impl<'a> Builder<'a, '_> {
                 return None;
             }
         };
-        let wire = if p.word.is_junction() { self.representative(part) } else { self.wire_at(part, slot) }?;
+        if p.word.is_junction() {
+            return self.common_variable(part, own == "e");
+        }
+        let wire = self.wire_at(part, slot)?;
         Some(if own == "e" { self.pairs[wire].effort } else { self.pairs[wire].flow })
     }
 

@@ -237,9 +237,7 @@ impl<'a> Builder<'a, '_> {
         let name = variable.text.as_str();
         let slot = match (p.word, name) {
             (Word::Zero, "e") | (Word::One, "f") => {
-                let wire = self.representative(part)?;
-                let pair = &self.pairs[wire];
-                let symbol = if name == "e" { pair.effort } else { pair.flow };
+                let symbol = self.common_variable(part, name == "e")?;
                 return Some(self.symbol_value(symbol));
             }
             (w, "e" | "f") if w.is_junction() || w.is_two_port() => None,

@@ -8,6 +8,7 @@
 
 mod blocks;
 mod builder;
+mod common;
 mod constraint;
 mod csv;
 mod decls;
@@ -36,6 +37,8 @@ pub use files::{FileError, Files, NoFiles};
 pub use overrides::Override;
 pub use verify::verify;
 pub use warnings::warnings;
+
+use std::collections::BTreeMap;
 
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::ids::{Map, Table, id};
@@ -86,6 +89,8 @@ pub struct BondGraph {
     pub elements: Table<ElementId, Element>,
     /// Bonds, in the order written.
     pub bonds: Table<BondId, Bond>,
+    /// The bond of each drawn junction whose variable stands for the common one. Two that touch have each its own.
+    pub common: BTreeMap<ElementId, BondId>,
     /// Parameters and constants.
     pub parameters: Table<ParameterId, Parameter>,
     /// Inputs.
@@ -471,6 +476,7 @@ impl BondGraph {
             variables: self.variables.clone(),
             elements: self.elements.clone(),
             bonds: self.bonds.clone(),
+            common: self.common.clone(),
             parameters: self.parameters.clone(),
             inputs: self.inputs.clone(),
             signals: self.signals.clone(),
@@ -487,6 +493,14 @@ impl BondGraph {
     /// The bond at a port.
     pub fn bond_of(&self, port: PortRef) -> BondId {
         self.elements[port.element].ports[port.port as usize].bond
+    }
+    /// What a port is called: its element, in fields and two-ports with the port: `body`, `gap.el`, `gear.in`.
+    pub fn port_name(&self, port: PortRef) -> String {
+        let element = &self.elements[port.element];
+        match element.ports[port.port as usize].name.as_str() {
+            "" => element.name.clone(),
+            own => format!("{}.{own}", element.name),
+        }
     }
     /// The symbols (co-energy `z`, rate `X'`) of a storage port: (flow, effort) of an `I`, (effort, flow) of a `C`.
     ///

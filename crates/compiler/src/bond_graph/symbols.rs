@@ -1,5 +1,7 @@
 //! Names people know for the variables of every bond, and which bonds share their units.
 
+use std::collections::BTreeSet;
+
 use super::Meaning;
 use super::builder::{Builder, Pair};
 use super::dimension::Quantity;
@@ -26,9 +28,9 @@ impl Sets {
 }
 
 impl Builder<'_, '_> {
-    /// Makes the symbols of all bonds and stored quantities.
-    pub fn make_symbols(&mut self) {
-        let names = self.bond_names();
+    /// Makes the symbols of all bonds and stored quantities. In the `parted` bonds a constraint acts.
+    pub fn make_symbols(&mut self, parted: &BTreeSet<usize>) {
+        let names = self.bond_names(parted);
         let units = self.shared_units();
         for (wire, (effort, flow)) in names.into_iter().enumerate() {
             let effort = self.fresh(&effort, Facts::default());
@@ -38,6 +40,7 @@ impl Builder<'_, '_> {
             self.mean(flow, Meaning::Flow(Self::bond_id(wire)), flow_in.clone());
             self.pairs.push(Pair { effort, flow, effort_in, flow_in });
         }
+        self.make_parted(parted);
         self.make_stored();
         self.make_reactions();
     }
@@ -86,16 +89,14 @@ impl Builder<'_, '_> {
     }
 
     /// Names of effort and flow of every bond.
-    fn bond_names(&self) -> Vec<(String, String)> {
+    fn bond_names(&self, parted: &BTreeSet<usize>) -> Vec<(String, String)> {
         let mut names: Vec<(String, String)> = (0..self.wiring.wires.len()).map(|w| self.bond_name(w)).collect();
         for (junction, p) in self.flat.parts.iter().enumerate().filter(|(_, p)| p.word.is_junction()) {
             let Some(wire) = self.representative(junction) else { continue };
             let w = &self.wiring.wires[wire];
-            let inner = |end: (usize, usize)| {
-                let word = self.part(end.0).word;
-                word.is_junction() || word.is_two_port()
-            };
-            if !inner(w.from) || !inner(w.to) {
+            let inner = |end: (usize, usize)| self.part(end.0).word.is_inner();
+            let elsewhere = parted.contains(&wire) && self.left_end(wire).0 == junction;
+            if !inner(w.from) || !inner(w.to) || elsewhere {
                 continue;
             }
             match p.word {

@@ -1,5 +1,7 @@
 //! What holds of every graph that this stage gives; a breach is our fault, not the modeller's.
 
+use std::collections::BTreeSet;
+
 use super::{BondGraph, Held, Kind, Meaning, PortRef, Signal, Storage};
 use crate::algebra::{Expr, Symbol};
 use crate::ids::Id;
@@ -11,6 +13,8 @@ use crate::ids::Id;
 pub fn verify(graph: &BondGraph) -> Result<(), String> {
     bonds(graph)?;
     elements(graph)?;
+    junctions(graph)?;
+    names(graph)?;
     symbols(graph)
 }
 
@@ -72,6 +76,49 @@ fn elements(graph: &BondGraph) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// The bond that stands for a junction is one of its own, and stands for no other that it joins to this one unless these
+/// two touch nothing else.
+fn junctions(graph: &BondGraph) -> Result<(), String> {
+    for (&junction, &bond) in &graph.common {
+        let element = &graph.elements[junction];
+        let name = &element.name;
+        if !element.ports.iter().any(|p| p.bond == bond) {
+            return Err(format!("`{name}` is stood for by a bond of others"));
+        }
+        let other = |bond| graph.far_end(bond, junction);
+        let alike = |e| std::mem::discriminant(&graph.elements[e].kind) == std::mem::discriminant(&element.kind);
+        let shared = other(bond) != junction && alike(other(bond)) && graph.common.get(&other(bond)) == Some(&bond);
+        if shared && element.ports.iter().any(|p| !alike(other(p.bond))) {
+            return Err(format!("one bond stands for `{name}` and for its neighbour"));
+        }
+    }
+    Ok(())
+}
+
+/// Elements have names of their own, the ports of one element too, and so have bonds and signals.
+fn names(graph: &BondGraph) -> Result<(), String> {
+    let mut seen = BTreeSet::new();
+    let elements = graph.elements.values().map(|e| &e.name);
+    let bonds = graph.bonds.values().map(|b| &b.name).filter(|n| !n.is_empty());
+    if let Some(name) = elements.chain(bonds).find(|n| !seen.insert(*n)) {
+        return Err(format!("two elements or bonds are called `{name}`"));
+    }
+    for element in graph.elements.values().filter(|e| !matches!(e.kind, Kind::Zero | Kind::One)) {
+        let mut seen = BTreeSet::new();
+        if element.ports.iter().any(|p| !seen.insert(&p.name)) {
+            return Err(format!("two ports of `{}` have one name", element.name));
+        }
+    }
+    let mut seen = BTreeSet::new();
+    let parameters = graph.parameters.values().map(|p| &p.name);
+    let signals = graph.signals.values().map(|s| &s.name).chain(graph.held.values().map(|h| &h.name));
+    let inputs = graph.inputs.values().map(|i| &i.name);
+    match parameters.chain(signals).chain(inputs).find(|n| !seen.insert(*n)) {
+        Some(name) => Err(format!("two parameters or signals are called `{name}`")),
+        None => Ok(()),
+    }
 }
 
 fn symbols(graph: &BondGraph) -> Result<(), String> {

@@ -7,6 +7,7 @@ use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
 use super::signals::{NodeId, signal_graph};
 use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
+use super::verify::verify;
 use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, digits, local};
 use crate::algebra::{Exprs, NumericPoint, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
@@ -26,7 +27,8 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     let mut undrawn = BTreeSet::new();
     let mut point = start_point(&x, graph);
     for members in parts(graph) {
-        let mut part = Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new() };
+        let mut part =
+            Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new(), kept: Vec::new() };
         match part.assign_well_conditioned(&mut strokes, &mut point) {
             Ok(solved) => {
                 undrawn.extend(solved.undetermined.iter().copied());
@@ -43,7 +45,9 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     ports.ports.sort_by_key(|p| p.port);
     let mut strokes = strokes.table();
     erase(graph, &mut strokes, &undrawn);
-    Ok(CausalGraph { graph: graph.with_exprs(x), strokes, ports })
+    let causal = CausalGraph { graph: graph.with_exprs(x), strokes, ports };
+    debug_assert_eq!(verify(&causal), Ok(()), "{}", graph.name);
+    Ok(causal)
 }
 
 /// One connected part under assignment, with the causality chosen for some of its algebraic laws.
@@ -53,6 +57,8 @@ struct Part<'a> {
     wanted: &'a Wanted,
     members: &'a [ElementId],
     laws: BTreeMap<PortRef, PortCausality>,
+    /// Junctions whose variable turned out independent without a storage.
+    kept: Vec<ElementId>,
 }
 
 /// Up to this many laws on causal loops all their causalities are tried; above, one law is turned at a time.
@@ -99,6 +105,7 @@ impl Part<'_> {
         }
         let drawn: BTreeMap<PortRef, bool> =
             outer_ports(self.graph, self.members).into_iter().filter_map(|p| Some((p, strokes.at(p)?))).collect();
+        self.kept = strokes.kept(self.members);
         strokes.undo(mark);
         let start = turnable.keys().map(|&p| (p, drawn[&p])).collect();
         let before = (loop_size(self.graph, &table, turned(self.graph, &turnable, &start)), start);
@@ -185,6 +192,7 @@ impl Part<'_> {
         let mark = strokes.mark();
         let mut fine = contradiction::force_strokes(self.graph, strokes, self.members).is_ok();
         let is_law = |p: &PortRef| matches!(self.graph.elements[p.element].kind, Kind::Resistor(_));
+        fine = fine && strokes.keep(&self.kept).is_ok();
         fine = fine && drawn.iter().filter(|(p, _)| !is_law(p)).all(|(&p, &here)| strokes.set_at(p, here).is_ok());
         fine = fine && choice.iter().all(|(&p, &here)| strokes.set_at(p, here).is_ok());
         for (&port, &here) in drawn {
@@ -201,6 +209,7 @@ impl Part<'_> {
     /// Assigns the part with the laws as they are wished.
     fn assign(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let (graph, members) = (self.graph, self.members);
+        strokes.release(members);
         let forced = contradiction::force_strokes(graph, strokes, members).map_err(|fault| vec![*fault])?;
         let mark = strokes.mark();
         let drawn = self.propagate(strokes);
@@ -217,8 +226,21 @@ impl Part<'_> {
         if !(forced && drawn) {
             strokes.undo(mark);
             draw_truth(graph, strokes, members, &solved);
+        } else if !solved.virtual_speeds.is_empty() {
+            self.draw_kept_if_allowed(strokes, mark, &solved);
         }
         Ok(solved)
+    }
+
+    /// Draws kept variables as sources at their junctions, if the forced strokes leave room for that.
+    fn draw_kept_if_allowed(&mut self, strokes: &mut Strokes, mark: usize, solved: &Solved) {
+        strokes.undo(mark);
+        draw_truth(self.graph, strokes, self.members, solved);
+        if strokes.kept(self.members).is_empty() || !strokes.is_complete(self.members) {
+            strokes.undo(mark);
+            strokes.release(self.members);
+            self.propagate(strokes);
+        }
     }
 
     /// The causality asked of an algebraic law: the one chosen, else the one in which it is written.
@@ -261,6 +283,7 @@ fn causality_of(here: bool) -> PortCausality {
 }
 
 /// The order in which storages are asked to be independent, ahead of the order of the model.
+#[derive(Default)]
 struct Wanted {
     independent: Vec<PortRef>,
     virtual_speeds: Vec<Virtual>,
@@ -272,8 +295,7 @@ struct Wanted {
 impl Wanted {
     /// `prefer`, then common variables of junctions whose integrals occur in moduli. Source: `method.md`, 5.2.
     fn of(x: &mut Exprs, graph: &BondGraph) -> Wanted {
-        let mut wanted =
-            Wanted { independent: Vec::new(), virtual_speeds: Vec::new(), why: BTreeMap::new(), asked: Vec::new() };
+        let mut wanted = Wanted::default();
         for preference in &graph.preferences {
             let asked = wanted.add(x, graph, preference.symbol, Kept::Preferred);
             wanted.asked.push(asked);
@@ -292,8 +314,7 @@ impl Wanted {
             _ => return Vec::new(),
         };
         let ends = [graph.bonds[bond].from, graph.bonds[bond].to];
-        let is_junction = |k: &Kind| matches!((k, flow), (Kind::One, true) | (Kind::Zero, false));
-        let Some(junction) = ends.iter().map(|p| p.element).find(|&e| is_junction(&graph.elements[e].kind)) else {
+        let Some(junction) = graph.junction_of(bond, flow) else {
             let own = ends.into_iter().filter(|&p| gives(graph, p, flow));
             return own.filter_map(|port| self.keep(graph, port, why)).collect();
         };
@@ -492,8 +513,18 @@ fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
         .collect()
 }
 
+/// Strokes of a part by sequential assignment alone; `None` if that contradicts itself.
+pub(super) fn sequential(graph: &BondGraph, members: &[ElementId]) -> Option<Table<BondId, Stroke>> {
+    let mut x = graph.exprs.clone();
+    let wanted = Wanted::default();
+    let mut part = Part { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
+    let mut strokes = Strokes::new(graph);
+    contradiction::force_strokes(graph, &mut strokes, members).ok()?;
+    part.propagate(&mut strokes).then(|| strokes.table())
+}
+
 /// Whether a port imposes an effort (`true`) or a flow (`false`) as drawn, or neither.
-fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
+pub(super) fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
     match graph.elements[port.element].kind {
         Kind::EffortSource { .. } | Kind::FlowDetector | Kind::ResidualEffort { .. } => Some(true),
         Kind::FlowSource { .. } | Kind::ZeroCompliance { .. } | Kind::EffortDetector | Kind::ResidualFlow { .. } => {
@@ -549,7 +580,7 @@ fn whole_truth(
     {
         return None;
     }
-    let (definitions, divisors) = local::definitions(x, graph, members, &|p| strokes.at(p));
+    let (definitions, divisors) = local::definitions(x, graph, members, &|p| strokes.at(p), &[]);
     (tree || is_triangular(&definitions)).then_some((definitions, divisors))
 }
 
@@ -603,6 +634,8 @@ fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], s
             strokes.leave_out(bond);
         }
     }
+    let kept: Vec<ElementId> = solved.virtual_speeds.iter().map(|v| v.junction).collect();
+    let _ = strokes.keep(&kept);
     for state in &solved.ports {
         let inertance = matches!(graph.elements[state.port.element].kind, Kind::Inertance(_));
         let here = match (imposes(graph, state.port), state.role) {

@@ -1,12 +1,12 @@
 //! What cannot hold together, and what is legal but odd, in physical words.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::ports::Solved;
 use super::strokes::{Strokes, sits_here};
-use super::{CausalGraph, Combination, Role, Stroke};
+use super::{CausalGraph, Combination, Role};
 use crate::algebra::{Expr, Exprs, PlainNames, Symbol, ascii};
-use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
+use crate::bond_graph::{Bond, BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::ids::Map;
@@ -261,43 +261,124 @@ fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnos
     }
 }
 
+/// Efforts and flows of bonds that nothing determines. How redundant sources share their reaction is told of these.
 fn circulating(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
-    let undetermined = |symbol: Symbol| causal.ports.undetermined.contains(&symbol);
-    let bonds: Vec<BondId> =
-        causal.strokes.iter().filter(|(_, s)| **s == Stroke::Undetermined).map(|(id, _)| id).collect();
+    let redundant = |s: &Symbol| causal.ports.ports.iter().any(|p| p.role == Role::Redundant && p.output == *s);
+    let free: BTreeSet<Symbol> = causal.ports.undetermined.iter().copied().filter(|s| !redundant(s)).collect();
+    let open = readers(causal, &free);
+    let inner = |b: &Bond| [b.from, b.to].iter().all(|p| graph.elements[p.element].kind.is_inner());
+    let concerned = |b: &Bond| inner(b) && (open.contains(&b.effort) || open.contains(&b.flow));
+    let bonds: Vec<BondId> = graph.bonds.iter().filter(|(_, b)| concerned(b)).map(|(id, _)| id).collect();
     let Some(&first) = bonds.first() else { return };
+    let efforts = bonds.iter().any(|&b| open.contains(&graph.bonds[b].effort));
+    let flows = bonds.iter().any(|&b| open.contains(&graph.bonds[b].flow));
+    let one = bonds.len() == 1;
+    let what = match (efforts, flows) {
+        (true, false) => {
+            if one {
+                "the effort"
+            } else {
+                "the efforts"
+            }
+        }
+        (false, true) => {
+            if one {
+                "the flow"
+            } else {
+                "the flows"
+            }
+        }
+        _ => "efforts and flows",
+    };
+    let (note, hint) = if close_a_ring(graph, &bonds) {
+        why_in_a_ring(efforts, flows)
+    } else {
+        why_on_a_tree(efforts, flows, &lonely(graph, &bonds))
+    };
     let numbers: Vec<String> = bonds.iter().map(|b| (b.index() + 1).to_string()).collect();
-    let efforts = bonds.iter().any(|&b| undetermined(graph.bonds[b].effort));
-    let flows = bonds.iter().any(|&b| undetermined(graph.bonds[b].flow));
-    let (what, note, hint) = match (efforts, flows) {
+    let (bonds, are, here) = match one {
+        true => ("bond", if efforts && flows { "are" } else { "is" }, "this one"),
+        false => ("bonds", "are", "this is one of them"),
+    };
+    let title = format!("{what} of {bonds} {} {are} not determined", numbers.join(", "));
+    all.push(Diagnostic::warning(codes::C006, title, graph.bonds[first].span, here).note(note).hint(hint));
+}
+
+/// These variables and all that read them, near or far.
+fn readers(causal: &CausalGraph, free: &BTreeSet<Symbol>) -> BTreeSet<Symbol> {
+    if free.is_empty() {
+        return BTreeSet::new();
+    }
+    let mut by: BTreeMap<Symbol, Vec<Symbol>> = BTreeMap::new();
+    for (&symbol, row) in &causal.ports.definitions {
+        row.0.iter().for_each(|t| by.entry(t.0).or_default().push(symbol));
+    }
+    let (mut found, mut work) = (free.clone(), free.iter().copied().collect::<Vec<_>>());
+    while let Some(symbol) = work.pop() {
+        work.extend(by.get(&symbol).into_iter().flatten().copied().filter(|s| found.insert(*s)));
+    }
+    found
+}
+
+/// Whether some of these bonds form a ring.
+fn close_a_ring(graph: &BondGraph, bonds: &[BondId]) -> bool {
+    let mut set = petgraph::unionfind::UnionFind::<usize>::new(graph.elements.len());
+    let ends = |b: &BondId| [graph.bonds[*b].from, graph.bonds[*b].to].map(|p| p.element.index());
+    bonds.iter().map(ends).any(|[from, to]| !set.union(from, to))
+}
+
+/// The junctions with a single bond at the ends of these bonds, by name.
+fn lonely(graph: &BondGraph, bonds: &[BondId]) -> Vec<String> {
+    let mut found: BTreeSet<ElementId> = BTreeSet::new();
+    for end in bonds.iter().flat_map(|&b| [graph.bonds[b].from.element, graph.bonds[b].to.element]) {
+        let element = &graph.elements[end];
+        if element.ports.len() == 1 && matches!(element.kind, Kind::Zero | Kind::One) {
+            found.insert(end);
+        }
+    }
+    found.into_iter().map(|e| graph.elements[e].name.clone()).collect()
+}
+
+fn why_in_a_ring(efforts: bool, flows: bool) -> (String, String) {
+    let (note, hint) = match (efforts, flows) {
         (true, false) => (
-            "the efforts",
             "nothing sets the level from which they are counted (a circuit without ground), or a ring of bonds passes \
              one on unchanged; all elements are determined",
             "to set the level, put a source `Se(0)` at one of the 0-junctions; in a ring, leave out one of the bonds",
         ),
         (false, true) => (
-            "the flows",
             "a flow can circulate in them: they form a ring that passes it on unchanged; all elements outside the ring \
              are determined",
             "leave out one of the bonds",
         ),
         _ => (
-            "efforts and flows",
             "the bonds form a ring that passes them on unchanged; all elements outside the ring are determined",
             "leave out one of the bonds",
         ),
     };
-    all.push(
-        Diagnostic::warning(
-            codes::C006,
-            format!("{what} of bonds {} are not determined", numbers.join(", ")),
-            graph.bonds[first].span,
-            "this is one of them",
-        )
-        .note(note)
-        .hint(hint),
+    (note.into(), hint.into())
+}
+
+fn why_on_a_tree(efforts: bool, flows: bool, lonely: &[String]) -> (String, String) {
+    let note = match (efforts, flows) {
+        (true, false) => "nothing sets the level from which they are counted (a circuit without ground)",
+        (false, true) => "nothing answers to how much flows there",
+        _ => "nothing answers to them",
+    };
+    if lonely.is_empty() {
+        let hint = match (efforts, flows) {
+            (true, false) => "to set the level, put a source `Se(0)` at one of the 0-junctions",
+            _ => "put an R or a storage at one of their junctions",
+        };
+        return (format!("{note}; all elements are determined"), hint.into());
+    }
+    let junctions = lonely.join(", ");
+    let (ends, has, it) = if lonely.len() == 1 { ("s", "has", "it") } else { ("", "have", "them") };
+    let note = format!(
+        "{note}: {junctions} {has} a single bond, and demand{ends} only that the flow of a 0-junction, the effort of a \
+         1-junction vanishes"
     );
+    (note, format!("put an element at {junctions}, or leave {it} out"))
 }
 
 /// Storages drawn in derivative causality by force although they are independent.

@@ -3,13 +3,14 @@
 
 use std::collections::BTreeSet;
 
-use super::assign::wished;
-use super::ports::{Wishes, imposes_effort, solve_part};
+use super::assign::{sequential, wished};
+use super::ports::{Virtual, Wishes, imposes_effort, solve_part};
+use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
 use super::strokes::{Strokes, parts};
 use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local};
 use crate::algebra::Symbol;
-use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortCausality, PortRef};
+use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortCausality, PortRef};
 use crate::ids::Table;
 
 /// The graph with these strokes, its ports as drawn: roles by stroke, every bond variable defined by the element that
@@ -21,10 +22,14 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     let mut ports = Ports::default();
     let drawn = |port: PortRef| sits_at(graph, strokes, port);
     let mut kept = BTreeSet::new();
+    let speeds = kept_in(causal, strokes);
     for members in parts(graph) {
-        if members.iter().all(|&m| in_order(graph, &drawn, m)) && !turns_sources(causal, &members, &drawn) {
+        if members.iter().all(|&m| is_drawn(graph, &speeds, &drawn, m)) && !turns_sources(causal, &members, &drawn) {
             ports.ports.extend(local::roles(graph, &members, &drawn));
-            let (definitions, divisors) = local::definitions(&mut x, graph, &members, &drawn);
+            let own = |v: &&Virtual| speeds.contains(&v.junction) && members.binary_search(&v.junction).is_ok();
+            let own: Vec<Virtual> = causal.ports.virtual_speeds.iter().filter(own).copied().collect();
+            let (definitions, divisors) = local::definitions(&mut x, graph, &members, &drawn, &own);
+            ports.virtual_speeds.extend(own);
             ports.definitions.extend(definitions);
             ports.watched.extend(divisors);
         } else {
@@ -39,16 +44,6 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     CausalGraph { graph: graph.with_exprs(x), strokes: strokes.clone(), ports }
 }
 
-/// Whether the stroke of its bond sits at a port; `None` without a stroke.
-fn sits_at(graph: &BondGraph, strokes: &Table<BondId, Stroke>, port: PortRef) -> Option<bool> {
-    let port = &graph.elements[port.element].ports[port.port as usize];
-    match strokes[port.bond] {
-        Stroke::Undetermined => None,
-        Stroke::To => Some(port.inward),
-        Stroke::From => Some(!port.inward),
-    }
-}
-
 /// Whether a source is drawn as if it gave the conjugate of what it imposes: then the strokes do not tell the truth.
 fn turns_sources(causal: &CausalGraph, members: &[ElementId], drawn: local::Drawn) -> bool {
     local::roles(&causal.graph, members, drawn).iter().any(|state| {
@@ -57,19 +52,11 @@ fn turns_sources(causal: &CausalGraph, members: &[ElementId], drawn: local::Draw
     })
 }
 
-/// Whether all bonds of an element are drawn, and a junction has one setter, a transformer hands through, a gyrator
-/// turns round.
-fn in_order(graph: &BondGraph, drawn: local::Drawn, element: ElementId) -> bool {
-    let ports = (0..graph.elements[element].ports.len() as u32).map(|port| drawn(PortRef { element, port }));
-    let Some(sits) = ports.collect::<Option<Vec<bool>>>() else { return false };
-    let here = sits.iter().filter(|here| **here).count();
-    match graph.elements[element].kind {
-        Kind::Zero => here == 1,
-        Kind::One => here + 1 == sits.len(),
-        Kind::Transformer { .. } => here == 1,
-        Kind::Gyrator { .. } => here != 1,
-        _ => true,
-    }
+/// Whether all bonds of an element are drawn, by the rules.
+fn is_drawn(graph: &BondGraph, kept: &BTreeSet<ElementId>, drawn: local::Drawn, element: ElementId) -> bool {
+    let (here, away) = around(element, graph, drawn);
+    let Element { kind, ports, .. } = &graph.elements[element];
+    here + away == ports.len() && in_order(kind, here, away, kept.contains(&element))
 }
 
 /// The ports of some elements as elimination found them, with all definitions behind them.
@@ -151,19 +138,36 @@ fn wishes(causal: &CausalGraph, members: &[ElementId]) -> Wishes {
 pub fn resistors_first(causal: &CausalGraph) -> Table<BondId, Stroke> {
     let graph = &causal.graph;
     let mut table = causal.strokes.clone();
+    let kept = kept_junctions(causal);
     for members in parts(graph) {
         // Where a flow circulates strokes say nothing.
         let drawn = |port: PortRef| sits_at(graph, &causal.strokes, port);
-        if !members.iter().all(|&m| in_order(graph, &drawn, m)) {
+        if !members.iter().all(|&m| is_drawn(graph, &kept, &drawn, m)) {
             continue;
         }
-        let relaxed = Relaxed { graph, members: &members, laws: resistors(graph, &members) };
+        let relaxed = Relaxed { graph, members: &members, kept: &kept, laws: resistors(graph, &members) };
         if let Some(strokes) = relaxed.best() {
             for &element in &members {
                 for port in &graph.elements[element].ports {
                     table[port.bond] = strokes[port.bond];
                 }
             }
+        }
+    }
+    table
+}
+
+/// Strokes as they are given by hand: sources, storages in integral causality in the order of the model, laws, each
+/// followed by what it settles; no junction keeps a variable that none of its bonds sets. Parts without such junctions,
+/// and parts that cannot be drawn so, have the strokes that they have.
+pub fn by_hand(causal: &CausalGraph) -> Table<BondId, Stroke> {
+    let graph = &causal.graph;
+    let mut table = causal.strokes.clone();
+    let kept = kept_junctions(causal);
+    for members in parts(graph).iter().filter(|members| members.iter().any(|m| kept.contains(m))) {
+        let Some(strokes) = sequential(graph, members) else { continue };
+        for port in members.iter().flat_map(|&m| &graph.elements[m].ports) {
+            table[port.bond] = strokes[port.bond];
         }
     }
     table
@@ -185,6 +189,7 @@ fn resistors(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
 struct Relaxed<'a> {
     graph: &'a BondGraph,
     members: &'a [ElementId],
+    kept: &'a BTreeSet<ElementId>,
     laws: Vec<PortRef>,
 }
 
@@ -223,6 +228,8 @@ impl Relaxed<'_> {
     fn draw(&self, choice: &[bool]) -> Option<(Cost, Table<BondId, Stroke>)> {
         let graph = self.graph;
         let mut strokes = Strokes::new(graph);
+        let kept: Vec<ElementId> = self.members.iter().copied().filter(|m| self.kept.contains(m)).collect();
+        strokes.keep(&kept).ok()?;
         let outer = self.members.iter().filter(|&&m| !graph.elements[m].kind.is_inner());
         let ports: Vec<PortRef> = outer
             .flat_map(|&element| {
@@ -253,7 +260,7 @@ impl Relaxed<'_> {
         }
         let table = strokes.table();
         let drawn = |port: PortRef| strokes.at(port);
-        if !self.members.iter().all(|&m| in_order(graph, &drawn, m)) {
+        if !self.members.iter().all(|&m| is_drawn(graph, self.kept, &drawn, m)) {
             return None;
         }
         let derivative = local::roles(graph, self.members, &drawn).iter().filter(|p| p.role == Role::Dependent).count();

@@ -1,6 +1,6 @@
 //! What strokes say about a part without rings: every variable defined by its neighbours.
 
-use super::ports::imposes_effort;
+use super::ports::{Virtual, imposes_effort};
 use super::{Combination, PortState, Role};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
@@ -13,8 +13,15 @@ pub type Drawn<'a> = &'a dyn Fn(PortRef) -> Option<bool>;
 
 /// Definitions of the variables that junctions and two-ports set, one element at a time, and the moduli divided by.
 ///
-/// Triangular if no signal runs in a circle, which is so on trees.
-pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], drawn: Drawn) -> Definitions {
+/// The common variables of `kept` junctions are given, their reactions are what their bonds add up to. Triangular if no
+/// signal runs in a circle, which is so on trees.
+pub fn definitions(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    drawn: Drawn,
+    kept: &[Virtual],
+) -> Definitions {
     let mut all = Vec::new();
     let mut divisors = Vec::new();
     let one = x.int(1);
@@ -28,9 +35,18 @@ pub fn definitions(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], draw
         match graph.elements[element].kind {
             Kind::Zero | Kind::One => {
                 let zero = matches!(graph.elements[element].kind, Kind::Zero);
-                let strong = (0..ports.len()).find(|&i| at(i) == zero).expect("one bond determines a junction");
                 let common = |i: usize| if zero { pair(i).0 } else { pair(i).1 };
                 let summed = |i: usize| if zero { pair(i).1 } else { pair(i).0 };
+                if let Some(v) = kept.iter().find(|v| v.junction == element) {
+                    let all_common = (0..ports.len()).map(|i| (common(i), Combination(vec![(v.speed, one)])));
+                    all.extend(all_common);
+                    let sign = |i: usize| if ports[i].inward { 1 } else { -1 };
+                    let mut sum: Vec<(Symbol, Expr)> = (0..ports.len()).map(|i| (summed(i), x.int(sign(i)))).collect();
+                    sum.sort_by_key(|t| t.0);
+                    all.push((v.reaction, Combination(sum)));
+                    continue;
+                }
+                let strong = (0..ports.len()).find(|&i| at(i) == zero).expect("one bond determines a junction");
                 let mut sum = Vec::with_capacity(ports.len() - 1);
                 for i in (0..ports.len()).filter(|&i| i != strong) {
                     all.push((common(i), Combination(vec![(common(strong), one)])));

@@ -12,10 +12,12 @@ mod drawn;
 mod local;
 mod ports;
 mod rank;
+mod rules;
 pub mod signals;
 mod start_point;
 mod strokes;
 mod text;
+mod verify;
 
 use std::collections::BTreeMap;
 
@@ -25,10 +27,12 @@ use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
 pub use contradiction::warnings;
-pub use drawn::{as_drawn, resistors_first, without_constraints};
+pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};
 pub use ports::Virtual;
 pub(crate) use ports::{circuits, imposes_effort, rank_given};
 pub use rank::{Reach, StateRank, control_reach, observe_reach, state_rank};
+pub use rules::{in_order, kept_in, kept_junctions};
+pub use verify::verify;
 
 /// Where the causal stroke of a bond sits: at the end that the effort runs towards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,8 +47,9 @@ pub enum Stroke {
 
 /// A bond graph with its causality.
 ///
-/// Invariant: one bond sets the effort of each 0-junction, one the flow of each 1-junction, unless some of its strokes
-/// are `Undetermined`.
+/// Invariants (see [`verify`]): one bond sets the effort of each 0-junction, one the flow of each 1-junction, unless some
+/// of its strokes are `Undetermined`, or its variable is independent without a storage ([`Ports::virtual_speeds`]): then
+/// it is given from outside, as by a source, and no bond sets it.
 #[derive(Debug, Clone)]
 pub struct CausalGraph {
     /// The graph; its pool holds the expressions of this stage too.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::drawn::by_hand;
 use super::ports::{Wishes, solve_part};
 use super::signals::{NodeId, SignalGraph, signal_graph};
 use super::strokes::parts;
@@ -63,7 +64,7 @@ pub fn control_reach(causal: &CausalGraph, sources: &[ElementId]) -> Option<Reac
     }
     let freed = sources.iter().map(|&element| PortRef { element, port: 0 }).collect();
     let StateRank { order, rank, integral } = rank_of(x, graph, order(causal), &freed);
-    let signals = signal_graph(graph, &causal.strokes);
+    let signals = signal_graph(graph, &by_hand(causal));
     let starts = sources.iter().map(|&source| {
         let bond = graph.elements[source].ports[0].bond;
         match graph.elements[source].kind {
@@ -86,7 +87,7 @@ pub fn observe_reach(causal: &CausalGraph, outputs: &[Symbol]) -> Option<Reach> 
     let freed = outputs.iter().map(|&symbol| detect(&mut graph, symbol)).collect::<Option<_>>()?;
     let x = graph.exprs.clone();
     let StateRank { order, rank, integral } = rank_of(x, &graph, order(causal), &freed);
-    let signals = signal_graph(&causal.graph, &causal.strokes);
+    let signals = signal_graph(&causal.graph, &by_hand(causal));
     let mut tails = vec![Vec::new(); signals.node_count()];
     for v in 0..signals.node_count() {
         heads(&signals, v).into_iter().for_each(|w| tails[w].push(v));

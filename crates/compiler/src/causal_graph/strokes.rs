@@ -20,6 +20,8 @@ pub struct Strokes<'a> {
     /// Bonds at each element, those left out not counted.
     degree: Table<ElementId, u32>,
     left_out: BTreeSet<BondId>,
+    /// Junctions whose common variable comes from none of their bonds.
+    kept: BTreeSet<ElementId>,
     /// Bonds set or left out, in order.
     trail: Vec<BondId>,
 }
@@ -44,6 +46,7 @@ impl<'a> Strokes<'a> {
             degree: open.clone(),
             open,
             left_out: BTreeSet::new(),
+            kept: BTreeSet::new(),
             trail: Vec::new(),
         }
     }
@@ -63,6 +66,31 @@ impl<'a> Strokes<'a> {
     pub fn set_at(&mut self, port: PortRef, here: bool) -> Result<(), Conflict> {
         let (bond, inward) = self.end(port);
         self.set(bond, here == inward)
+    }
+
+    /// Takes the common variables of junctions as given from outside, as a source at each of them would, and sets all
+    /// that follows. On conflict nothing has changed.
+    pub fn keep(&mut self, junctions: &[ElementId]) -> Result<(), Conflict> {
+        let (mark, before) = (self.trail.len(), self.kept.clone());
+        self.kept.extend(junctions);
+        let result = self.propagate(junctions.to_vec());
+        if result.is_err() {
+            self.undo(mark);
+            self.kept = before;
+        }
+        result
+    }
+
+    /// Lets bonds set the common variables of these elements again.
+    pub fn release(&mut self, members: &[ElementId]) {
+        members.iter().for_each(|m| {
+            self.kept.remove(m);
+        });
+    }
+
+    /// The junctions among these elements whose common variable is given from outside.
+    pub fn kept(&self, members: &[ElementId]) -> Vec<ElementId> {
+        members.iter().copied().filter(|m| self.kept.contains(m)).collect()
     }
 
     /// Leaves a bond out: it carries what circulates, and says nothing about causality.
@@ -270,7 +298,14 @@ impl<'a> Strokes<'a> {
             (1, _) => Ok(Some(!sits_here)),
             _ => Err(Conflict::Element(element)),
         };
+        let none_of = |set: u32, sits_here: bool| match (set, open) {
+            (0, 0) => Ok(None),
+            (0, _) => Ok(Some(sits_here)),
+            _ => Err(Conflict::Element(element)),
+        };
         match self.graph.elements[element].kind {
+            Kind::Zero if self.kept.contains(&element) => none_of(here, false),
+            Kind::One if self.kept.contains(&element) => none_of(away, true),
             Kind::Zero => one_of(here, true),
             Kind::One => one_of(away, false),
             _ if ports < self.graph.elements[element].ports.len() as u32

@@ -4,7 +4,7 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{CausalGraph, Combination, Role, Stroke};
 use crate::algebra::{Expr, Exprs, PlainNames, ascii};
-use crate::bond_graph::{BondGraph, PortCausality, PortRef};
+use crate::bond_graph::{PortCausality, PortRef};
 use crate::ids::Id;
 
 impl Display for CausalGraph {
@@ -35,7 +35,7 @@ impl Display for CausalGraph {
             writeln!(
                 f,
                 "  {:<12} {role:<20} gives {}, takes {}",
-                port_name(graph, state.port),
+                graph.port_name(state.port),
                 x.name(state.input),
                 x.name(state.output)
             )?;
@@ -69,12 +69,4 @@ fn sum(x: &mut Exprs, combination: &Combination) -> String {
     }
     let e = combination.expr(x);
     ascii(x, e, &PlainNames(x))
-}
-
-fn port_name(graph: &BondGraph, port: PortRef) -> String {
-    let element = &graph.elements[port.element];
-    match element.ports[port.port as usize].name.as_str() {
-        "" => element.name.clone(),
-        own => format!("{}.{own}", element.name),
-    }
 }

@@ -10,7 +10,7 @@ use super::{CausalPaths, find_paths};
 use crate::algebra::Symbol;
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortRef, ResistorLaw};
 use crate::causal_graph::signals::{EdgeKind, NodeId, SignalGraph, signal_graph};
-use crate::causal_graph::{CausalGraph, Stroke};
+use crate::causal_graph::{CausalGraph, Stroke, kept_in};
 use crate::ids::Table;
 
 /// What was inverted for what, and what could not be.
@@ -121,6 +121,7 @@ fn way_of(graph: &BondGraph, port: PortRef, changed: &dyn Fn(BondId) -> bool) ->
 fn refusals(causal: &CausalGraph, inverted: &Inverted, eliminated: &BTreeSet<PortRef>) -> Vec<(PortRef, Refusal)> {
     let graph = &causal.graph;
     let signals = signal_graph(graph, &inverted.strokes);
+    let kept = kept_in(causal, &inverted.strokes);
     let mut refused = Vec::new();
     for port in graph.outer_ports() {
         let storage = matches!(graph.elements[port.element].kind, Kind::Inertance(_) | Kind::Compliance(_));
@@ -131,7 +132,7 @@ fn refusals(causal: &CausalGraph, inverted: &Inverted, eliminated: &BTreeSet<Por
             refused.push((port, Refusal::Dependent));
             continue;
         }
-        let mut turner = Turner { graph, strokes: inverted.strokes.clone() };
+        let mut turner = Turner { graph, kept: &kept, strokes: inverted.strokes.clone() };
         if !turner.is_integral(port) {
             continue;
         }
@@ -187,13 +188,4 @@ fn modulus_reading(graph: &BondGraph, signals: &SignalGraph, port: PortRef) -> O
     let own = [NodeId::effort(bond), NodeId::flow(bond)];
     let reading = signals.edges.iter().filter(|e| e.kind == EdgeKind::Modulation && own.contains(&e.from));
     reading.map(|e| e.element).find(|&e| graph.elements[e].kind.is_inner())
-}
-
-/// Names of storages, for messages: that of the element, with the port of a field.
-pub fn port_name(graph: &BondGraph, port: PortRef) -> String {
-    let element = &graph.elements[port.element];
-    match &element.ports[port.port as usize].name {
-        name if name.is_empty() => element.name.clone(),
-        name => format!("{}.{name}", element.name),
-    }
 }

@@ -7,10 +7,10 @@ use super::dependent::{dependent_ports, derivative_edges, gives_flow, has_state,
 use super::inverted::{Inverted, invert};
 use super::numeric::{Row, rank, sample};
 use crate::algebra::Exprs;
-use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortRef};
+use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortRef};
 use crate::causal_graph::break_set::break_set;
 use crate::causal_graph::signals::{EdgeKind, NodeId, SignalEdge, SignalGraph, signal_graph};
-use crate::causal_graph::{CausalGraph, Stroke};
+use crate::causal_graph::{CausalGraph, Stroke, kept_in, kept_junctions};
 use crate::ids::{Id, Table};
 
 /// Numbers of differential and algebraic equations.
@@ -35,9 +35,10 @@ pub struct Counts {
 pub fn counts(causal: &CausalGraph, paths: &CausalPaths) -> Counts {
     let breaks: usize = paths.components.iter().map(|component| component.breaks.len()).sum();
     let multipliers = multipliers(&causal.graph, &causal.strokes);
+    let speeds = kept_junctions(causal).len();
     let break_form = Count {
         differential: state_ports(&causal.graph).len(),
-        algebraic: paths.dependent.len() + breaks + multipliers,
+        algebraic: paths.dependent.len() + breaks + multipliers + speeds,
     };
     Counts { break_form, inverted: inverted_count(causal, paths, multipliers) }
 }
@@ -69,8 +70,10 @@ fn inverted_count(causal: &CausalGraph, paths: &CausalPaths, multipliers: usize)
     let breaks: Vec<NodeId> = set.vertices.iter().map(|&v| NodeId::new(v)).collect();
     let eliminated = eliminated(graph, &paths.dependent, &inverted, &signals);
     let kept: Vec<PortRef> = state_ports(graph).into_iter().filter(|place| !eliminated.contains(place)).collect();
-    let equations = kept.len() + breaks.len() + multipliers;
-    let mut system = System { graph, columns: kept.iter().copied().zip(0..).collect(), exprs: graph.exprs.clone() };
+    let speeds: Vec<ElementId> = kept_in(causal, &inverted.strokes).into_iter().collect();
+    let equations = kept.len() + breaks.len() + multipliers + speeds.len();
+    let columns = kept.iter().copied().zip(0..).collect();
+    let mut system = System { graph, columns, speeds, exprs: graph.exprs.clone() };
     let rates = system.dependent_rates(causal, &inverted, &signals, &eliminated, paths);
     let differential = rank(system.rows(&signals, &breaks, &kept, &rates));
     Count { differential, algebraic: equations - differential }
@@ -95,10 +98,12 @@ fn eliminated(graph: &BondGraph, before: &[PortRef], inverted: &Inverted, signal
     dependent_ports(graph, &inverted.strokes).into_iter().filter(ours).collect()
 }
 
-/// What multiplies the derivatives of the kept storages' co-energy variables, one column each.
+/// What multiplies the derivatives of the kept storages' co-energy variables, then of the variables that junctions keep
+/// without a storage, one column each.
 struct System<'a> {
     graph: &'a BondGraph,
     columns: BTreeMap<PortRef, usize>,
+    speeds: Vec<ElementId>,
     exprs: Exprs,
 }
 
@@ -113,7 +118,10 @@ impl System<'_> {
     ) -> Vec<Row> {
         let cut: BTreeSet<NodeId> = breaks.iter().copied().collect();
         let nodes = |place: &PortRef| storage_nodes(self.graph, *place);
-        let wanted: Vec<NodeId> = kept.iter().map(nodes).flat_map(|(z, rate)| [z, rate]).chain(cut.clone()).collect();
+        let reactions: Vec<Vec<(NodeId, f64)>> = self.speeds.iter().map(|&j| self.reaction(j)).collect();
+        let storages = kept.iter().map(nodes).flat_map(|(z, rate)| [z, rate]);
+        let wanted: Vec<NodeId> =
+            storages.chain(cut.clone()).chain(reactions.iter().flatten().map(|term| term.0)).collect();
         let sources = self.rate_sources(signals, rates);
         let arriving = self.propagate(signals, &sources, &cut, &wanted, false);
         let integrals = incoming(signals, EdgeKind::Integral);
@@ -132,7 +140,21 @@ impl System<'_> {
             rows.push(row);
         }
         rows.extend(breaks.iter().map(|node| arriving.get(node).cloned().unwrap_or_default()));
+        for terms in reactions {
+            let mut row = Row::new();
+            for (node, sign) in terms {
+                arriving.get(&node).into_iter().for_each(|from| add(&mut row, from, sign));
+            }
+            rows.push(row);
+        }
         rows
+    }
+
+    /// What the bonds of a junction add up to, where the junction keeps its variable without a storage.
+    fn reaction(&self, junction: ElementId) -> Vec<(NodeId, f64)> {
+        let element = &self.graph.elements[junction];
+        let sign = |inward: bool| if inward { 1.0 } else { -1.0 };
+        element.ports.iter().map(|p| (common(&element.kind, p.bond).conjugate(), sign(p.inward))).collect()
     }
 
     /// What storages in derivative causality set: their inertance or compliance times the rate of their co-energy.
@@ -159,6 +181,10 @@ impl System<'_> {
         let unit =
             |(place, column): (&PortRef, &usize)| (storage_nodes(self.graph, *place).0, Row::from([(*column, 1.0)]));
         let mut rates: BTreeMap<NodeId, Row> = self.columns.iter().map(unit).collect();
+        for (&junction, column) in self.speeds.iter().zip(self.columns.len()..) {
+            let Element { kind, ports, .. } = &self.graph.elements[junction];
+            rates.extend(ports.iter().map(|p| (common(kind, p.bond), Row::from([(column, 1.0)]))));
+        }
         let (drawn, turned): (Vec<PortRef>, Vec<PortRef>) =
             eliminated.iter().partition(|place| !inverted.ports.contains(place) && paths.dependent.contains(place));
         let before = signal_graph(self.graph, &causal.strokes);
@@ -229,6 +255,11 @@ fn incoming(signals: &SignalGraph, kind: EdgeKind) -> BTreeMap<NodeId, Vec<&Sign
         edges.entry(edge.to).or_default().push(edge);
     }
     edges
+}
+
+/// The common variable of a junction at one of its bonds.
+fn common(kind: &Kind, bond: BondId) -> NodeId {
+    if matches!(kind, Kind::Zero) { NodeId::effort(bond) } else { NodeId::flow(bond) }
 }
 
 /// Co-energy variable and rate of a storage port.

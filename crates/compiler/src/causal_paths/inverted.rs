@@ -10,7 +10,7 @@ use super::dependent::{derivative_edges, gives_flow, shortest_of};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Port, PortRef};
 use crate::causal_graph::break_set::{count, cyclic_components};
 use crate::causal_graph::signals::{EdgeKind, NodeId, SignalGraph, signal_graph};
-use crate::causal_graph::{CausalGraph, Stroke};
+use crate::causal_graph::{CausalGraph, Stroke, in_order, kept_junctions};
 use crate::ids::{Id, Table};
 
 /// Work allowed: bonds looked at in all tries together.
@@ -36,7 +36,8 @@ pub fn invert(causal: &CausalGraph) -> Inverted {
     let signals = signal_graph(graph, &causal.strokes);
     let mut best = Inverted { strokes: causal.strokes.clone(), ports: Vec::new() };
     let mut score = score_of(graph, &best);
-    let mut tries = Tries { graph, start: &causal.strokes, left: BUDGET };
+    let kept = kept_junctions(causal);
+    let mut tries = Tries { graph, kept: &kept, start: &causal.strokes, left: BUDGET };
     let mut wanted = BTreeSet::new();
     for ring in rings(graph, &causal.strokes, &signals) {
         if score.0 == 0 {
@@ -120,6 +121,7 @@ fn distances(n: usize, from: &[usize], next: impl Fn(usize) -> Vec<usize>) -> BT
 /// Tries sets of storages, within a budget.
 struct Tries<'a> {
     graph: &'a BondGraph,
+    kept: &'a BTreeSet<ElementId>,
     start: &'a Table<BondId, Stroke>,
     left: usize,
 }
@@ -128,7 +130,7 @@ impl Tries<'_> {
     /// Inverts as many of the wanted storages as can be; `None` when the budget is spent.
     fn attempt(&mut self, wanted: &BTreeSet<PortRef>) -> Option<(Inverted, Score)> {
         self.spend(1)?;
-        let mut turner = Turner { graph: self.graph, strokes: self.start.clone() };
+        let mut turner = Turner { graph: self.graph, kept: self.kept, strokes: self.start.clone() };
         for &place in wanted {
             let open = |end: PortRef, turner: &Turner| {
                 turner.is_resistor(end) || wanted.contains(&end) && turner.is_integral(end)
@@ -159,7 +161,7 @@ impl Tries<'_> {
                     if place == end || self.spend(1).is_none() {
                         continue;
                     }
-                    let mut turner = Turner { graph: self.graph, strokes: found.strokes.clone() };
+                    let mut turner = Turner { graph: self.graph, kept: self.kept, strokes: found.strokes.clone() };
                     if !turner.turn(place, |other, _| other == end) {
                         continue;
                     }
@@ -204,6 +206,8 @@ impl Tries<'_> {
 /// Turns strokes along a way through the junction structure, so that every junction and two-port stays in order.
 pub(super) struct Turner<'a> {
     pub graph: &'a BondGraph,
+    /// Junctions that no bond sets.
+    pub kept: &'a BTreeSet<ElementId>,
     pub strokes: Table<BondId, Stroke>,
 }
 
@@ -296,18 +300,12 @@ impl Turner<'_> {
         in_order
     }
 
-    /// Whether a junction has one setter, a transformer hands through, a gyrator turns round.
     fn in_order(&self, element: ElementId) -> bool {
+        let kept = self.kept.contains(&element);
         let element = &self.graph.elements[element];
         let into = element.ports.iter().filter(|port| self.effort_in(port) == Some(true)).count();
         let out = element.ports.iter().filter(|port| self.effort_in(port) == Some(false)).count();
-        match element.kind {
-            Kind::Zero => into == 1,
-            Kind::One => out == 1,
-            Kind::Transformer { .. } => into == 1 && out == 1,
-            Kind::Gyrator { .. } => into != 1,
-            _ => true,
-        }
+        in_order(&element.kind, into, out, kept)
     }
 }
 

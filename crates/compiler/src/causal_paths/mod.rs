@@ -11,7 +11,7 @@ pub(crate) mod numeric;
 mod text;
 mod trace;
 
-pub use certificate::{Certificate, Opened, Refusal, certificate, port_name};
+pub use certificate::{Certificate, Opened, Refusal, certificate};
 pub use counts::{Count, Counts, counts, eliminated_ports};
 pub use inverted::{Inverted, invert};
 

@@ -2,7 +2,7 @@
 
 use super::{CausalPaths, Component, Path};
 use crate::algebra::{Expr, PlainNames, Symbol, ascii};
-use crate::bond_graph::{BondGraph, ElementId, PortRef};
+use crate::bond_graph::{BondGraph, ElementId};
 use crate::causal_graph::CausalGraph;
 
 impl CausalPaths {
@@ -15,7 +15,7 @@ impl CausalPaths {
             text.push_str("  there are more: shown is one for every break variable and for every dependent storage\n");
         }
         section(&mut text, "components", self.components.iter().map(|component| shown.component(component)));
-        section(&mut text, "derivative storages", self.dependent.iter().map(|place| shown.port(*place)));
+        section(&mut text, "derivative storages", self.dependent.iter().map(|&place| causal.graph.port_name(place)));
         text
     }
 }
@@ -78,13 +78,5 @@ impl Shown<'_> {
 
     fn expr(&self, e: Expr) -> String {
         ascii(&self.paths.exprs, e, &PlainNames(&self.paths.exprs))
-    }
-
-    fn port(&self, place: PortRef) -> String {
-        let element = &self.graph.elements[place.element];
-        match element.ports[place.port as usize].name.as_str() {
-            "" => element.name.clone(),
-            own => format!("{}.{own}", element.name),
-        }
     }
 }

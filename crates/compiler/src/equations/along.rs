@@ -2,8 +2,8 @@
 //! which unknowns are left. Source: `method.md`, sections 3 and 4.
 
 use super::definitions::{Definition, Definitions};
-use super::minimal::{Assembled, Cell, Later};
-use super::{Cause, Unavailable};
+use super::minimal::{Assembled, Cell, Chosen, Later};
+use super::{Cause, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{Kind, PortRef};
 use crate::causal_graph::{CausalGraph, Role};
@@ -28,10 +28,12 @@ pub struct Closure {
     pub residual: Expr,
 }
 
-/// Writes down what defines every variable, with every storage that `treat` does not eliminate as a state.
+/// Writes down what defines every variable, with every storage that `treat` does not eliminate as a state. Independent
+/// variables without a storage are unknowns, or if `speeds` is `Free` states with a free rate.
 pub fn assemble_all<'a>(
     causal: &'a CausalGraph,
     treat: &dyn Fn(PortRef) -> Treatment,
+    speeds: Treatment,
 ) -> Result<(Assembled<'a>, Vec<Closure>), (Symbol, Unavailable)> {
     let graph = &causal.graph;
     let mut d = Definitions::new(graph.exprs.clone(), graph);
@@ -45,7 +47,7 @@ pub fn assemble_all<'a>(
     let mut assembled = Assembled::empty(d);
     assembled.imposed_and_algebraic(causal);
     let mut closures = assembled.all_storages(causal, treat);
-    closures.extend(assembled.virtual_speeds(causal));
+    closures.extend(assembled.virtual_speeds(causal, speeds));
     assembled.signals();
     assembled.rates()?;
     assembled.d.define_user_rates();
@@ -105,21 +107,31 @@ impl<'a> Assembled<'a> {
         let residual = self.relation(cell)?;
         self.independent(cell);
         // By its speed: the bond carries the rate of the stored quantity, whatever the rate of the speed is.
-        if let Some(Later::Speed { rate, stored, bond, .. }) = self.later.pop_if(|l| l.is_speed_of(cell.z)) {
-            self.later.push(Later::Free { rate, stored, bond });
+        if let Some(Later::Speed { stored, bond, .. }) = self.later.pop_if(|l| l.is_speed_of(cell.z)) {
+            self.later.push(Later::Free { stored, bond });
         }
         self.d.free.insert(self.d.states.get(&cell.z).copied().unwrap_or(cell.rate));
         Some(Closure { unknown: None, residual })
     }
 
-    /// Independent variables without a storage: unknown, with a reaction that vanishes.
-    fn virtual_speeds(&mut self, causal: &CausalGraph) -> Vec<Closure> {
+    /// Independent variables without a storage: they, or their rates, are unknown, and their reactions vanish.
+    fn virtual_speeds(&mut self, causal: &CausalGraph, treatment: Treatment) -> Vec<Closure> {
         let mut closures = Vec::new();
         for v in &causal.ports.virtual_speeds {
             let residual = self.d.x.sym(v.reaction);
-            self.d.free.insert(v.speed);
-            closures.push(Closure { unknown: Some((v.speed, Cause::Multiplier(v.junction))), residual });
+            let unknown = if treatment == Treatment::Free {
+                let rate = self.d.state(v.speed);
+                self.d.free.insert(rate);
+                let kind = StateKind::Storage(Some(v.junction));
+                self.states.push(Chosen { symbol: v.speed, kind, meaning: None, tracked: v.speed });
+                None
+            } else {
+                self.d.free.insert(v.speed);
+                Some((v.speed, Cause::Multiplier(v.junction)))
+            };
+            closures.push(Closure { unknown, residual });
         }
+        self.sort_states();
         closures
     }
 

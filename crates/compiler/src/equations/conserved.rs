@@ -107,7 +107,7 @@ fn replace(
         terms.push(assembled.d.x.mul(&[factor, balances[b].quantity]));
     }
     let value = assembled.d.x.add(&terms);
-    let symbol = assembled.d.x.symbol(&format!("K{number}"), Default::default());
+    let symbol = assembled.d.x.fresh(&format!("K{number}"), Default::default());
     let constant = assembled.d.x.sym(symbol);
     let residual = assembled.d.x.sub(value, constant);
     for &(b, _) in vector.iter().rev() {

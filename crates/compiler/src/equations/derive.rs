@@ -9,6 +9,7 @@ use super::definitions::Definitions;
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::stiff::parameters;
+use super::verify::verify;
 use super::{
     Algebraic, BreakBound, Conserved, Equations, Form, Relations, State, StateKind, Step, Unavailable, conserved,
     display, domains, index, observed, relations,
@@ -27,13 +28,15 @@ use crate::unit::Unit;
 /// Errors: a rate of an input is needed that nobody gives (E001), a loop of variables has no unique solution (E002).
 /// Source: `method.md`, sections 4 and 5.
 pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
-    match form {
+    let equations = match form {
         Form::Minimal | Form::Kane => minimal(causal, form),
         Form::Inverted => inverted(causal),
         Form::Break | Form::Relaxed => classical(causal, form),
         Form::Lagrange => lagrange(causal),
         Form::Stiff => stiff(causal),
-    }
+    }?;
+    debug_assert_eq!(verify(&equations), Ok(()), "{} in form {form:?}", causal.graph.name);
+    Ok(equations)
 }
 
 /// Independent variables alone: one explicit equation each.
@@ -51,7 +54,7 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
 /// All storages along the strokes, dependent ones with multipliers.
 fn classical(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let strokes = if form == Form::Relaxed { resistors_first(causal) } else { causal.strokes.clone() };
-    along(causal, &strokes, form, &|_| Treatment::Multiplier)
+    along(causal, &strokes, form, &|_| Treatment::Multiplier, Treatment::Multiplier)
 }
 
 /// All storages, those on zero-order paths in derivative causality.
@@ -59,8 +62,8 @@ fn inverted(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
     let inverted = invert(causal);
     let gone = eliminated_ports(causal, &inverted);
     let treat = |port| if gone.contains(&port) { Treatment::Eliminated } else { Treatment::Free };
-    let mut equations = along(causal, &inverted.strokes, Form::Inverted, &treat)
-        .or_else(|_| along(causal, &inverted.strokes, Form::Inverted, &|_| Treatment::Free))?;
+    let form = |treat, speeds| along(causal, &inverted.strokes, Form::Inverted, treat, speeds);
+    let mut equations = form(&treat, Treatment::Free).or_else(|_| form(&|_| Treatment::Free, Treatment::Multiplier))?;
     equations.certificate = Some(certificate(causal, &inverted));
     Ok(equations)
 }
@@ -70,11 +73,12 @@ fn along(
     strokes: &Table<BondId, Stroke>,
     form: Form,
     treat: &dyn Fn(PortRef) -> Treatment,
+    speeds: Treatment,
 ) -> Result<Equations, Diagnostics> {
     let drawn = as_drawn(causal, strokes);
     let graph = &drawn.graph;
-    let (mut assembled, mut closures) =
-        assemble_all(&drawn, treat).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
+    let (mut assembled, mut closures) = assemble_all(&drawn, treat, speeds)
+        .map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     closures.extend(assembled.open_laws(&drawn));
     let d = &mut assembled.d;
     let rates: BTreeSet<Symbol> = assembled.states.iter().map(|s| d.states[&s.symbol]).collect();
@@ -104,7 +108,7 @@ fn stiff(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
 
 fn constrained(open: &CausalGraph) -> Result<(Assembled<'_>, Vec<Closure>), Diagnostics> {
     let graph = &open.graph;
-    let (mut assembled, mut closures) = assemble_all(open, &|_| Treatment::Multiplier)
+    let (mut assembled, mut closures) = assemble_all(open, &|_| Treatment::Multiplier, Treatment::Multiplier)
         .map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     closures.extend(assembled.open_constraints(open));
     Ok((assembled, closures))

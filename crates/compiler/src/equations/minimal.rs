@@ -55,7 +55,7 @@ pub(super) enum Later {
     /// The rate of a dependent storage follows by differentiating what defines its stored quantity.
     Dependent { rate: Symbol, stored: Symbol },
     /// The rate of the state is free: the bond carries the rate of `X`.
-    Free { rate: Symbol, stored: Expr, bond: Symbol },
+    Free { stored: Expr, bond: Symbol },
     /// `pi' = structure + S'^T X_d`.
     Momentum { rate: Symbol, structure: Expr, followers: Vec<Follower>, z: Symbol },
 }
@@ -482,8 +482,9 @@ impl<'a> Assembled<'a> {
         }
         for cell in group.iter().filter(|c| c.state.role == Role::Independent) {
             let followers = self.followers(cell.z, group);
-            let element = cell.state.port.element;
-            let (sum, state) = self.momentum_state(Some(cell.stored), cell.z, cell.rate, element, followers);
+            let (port, graph) = (cell.state.port, self.d.graph);
+            let place = (port.element, graph.port_name(port));
+            let (sum, state) = self.momentum_state(Some(cell.stored), cell.z, cell.rate, place, followers);
             let own = self.d.x.sub(state, sum);
             self.d.set(cell.stored, own);
             match cell.law {
@@ -496,7 +497,8 @@ impl<'a> Assembled<'a> {
         }
         for v in speeds {
             let followers = self.followers(v.speed, group);
-            let (sum, state) = self.momentum_state(None, v.speed, v.reaction, v.junction, followers);
+            let place = (v.junction, self.d.graph.elements[v.junction].name.clone());
+            let (sum, state) = self.momentum_state(None, v.speed, v.reaction, place, followers);
             let residual = self.d.x.sub(state, sum);
             self.d.set_root(v.speed, residual);
         }
@@ -518,17 +520,16 @@ impl<'a> Assembled<'a> {
         }
     }
 
-    /// Declares the state `pi` with its rate; gives `Σ S X_d` and `pi` as expressions.
+    /// Declares the state `pi` of a port or junction, with its rate; gives `Σ S X_d` and `pi` as expressions.
     fn momentum_state(
         &mut self,
         stored: Option<Symbol>,
         z: Symbol,
         rate: Symbol,
-        element: ElementId,
+        (element, place): (ElementId, String),
         followers: Vec<Follower>,
     ) -> (Expr, Expr) {
-        let name = format!("{}.pi", self.d.graph.elements[element].name);
-        let pi = self.d.x.symbol(&name, Default::default());
+        let pi = self.d.x.fresh(&format!("{place}.pi"), Default::default());
         let state = self.d.x.sym(pi);
         self.balance(pi, state, rate, &[]);
         if let Some(balance) = self.balances.last_mut() {
@@ -600,8 +601,8 @@ impl Assembled<'_> {
                     let residual = d.x.sub(change, bond);
                     d.of.insert(rate, Definition::Implicit(residual));
                 }
-                Later::Free { rate, stored, bond } => {
-                    let change = d.rate(stored).map_err(|reason| (rate, reason))?;
+                Later::Free { stored, bond } => {
+                    let change = d.rate(stored).map_err(|reason| (bond, reason))?;
                     d.set(bond, change);
                 }
                 Later::Dependent { rate, stored } => {

@@ -18,6 +18,7 @@ mod places;
 mod relations;
 mod stiff;
 mod text;
+mod verify;
 
 use std::collections::BTreeSet;
 
@@ -39,6 +40,7 @@ pub use text::{
     Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
     print_sides, print_symbol,
 };
+pub use verify::verify;
 
 /// Equations in evaluation order.
 ///

@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::Closure;
+use super::breaks::name_of;
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
 use super::{Cause, StateKind};
@@ -162,9 +163,9 @@ impl Assembled<'_> {
         let k = d.x.mul(&[stiffness, rate, rate, inertia]);
         let c = d.x.mul(&[two, damping, root, rate, inertia]);
         let relation = if along { relation } else { d.x.neg(relation) };
-        let name = format!("{}.spring", d.graph.elements[element].name);
-        let taken = d.x.find_symbol(&name).is_some();
-        let spring = d.x.symbol(&if taken { format!("{name}*") } else { name }, Facts::default());
+        let carried = name_of(d, multiplier);
+        let place = carried.rsplit_once('.').map_or(carried.as_str(), |(place, _)| place);
+        let spring = d.x.fresh(&format!("{place}.spring"), Facts::default());
         let force = d.x.sym(spring);
         let damped = d.x.mul(&[c, relation]);
         let carried = d.x.add(&[force, damped]);

@@ -10,7 +10,7 @@ use crate::algebra::{
     unicode_name,
 };
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
-use crate::causal_paths::{Refusal, port_name};
+use crate::causal_paths::Refusal;
 
 /// A way of writing equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,10 +112,10 @@ pub fn print_certificate(shown: &Shown) -> Vec<String> {
     let mut lines = Vec::new();
     for opened in &certificate.inverted {
         let paths: Vec<String> = opened.paths.iter().map(|(c, list)| format!("class {c} {}", names(list))).collect();
-        lines.push(format!("{} is inverted: it opens {}", port_name(graph, opened.port), paths.join(", ")));
+        lines.push(format!("{} is inverted: it opens {}", graph.port_name(opened.port), paths.join(", ")));
     }
     for &port in &certificate.eliminated {
-        lines.push(format!("{} follows from the others", port_name(graph, port)));
+        lines.push(format!("{} follows from the others", graph.port_name(port)));
     }
     for &symbol in &certificate.left {
         let name =
@@ -129,7 +129,7 @@ pub fn print_certificate(shown: &Shown) -> Vec<String> {
             }
             _ => String::new(),
         };
-        lines.push(format!("{} stays as it is: {why}{element}", port_name(graph, *port)));
+        lines.push(format!("{} stays as it is: {why}{element}", graph.port_name(*port)));
     }
     lines
 }

@@ -61,6 +61,7 @@ pub fn empty(name: &str) -> BondGraph {
         variables: Map::from([(time, Variable { meaning: Meaning::Time, unit: None })]),
         elements: Table::new(),
         bonds: Table::new(),
+        common: Default::default(),
         parameters: Table::new(),
         inputs: Table::new(),
         signals: Table::new(),

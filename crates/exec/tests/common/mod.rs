@@ -128,6 +128,7 @@ impl Sketch {
             variables: Map::new(),
             elements: self.elements,
             bonds: Table::new(),
+            common: Default::default(),
             parameters: self.parameters.into_iter().collect(),
             inputs: self.inputs.into_iter().collect(),
             signals: Table::new(),

@@ -8,7 +8,7 @@ use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Form, StateKind, derive_equations};
 use halfarrow_compiler::program::{Unavailable, schedule};
-use halfarrow_compiler::{ast, bond_graph, causal_graph};
+use halfarrow_compiler::{ast, bond_graph, causal_graph, equations};
 use halfarrow_exec::{Model, StartError};
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Failure, Method, Options, Sink, System, simulate};
@@ -105,10 +105,17 @@ fn build(text: &str, constant: bool) -> Result<Outcome, Fault> {
         Err(faults) => return Ok(Outcome::Refused { stage: "causality", faults }),
     };
     let _ = causal_graph::warnings(&causal);
+    let drawn = bond_graph::verify(&graph).and_then(|()| causal_graph::verify(&causal));
+    if let Err(why) = drawn {
+        return fault("stroke rules", why);
+    }
     let equations = match derive_equations(&causal, Form::Minimal) {
         Ok(equations) => equations,
         Err(faults) => return Ok(Outcome::Refused { stage: "equations", faults }),
     };
+    if let Err(why) = equations::verify(&equations) {
+        return fault("names and symbols", why);
+    }
     let states = equations.states.iter().filter(|s| s.kind != StateKind::Signal).count();
     let (conserved, dof) = (equations.conserved.len(), equations.dof);
     match Model::new(schedule(&equations)) {

@@ -3,7 +3,6 @@
 use halfarrow_compiler::algebra::{Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, Meaning};
 use halfarrow_compiler::causal_graph::{CausalGraph, Reach, control_reach, observe_reach};
-use halfarrow_compiler::causal_paths::port_name;
 use halfarrow_exec::Linearised;
 use serde::Serialize;
 
@@ -65,7 +64,7 @@ impl Model {
 }
 
 fn report(causal: &CausalGraph, order: usize, rank: Option<usize>, reach: Option<Reach>, why: String) -> ReachReport {
-    let names = |ports: &[_]| ports.iter().map(|&port| port_name(&causal.graph, port)).collect();
+    let names = |ports: &[_]| ports.iter().map(|&port| causal.graph.port_name(port)).collect();
     let Some(reach) = reach else {
         let nothing = ReachReport {
             order,

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use halfarrow_compiler::bond_graph::{BondGraph, Kind, PortCausality, PortRef, ResistorLaw};
 use halfarrow_compiler::causal_graph::{CausalGraph, PortState, Role};
-use halfarrow_compiler::causal_paths::port_name;
 
 use crate::loops::LoopsReport;
 
@@ -49,13 +48,7 @@ fn one(causal: &CausalGraph, loops: &LoopsReport, state: &PortState, on_paths: &
         _ => ("-".to_string(), String::new()),
     };
     let why = if forced { format!("forced by the model; {why}") } else { why };
-    Decided {
-        name: port_name(graph, state.port),
-        kind: element.kind.word(),
-        law: element.label.clone(),
-        causality,
-        why,
-    }
+    Decided { name: graph.port_name(state.port), kind: element.kind.word(), law: element.label.clone(), causality, why }
 }
 
 fn given(kind: &Kind) -> (String, String) {
@@ -73,7 +66,7 @@ fn given(kind: &Kind) -> (String, String) {
 }
 
 fn storage(graph: &BondGraph, loops: &LoopsReport, port: PortRef, role: Role) -> (String, String) {
-    let name = port_name(graph, port);
+    let name = graph.port_name(port);
     let told = loops.storages.iter().find(|s| s.name == name);
     let causality = told.map_or("-", |s| s.causality).to_string();
     let own = graph.storage_symbols(port).map(|(co_energy, _)| co_energy);

@@ -1,0 +1,55 @@
+//! What holds of all equations that this stage gives; a breach is our fault, not the modeller's.
+
+use std::collections::BTreeSet;
+
+use super::{Equations, Step};
+use crate::algebra::Symbol;
+
+/// Checks the invariants of [`Equations`]: every unknown has a name and a symbol of its own, what can be recorded has
+/// one meaning a name, nothing is defined twice or both unknown and defined, and there are as many residuals as unknowns
+/// that no step gives a rate.
+///
+/// # Errors
+/// The first breach, in words for us.
+pub fn verify(equations: &Equations) -> Result<(), String> {
+    names(equations)?;
+    symbols(equations)?;
+    let open = equations.states.iter().filter(|s| !equations.steps.iter().any(|step| step.defines(s.rate))).count();
+    let (unknown, vanish) = (open + equations.algebraic.len(), equations.residuals.len());
+    if unknown != vanish {
+        return Err(format!("{vanish} expressions vanish for {unknown} unknowns"));
+    }
+    Ok(())
+}
+
+fn names(equations: &Equations) -> Result<(), String> {
+    let states = equations.states.iter().map(|s| &s.name);
+    let unknowns = states.chain(equations.algebraic.iter().map(|a| &a.name));
+    once(unknowns, |name| format!("two unknowns are called `{name}`"))?;
+    once(equations.conserved.iter().map(|c| &c.name), |name| format!("two constants are called `{name}`"))?;
+    once(equations.observed.iter().map(|o| &o.name), |name| format!("two variables are called `{name}`"))
+}
+
+fn symbols(equations: &Equations) -> Result<(), String> {
+    let name = |s: &Symbol| format!("`{}` is unknown or defined twice", equations.graph.exprs.name(*s));
+    let conserved = equations.conserved.iter().map(|c| c.symbol);
+    let defined = equations.steps.iter().flat_map(Step::defined);
+    let all: Vec<Symbol> = equations.unknowns().into_iter().chain(conserved).chain(defined).collect();
+    once(all.iter(), name)
+}
+
+fn once<'a, T: Ord + 'a>(all: impl Iterator<Item = &'a T>, breach: impl Fn(&T) -> String) -> Result<(), String> {
+    let mut seen = BTreeSet::new();
+    all.into_iter().find(|one| !seen.insert(*one)).map_or(Ok(()), |again| Err(breach(again)))
+}
+
+impl Step {
+    /// The symbols that the step defines; the body of an iteration is written out after it once more.
+    fn defined(&self) -> Vec<Symbol> {
+        match self {
+            Step::Assign { symbol, .. } => vec![*symbol],
+            Step::Linear { unknowns, .. } | Step::Newton { unknowns, .. } => unknowns.clone(),
+            Step::Watch { .. } => Vec::new(),
+        }
+    }
+}
