@@ -51,12 +51,12 @@ pub struct Miss {
 /// A model that records for the audit what it hands out no one else.
 pub struct Audited<'a, M> {
     model: &'a mut M,
-    book: Book<'a>,
+    book: Book,
 }
 
 /// What is recorded.
-struct Book<'a> {
-    auditor: Auditor<'a>,
+struct Book {
+    auditor: Auditor,
     parameters: BTreeMap<String, f64>,
     names: Vec<String>,
     times: Vec<f64>,
@@ -74,7 +74,7 @@ struct Book<'a> {
 
 impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// Audits what `model` computes; what it records stays what it is.
-    pub fn new(model: &'a mut M, graph: &'a BondGraph) -> Audited<'a, M> {
+    pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked: Vec<String> = model.recorded().iter().map(|&i| observed[i].name.clone()).collect();
         let available = |name: &String| observed.iter().any(|o| o.name == *name && o.value.is_ok());
@@ -155,7 +155,7 @@ impl Parameters for exec::ImplicitModel {
 /// What has grown this many times over the run before grows without bound.
 const GROWN: f64 = 1e3;
 
-impl Book<'_> {
+impl Book {
     /// Keeps the values just observed at `t`.
     fn keep(&mut self, t: f64) -> Result<(), Failure> {
         if let Some(what) = self.not_finite() {

@@ -155,7 +155,7 @@ impl Model {
             }
             Err(error) => return Err(error),
         };
-        if let Some((compared, _)) = &comparison {
+        if let Some(Ok((compared, _))) = &comparison {
             page.refused = compared.refused();
         }
         progress(0.8, "drawing");
