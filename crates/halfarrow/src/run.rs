@@ -335,6 +335,12 @@ impl Model {
         match error {
             StartError::Failure(failure) => self.stopped(failure),
             StartError::Conflict(conflict) => self.fault(conflict_diagnostic(&conflict).into()),
+            StartError::NoNumber { value, span, .. } => {
+                let d = Diagnostic::error(codes::I005, error.to_string(), span, format!("this comes to {value}"));
+                self.fault(
+                    d.hint("look for a root or a logarithm of what is below zero, or for a division by zero").into(),
+                )
+            }
             StartError::NotFound(_) => {
                 let span = halfarrow_compiler::span::Span::default();
                 let d = Diagnostic::error(codes::I004, error.to_string(), span, "in this model");

@@ -205,7 +205,13 @@ impl Reach {
     }
     fn slope(&self, th: &[f64], i: usize) -> f64 {
         let last = th.len() - 1;
-        let cross = if i == 0 { th[last] } else if i == last { th[0] } else { 0.0 };
+        let cross = if i == 0 {
+            th[last]
+        } else if i == last {
+            th[0]
+        } else {
+            0.0
+        };
         self.a[i] * (th[i] + self.b[i]).cos() + self.c * cross
     }
     fn slope_text(&self, n: usize, i: usize) -> String {
@@ -214,8 +220,7 @@ impl Reach {
         format!("{:?}*cos(th{i} + {:?}){cross}", self.a[i], self.b[i])
     }
     fn text(&self, n: usize) -> String {
-        let terms: Vec<String> =
-            (0..n).map(|i| format!("{:?}*sin(th{i} + {:?})", self.a[i], self.b[i])).collect();
+        let terms: Vec<String> = (0..n).map(|i| format!("{:?}*sin(th{i} + {:?})", self.a[i], self.b[i])).collect();
         format!("{} + {:?}*th0*th{}", terms.join(" + "), self.c, n - 1)
     }
 }
@@ -270,4 +275,138 @@ fn random_mechanisms_rest_where_their_relations_hold() {
             assert!(left.abs() < 1e-9, "{text}torque {i} is left: {left}");
         }
     }
+}
+
+/// The words of the fault that a model has at its start.
+fn fault_at_start(text: &str) -> String {
+    match model(text).simulate(&Run { to: 1e-9, ..Run::default() }, &mut |_| true) {
+        Err(error @ Error::Model(_)) => error.render(false),
+        Err(other) => panic!("{}", other.render(false)),
+        Ok(done) => panic!("{:?}", done.trace.columns.iter().map(|c| (&c.name, c.values[0])).collect::<Vec<_>>()),
+    }
+}
+
+const FORMS: [Form; 4] = [Form::Minimal, Form::Kane, Form::Break, Form::Lagrange];
+
+/// Storages that start from something, beside others of which nothing is said: those are empty, in every form.
+#[test]
+fn freedom_is_zero_in_the_storages() {
+    let given_first = "model GivenFirst
+1:n -> C:C1(k = 2, q0 = 1)
+n -> C:C2(k = 3)
+n -> R:r(1)";
+    let moved = "model Moved
+Sf:drive(2 + sin(t)) -> 0:n -> 1:a -> I:free(3)
+n -> 1:b -> I:tied(2)
+a -> R:r(1)";
+    let cases: [(&str, &[(&str, f64)]); 4] = [
+        (&fault("start_free"), &[("I1.f", 0.0), ("I2.f", 1.0)]),
+        (&fault("start_free2"), &[("C1.q", 0.0), ("C2.q", 1.0)]),
+        (given_first, &[("C1.q", 1.0), ("C2.q", 0.0)]),
+        (moved, &[("free.f", 0.0), ("tied.f", 2.0)]),
+    ];
+    for (text, wanted) in cases {
+        for form in FORMS {
+            let all = start_of(&model(text), form, Start::Given);
+            for &(name, value) in wanted {
+                assert!((all[name] - value).abs() < 1e-15, "{form:?}: {name} = {}, not {value}\n{text}", all[name]);
+            }
+        }
+    }
+}
+
+/// Nets of like storages with resistors between, some with a start value: the others are empty in every form.
+#[test]
+fn random_nets_start_alike_in_every_form() {
+    let mut seed = 6;
+    for round in 0..12 {
+        let n = 3 + round % 3;
+        let (kind, law) = if round % 2 == 0 { ("I", "f0") } else { ("C", "q0") };
+        let junction = if round % 4 < 2 { "0" } else { "1" };
+        let mut text = format!("model Net{round}\n{junction}:n -> R:r(2)\n");
+        let given: Vec<Option<f64>> =
+            (0..n).map(|i| (i == 0 || next(&mut seed) > 0.0).then(|| next(&mut seed)).filter(|_| i != 1)).collect();
+        let storages: Vec<String> = given
+            .iter()
+            .enumerate()
+            .map(|(i, g)| {
+                format!("{kind}:s{i}({}{})", 1.0 + i as f64, g.map_or(String::new(), |g| format!(", {law} = {g:?}")))
+            })
+            .collect();
+        // All of them have their own flow (effort), so that none depends on another.
+        if (kind == "I") == (junction == "0") {
+            storages.iter().for_each(|s| text += &format!("n -> {s}\n"));
+        } else {
+            let other = if junction == "0" { "1" } else { "0" };
+            for (i, s) in storages.iter().enumerate() {
+                text += &format!("n -> {other}:m{i} -> {s}\nm{i} -> R:r{i}({})\n", 1 + i);
+            }
+        }
+        let variable = if kind == "I" { "f" } else { "q" };
+        for form in FORMS {
+            let all = start_of(&model(&text), form, Start::Given);
+            for (i, g) in given.iter().enumerate() {
+                let found = all[&format!("s{i}.{variable}")];
+                assert!((found - g.unwrap_or(0.0)).abs() < 1e-12, "{form:?}: s{i} = {found}\n{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_start_value_that_is_no_number_is_a_fault_at_its_place() {
+    let words = fault_at_start(&fault("start_nan"));
+    assert!(words.contains("I005") && words.contains("test.bond:3:") && words.contains("a.f"), "{words}");
+    let words = fault_at_start("model Big\nparam x = 0\nSe:s(1) -> 1:j -> I:a(1)\nj -> C:c(1, q0 = 1/x)");
+    assert!(words.contains("c.q comes to inf"), "{words}");
+}
+
+/// Laws without a slope at zero: what is asked is looked for beyond.
+#[test]
+fn start_values_are_found_where_a_law_has_a_slope() {
+    let square = start_of(&model(&fault("start_square")), Form::Minimal, Start::Given);
+    assert!((square["a.q"].abs() - 2.0).abs() < 1e-12 && (square["a.e"] - 4.0).abs() < 1e-12);
+    let cubic = fault("break_cubic").replace("e = q^3", "e = q^3, e0 = 8");
+    for form in FORMS {
+        let all = start_of(&model(&cubic), form, Start::Given);
+        assert!((all["c1.q"] - 2.0).abs() < 1e-12 && (all["c2.q"] - 8.0).abs() < 1e-12, "{form:?}");
+    }
+    let none = "model None\nSe:s(1) -> 1:j -> C:a(e = q^2, e0 = -4)\nj -> I:m(1)";
+    let words = fault_at_start(none);
+    assert!(words.contains("I003") && words.contains("a.e = -4 asked"), "{words}");
+}
+
+/// A rolling wheel with its heading and all four of its speeds given, at headings where rows of the conditions are rounding.
+#[test]
+fn more_start_values_than_unknowns_agree() {
+    for heading in ["0", "1e-9", "0.7", "pi/2", "pi", "-2.5"] {
+        for kept in ["roll.f", "turn.f, roll.f"] {
+            let text = format!(
+                "model Wheel
+param r = 0.3, w0 = 2, a0 = {heading}
+state psi' = turn.f from a0
+state x' = x.f from 0
+1:x -> I:mx(10, f0 = r*w0*cos(a0))
+1:y -> I:my(10, f0 = r*w0*sin(a0))
+1:roll -> I:Jr(0.4, f0 = w0)
+1:turn -> I:Jt(0.2, f0 = 1)
+constraint cx: x.f - r*cos(psi)*roll.f = 0
+constraint cy: y.f - r*sin(psi)*roll.f = 0
+prefer {kept}"
+            );
+            let all = start_of(&model(&text), Form::Minimal, Start::Given);
+            assert!((all["Jr.f"] - 2.0).abs() < 1e-12 && (all["Jt.f"] - 1.0).abs() < 1e-12, "{heading}: {all:?}");
+            assert!((all["mx.f"] - 0.6 * all["psi"].cos()).abs() < 1e-12, "{heading}");
+            assert!((all["my.f"] - 0.6 * all["psi"].sin()).abs() < 1e-12, "{heading}");
+            assert!(all["mx.e"].abs() < 100.0 && all["my.e"].abs() < 100.0, "{heading}: {all:?}");
+        }
+    }
+    let text = "model Conflict
+state psi' = turn.f from 0.7
+1:x -> I:mx(10, f0 = 0.6)
+1:roll -> I:Jr(0.4, f0 = 2)
+1:turn -> I:Jt(0.2, f0 = 1)
+constraint cx: x.f - 0.3*cos(psi)*roll.f = 0
+prefer roll.f";
+    assert!(fault_at_start(text).contains("I003"));
 }

@@ -98,6 +98,7 @@ codes! {
     I002 "a start value given twice";
     I003 "start values that contradict each other or a constraint";
     I004 "start values that no iteration brings together";
+    I005 "a start value that is no number";
 }
 
 #[cfg(test)]

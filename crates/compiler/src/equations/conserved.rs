@@ -118,7 +118,7 @@ fn replace(
             assembled.d.constants.insert(symbol);
             assembled.d.set(state, solution);
             let name = assembled.d.x.name(symbol).to_string();
-            return Some(Conserved { symbol, name, value });
+            return Some(Conserved { symbol, name, value, replaced: state });
         }
     }
     None

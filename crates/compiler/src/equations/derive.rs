@@ -6,7 +6,8 @@ use super::along::{Closure, Treatment, assemble_all};
 use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
-use super::minimal::{Assembled, assemble};
+use super::freedom::{self, Sum};
+use super::minimal::{Assembled, Chosen, assemble};
 use super::momenta::{Momentum, known};
 use super::stiff::parameters;
 use super::verify::verify;
@@ -180,6 +181,8 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();
     let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();
     let free_rates: BTreeSet<Symbol> = rates.intersection(&d.free).copied().collect();
+    let sum = |s: &Chosen| s.meaning.map(|value| Sum { state: s.symbol, value, speed: s.tracked });
+    let sums: Vec<Sum> = states.iter().filter_map(sum).collect();
     let meanings: Vec<_> = states.iter().filter_map(|s| s.meaning.map(|m| (s.symbol, m))).collect();
     let states: Vec<State> = states
         .into_iter()
@@ -197,7 +200,11 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let observed = observed::observed(&mut d, &states);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
-    let conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
+    let mut conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
+    if own_start {
+        let free = freedom::conditions(&mut d, causal, &conserved, &sums, &conditions);
+        conditions.extend(free);
+    }
     let domains = domains::domains(&mut d, &states);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
         Step::Newton { unknowns, .. } => unknowns.clone(),

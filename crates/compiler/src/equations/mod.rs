@@ -9,6 +9,7 @@ mod derive;
 mod display;
 mod domains;
 mod form;
+mod freedom;
 mod index;
 mod minimal;
 mod momenta;
@@ -201,6 +202,8 @@ pub struct Conserved {
     pub name: String,
     /// What is conserved, in stored quantities.
     pub value: Expr,
+    /// The state in whose place it stands.
+    pub replaced: Symbol,
 }
 
 /// One step of an evaluation.

@@ -111,9 +111,7 @@ impl<'a> Ports<'a> {
 
 fn stored(causal: &CausalGraph, port: &PortState) -> Option<Symbol> {
     match &causal.graph.elements[port.port.element].kind {
-        Kind::Inertance(storage) | Kind::Compliance(storage) => {
-            storage.stored.get(port.port.port as usize).copied()
-        }
+        Kind::Inertance(storage) | Kind::Compliance(storage) => storage.stored.get(port.port.port as usize).copied(),
         _ => None,
     }
 }
@@ -211,8 +209,9 @@ impl Sum<'_, '_> {
         let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
         for (variable, coefficient) in variables.into_iter().zip(coefficients) {
             let d = &mut self.assembled.d;
-            let reads_bonds =
-                d.x.depends_on_any(coefficient, &|s| matches!(d.meaning(s), Some(Meaning::Effort(_) | Meaning::Flow(_))));
+            let reads_bonds = d
+                .x
+                .depends_on_any(coefficient, &|s| matches!(d.meaning(s), Some(Meaning::Effort(_) | Meaning::Flow(_))));
             let known = self.ports.free.contains(&variable) || self.ports.dependent.contains_key(&variable);
             let row = match self.assembled.rows.get(&variable) {
                 Some(row) => row.clone(),

@@ -40,17 +40,19 @@ struct Nearest {
     weights: Vec<f64>,
     least: f64,
     rates: Vec<f64>,
+    /// What the rates were made of when they were seen.
+    scale: Vec<f64>,
 }
 
 impl Nearest {
     fn new(weights: Vec<f64>) -> Nearest {
-        Nearest { weights, least: f64::INFINITY, rates: Vec::new() }
+        Nearest { weights, least: f64::INFINITY, rates: Vec::new(), scale: Vec::new() }
     }
 
-    fn see(&mut self, rates: &[f64]) {
+    fn see(&mut self, rates: &[f64], scale: &[f64]) {
         let size = rates.iter().zip(&self.weights).fold(0.0f64, |most, (r, w)| most.max((r * w).abs()));
         if size < self.least {
-            (self.least, self.rates) = (size, rates.to_vec());
+            (self.least, self.rates, self.scale) = (size, rates.to_vec(), scale.to_vec());
         }
     }
 }
@@ -84,12 +86,7 @@ impl Model {
     }
 
     /// What was found, if the constraints are kept there.
-    fn audited(
-        &mut self,
-        leaf: Option<&Leaf>,
-        t: f64,
-        found: Equilibrium,
-    ) -> Result<Equilibrium, EquilibriumError> {
+    fn audited(&mut self, leaf: Option<&Leaf>, t: f64, found: Equilibrium) -> Result<Equilibrium, EquilibriumError> {
         let constraints = self.constraints();
         match self.missed_constraint(&constraints, t, &found.x, leaf.map_or(&[], |leaf| &leaf.size), KEPT) {
             Some((name, miss)) => Err(EquilibriumError::Missed(name, miss)),
@@ -129,7 +126,7 @@ impl Model {
             let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
             let before = norm(rates);
             let nearest = nearest.get_or_insert_with(|| Nearest::new(newton.weights.clone()));
-            nearest.see(rates);
+            nearest.see(rates, &scale);
             let step = match pull.is_infinite() {
                 true => step,
                 false => damped_motion(&at, pull, n).unwrap_or(step),
@@ -161,7 +158,10 @@ impl Model {
                 None => break,
             }
         }
-        self.nowhere(nearest.as_ref().map_or(&at.rates, |nearest| &nearest.rates), &scale)
+        match nearest {
+            Some(Nearest { rates, scale, .. }) if !rates.is_empty() => self.nowhere(&rates, &scale),
+            _ => self.nowhere(&at.rates, &scale),
+        }
     }
 
     /// Whether a move has left a constraint: near a position where a form is singular a long one may.

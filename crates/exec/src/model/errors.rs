@@ -100,6 +100,15 @@ pub enum StartError {
     Conflict(StartConflict),
     /// The start values are curves that the iteration did not bring together: their names.
     NotFound(Vec<String>),
+    /// A start value is no number.
+    NoNumber {
+        /// The variable, as `I1.f`.
+        name: String,
+        /// What it comes to.
+        value: f64,
+        /// Where it stands.
+        span: Span,
+    },
     /// The model has no value at the start.
     Failure(Failure),
 }
@@ -116,6 +125,9 @@ impl fmt::Display for StartError {
             }
             StartError::NotFound(names) => {
                 write!(f, "no start was found with {}: give start values nearer to each other", names.join(", "))
+            }
+            StartError::NoNumber { name, value, .. } => {
+                write!(f, "the start value of {name} comes to {value}: it has to be a finite number")
             }
             StartError::Failure(failure) => failure.fmt(f),
         }

@@ -113,7 +113,13 @@ impl Model {
             });
         }
         let routine = self.routine_for(&wanted);
-        let mut leaf = Leaf { routine, rows, drives: self.program.relations.drives, size: vec![1.0; x.len()], constraints: self.constraints() };
+        let mut leaf = Leaf {
+            routine,
+            rows,
+            drives: self.program.relations.drives,
+            size: vec![1.0; x.len()],
+            constraints: self.constraints(),
+        };
         let own = self.sizes(t, x);
         leaf.size = match self.structure(&leaf, t, x) {
             Some((moves, drives)) => (0..x.len()).map(|j| reach(&moves, &drives, j).unwrap_or(own[j])).collect(),
@@ -337,7 +343,8 @@ pub(super) fn leading_rows(matrix: &[f64], columns: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     while chosen.len() < columns {
         let length = |i: usize| left[i].iter().map(|v| v * v).sum::<f64>();
-        let best = (0..rows).filter(|i| !chosen.contains(i)).max_by(|&a, &b| length(a).total_cmp(&length(b)).then(b.cmp(&a)));
+        let best =
+            (0..rows).filter(|i| !chosen.contains(i)).max_by(|&a, &b| length(a).total_cmp(&length(b)).then(b.cmp(&a)));
         let Some(best) = best.filter(|&i| length(i) > 1e-20) else { break };
         let unit: Vec<f64> = left[best].iter().map(|v| v / length(best).sqrt()).collect();
         for row in &mut left {

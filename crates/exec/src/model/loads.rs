@@ -79,7 +79,8 @@ impl Model {
             let columns = slopes.len() / miss.len().max(1);
             let step = minimum_norm::step(&slopes, &miss, columns)?.step;
             let states = states_of(curve, &ways, &step[..columns - 1]);
-            place = Place { x: self.moved(curve.leaf, curve.t, &place.x, &states)?, part: place.part + step[columns - 1] };
+            place =
+                Place { x: self.moved(curve.leaf, curve.t, &place.x, &states)?, part: place.part + step[columns - 1] };
             let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
             if length < 1e-10 {
                 return Some((place, iteration));

@@ -15,6 +15,11 @@ const FIRM: f64 = 1e4;
 /// Passes over conditions that one unknown is left in.
 const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
+/// Where unknowns begin that nothing determines yet: at zero; then beside it, where laws have a slope, later ones a bit more
+/// than those before.
+const BEGINNINGS: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3];
+/// Part of the greatest derivative by an unknown that is what rounding left of one.
+const NOISE: f64 = 1e-14;
 /// More states than this are not linearised to find typical magnitudes.
 const MOST_LINEARISED: usize = 200;
 
@@ -48,6 +53,7 @@ impl Model {
     /// Start values that contradict each other, with fitting ones.
     pub fn initialise(&mut self, t: f64) -> Result<Vec<f64>, StartError> {
         self.restart();
+        self.check_asked()?;
         let states = self.program.states.len();
         let n = states + self.conserved.len();
         let mut z = vec![0.0; n];
@@ -70,6 +76,17 @@ impl Model {
             self.scales = self.magnitudes(t, &z);
         }
         Ok(z)
+    }
+
+    /// That every start value is a number.
+    fn check_asked(&self) -> Result<(), StartError> {
+        let value = |asked: &Value| self.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
+        for start in &self.program.start {
+            if let Some(value) = value(&start.asked).filter(|v| !v.is_finite()) {
+                return Err(StartError::NoNumber { name: start.name.clone(), value, span: start.span });
+            }
+        }
+        Ok(())
     }
 
     /// Typical magnitudes of the states: how great they are at the start, how far they are from where the linearised
@@ -189,8 +206,7 @@ impl Model {
         };
         // What rounding leaves of an unknown that should be 0, beside the greatest of the others: each weighed by what
         // it does to the conditions.
-        let greatest = |row: &[f64]| row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
-        let rows: Vec<f64> = (0..residual.len()).map(|i| greatest(&jacobian[i * n..][..n])).collect();
+        let rows: Vec<f64> = greatest_of(jacobian, residual.len(), n);
         let share = |i: usize, j: usize| if rows[i] > 0.0 { jacobian[i * n + j].abs() / rows[i] } else { 0.0 };
         let weight = |j: usize| (0..rows.len()).fold(0.0f64, |most, i| most.max(share(i, j)));
         let weighed = group.unknowns.iter().enumerate().map(|(j, &u)| weight(j) * z[u as usize].abs());
@@ -210,56 +226,71 @@ impl Model {
         let names: Vec<String> = group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
         let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
         let not_found = StartError::NotFound(names);
-        let mut z = all.z.clone();
-        let starts = [0.0, 1e-6, 1e-3, 1.0];
-        let mut at = None;
-        for start in starts {
-            for &u in group.unknowns.iter().filter(|&&u| !all.known[u as usize]) {
-                z[u as usize] = start;
+        let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
+        let routed = Routed { t, routine, group };
+        // What is determined already stays, if the rest can be met so; then everything may move.
+        let mut first = None;
+        for movable in [open.clone(), vec![true; open.len()]] {
+            if !movable.contains(&true) {
+                continue;
             }
-            at = self.linearised(t, routine, group, &z);
-            if at.is_some() {
-                break;
-            }
-        }
-        let (mut residual, mut jacobian) = match at {
-            Some(at) => at,
-            None => {
-                let run = self.residuals(t, routine, &z, None);
-                return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
-            }
-        };
-        let mut weights: Option<Vec<f64>> = None;
-        // At first every row weighs as its Jacobian says, which finds a start if there is one. What is missed then is
-        // missed by as little as possible with the weights as they are there.
-        loop {
-            let routed = Routed { t, routine, group };
-            let moves = if weights.is_none() { ITERATIONS } else { 10 * ITERATIONS };
-            for _ in 0..moves {
-                if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), weights.as_deref()) {
+            for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
+                let mut z = all.z.clone();
+                let offset = |j: usize| if k < 4 { beginning } else { beginning * (1.0 + j as f64 / 16.0) };
+                (0..open.len()).filter(|&j| open[j]).for_each(|j| z[group.unknowns[j] as usize] = offset(j));
+                if let Some(at) = self.linearised(t, routine, group, &z) {
+                    let (z, residual, jacobian) = self.nearest(routed, z, at, &movable);
+                    if self.missed(group, &z, &residual, &jacobian).is_empty() {
+                        all.z = z;
+                        group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
+                        return Ok(());
+                    }
+                    if movable.iter().all(|m| *m) {
+                        first.get_or_insert((z, residual, jacobian));
+                    }
+                }
+                // Where nothing is open every beginning is the same.
+                if !open.contains(&true) {
                     break;
                 }
             }
-            let missed = self.missed(group, &z, &residual, &jacobian);
-            if missed.is_empty() {
-                all.z = z;
-                group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
-                return Ok(());
-            }
-            let Some(step) = minimum_norm::step(&jacobian, &residual, group.unknowns.len()) else {
-                return Err(not_found);
-            };
-            match weights {
-                None => {
-                    let firm = |&c: &usize| if self.program.start[c].firm { FIRM } else { 1.0 };
-                    let all = step.weights.iter().zip(group.conditions.iter().map(firm));
-                    weights = Some(all.map(|(weight, firm)| weight * firm).collect());
-                }
-                Some(weights) => {
-                    return Err(self.conflict(routed, &z, (&residual, &jacobian), &weights).unwrap_or(not_found));
-                }
+        }
+        let Some((mut z, mut residual, mut jacobian)) = first else {
+            let run = self.residuals(t, routine, &all.z, None);
+            return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
+        };
+        // What is missed then is missed by as little as possible, with the weights as they are there.
+        let firm = |&c: &usize| if self.program.start[c].firm { FIRM } else { 1.0 };
+        let weights = weights_of(&jacobian, residual.len(), group.unknowns.len());
+        let weights: Vec<f64> = weights.iter().zip(group.conditions.iter().map(firm)).map(|(w, f)| w * f).collect();
+        let movable = vec![true; open.len()];
+        for _ in 0..10 * ITERATIONS {
+            if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), &movable, Some(&weights)) {
+                break;
             }
         }
+        if self.missed(group, &z, &residual, &jacobian).is_empty() {
+            all.z = z;
+            group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
+            return Ok(());
+        }
+        Err(self.conflict(routed, &z, (&residual, &jacobian), &weights).unwrap_or(not_found))
+    }
+
+    /// Where damped steps of minimum norm lead, of the unknowns that may move.
+    fn nearest(
+        &mut self,
+        routed: Routed,
+        mut z: Vec<f64>,
+        (mut residual, mut jacobian): (Vec<f64>, Vec<f64>),
+        movable: &[bool],
+    ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        for _ in 0..ITERATIONS {
+            if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), movable, None) {
+                break;
+            }
+        }
+        (z, residual, jacobian)
     }
 
     /// One damped step; whether it helped.
@@ -268,14 +299,14 @@ impl Model {
         Routed { t, routine, group }: Routed,
         z: &mut Vec<f64>,
         (residual, jacobian): (&mut Vec<f64>, &mut Vec<f64>),
+        movable: &[bool],
         weights: Option<&[f64]>,
     ) -> bool {
         let n = group.unknowns.len();
-        let step = match weights {
-            None => minimum_norm::step(jacobian, residual, n),
-            Some(weights) => minimum_norm::weighed_step(jacobian, residual, n, weights.to_vec()),
-        };
-        let Some(step) = step else { return false };
+        let weights = weights.map_or_else(|| weights_of(jacobian, residual.len(), n), <[f64]>::to_vec);
+        let moving = jacobian.iter().zip(movable.iter().cycle()).map(|(j, m)| if *m { *j } else { 0.0 });
+        let moving: Vec<f64> = moving.collect();
+        let Some(step) = minimum_norm::weighed_step(&moving, residual, n, weights) else { return false };
         let norm = |r: &[f64]| r.iter().zip(&step.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
         let moves = |(u, s): (&u32, &f64)| s.abs() > 4.0 * f64::EPSILON * z[*u as usize].abs();
         if norm(residual) == 0.0 || !group.unknowns.iter().zip(&step.step).any(moves) {
@@ -323,6 +354,11 @@ impl Model {
         let firm = |i: &usize| self.program.start[group.conditions[*i]].firm;
         if !involved.iter().all(firm) {
             involved.retain(|i| !firm(i));
+        }
+        // A start that misses a constraint is no start to offer.
+        let met = |i: usize| weighed[i].abs() <= 1e-3 * most || !firm(&i);
+        if !involved.iter().all(firm) && !(0..residual.len()).all(met) {
+            return None;
         }
         let values = involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect();
         Some(StartError::Conflict(StartConflict { values }))
@@ -420,4 +456,21 @@ impl Model {
         self.frame.reserve(&routine);
         routine
     }
+}
+
+/// The greatest derivative of each condition; where all are rounding beside those of other conditions by the same unknown,
+/// the greatest of these, so that nothing is made of rounding.
+fn greatest_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
+    let mut greatest = vec![0.0f64; columns];
+    for row in jacobian.chunks(columns.max(1)) {
+        greatest.iter_mut().zip(row).for_each(|(most, j)| *most = most.max(j.abs()));
+    }
+    let size = |(j, most): (&f64, &f64)| if *j != 0.0 && j.abs() <= NOISE * most { *most } else { j.abs() };
+    let row = |i: usize| jacobian[i * columns..][..columns].iter().zip(&greatest).map(size).fold(0.0f64, f64::max);
+    (0..rows).map(row).collect()
+}
+
+/// The weights of conditions, each by its greatest derivative.
+fn weights_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
+    greatest_of(jacobian, rows, columns).into_iter().map(minimum_norm::inverse).collect()
 }

@@ -92,7 +92,7 @@ impl Sketch {
     }
     pub fn conserved(&mut self, name: &str) -> Expr {
         let (symbol, value) = self.symbol(name);
-        self.conserved.push(Conserved { symbol, name: name.into(), value });
+        self.conserved.push(Conserved { symbol, name: name.into(), value, replaced: symbol });
         value
     }
     pub fn rate(&mut self, name: &str, value: Expr) {

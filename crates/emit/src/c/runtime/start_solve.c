@@ -134,9 +134,30 @@ static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const doub
     return 1;
 }
 
-/* The shortest of the steps that reduce jacobian * step + residual most, rows and columns weighed so that the greatest
+/* The weights of rows, each by its greatest entry; entries that are rounding beside others in their column weigh as these. */
+static void ha_weights(int rows, int columns, const double *jacobian, double *weights)
+{
+    double greatest[HA_MOST_COLUMNS] = {0.0};
+    int i;
+    int j;
+    for (i = 0; i < rows; ++i) {
+        for (j = 0; j < columns; ++j) {
+            greatest[j] = ha_max(greatest[j], fabs(jacobian[i * columns + j]));
+        }
+    }
+    for (i = 0; i < rows; ++i) {
+        double most = 0.0;
+        for (j = 0; j < columns; ++j) {
+            const double size = fabs(jacobian[i * columns + j]);
+            most = ha_max(most, size > 0.0 && size <= 1e-14 * greatest[j] ? greatest[j] : size);
+        }
+        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
+    }
+}
+
+/* The shortest of the steps that reduce jacobian * step + residual most, rows weighed, and columns so that the greatest
  * entry of each is 1: singular values by rotations of columns in pairs. */
-static int ha_shortest_step(int rows, int columns, const double *jacobian, const double *residual, double *weights, double *step)
+static int ha_shortest_step(int rows, int columns, const double *jacobian, const double *residual, const double *weights, double *step)
 {
     double b[HA_MOST_ROWS * HA_MOST_COLUMNS];
     double v[HA_MOST_ROWS * HA_MOST_ROWS];
@@ -151,11 +172,6 @@ static int ha_shortest_step(int rows, int columns, const double *jacobian, const
     int j;
     int k;
     for (i = 0; i < rows; ++i) {
-        double most = 0.0;
-        for (j = 0; j < columns; ++j) {
-            most = ha_max(most, fabs(jacobian[i * columns + j]));
-        }
-        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
         right[i] = -residual[i] * weights[i];
     }
     for (j = 0; j < columns; ++j) {
@@ -252,9 +268,10 @@ static double ha_weighed(const double *residual, const double *weights, int n)
     return sqrt(sum);
 }
 
-/* One damped step of Gauss-Newton of minimum norm; whether it helped. */
-static int ha_nearer(ha_model *m, double t, const ha_group *g, double *z, double *residual, double *jacobian)
+/* One damped step of Gauss-Newton of minimum norm, of the unknowns that are not fixed; whether it helped. */
+static int ha_nearer(ha_model *m, double t, const ha_group *g, const unsigned char *fixed, double *z, double *residual, double *jacobian)
 {
+    double moving[HA_MOST_ROWS * HA_MOST_COLUMNS];
     double weights[HA_MOST_ROWS];
     double step[HA_MOST_COLUMNS];
     double before[HA_MOST_COLUMNS] = {0.0};
@@ -265,7 +282,11 @@ static int ha_nearer(ha_model *m, double t, const ha_group *g, double *z, double
     int moves = 0;
     int halving;
     int j;
-    if (!ha_shortest_step(g->rows, g->columns, jacobian, residual, weights, step)) {
+    for (j = 0; j < g->rows * g->columns; ++j) {
+        moving[j] = fixed[g->unknowns[j % g->columns]] ? 0.0 : jacobian[j];
+    }
+    ha_weights(g->rows, g->columns, jacobian, weights);
+    if (!ha_shortest_step(g->rows, g->columns, moving, residual, weights, step)) {
         return 0;
     }
     norm = ha_weighed(residual, weights, g->rows);
@@ -294,34 +315,63 @@ static int ha_nearer(ha_model *m, double t, const ha_group *g, double *z, double
     return 0;
 }
 
-static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, unsigned char *known)
+/* From one beginning of the unknowns that are open: whether all conditions are met. */
+static int ha_solve_from(ha_model *m, double t, const ha_group *g, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
 {
-    static const double starts[] = {0.0, 1e-6, 1e-3, 1.0};
     double residual[HA_MOST_ROWS];
     double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
-    int there = 0;
     int i;
-    int j;
-    for (i = 0; i < 4 && !there; ++i) {
-        for (j = 0; j < g->columns; ++j) {
-            if (!known[g->unknowns[j]]) {
-                z[g->unknowns[j]] = starts[i];
-            }
+    for (i = 0; i < g->columns; ++i) {
+        if (open[g->unknowns[i]]) {
+            z[g->unknowns[i]] = beginning * (1.0 + offset * (double)i);
         }
-        there = ha_linearised(m, t, g, z, residual, jacobian);
     }
-    if (!there) {
+    if (!ha_linearised(m, t, g, z, residual, jacobian)) {
         return 0;
     }
     for (i = 0; i < 60; ++i) {
-        if (!ha_nearer(m, t, g, z, residual, jacobian)) {
+        if (!ha_nearer(m, t, g, fixed, z, residual, jacobian)) {
             break;
         }
     }
-    for (j = 0; j < g->columns; ++j) {
-        known[g->unknowns[j]] = 1;
-    }
     return ha_is_met(m, g, z, residual, jacobian);
+}
+
+/* What is determined already stays, if the rest can be met so; then everything may move. */
+static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, unsigned char *known)
+{
+    static const double beginnings[] = {0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3};
+    double before[HA_START_UNKNOWNS + 1];
+    unsigned char open[HA_START_UNKNOWNS + 1];
+    unsigned char fixed[HA_START_UNKNOWNS + 1];
+    int any = 0;
+    int round;
+    int i;
+    int j;
+    ha_copy(before, z, HA_START_UNKNOWNS);
+    for (j = 0; j < HA_START_UNKNOWNS; ++j) {
+        open[j] = !known[j];
+        fixed[j] = known[j];
+    }
+    for (j = 0; j < g->columns; ++j) {
+        any = any || open[g->unknowns[j]];
+    }
+    if (!any) {
+        memset(fixed, 0, sizeof fixed);
+    }
+    for (round = any ? 0 : 1; round < 2; ++round) {
+        for (i = 0; i < (any ? 10 : 1); ++i) {
+            ha_copy(z, before, HA_START_UNKNOWNS);
+            if (ha_solve_from(m, t, g, open, fixed, beginnings[i], i < 4 ? 0.0 : 1.0 / 16.0, z)) {
+                for (j = 0; j < g->columns; ++j) {
+                    known[g->unknowns[j]] = 1;
+                }
+                return 1;
+            }
+        }
+        memset(fixed, 0, sizeof fixed);
+    }
+    return 0;
 }
 
 //end
