@@ -114,7 +114,8 @@ fn the_audit_sees_a_constraint_at_the_wrong_junction() {
     let columns: BTreeMap<String, &[f64]> = values.iter().map(|(name, v)| (name.clone(), &v[..])).collect();
     let parameters = BTreeMap::new();
     let samples = halfarrow_audit::Run { times: &[0.0, 1.0], columns: &columns, parameters: &parameters };
-    let miss = |graph: &bond_graph::BondGraph| halfarrow_audit::audit(graph, &samples).residual.map_or(0.0, |f| f.value);
+    let miss =
+        |graph: &bond_graph::BondGraph| halfarrow_audit::audit(graph, &samples).residual.map_or(0.0, |f| f.value);
     assert!(miss(&graph) < 1e-12);
     // The same graph, but the constraint names b.
     let flow = |name: &str| graph.bonds[graph.common[&element(&causal, name)]].flow;

@@ -1,6 +1,6 @@
 //! What holds of all equations that this stage gives; a breach is our fault, not the modeller's.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Equations, Step};
 use crate::algebra::Symbol;
@@ -23,11 +23,19 @@ pub fn verify(equations: &Equations) -> Result<(), String> {
 }
 
 fn names(equations: &Equations) -> Result<(), String> {
-    let states = equations.states.iter().map(|s| &s.name);
-    let unknowns = states.chain(equations.algebraic.iter().map(|a| &a.name));
-    once(unknowns, |name| format!("two unknowns are called `{name}`"))?;
+    once(equations.states.iter().map(|s| &s.name), |name| format!("two states are called `{name}`"))?;
     once(equations.conserved.iter().map(|c| &c.name), |name| format!("two constants are called `{name}`"))?;
-    once(equations.observed.iter().map(|o| &o.name), |name| format!("two variables are called `{name}`"))
+    once(equations.observed.iter().map(|o| &o.name), |name| format!("two variables are called `{name}`"))?;
+    // The two ends of a bond that two elements share have one name: they are one variable.
+    let own = |symbol| equations.graph.exprs.name(symbol).trim_end_matches('*');
+    let states = equations.states.iter().map(|s| (s.name.as_str(), own(s.symbol)));
+    let mut known: BTreeMap<&str, &str> = states.collect();
+    for unknown in &equations.algebraic {
+        if known.insert(&unknown.name, own(unknown.symbol)).is_some_and(|other| other != own(unknown.symbol)) {
+            return Err(format!("two unknowns are called `{}`", unknown.name));
+        }
+    }
+    Ok(())
 }
 
 fn symbols(equations: &Equations) -> Result<(), String> {
