@@ -132,7 +132,8 @@ fn signals_end_runs_in_order() {
 #[cfg(target_os = "linux")]
 fn a_sweep_keeps_others_away_and_goes_on_after_a_signal() {
     let here = folder("sweeps");
-    let arguments = ["sweep", "osc.bond", "--vary", "k=lin(1,1000,400)", "--to", "20", "--step", "1e-3", "--out", "r.csv"];
+    let arguments =
+        ["sweep", "osc.bond", "--vary", "k=lin(1,1000,400)", "--to", "20", "--step", "1e-3", "--out", "r.csv"];
     let json_too = [&arguments[..], &["--json"]].concat();
     let first = command(&here, &json_too).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait("a first chunk", || fs::metadata(here.join("r.csv.partial")).is_ok_and(|file| file.len() > 100));
@@ -149,7 +150,8 @@ fn a_sweep_keeps_others_away_and_goes_on_after_a_signal() {
         assert!(report["done"].as_u64() < Some(400) && report["sets"] == 400, "{report}");
         assert!(!here.join("r.csv").exists());
     }
-    let short = ["sweep", "osc.bond", "--vary", "k=list(1,2)", "--to", "0.1", "--step", "1e-3", "--out", "r.csv", "--restart"];
+    let short =
+        ["sweep", "osc.bond", "--vary", "k=list(1,2)", "--to", "0.1", "--step", "1e-3", "--out", "r.csv", "--restart"];
     assert_eq!(command(&here, &short).output().unwrap().status.code(), Some(0), "the lock is gone");
 }
 
@@ -172,7 +174,8 @@ fn what_the_audit_finds_decides_the_exit_status() {
     let report = json(&refused);
     assert_eq!(report["audit"]["verdict"], "refused");
     assert!(report["error"].as_str().unwrap().contains("do not use it"), "{report}");
-    let sweep = ["sweep", "osc.bond", "--vary", "k=list(1e4,2e4)", "--to", "1", "--solver", "heun", "--out", "r.csv", "--json"];
+    let sweep =
+        ["sweep", "osc.bond", "--vary", "k=list(1e4,2e4)", "--to", "1", "--solver", "heun", "--out", "r.csv", "--json"];
     let fine = command(&here, &[&sweep[..], &["--step", "1e-5"]].concat()).output().unwrap();
     assert_eq!((fine.status.code(), json(&fine)["audit"]["sets"].as_u64()), (Some(0), Some(2)));
     let refused = command(&here, &[&sweep[..], &["--step", "1e-2"]].concat()).output().unwrap();

@@ -37,13 +37,7 @@ pub(crate) struct Worst {
 impl Worst {
     /// Takes note of a miss. `scale` is the least that it counts relative to; `raw`, which has all its terms, is asked for only
     /// where it would stand out.
-    pub fn note(
-        &mut self,
-        miss: f64,
-        scale: Scale,
-        settled: &Settled,
-        raw: impl FnOnce() -> Raw,
-    ) {
+    pub fn note(&mut self, miss: f64, scale: Scale, settled: &Settled, raw: impl FnOnce() -> Raw) {
         let value = scale.relative(miss);
         if !self.now.as_ref().is_some_and(|(now, _)| now.value.is_nan() || value <= now.value) {
             self.keep(raw(), settled);

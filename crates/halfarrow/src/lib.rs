@@ -59,5 +59,5 @@ pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, duration, fr
 pub use report::{Page, Report};
 pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
 pub use stage::Stage;
-pub use verdict::Verdict;
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
+pub use verdict::Verdict;

@@ -11,8 +11,8 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, WallClock, run_real_time};
+use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
 use halfarrow_trace::read_inputs;
 use serde::Serialize;
 
@@ -211,7 +211,8 @@ impl Model {
         let made = Made::by(&Run { method: options.method, step: options.step, ..Run::default() });
         report.judge(&made);
         // Steps that are too long are the modeller's choice; laws that do not hold are nobody's.
-        let laws = AuditReport { power: report.power.clone(), residual: report.residual.clone(), ..AuditReport::default() };
+        let laws =
+            AuditReport { power: report.power.clone(), residual: report.residual.clone(), ..AuditReport::default() };
         match laws.refusal(&made) {
             Some(failure) => Err(self.stopped(failure)),
             None => Ok(report),

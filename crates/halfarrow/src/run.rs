@@ -577,7 +577,9 @@ mod tests {
         let mut said = judged(Ok(done), &Made::by(&run)).expect("a doubt is said");
         assert!(said.report.notes.iter().any(|note| note.contains("1e-4")), "{:?}", said.report.notes);
         said.report.audit.residual.as_mut().expect("laws are checked").value = 0.5;
-        let Err(Error::Run(stopped)) = judged(Ok(said), &Made::by(&run)) else { panic!("half of the effort is missing") };
+        let Err(Error::Run(stopped)) = judged(Ok(said), &Made::by(&run)) else {
+            panic!("half of the effort is missing")
+        };
         assert!(matches!(&stopped.failure, Failure::Untrue { miss, .. } if *miss == 0.5), "{}", stopped.failure);
         assert!(!stopped.trace.times.is_empty(), "what was computed is kept");
     }

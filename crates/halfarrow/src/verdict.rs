@@ -14,7 +14,7 @@ pub(crate) const SAID: f64 = 1e-6;
 /// A result that misses a law by more than this part of what is there is refused.
 pub(crate) const REFUSED: f64 = 1e-2;
 /// Errors of steps add up over a run: as many times the tolerance of a step are what was asked for.
-const STEPS: f64 = 300.0;
+const STEPS: f64 = 1000.0;
 /// Unknowns of equations that a step solves to the tolerance miss laws by some of it.
 const SOLVED: f64 = 30.0;
 /// The form `stiff`: its springs give by so much of the ratio of speeds.

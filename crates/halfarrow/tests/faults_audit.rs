@@ -30,8 +30,7 @@ fn run(model: &Model, run: &Run) -> Result<Simulated, Box<Stopped>> {
     }
 }
 
-const FORMS: [Form; 6] =
-    [Form::Minimal, Form::Kane, Form::Inverted, Form::Break, Form::Relaxed, Form::Lagrange];
+const FORMS: [Form; 6] = [Form::Minimal, Form::Kane, Form::Inverted, Form::Break, Form::Relaxed, Form::Lagrange];
 
 fn laws(audit: &AuditReport) -> f64 {
     [&audit.residual, &audit.power].into_iter().flatten().fold(0.0f64, |most, miss| most.max(miss.value))
@@ -147,7 +146,8 @@ fn a_long_rest_before_a_motion_raises_no_alarm() {
 fn what_comes_to_rest_raises_no_alarm() {
     let model = text("model M\n1:a -> I:m(1, f0 = 1)\na -> R:d(50)\na -> C:spring(k = 3, q0 = 1)\nSe:w(3) -> a\n");
     for form in [Form::Minimal, Form::Lagrange, Form::Break] {
-        let done = run(&model, &Run { to: 2000.0, form, ..Run::default() }).unwrap_or_else(|stopped| panic!("{stopped}"));
+        let done =
+            run(&model, &Run { to: 2000.0, form, ..Run::default() }).unwrap_or_else(|stopped| panic!("{stopped}"));
         assert_eq!(done.report.audit.verdict, Verdict::Holds, "{form:?} {:?}", done.report.audit);
     }
 }
@@ -165,7 +165,10 @@ fn sweeps_audit_a_sample_of_their_sets() {
         units: false,
     };
     let sweep = |vary: &str| {
-        text(OSCILLATOR).sweep(&of(vary), &out, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false))).audit
+        text(OSCILLATOR)
+            .sweep(&of(vary), &out, &mut |_, _| true)
+            .unwrap_or_else(|e| panic!("{}", e.render(false)))
+            .audit
     };
     let fine = sweep("k=lin(1e-3,2e-3,40)");
     assert_eq!((fine.sets, fine.doubtful, fine.refused, fine.misses.len()), (16, 0, 0, 0), "{fine:?}");

@@ -17,10 +17,9 @@ pub fn draw(arguments: &arguments::Draw) -> u8 {
         arguments.out.iter().try_for_each(|path| write_picture(&picture, path))?;
         match arguments.model.model.json {
             true => screen::print_json(&json!({"written": arguments.out})),
-            false => arguments
-                .out
-                .iter()
-                .try_for_each(|path| screen::print(&format!("{} is written\n", path.display()))),
+            false => {
+                arguments.out.iter().try_for_each(|path| screen::print(&format!("{} is written\n", path.display())))
+            }
         }?;
         Ok(0)
     })
