@@ -9,7 +9,13 @@ use serde_json::Value;
 /// Runs `halfarrow` in a folder.
 fn halfarrow(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
-    command.current_dir(folder).args(arguments).env_remove("NO_COLOR").output().expect("the program starts")
+    command
+        .current_dir(folder)
+        .args(arguments)
+        .env_remove("NO_COLOR")
+        .env_remove("COLUMNS")
+        .output()
+        .expect("the program starts")
 }
 
 fn status(output: &Output) -> i32 {
@@ -334,4 +340,32 @@ fn a_model_is_exported_as_fmu() {
     );
     assert!(!here.join("other.fmu").exists());
     assert_eq!(status(&halfarrow(&here, &["export", "fmu2", &car, "--out", "car.zip"])), 2);
+}
+
+/// Tables and equations are no wider than the page: 80 columns without a terminal, else as `COLUMNS` or `--width` say.
+#[test]
+fn tables_and_equations_fit_the_page() {
+    let here = folder("width");
+    let widest = |output: &Output| stdout(output).lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    let commands: [&[&str]; 4] = [&["loops"], &["equations"], &["equations", "--form", "lagrange"], &["linearize"]];
+    for name in ["slider_crank", "rectifier", "gear_train", "quarter_car"] {
+        let model = model(name);
+        for command in commands {
+            let mut arguments = command.to_vec();
+            arguments.push(&model);
+            let usual = halfarrow(&here, &arguments);
+            assert_eq!(status(&usual), 0, "{}", stderr(&usual));
+            assert!(widest(&usual) <= 80, "{arguments:?}\n{}", stdout(&usual));
+            arguments.extend(["--width", "50"]);
+            let narrow = halfarrow(&here, &arguments);
+            assert!(widest(&narrow) <= 50, "{arguments:?}\n{}", stdout(&narrow));
+            let mut program = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
+            let by_columns = program.args(&arguments[..arguments.len() - 2]).env("COLUMNS", "50").output();
+            assert_eq!(stdout(&by_columns.expect("the program starts")), stdout(&narrow));
+        }
+    }
+    let wide = halfarrow(&here, &["loops", &model("slider_crank"), "--width", "400"]);
+    assert!(widest(&wide) > 100, "nothing is folded where there is room\n{}", stdout(&wide));
+    let refused = halfarrow(&here, &["loops", &model("slider_crank"), "--width", "none"]);
+    assert_eq!(status(&refused), 2);
 }

@@ -17,7 +17,11 @@ fn document(path: &str) -> String {
 
 /// Standard output of a run that went well.
 fn halfarrow(folder: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_halfarrow")).current_dir(folder).args(arguments).output();
+    let output = Command::new(env!("CARGO_BIN_EXE_halfarrow"))
+        .current_dir(folder)
+        .args(arguments)
+        .env_remove("COLUMNS")
+        .output();
     let output = output.expect("the program starts");
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "halfarrow {}\n{errors}", arguments.join(" "));

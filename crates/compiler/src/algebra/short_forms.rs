@@ -46,7 +46,7 @@ impl ShortForms {
 impl Exprs {
     /// Bounds the search for short forms from now on: after so many terms have been formed, what [`Exprs::simplify`]
     /// and [`Exprs::textbook`] are given stays as it is. The same expressions always take the same number of terms, on
-    /// every machine; some ten million take a second.
+    /// every machine; about two million take a second.
     pub fn bound_search(&mut self, terms: u64) {
         self.short_forms.left = terms;
     }

@@ -323,7 +323,8 @@ impl<'a> Builder<'a, '_> {
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
         self.named_quantities.insert(name.clone(), value.quantity.clone());
-        let named = Named { name, value: value.expr, unit, doc, span: d.span };
+        let unit_is_written = unit.is_some();
+        let named = Named { name, value: value.expr, unit, unit_is_written, doc, span: d.span };
         if output {
             self.outputs.push(named)
         } else {

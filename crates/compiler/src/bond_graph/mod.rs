@@ -398,6 +398,8 @@ pub struct Named {
     pub value: Expr,
     /// Unit.
     pub unit: Option<Unit>,
+    /// Whether the unit stands in the model; if not, it follows from the value.
+    pub unit_is_written: bool,
     /// Documentation.
     pub doc: String,
     /// Where it is declared.

@@ -24,7 +24,8 @@ impl Builder<'_, '_> {
                     replaced.insert(signal.symbol, value);
                     self.meanings[signal.symbol.0 as usize] = None;
                     let (name, unit, span) = (signal.name.clone(), signal.unit.clone(), signal.span);
-                    graph.lets.push(Named { name, value, unit, doc: String::new(), span });
+                    let doc = String::new();
+                    graph.lets.push(Named { name, value, unit, unit_is_written: false, doc, span });
                 }
                 None => {
                     let id = kept.push(signal.clone());

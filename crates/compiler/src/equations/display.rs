@@ -255,7 +255,7 @@ pub fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, E
 /// Outputs that may give their name to a state: one without a unit does not say what its numbers are.
 fn outputs_with_unit<'a>(d: &Definitions<'a>) -> impl Iterator<Item = &'a Named> + use<'a> {
     let graph: &'a BondGraph = d.graph;
-    graph.outputs.iter().filter(|output| output.unit.is_some())
+    graph.outputs.iter().filter(|output| output.unit_is_written)
 }
 
 /// Whether numbers of the one are numbers of the other: a state is shown in SI units.

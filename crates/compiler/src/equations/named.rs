@@ -292,12 +292,13 @@ fn kept(d: &mut Definitions, equations: &Equations, drafts: &Drafts) -> Kept {
     let mut all = drafts.exprs();
     all.extend(drafts.values.iter().map(|v| v.1));
     let uses = d.x.symbol_uses(&all);
+    let share = WORK / (drafts.values.len() as u64 + 1);
     let mut known = BTreeMap::new();
     let mut definitions = Vec::new();
     for &(symbol, value) in &drafts.values {
         let mut value = d.x.substitute(value, &known);
         if d.x.printed_length(value) <= SEARCHED {
-            d.x.bound_search(WORK / 100);
+            d.x.bound_search(share);
             value = put_in(&mut d.x, value, &BTreeMap::new());
         }
         let often = uses.get(&symbol).is_some_and(|&n| n > 1);
