@@ -32,9 +32,12 @@ impl Page {
         text.lines().map(|line| self.line(line)).collect()
     }
 
-    /// A line of words or an equation, folded where it is too long; what follows is indented.
+    /// A line of words or an equation, folded where it is too long; what follows is indented. Lines of tables stay.
     pub fn line(self, line: &str) -> String {
-        fold(line, self.width).join("\n") + "\n"
+        match line.starts_with(['┌', '│', '╞', '└']) {
+            true => format!("{line}\n"),
+            false => fold(line, self.width).join("\n") + "\n",
+        }
     }
 
     /// A table with a header. Where it is too wide, long cells move below their rows; where that does not help, columns go

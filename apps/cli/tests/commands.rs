@@ -356,11 +356,11 @@ fn tables_and_equations_fit_the_page() {
             let usual = halfarrow(&here, &arguments);
             assert_eq!(status(&usual), 0, "{}", stderr(&usual));
             assert!(widest(&usual) <= 80, "{arguments:?}\n{}", stdout(&usual));
-            arguments.extend(["--width", "50"]);
+            arguments.extend(["--width", "60"]);
             let narrow = halfarrow(&here, &arguments);
-            assert!(widest(&narrow) <= 50, "{arguments:?}\n{}", stdout(&narrow));
+            assert!(widest(&narrow) <= 60, "{arguments:?}\n{}", stdout(&narrow));
             let mut program = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
-            let by_columns = program.args(&arguments[..arguments.len() - 2]).env("COLUMNS", "50").output();
+            let by_columns = program.args(&arguments[..arguments.len() - 2]).env("COLUMNS", "60").output();
             assert_eq!(stdout(&by_columns.expect("the program starts")), stdout(&narrow));
         }
     }

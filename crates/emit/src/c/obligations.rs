@@ -12,8 +12,9 @@ const FRAME: usize = 96;
 
 /// The lines, as they stand in the comment at the head of the source.
 pub(super) fn lines(plan: &Plan, header: &str) -> String {
-    let newton = !plan.newton.is_empty();
-    let indirect = if newton { "through one constant table, to the equations of each Newton block" } else { "none" };
+    let tables = !plan.newton.is_empty() || !plan.program.start.is_empty();
+    let indirect =
+        if tables { "through constant tables, to the equations of Newton blocks and of the start" } else { "none" };
     let all: [(&str, String); 10] = [
         ("recursion", "none (MISRA C:2012 17.2)".into()),
         ("heap", "none: no malloc, calloc, realloc, free (21.3), no array of variable length (18.8)".into()),
