@@ -101,6 +101,80 @@ fn resistors_over_all_decades_share_what_drives_them() {
     }
 }
 
+/// Numbers without a pattern, the same every time.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as usize % n
+    }
+
+    /// A value over twelve decades.
+    fn value(&mut self) -> String {
+        format!("{}e{}", 1 + self.below(999), self.below(11) as i32 - 7)
+    }
+}
+
+/// A tree of junctions with a ring now and then, transformers and gyrators in between, and these elements on it.
+fn random_graph(seed: u64, kinds: &[&str]) -> String {
+    let mut dice = Dice(seed);
+    let n = 2 + dice.below(5);
+    let (mut text, mut bonds) = ("model Random\n".to_string(), String::new());
+    (0..n).for_each(|i| text += &format!("{}:n{i}\n", dice.below(2)));
+    let rings = dice.below(5).saturating_sub(2);
+    for k in 1..n + rings {
+        let (a, b) = if k < n { (k, dice.below(k)) } else { (k % n, (k % n + 1 + dice.below(n - 1)) % n) };
+        match dice.below(5) {
+            0 => bonds += &format!("n{a} -> n{b}\n"),
+            kind => {
+                text += &format!("{}:t{k}({})\n", ["TF", "GY"][kind % 2], dice.value());
+                bonds += &format!("n{a} -> t{k} -> n{b}\n");
+            }
+        }
+    }
+    for (j, kind) in (0..3 + dice.below(5)).map(|j| (j, kinds[dice.below(kinds.len())])).collect::<Vec<_>>() {
+        text += &format!("{kind}:x{j}({})\n", dice.value());
+        let (node, source) = (dice.below(n), kind.starts_with('S'));
+        bonds += &if source { format!("x{j} -> n{node}\n") } else { format!("n{node} -> x{j}\n") };
+    }
+    text + &bonds
+}
+
+#[test]
+fn laws_hold_in_random_nets_over_many_decades() {
+    let mut done = 0;
+    for seed in 0..150 {
+        let text = random_graph(seed, &["R", "R", "R", "Se", "Sf"]);
+        // Sources may contradict each other, or nothing may determine a flow: that is said, and not counted here.
+        let Ok(model) = Model::from_text("test.bond", &text, &[]) else { continue };
+        let Ok(ran) = model.simulate(&Run { to: 0.1, ..Run::default() }, &mut |_| true) else { continue };
+        let missed = ran.report.audit.residual.as_ref().map_or(0.0, |miss| miss.value);
+        assert!(missed < 1e-9, "{missed}: {text}");
+        done += 1;
+    }
+    assert!(done > 60, "{done}");
+}
+
+/// Without losses every pole is on the imaginary axis.
+#[test]
+fn random_graphs_without_losses_have_no_damping() {
+    let mut done = 0;
+    for seed in 1000..1150 {
+        let text = random_graph(seed, &["I", "C"]);
+        let Ok(model) = Model::from_text("test.bond", &text, &[]) else { continue };
+        let told = model.linearize(&Linearize::default()).unwrap_or_else(|e| panic!("{text}{}", e.render(false)));
+        if told.poles.is_empty() {
+            continue;
+        }
+        let most = told.poles.iter().map(|p| libm::hypot(p[0], p[1])).fold(0.0, f64::max);
+        assert!(told.poles.iter().all(|p| p[0].abs() <= 1e-10 * most), "{:?} {text}", told.poles);
+        assert_eq!(told.stability, Stability::Marginal, "{:?} {text}", told.poles);
+        done += 1;
+    }
+    assert!(done > 60, "{done}");
+}
+
 /// `n` windows in a row: upright rods of 1 m and 1 kg that stand on the floor, joined at their tops by level ones, so
 /// that half of the moduli are 0 at the start. `turn`: which of nodes, bonds and states stand in reverse order.
 fn windows(n: usize, by_constraint: bool, turn: usize) -> String {

@@ -50,12 +50,11 @@ fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
         .filter(|(_, known)| *known < DIGITS)
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let known = known.max(0.0).floor();
+    let name =
+        if pole[1] == 0.0 { format!("{:.3e}", pole[0]) } else { format!("{:.3e} ± {:.3e} i", pole[0], pole[1].abs()) };
     Some(format!(
-        "of the pole {:.3e} {} {:.3e}i about {known} digits are known: the entries of the matrix are of such different \
-         magnitudes, or the poles so near to each other, that rounding moves it",
-        pole[0],
-        if pole[1] < 0.0 { '-' } else { '+' },
-        pole[1].abs()
+        "of the pole {name} about {known} digits are known: the entries of the matrix are of such different magnitudes, or \
+         poles so near to each other, that rounding moves it"
     ))
 }
 
