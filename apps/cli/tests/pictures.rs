@@ -31,7 +31,9 @@ fn said(output: &Output) -> String {
 fn a_drawing_shows_what_is_asked_for_and_keeps_places() {
     let at = folder("draw");
     assert!(halfarrow(&at, &["draw", "--out", "old.svg"]).status.success());
-    assert!(halfarrow(&at, &["draw", "--out", "new.svg", "--no-laws", "--no-paths", "--keep", "old.svg"]).status.success());
+    assert!(
+        halfarrow(&at, &["draw", "--out", "new.svg", "--no-laws", "--no-paths", "--keep", "old.svg"]).status.success()
+    );
     let (old, new) = (read(&at, "old.svg"), read(&at, "new.svg"));
     assert!(old.contains(">k = kt<") && !new.contains(">k = kt<") && new.contains("tread"));
     let none = halfarrow(&at, &["draw", "--out", "x.svg", "--paths", "1"]);
@@ -48,7 +50,16 @@ fn plots_lay_runs_over_each_other() {
     let at = folder("plot");
     let run = |more: &[&str]| halfarrow(&at, &[&["simulate", "--to", "1", "--every", "0.05"], more].concat());
     assert!(run(&["--out", "soft.csv", "--set", "ks=9e3"]).status.success());
-    let done = run(&["--plot", "a.svg", "--plot-vars", "damper.e,body.f", "--overlay", "soft.csv", "--overlay", "ks=30e3,b=500"]);
+    let done = run(&[
+        "--plot",
+        "a.svg",
+        "--plot-vars",
+        "damper.e,body.f",
+        "--overlay",
+        "soft.csv",
+        "--overlay",
+        "ks=30e3,b=500",
+    ]);
     assert!(done.status.success(), "{}", said(&done));
     let svg = read(&at, "a.svg");
     assert!(svg.contains("body.f · soft.csv") && svg.contains("damper.e · ks=30e3,b=500"), "{svg}");

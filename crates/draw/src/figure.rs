@@ -123,10 +123,9 @@ impl Glyph {
     pub fn core(&self) -> [f64; 2] {
         match self.form {
             Form::Junction => [9.0, 11.0],
-            Form::Field => [
-                self.main_width().max(self.law_width()) / 2.0 + 4.0,
-                10.0 + self.law.len() as f64 * LEADING / 2.0,
-            ],
+            Form::Field => {
+                [self.main_width().max(self.law_width()) / 2.0 + 4.0, 10.0 + self.law.len() as f64 * LEADING / 2.0]
+            }
             _ => [width(&self.kind, KIND, true) / 2.0 + 4.0, 10.5],
         }
     }

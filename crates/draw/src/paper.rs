@@ -80,14 +80,16 @@ impl Paper {
     }
     /// The number of lines that a line crosses.
     pub fn crossings(&self, from: Point, to: Point) -> usize {
-        let mut met: Vec<usize> = along(from, to).filter_map(|t| self.tiles.get(&t)).flat_map(|t| &t[1]).copied().collect();
+        let mut met: Vec<usize> =
+            along(from, to).filter_map(|t| self.tiles.get(&t)).flat_map(|t| &t[1]).copied().collect();
         met.sort_unstable();
         met.dedup();
         met.into_iter().filter(|&i| cross(from, to, self.lines[i][0], self.lines[i][1])).count()
     }
     /// The boxes that reach into a window, in order.
     pub fn boxes_in(&self, window: Area) -> Vec<Area> {
-        let mut met: Vec<usize> = tiles(window).filter_map(|t| self.tiles.get(&t)).flat_map(|t| &t[0]).copied().collect();
+        let mut met: Vec<usize> =
+            tiles(window).filter_map(|t| self.tiles.get(&t)).flat_map(|t| &t[0]).copied().collect();
         met.sort_unstable();
         met.dedup();
         met.into_iter().map(|i| self.boxes[i].0).filter(|a| a.overlaps(&window)).collect()

@@ -30,7 +30,11 @@ impl Route {
     /// The direction in which the course arrives at one of its ends (0 or 1), length 1.
     pub fn arrival(&self, end: usize) -> Point {
         let last = self.points.len() - 1;
-        if end == 0 { unit(step(self.points[1], self.points[0])) } else { unit(step(self.points[last - 1], self.points[last])) }
+        if end == 0 {
+            unit(step(self.points[1], self.points[0]))
+        } else {
+            unit(step(self.points[last - 1], self.points[last]))
+        }
     }
     /// The point at this fraction of the way, and the direction there.
     pub fn at(&self, t: f64) -> (Point, Point) {
@@ -112,7 +116,13 @@ fn route(figure: &Figure, placed: &Placement, bond: usize, aside: f64, turn: usi
 
 /// Leads the bonds whose straight line runs through a sign or a text around it, in order, and notes them on the paper.
 /// How many there is no way for.
-pub fn lead_around(figure: &Figure, placed: &Placement, routes: &mut [Route], paper: &mut Paper, bonds: &[usize]) -> usize {
+pub fn lead_around(
+    figure: &Figure,
+    placed: &Placement,
+    routes: &mut [Route],
+    paper: &mut Paper,
+    bonds: &[usize],
+) -> usize {
     let mut lost = 0;
     for &bond in bonds {
         let ends = figure.bonds[bond].ends;

@@ -84,20 +84,24 @@ fn arrange(figure: &Figure, placed: Placement) -> Scene {
     let lanes = lanes(figure);
     let mut paper = glyphs(figure, &placed);
     let mut routes = straight(figure, &placed);
-    let meets = |paper: &Paper, route: &Route, i: usize| route.pieces().any(|[p, q]| paper.blocked(p, q, figure.bonds[i].ends));
+    let meets =
+        |paper: &Paper, route: &Route, i: usize| route.pieces().any(|[p, q]| paper.blocked(p, q, figure.bonds[i].ends));
     let (mut around, plain): (Vec<usize>, Vec<usize>) = (0..routes.len()).partition(|&i| meets(&paper, &routes[i], i));
     let mut with_lines = paper.clone();
     plain.iter().flat_map(|&i| routes[i].pieces()).for_each(|[p, q]| with_lines.add_line(p, q));
     let (names, _) = names(figure, &placed, &mut with_lines);
     // What a text could not keep off is led around it.
     names.iter().for_each(|&(v, c)| paper.add_box(Area::around(c, name_size(figure, v)), None));
-    let plain: Vec<usize> = plain.into_iter().filter(|&i| {
-        let hit = meets(&paper, &routes[i], i);
-        if hit {
-            around.push(i);
-        }
-        !hit
-    }).collect();
+    let plain: Vec<usize> = plain
+        .into_iter()
+        .filter(|&i| {
+            let hit = meets(&paper, &routes[i], i);
+            if hit {
+                around.push(i);
+            }
+            !hit
+        })
+        .collect();
     plain.iter().flat_map(|&i| routes[i].pieces()).for_each(|[p, q]| paper.add_line(p, q));
     let mut faults = lead_around(figure, &placed, &mut routes, &mut paper, &around);
     faults += overlaps(figure, &placed, &names);
@@ -152,12 +156,15 @@ fn names(figure: &Figure, placed: &Placement, paper: &mut Paper) -> (Vec<(usize,
 /// How many texts of two-ports and junctions stand on another text or sign.
 fn overlaps(figure: &Figure, placed: &Placement, names: &[(usize, Point)]) -> usize {
     let mut paper = glyphs(figure, placed);
-    names.iter().filter(|&&(v, centre)| {
-        let area = Area::around(centre, name_size(figure, v));
-        let met = paper.crowding(area) > 0;
-        paper.add_box(area, None);
-        met
-    }).count()
+    names
+        .iter()
+        .filter(|&&(v, centre)| {
+            let area = Area::around(centre, name_size(figure, v));
+            let met = paper.crowding(area) > 0;
+            paper.add_box(area, None);
+            met
+        })
+        .count()
 }
 
 /// Notes half arrows and strokes.

@@ -56,7 +56,8 @@ pub fn render(figure: &Figure, keep: &BTreeMap<String, Point>) -> String {
 
 /// Title and documentation.
 fn head(figure: &Figure) -> Vec<Row> {
-    let title = Row { mark: Mark::Title, text: figure.title.clone(), width: width(&figure.title, 17.0, true), height: 20.0 };
+    let title =
+        Row { mark: Mark::Title, text: figure.title.clone(), width: width(&figure.title, 17.0, true), height: 20.0 };
     let doc = |text: String| Row { mark: Mark::Doc, width: width(&text, 12.0, false), text, height: 17.0 };
     let title = (!figure.title.is_empty()).then_some(title);
     title.into_iter().chain(wrap(&figure.doc, LEGEND).into_iter().map(doc)).collect()
@@ -181,7 +182,11 @@ impl Svg {
             let data = course(figure, &scene.placed, &scene.routes, &scene.lanes, i);
             let tip = escape(&format!("{}, class {}: {}", path.number, path.class, path.text));
             let look = stroked(path.number);
-            _ = writeln!(self.out, "<path data-path=\"{}\" d=\"{data}\" {look}><title>{tip}</title></path>", path.number);
+            _ = writeln!(
+                self.out,
+                "<path data-path=\"{}\" d=\"{data}\" {look}><title>{tip}</title></path>",
+                path.number
+            );
         }
         self.close();
     }
@@ -291,7 +296,8 @@ impl Svg {
         let main = main_line(glyph, at, facing, mirrored);
         self.main_line(main.at, main.anchor, glyph);
         for (line, place) in glyph.law.iter().zip(law_lines(glyph, at, facing, mirrored)) {
-            let style = format!("font-size=\"{LAW}\" font-style=\"italic\" text-anchor=\"{}\" fill=\"{SOFT}\"", place.anchor);
+            let style =
+                format!("font-size=\"{LAW}\" font-style=\"italic\" text-anchor=\"{}\" fill=\"{SOFT}\"", place.anchor);
             self.text(place.at, &style, line);
         }
     }

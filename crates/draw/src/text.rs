@@ -163,7 +163,10 @@ mod tests {
 
     #[test]
     fn long_text_is_broken_and_nothing_is_lost() {
-        assert_eq!(wrap("lb·cos(al) − cu·sin(ph) − xa − la·cos(au)", 24), ["lb·cos(al) − cu·sin(ph)", "− xa − la·cos(au)"]);
+        assert_eq!(
+            wrap("lb·cos(al) − cu·sin(ph) − xa − la·cos(au)", 24),
+            ["lb·cos(al) − cu·sin(ph)", "− xa − la·cos(au)"]
+        );
         assert_eq!(wrap("a·b·c·d", 4), ["a·b·", "c·d"]);
         assert_eq!(wrap("abcdefgh", 3), ["abc", "def", "gh"]);
         assert_eq!(wrap("spring", 6), ["spring"]);

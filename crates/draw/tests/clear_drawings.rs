@@ -118,7 +118,8 @@ fn faults(svg: &str) -> Vec<String> {
 
 /// All models, and graphs that are hard to draw.
 fn all() -> Vec<(String, String)> {
-    let models = std::fs::read_dir(here("../../models")).expect("models").flatten().map(|e| e.path().join("model.bond"));
+    let models =
+        std::fs::read_dir(here("../../models")).expect("models").flatten().map(|e| e.path().join("model.bond"));
     let graphs = std::fs::read_dir(here("tests/graphs")).expect("graphs").flatten().map(|e| e.path());
     let mut files: Vec<PathBuf> = models.chain(graphs).filter(|f| f.is_file()).collect();
     files.sort();
@@ -172,7 +173,9 @@ fn instances_of_a_component_are_drawn_alike() {
 fn what_was_placed_stays_and_what_is_new_finds_a_place() {
     let text = read(&here("../../models/quarter_car/model.bond"));
     let before = positions(&drawn(&text, &DrawOptions::default()));
-    let longer = format!("{text}\n1:seat -> I:driver(80 kg)\n0:cushion -> seat\ncushion -> C:foam(k = 9e3)\n1:lift -> cushion\nSf:floor(0) -> lift\n");
+    let longer = format!(
+        "{text}\n1:seat -> I:driver(80 kg)\n0:cushion -> seat\ncushion -> C:foam(k = 9e3)\n1:lift -> cushion\nSf:floor(0) -> lift\n"
+    );
     let options = DrawOptions { keep: before.clone(), ..DrawOptions::default() };
     let svg = drawn(&longer, &options);
     assert_eq!(faults(&svg), Vec::<String>::new());
@@ -207,7 +210,11 @@ fn every_path_has_a_look_of_its_own_and_laws_stand_in_full() {
     let svg = drawn(&text, &DrawOptions { paths: DrawnPaths::First(20), ..DrawOptions::default() });
     let xml = Document::parse(&svg).expect("XML");
     let layer = xml.descendants().find(|n| n.attribute("class") == Some("paths")).expect("paths");
-    let looks: Vec<_> = layer.children().filter(Node::is_element).map(|n| (n.attribute("stroke"), n.attribute("stroke-dasharray"))).collect();
+    let looks: Vec<_> = layer
+        .children()
+        .filter(Node::is_element)
+        .map(|n| (n.attribute("stroke"), n.attribute("stroke-dasharray")))
+        .collect();
     assert_eq!(looks.iter().collect::<BTreeSet<_>>().len(), looks.len(), "{looks:?}");
     assert!(looks.len() == 20 && !svg.contains('…'), "nothing is left out");
 }

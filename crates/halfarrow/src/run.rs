@@ -530,7 +530,11 @@ pub(crate) fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec
         Record::Also(more) => {
             let observed = system.program().observed.iter().filter(|o| o.default && o.value.is_ok());
             let mut names: Vec<String> = observed.map(|o| o.name.clone()).collect();
-            more.iter().for_each(|name| if !names.contains(name) { names.push(name.clone()) });
+            more.iter().for_each(|name| {
+                if !names.contains(name) {
+                    names.push(name.clone())
+                }
+            });
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let notes = left_out(system, true);
             system.record(&names).map_err(|error| refused(system, error)).map(|()| notes)

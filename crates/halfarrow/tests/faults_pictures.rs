@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use halfarrow::{
-    Compare, DrawOptions, DrawnPaths, Error, Form, Linearize, Model, PlotOptions, Problem, Record, Report, Run, positions,
+    Compare, DrawOptions, DrawnPaths, Error, Form, Linearize, Model, PlotOptions, Problem, Record, Report, Run,
+    positions,
 };
 
 fn load(path: &str) -> Model {
@@ -46,7 +47,9 @@ fn comparing_keeps_to_its_budget() {
     let report = match model.compare(&wanted, &mut |_, _| true) {
         Ok(report) => report,
         // A machine that is busy with other things may not even come to the reference.
-        Err(Error::Usage(Problem::BadOption { reason })) => return assert!(reason.contains("give more time"), "{reason}"),
+        Err(Error::Usage(Problem::BadOption { reason })) => {
+            return assert!(reason.contains("give more time"), "{reason}");
+        }
         Err(error) => panic!("{}", error.render(false)),
     };
     let without = report.rows.iter().filter(|row| row.seconds_per_second.is_none()).count();
@@ -60,10 +63,17 @@ fn comparing_keeps_to_its_budget() {
 fn equal_equations_stand_once_with_the_names_of_their_forms() {
     let model = load("../../models/pendulum/model.bond");
     let page = report(&model, &Report { to: Some(0.5), compare: false, ..Report::default() }, &mut Vec::new());
-    for name in ["Minimal form", "Kane’s form", "Inverted form", "Classical form: break", "Lagrange’s form", "Stiff form"] {
-        assert_eq!(page.matches(&format!("<h3>{name}")).count() + page.matches(&format!("<h3 class=\"same\">{name}")).count(), 1, "{name}");
+    for name in
+        ["Minimal form", "Kane’s form", "Inverted form", "Classical form: break", "Lagrange’s form", "Stiff form"]
+    {
+        assert_eq!(
+            page.matches(&format!("<h3>{name}")).count() + page.matches(&format!("<h3 class=\"same\">{name}")).count(),
+            1,
+            "{name}"
+        );
     }
-    let forms: Vec<&str> = page.split("<div class=\"form\">").skip(1).map(|f| f.split("</div>").next().unwrap_or_default()).collect();
+    let forms: Vec<&str> =
+        page.split("<div class=\"form\">").skip(1).map(|f| f.split("</div>").next().unwrap_or_default()).collect();
     let tables: Vec<&str> = forms.iter().filter_map(|f| f.split("<table").nth(1)).collect();
     assert!(tables.len() < Form::ALL.len());
     for (i, table) in tables.iter().enumerate() {
@@ -73,8 +83,16 @@ fn equal_equations_stand_once_with_the_names_of_their_forms() {
 
 #[test]
 fn curves_of_a_report_come_with_all_that_is_needed_to_zoom_them() {
-    let page = report(&load("../../models/pendulum/model.bond"), &Report { to: Some(0.5), compare: false, ..Report::default() }, &mut Vec::new());
-    assert!(page.contains("<div id=\"curves\">") && page.contains("var uPlot=function()") && page.contains("const runs = {t:["));
+    let page = report(
+        &load("../../models/pendulum/model.bond"),
+        &Report { to: Some(0.5), compare: false, ..Report::default() },
+        &mut Vec::new(),
+    );
+    assert!(
+        page.contains("<div id=\"curves\">")
+            && page.contains("var uPlot=function()")
+            && page.contains("const runs = {t:[")
+    );
     for outside in ["http", "src=", "url(", "@import", "<link", "<iframe", "XMLHttpRequest", "fetch(", "import("] {
         assert!(!page.contains(outside), "{outside}");
     }
@@ -88,7 +106,8 @@ fn an_output_that_is_a_state_does_not_hide_it() {
     let model = model(TWO_NAMES);
     let done = model.simulate(&Run { to: 3.0, every: Some(0.1), ..Run::default() }, &mut |_| true).expect("a run");
     let svg = model.plot(&done.trace).svg;
-    let curves: Vec<&str> = svg.split("class=\"curve\"").skip(1).map(|c| c.split("</path>").next().unwrap_or_default()).collect();
+    let curves: Vec<&str> =
+        svg.split("class=\"curve\"").skip(1).map(|c| c.split("</path>").next().unwrap_or_default()).collect();
     let dashed: Vec<bool> = curves.iter().map(|c| c.contains("stroke-dasharray")).collect();
     assert_eq!(dashed, [false, true], "{svg}");
 }
@@ -103,7 +122,10 @@ fn chosen_variables_of_several_runs_lie_over_each_other() {
     let options = PlotOptions { vars: vec!["drag.e".into()], x: Some("mass.f".into()), log: [false, true] };
     let svg = first.plot_runs(&[("heavy", &one), ("light", &other)], &options).expect("a plot").svg;
     assert_eq!(svg.matches("class=\"curve\"").count(), 2);
-    assert!(svg.contains("drag.e · heavy") && svg.contains("drag.e · light") && svg.contains(">mass.f</text>"), "{svg}");
+    assert!(
+        svg.contains("drag.e · heavy") && svg.contains("drag.e · light") && svg.contains(">mass.f</text>"),
+        "{svg}"
+    );
     assert!(!svg.contains("NaN") && svg.contains("<title>Two</title>"));
     let unknown = PlotOptions { vars: vec!["drg.e".into()], ..PlotOptions::default() };
     let error = first.plot_runs(&[("", &one)], &unknown).expect_err("there is none");
@@ -116,18 +138,28 @@ const LOOP: &str = "model Loop\ninput u = 0\nMSe:drive(0.5*u) -> 1:a -> I:ia(1)\
 #[test]
 fn margins_of_a_loop_are_those_of_its_transfer_function() {
     let model = model(LOOP);
-    let wanted = Linearize { inputs: Some(vec!["u".into()]), outputs: Some(vec!["out".into()]), ..Linearize::default() };
+    let wanted =
+        Linearize { inputs: Some(vec!["u".into()]), outputs: Some(vec!["out".into()]), ..Linearize::default() };
     let report = model.linearize(&wanted).expect("a linear model");
     let margins = report.responses()[0].margins();
     let gain = margins.iter().find(|m| m.of_gain).expect("a gain margin");
-    assert!((gain.hertz - 1.0 / std::f64::consts::TAU).abs() < 1e-4 && (gain.size() - 20.0 * 4.0_f64.log10()).abs() < 1e-2, "{gain:?}");
+    assert!(
+        (gain.hertz - 1.0 / std::f64::consts::TAU).abs() < 1e-4 && (gain.size() - 20.0 * 4.0_f64.log10()).abs() < 1e-2,
+        "{gain:?}"
+    );
     let phase = margins.iter().find(|m| !m.of_gain).expect("a phase margin");
     // |K/(jw (jw + 1)^2)| = 1 means w (w^2 + 1) = K: w = 0.4238537991.
     let w = 0.423_853_799_1_f64;
     let exact = 180.0 - 90.0 - 2.0 * w.atan().to_degrees();
-    assert!((phase.hertz - w / std::f64::consts::TAU).abs() < 1e-4 && (phase.size() - exact).abs() < 0.05, "{phase:?} {exact}");
+    assert!(
+        (phase.hertz - w / std::f64::consts::TAU).abs() < 1e-4 && (phase.size() - exact).abs() < 0.05,
+        "{phase:?} {exact}"
+    );
     let svg = report.bode().svg;
-    assert!(svg.contains("gain margin 12.0 dB at 0.159 Hz") && svg.contains("phase margin 44.1° at 0.0675 Hz"), "{svg}");
+    assert!(
+        svg.contains("gain margin 12.0 dB at 0.159 Hz") && svg.contains("phase margin 44.1° at 0.0675 Hz"),
+        "{svg}"
+    );
     assert!(svg.contains(">frequency in Hz<") && svg.contains(">magnitude in dB<"), "{svg}");
 }
 

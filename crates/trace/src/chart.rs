@@ -292,7 +292,10 @@ impl Page {
             Guide::Span { x, y, name } => {
                 let [from, to] = [area.place([*x, y[0]]), area.place([*x, y[1]])];
                 let bar = format!("M{} {}h8m-4 0V{}m-4 0h8", n(from[0] - 4.0), n(from[1]), n(to[1]));
-                _ = writeln!(self.out, "<path class=\"margin\" d=\"{bar}\" stroke=\"#b22222\" stroke-width=\"1.4\" fill=\"none\"/>");
+                _ = writeln!(
+                    self.out,
+                    "<path class=\"margin\" d=\"{bar}\" stroke=\"#b22222\" stroke-width=\"1.4\" fill=\"none\"/>"
+                );
                 let (anchor, off) = if from[0] > 0.6 * WIDTH { ("end", -8.0) } else { ("start", 8.0) };
                 let style = format!("font-size=\"10\" fill=\"#b22222\" text-anchor=\"{anchor}\" {HALO}");
                 self.text([from[0] + off, 0.5 * (from[1] + to[1]) + 3.6], &style, name);

@@ -79,8 +79,10 @@ pub enum InputError {
 pub fn read_trace(path: &Path) -> Result<Trace, Vec<InputError>> {
     let signals = read_inputs(path)?;
     let times = signals.values().next().map(|s| s.times().to_vec()).unwrap_or_default();
-    let column = |(name, signal): (&String, &Signal)| {
-        Column { name: name.clone(), unit: String::new(), values: signal.values().to_vec() }
+    let column = |(name, signal): (&String, &Signal)| Column {
+        name: name.clone(),
+        unit: String::new(),
+        values: signal.values().to_vec(),
     };
     Ok(Trace { times, columns: signals.iter().map(column).collect() })
 }

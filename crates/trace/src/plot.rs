@@ -130,7 +130,13 @@ impl Page {
         self.out.push_str("<g fill=\"none\" stroke-width=\"1.5\" stroke-linejoin=\"round\">\n");
         let hidden = hidden(drawn, &values);
         for (i, column) in drawn.iter().enumerate() {
-            self.curve([COLOURS[i], dashes(hidden[i])], column, &decimate(&trace.times, &column.values, AREA[0] as usize), time, &values);
+            self.curve(
+                [COLOURS[i], dashes(hidden[i])],
+                column,
+                &decimate(&trace.times, &column.values, AREA[0] as usize),
+                time,
+                &values,
+            );
         }
         self.out.push_str("</g>\n");
         self.legend(columns, &hidden);
@@ -155,7 +161,14 @@ impl Page {
         }
         self.out.push('\n');
     }
-    fn curve(&mut self, [colour, dashes]: [&str; 2], column: &Column, runs: &[Vec<[f64; 2]>], time: &Axis, values: &Axis) {
+    fn curve(
+        &mut self,
+        [colour, dashes]: [&str; 2],
+        column: &Column,
+        runs: &[Vec<[f64; 2]>],
+        time: &Axis,
+        values: &Axis,
+    ) {
         let (mut data, mut dots) = (String::new(), String::new());
         for run in runs {
             let place = |p: &[f64; 2]| [time.place(p[0]), AREA[1] - values.place(p[1])];

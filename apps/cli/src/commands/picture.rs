@@ -38,8 +38,8 @@ fn options(arguments: &arguments::Draw) -> Result<DrawOptions, Problem> {
 
 /// Where elements stand in an earlier drawing.
 fn kept(path: &Path) -> Result<BTreeMap<String, [f64; 2]>, Problem> {
-    let svg = std::fs::read_to_string(path)
-        .map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })?;
+    let svg =
+        std::fs::read_to_string(path).map_err(|why| Problem::Unreadable { path: path.into(), why: why.to_string() })?;
     let found = positions(&svg);
     match found.is_empty() {
         true => Err(Problem::BadInput {

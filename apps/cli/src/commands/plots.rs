@@ -53,7 +53,10 @@ pub fn write_plots(arguments: &Simulate, model: &Model, run: &Run, done: &Simula
 fn other(arguments: &Simulate, run: &Run, what: &str) -> Result<Trace, Error> {
     if Path::new(what).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         let path = PathBuf::from(what);
-        let bad = |faults: Vec<_>| Problem::BadInput { path: path.clone(), faults: faults.iter().map(ToString::to_string).collect() };
+        let bad = |faults: Vec<_>| Problem::BadInput {
+            path: path.clone(),
+            faults: faults.iter().map(ToString::to_string).collect(),
+        };
         return read_trace(&path).map_err(|faults| bad(faults).into());
     }
     let pair = |text: &str| {

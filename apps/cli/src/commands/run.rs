@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, DrawOptions, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated, Start,
-    Stopped, Trace, csv_text, write_csv, write_parquet,
+    AuditReport, DrawOptions, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated,
+    Start, Stopped, Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 

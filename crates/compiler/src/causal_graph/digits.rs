@@ -121,7 +121,8 @@ impl Rows<'_> {
     }
 }
 
-/// The greatest entry between straight laws, each weighed by its slope.
+/// The greatest gain there and back between straight laws, each weighed by its slope: the square of the entry between
+/// them. What is left of 1 beside such a gain is what is wanted.
 fn cost_of_laws(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut NumericPoint, rows: &mut Rows) -> f64 {
     let laws = solved.ports.iter().filter(|p| matches!(p.role, Role::Algebraic(_)));
     let weighed = laws.filter_map(|p| {
@@ -137,7 +138,7 @@ fn cost_of_laws(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut Numer
     for (port, (_, output)) in &weighed {
         let row = rows.row(x, point, port.output);
         let entries = row.iter().filter_map(|(s, v)| Some((output * v / inputs.get(s)?).abs()));
-        most = entries.fold(most, f64::max);
+        most = entries.map(|entry| entry * entry).fold(most, f64::max);
     }
     most
 }

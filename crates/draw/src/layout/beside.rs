@@ -116,7 +116,9 @@ impl<'n> Table<'n> {
 fn around(p: Point, room: [Room; 4]) -> Vec<Point> {
     let mut places = Vec::new();
     for ring in 0..4 {
-        for (dx, dy) in [(1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+        for (dx, dy) in
+            [(1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+        {
             let far = 1.0 + 0.75 * f64::from(ring);
             let side = Side::of([-dx as i32, -dy as i32]);
             let own = room[side as usize];

@@ -46,7 +46,8 @@ pub fn gather(net: &Network, shapes: &[Vec<Cell>], mut cells: Vec<Cell>) -> Vec<
     if net.alike.is_empty() {
         return cells;
     }
-    let shapes: Vec<Vec<Cell>> = shapes.iter().zip(&net.alike).map(|(s, group)| close_up(&s[..group[0].len()])).collect();
+    let shapes: Vec<Vec<Cell>> =
+        shapes.iter().zip(&net.alike).map(|(s, group)| close_up(&s[..group[0].len()])).collect();
     let widest = shapes.iter().flatten().flatten().copied().max().unwrap_or(0);
     let apart = 2 * widest + 3;
     let (block, _) = membership(net);

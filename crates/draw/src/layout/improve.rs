@@ -96,7 +96,8 @@ fn squeeze(board: &mut Board) {
             let mut by = [0, 0];
             by[axis] = -1;
             while carry(board, &beyond, |c| [c[0] + by[0], c[1] + by[1]])
-                .is_some_and(|m| board.keeps_blocks(&m) && attempt(board, &m, 0)) {}
+                .is_some_and(|m| board.keeps_blocks(&m) && attempt(board, &m, 0))
+            {}
         }
     }
 }

@@ -131,7 +131,8 @@ impl Plan {
     }
     /// Turns cells into px; bonds get more room by this factor.
     pub fn placement(&self, wider: f64) -> Placement {
-        let laid: Vec<_> = self.parts.iter().map(|(nodes, net, cells)| (nodes, space::space(net, cells, wider))).collect();
+        let laid: Vec<_> =
+            self.parts.iter().map(|(nodes, net, cells)| (nodes, space::space(net, cells, wider))).collect();
         pack(self.nodes, &laid)
     }
 }

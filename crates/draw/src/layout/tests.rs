@@ -110,9 +110,14 @@ fn odd_graphs_are_drawn_too() {
     check(&Network { nodes: vec![node(Role::OnePort)], bonds: vec![], alike: vec![] });
     check(&Network { nodes: vec![node(Role::OnePort); 2], bonds: vec![[0, 1]], alike: vec![] });
     check(&Network { nodes: vec![node(Role::Centre); 2], bonds: vec![[0, 0], [0, 1], [1, 0], [0, 1]], alike: vec![] });
-    let star = Network { nodes: vec![node(Role::OnePort); 40], bonds: (1..40).map(|i| [0, i]).collect(), alike: vec![] };
+    let star =
+        Network { nodes: vec![node(Role::OnePort); 40], bonds: (1..40).map(|i| [0, i]).collect(), alike: vec![] };
     check(&star);
-    let parts = Network { nodes: vec![node(Role::OnePort); 20], bonds: (0..10).map(|i| [2 * i, 2 * i + 1]).collect(), alike: vec![] };
+    let parts = Network {
+        nodes: vec![node(Role::OnePort); 20],
+        bonds: (0..10).map(|i| [2 * i, 2 * i + 1]).collect(),
+        alike: vec![],
+    };
     check(&parts);
 }
 

@@ -202,7 +202,9 @@ impl Model {
         let made = |form: Form| {
             progress(0.0, form.name());
             let over = form != Form::Minimal && is_over(budget.part(REFERENCE));
-            let subject = if over { Err(LEFT_OUT.to_string()) } else {
+            let subject = if over {
+                Err(LEFT_OUT.to_string())
+            } else {
                 self.subject(&Run { form, ..run.clone() }).map_err(|error| short(&error))
             };
             (form, subject)
@@ -219,11 +221,12 @@ impl Model {
         // What is integrated in another way confirms more.
         others.sort_by_key(|(_, subject)| subject.is_explicit());
         let reference =
-            Reference::new(&minimal, &others, &motion, to, budget.part(REFERENCE))
-                .map_err(|stopped| match stopped.failure {
-                    Failure::Interrupted { .. } => budget.too_short(),
-                    failure => self.stopped(failure),
-                })?;
+            Reference::new(&minimal, &others, &motion, to, budget.part(REFERENCE)).map_err(|stopped| match stopped
+                .failure
+            {
+                Failure::Interrupted { .. } => budget.too_short(),
+                failure => self.stopped(failure),
+            })?;
         let patience = Duration::from_secs_f64(compare.patience.clamp(1e-3, 1e6));
         let mut forms: Vec<Measured> = Vec::with_capacity(subjects.len());
         let count = subjects.len() as f64;

@@ -8,7 +8,9 @@ use cpu_time::ThreadTime;
 use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec::{self as exec, Operations};
-use halfarrow_sim::{Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit};
+use halfarrow_sim::{
+    Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit,
+};
 use halfarrow_trace::Trace;
 
 use crate::audited::{AuditReport, Audited};
@@ -175,7 +177,13 @@ impl Subject<'_> {
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(names);
-                simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(Some(&mut trace), settings))?;
+                simulate_implicit(
+                    &mut system,
+                    &options,
+                    &mut y,
+                    &mut yp,
+                    &mut Patient::new(Some(&mut trace), settings),
+                )?;
             }
         }
         Ok(trace)
@@ -195,7 +203,8 @@ impl Subject<'_> {
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(&[]);
                 let begun = ThreadTime::now();
-                let summary = simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(None, settings))?;
+                let summary =
+                    simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(None, settings))?;
                 Ok((begun.elapsed(), summary))
             }
         }

@@ -22,8 +22,7 @@ impl LinearizeReport {
         let unit = self.common_unit(&responses);
         let scale = |label: &str, unit: &str, kind| Scale { label: label.into(), unit: unit.into(), kind };
         let frequency = || scale("frequency", "Hz", ScaleKind::Logarithmic);
-        let over =
-            |values: Vec<f64>, r: &Response| r.hertz().into_iter().zip(values).map(|(f, v)| [f, v]).collect();
+        let over = |values: Vec<f64>, r: &Response| r.hertz().into_iter().zip(values).map(|(f, v)| [f, v]).collect();
         let curve = |r: &Response, values: Vec<f64>| Curve {
             name: self.curve_name(r),
             points: over(values, r),

@@ -131,7 +131,8 @@ impl Model {
                     patience: 2.0,
                     budget: Some(report.compare_budget),
                 };
-                let compared = self.compare(&wanted, &mut |part, what| progress(0.1 + 0.6 * part, &format!("comparing: {what}")));
+                let compared =
+                    self.compare(&wanted, &mut |part, what| progress(0.1 + 0.6 * part, &format!("comparing: {what}")));
                 let with_picture = |report: CompareReport| {
                     let svg = report.plot().svg;
                     (report, svg)

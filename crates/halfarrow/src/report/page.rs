@@ -4,10 +4,10 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::curves::{LIBRARY, LIBRARY_STYLE, SCRIPT, data};
 use super::{Content, FormPart, FormText, PathRow};
-use halfarrow_compiler::equations::Form;
 use crate::audited::Miss;
 use crate::compare::{CompareReport, Row};
 use crate::run::Simulated;
+use halfarrow_compiler::equations::Form;
 
 const STYLE: &str = include_str!("page.css");
 

@@ -54,13 +54,19 @@ pub fn plot_runs(runs: &[(&str, &Trace)], title: &str, options: &PlotOptions) ->
         }
     };
     let mut units: Vec<&str> = Vec::new();
-    vars.iter().for_each(|c| if !units.contains(&c.unit.as_str()) { units.push(&c.unit) });
+    vars.iter().for_each(|c| {
+        if !units.contains(&c.unit.as_str()) {
+            units.push(&c.unit)
+        }
+    });
     let height = if units.len() == 1 { 320.0 } else { 170.0 };
     let panel = |unit: &&str| {
         let own: Vec<&Column> = vars.iter().filter(|c| c.unit == **unit).copied().collect();
-        let label = if own.len() < 4 { own.iter().map(|c| &c.name[..]).collect::<Vec<_>>().join(", ") } else { String::new() };
+        let label =
+            if own.len() < 4 { own.iter().map(|c| &c.name[..]).collect::<Vec<_>>().join(", ") } else { String::new() };
         let label = if label.chars().count() > 26 { String::new() } else { label };
-        let curves = own.iter().flat_map(|var| runs.iter().filter_map(|run| curve(var, run, options, runs.len()))).collect();
+        let curves =
+            own.iter().flat_map(|var| runs.iter().filter_map(|run| curve(var, run, options, runs.len()))).collect();
         let y = Scale { label, unit: unit.to_string(), kind: kind(options.log[1]) };
         Panel { x: x.clone(), y, height, equal: false, curves, guides: Vec::new() }
     };
