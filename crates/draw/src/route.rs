@@ -8,6 +8,8 @@ use crate::geometry::{Area, Point, add, flow_side, leave_box, length, step, unit
 use crate::layout::Placement;
 use crate::paper::Paper;
 
+/// Bonds led around something; of more in one drawing nobody could follow each.
+const MOST: usize = 400;
 /// Distance between parallel bonds.
 const PARALLEL: f64 = 15.0;
 
@@ -124,10 +126,11 @@ pub fn lead_around(
     bonds: &[usize],
 ) -> usize {
     let mut lost = 0;
-    for &bond in bonds {
+    for (count, &bond) in bonds.iter().enumerate() {
         let ends = figure.bonds[bond].ends;
         let [a, b] = ends.map(|v| placed.anchors[v]);
-        match detour(paper, a, b, ends) {
+        let found = if count < MOST { detour(paper, a, b, ends) } else { None };
+        match found {
             Some(bends) if !bends.is_empty() => {
                 let leave = |v: usize, towards: Point| {
                     let at = placed.anchors[v];

@@ -12,6 +12,7 @@ pub fn place_beside(net: &Network, pinned: &[Option<Point>]) -> Placement {
     let mut table = Table::new(net, pinned);
     table.all_beside();
     table.new_parts();
+    table.turn_texts();
     table.placement()
 }
 
@@ -81,6 +82,7 @@ impl<'n> Table<'n> {
     }
     fn area(&self, v: usize, p: Point) -> Area {
         let room = self.net.nodes[v].room[self.side(v, p) as usize];
+        let room = if self.mirrored[v] { room.mirrored() } else { room };
         Area { min: [p[0] - room.west, p[1] - room.north], max: [p[0] + room.east, p[1] + room.south] }
     }
     /// Parts of which nothing has a place are laid out on their own, below the rest.
@@ -95,6 +97,28 @@ impl<'n> Table<'n> {
                 self.mirrored[v] = placed.mirrored[i];
             }
         }
+    }
+    /// Turns the text of a one-port above or below its neighbour to the other side where that frees it.
+    fn turn_texts(&mut self) {
+        for v in 0..self.at.len() {
+            let Some(p) = self.at[v].filter(|_| self.hangs[v]) else { continue };
+            if !matches!(self.side(v, p), Side::North | Side::South) {
+                continue;
+            }
+            let before = self.met(v, p);
+            self.mirrored[v] = !self.mirrored[v];
+            if before <= self.met(v, p) {
+                self.mirrored[v] = !self.mirrored[v];
+            }
+        }
+    }
+    /// How much the room of a node meets: other nodes, and bonds that do not end there.
+    fn met(&self, v: usize, p: Point) -> usize {
+        let own = self.area(v, p);
+        let others = (0..self.at.len()).filter(|&u| u != v).filter_map(|u| Some(self.area(u, self.at[u]?)));
+        let foreign = self.net.bonds.iter().filter(|b| !b.contains(&v));
+        let lines = foreign.filter_map(|b| Some([self.at[b[0]]?, self.at[b[1]]?]));
+        others.filter(|a| a.overlaps(&own)).count() + lines.filter(|[a, b]| own.meets(*a, *b)).count()
     }
     fn extent(&self) -> (Point, Point) {
         let areas = (0..self.at.len()).filter_map(|v| Some(self.area(v, self.at[v]?)));

@@ -41,8 +41,8 @@ pub fn improve(net: &Network, start: Vec<Cell>) -> Vec<Cell> {
 /// The worst deterioration accepted at the start of each round.
 fn thresholds(nodes: usize) -> &'static [i64] {
     match nodes {
-        0..=SMALL => &[24, 48, 24, 48, 72, 72],
-        ..=24 => &[0, 24, 48, 48, 48, 72],
+        _ if nodes <= SMALL => &[24, 48, 24, 48, 72, 72],
+        0..=24 => &[0, 24, 48, 48, 48, 72],
         25..=60 => &[0, 12, 24, 48],
         61..=BRANCHED => &[0, 16],
         _ => &[0],

@@ -83,7 +83,11 @@ impl Sink for Patient<'_> {
 
     fn progress(&mut self, _: f64) -> ControlFlow<()> {
         self.steps += 1;
-        if self.steps % LOOK == 0 && is_over(self.until) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if self.steps.is_multiple_of(LOOK) && is_over(self.until) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 
