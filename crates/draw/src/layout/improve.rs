@@ -122,6 +122,9 @@ fn propose(board: &Board, branches: &[Branch], dice: &mut Dice) -> Option<Vec<(u
         return None;
     }
     let moves = match dice.below(8) {
+        0..=2 if board.block[v].is_some() && !branches.is_empty() => {
+            pull(board, &branches[dice.below(branches.len())], dice)
+        }
         _ if board.block[v].is_some() => shift(board, v, dice),
         0 | 1 => cluster(board, v, dice),
         2 if !branches.is_empty() => swing(board, &branches[dice.below(branches.len())], dice),
@@ -195,6 +198,16 @@ fn swing(board: &Board, branch: &Branch, dice: &mut Dice) -> Option<Vec<(usize, 
         };
         [x + px, y + py]
     })
+}
+
+/// A branch to where it begins next to the node that holds it.
+fn pull(board: &Board, branch: &Branch, dice: &mut Dice) -> Option<Vec<(usize, Cell)>> {
+    let near = board.incident[branch.pivot].iter().map(|&b| board.net.across(b, branch.pivot));
+    let first = near.into_iter().find(|u| branch.nodes.binary_search(u).is_ok())?;
+    let far = 1 + dice.below(3) as i32;
+    let [x, y] = [[far, 0], [-far, 0], [0, far], [0, -far]][dice.below(4)];
+    let [from, to] = [board.at[first], board.at[branch.pivot]];
+    carry(board, &branch.nodes, |c| [c[0] + to[0] + x - from[0], c[1] + to[1] + y - from[1]])
 }
 
 /// Moves these nodes (many: in order) together, if all target cells are free or left by them.

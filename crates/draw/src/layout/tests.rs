@@ -72,6 +72,24 @@ proptest! {
     fn no_two_nodes_overlap(net in network(7)) {
         check(&net);
     }
+    #[test]
+    fn what_is_pinned_stays(net in network(6), some in proptest::collection::vec(any::<bool>(), 7)) {
+        let whole = lay_out(&net);
+        let pin = |v: usize| some[v % 7].then_some([whole.anchors[v][0] + 0.5, whole.anchors[v][1] - 7.0]);
+        let pinned: Vec<_> = (0..net.nodes.len()).map(pin).collect();
+        let placed = layout(&net, &pinned);
+        prop_assert_eq!(&placed, &layout(&net, &pinned), "the same graph gives the same picture");
+        for (v, p) in pinned.iter().enumerate().filter_map(|(v, p)| Some((v, (*p)?))) {
+            prop_assert_eq!(placed.anchors[v], p);
+        }
+        if pinned.iter().any(Option::is_some) {
+            for v in 0..net.nodes.len() {
+                let a = area(&net, &placed, v);
+                let corner = placed.corner;
+                prop_assert!((0..2).all(|k| a.min[k] >= corner[k] - 0.01 && a.max[k] <= corner[k] + placed.size[k] + 0.01));
+            }
+        }
+    }
 }
 
 /// A ladder of so many sections: a chain of junctions with a one-port each.
@@ -128,4 +146,22 @@ fn large_graphs_are_laid_out_in_a_moment() {
     assert_eq!(placed.anchors.len(), 10_000);
     assert!(placed.size[0] < 5.0 * placed.size[1], "folded into lines: {:?}", placed.size);
     assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
+}
+
+#[test]
+fn equal_parts_get_equal_shapes() {
+    // Five junctions in a ring with a chord, each with two one-ports of its own.
+    let mut net = Network { nodes: Vec::new(), bonds: Vec::new(), alike: vec![Vec::new()] };
+    for i in 0..5 {
+        net.nodes.extend([node(Role::Centre), node(Role::OnePort), node(Role::OnePort)]);
+        net.bonds.extend([[3 * i, 3 * i + 1], [3 * i, 3 * i + 2], [3 * i, 3 * ((i + 1) % 5)]]);
+        net.alike[0].push(vec![3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    net.bonds.push([0, 6]);
+    check(&net);
+    let placed = lay_out(&net);
+    let way = |a: usize, b: usize| [0, 1].map(|k| (placed.anchors[b][k] - placed.anchors[a][k]).partial_cmp(&0.0));
+    let shape = |part: &Vec<usize>| [way(part[0], part[1]), way(part[0], part[2])];
+    let shapes: Vec<_> = net.alike[0].iter().map(shape).collect();
+    assert!(shapes.iter().all(|s| *s == shapes[0]), "{shapes:?}");
 }
