@@ -43,7 +43,7 @@ pub(super) fn description(export: &Export, variables: &Variables, version: Versi
         lines.iter().for_each(|line| text += &format!("    {line}\n"));
         text += "  </UnitDefinitions>\n";
     }
-    text += "  <LogCategories>\n    <Category name=\"logStatusError\" description=\"What fails, with the elements concerned\"/>\n  </LogCategories>\n";
+    text += "  <LogCategories>\n    <Category name=\"logStatusError\" description=\"What fails, with the elements concerned\"/>\n    <Category name=\"logStatusDiscard\" description=\"Points tried by the integrator at which the model has no value\"/>\n    <Category name=\"logStatusWarning\" description=\"What the run goes on with, but is not certain of\"/>\n  </LogCategories>\n";
     let _ = writeln!(text, "  <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"{:?}\"/>", export.step);
     text += "  <ModelVariables>\n";
     let nominals = variables.nominals(export);

@@ -6,6 +6,9 @@ use halfarrow_compiler::program::{Cause, ConditionId, Layout, Program, Routine, 
 /// Evaluations in one search along a curve; at its end the run makes a stop at which nothing changes.
 const SEARCH: usize = 4000;
 
+/// Depth beyond a border, relative to the values around it, below which it may be rounding.
+const SHALLOW: f64 = 1e-9;
+
 /// Conditions of time, in an order in which each reads those before it.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
@@ -85,11 +88,16 @@ impl Clock {
         if a - low < high - a { (a - low, rate) } else { (high - a, -rate) }
     }
 
-    /// Searches a curve with steps in which a cubic follows it; gives the change, or where the search ended.
+    /// Searches a curve with steps in which a cubic follows it, or a straight line its rate, as beside a double zero, where
+    /// values are all rounding, or in which it cannot come to its border; gives the change, or where the search ended.
+    ///
+    /// A value beyond the border counts where the rates on the way there tell of it: what they do not explain is rounding,
+    /// as beside a double zero, which is no change.
     fn next_on_curve(&self, frame: &mut Frame, index: usize, from: f64, until: Option<f64>) -> Option<f64> {
         let mut t = from;
         let mut h = 1e-9 * from.abs().max(1.0);
         let mut here = self.margin(frame, index, t);
+        let mut way = Way { from: t, margin: here.0, fastest: here.1.abs() };
         for _ in 0..SEARCH {
             if until.is_some_and(|until| t > until) {
                 return None;
@@ -101,18 +109,23 @@ impl Clock {
             }
             let cubic = 0.5 * (here.0 + there.0) + 0.125 * h * (here.1 - there.1);
             let error = (middle.0 - cubic).abs();
-            let allowed = 1e-3 * here.0.abs().max(there.0.abs()).max(middle.0.abs());
-            if error > allowed && h > 1e-12 * t.abs().max(1e-6) {
+            let size = here.0.abs().max(there.0.abs()).max(middle.0.abs());
+            let allowed = 1e-3 * size;
+            let fastest = here.1.abs().max(there.1.abs()).max(middle.1.abs());
+            let moved = h * fastest;
+            let bent = (middle.1 - 0.5 * (here.1 + there.1)).abs();
+            let followed = error <= allowed || bent <= 1e-2 * fastest || moved <= 0.5 * size;
+            if !followed && h > 1e-12 * t.abs().max(1e-6) {
                 h *= 0.5;
                 continue;
             }
             for (a, b) in [((t, here), (t + 0.5 * h, middle)), ((t + 0.5 * h, middle), (t + h, there))] {
-                if let Some(change) = self.change_between(frame, index, a, b) {
+                if let Some(change) = self.change_between(frame, index, (a, b), &mut way) {
                     return Some(change).filter(|&c| c > from);
                 }
             }
             (t, here) = (t + h, there);
-            if error < 0.1 * allowed {
+            if error <= 0.1 * allowed || bent <= 1e-3 * fastest || moved <= 0.125 * size {
                 h *= 2.0;
             }
         }
@@ -120,17 +133,32 @@ impl Clock {
     }
 
     /// The change between two points, if the second is beyond a border or the way to it leads there.
-    fn change_between(&self, frame: &mut Frame, index: usize, a: At, b: At) -> Option<f64> {
+    fn change_between(&self, frame: &mut Frame, index: usize, (a, b): (At, At), way: &mut Way) -> Option<f64> {
+        way.fastest = way.fastest.max(b.1.1.abs());
         if b.1.0 < 0.0 {
-            return Some(self.bisect(frame, a.0, b.0, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
+            let told = (b.0 - way.from) * way.fastest >= 0.5 * (way.margin - b.1.0);
+            return told
+                .then(|| self.bisect(frame, way.from, b.0, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
         }
-        if a.1.1 < 0.0 && b.1.1 > 0.0 {
+        *way = Way { from: b.0, margin: b.1.0, fastest: b.1.1.abs() };
+        if a.1.0 >= 0.0 && a.1.1 < 0.0 && b.1.1 > 0.0 {
             let lowest = self.bisect(frame, a.0, b.0, |this, frame, t| this.margin(frame, index, t).1 > 0.0);
-            if self.margin(frame, index, lowest).0 < 0.0 {
-                return Some(self.bisect(frame, a.0, lowest, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
+            let depth = self.margin(frame, index, lowest).0;
+            if depth < 0.0 {
+                let first = self.bisect(frame, a.0, lowest, |this, frame, t| this.margin(frame, index, t).0 < 0.0);
+                let deep = -depth > SHALLOW * a.1.0.max(b.1.0);
+                return Some(first).filter(|_| deep || self.is_dip(frame, index, first, (lowest, depth)));
             }
         }
         None
+    }
+
+    /// Whether a curve that is shallow between `first` and its lowest point is a parabola there, and not rounding.
+    fn is_dip(&self, frame: &mut Frame, index: usize, first: f64, (lowest, depth): (f64, f64)) -> bool {
+        [0.25, 0.5, 0.75].iter().all(|part| {
+            let margin = self.margin(frame, index, lowest + (first - lowest) * part).0;
+            (margin - depth * (1.0 - part * part)).abs() <= -0.25 * depth
+        })
     }
 
     /// The first instant, to rounding, at which `beyond` holds; it does at `high` and not at `low`.
@@ -157,3 +185,12 @@ impl Clock {
 
 /// A time with margin and rate.
 type At = (f64, (f64, f64));
+
+/// The way of a margin since it was last seen not beyond the border.
+struct Way {
+    /// When that was, in s.
+    from: f64,
+    margin: f64,
+    /// The greatest rate since.
+    fastest: f64,
+}

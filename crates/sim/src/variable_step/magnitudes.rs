@@ -12,6 +12,13 @@ const PART: f64 = 0.1;
 /// Part of what moves a state below which its magnitude is what rounding left of it: a machine at rest in equilibrium.
 const NOISE: f64 = 1e-12;
 
+/// Part of what a state would hold with the energy of those that it exchanges energy with that is always believed of it: what is
+/// less is a ripple, and the first of what reaches it comes as one.
+const RIPPLE: f64 = 1e-4;
+
+/// Strength of an exchange relative to the strongest of the same state below which it may be what rounding left.
+const WEAK: f64 = 1e-6;
+
 /// Steps of the growth of a matrix's powers, of which the last half is believed.
 const POWERS: usize = 16;
 
@@ -63,6 +70,21 @@ pub(super) fn guess_magnitudes(
         }
     }
     Ok(())
+}
+
+/// What the system knows of its states where it stands at `(t, x)`, `interval` s before the next jump: the shortest time, in s,
+/// and the least magnitude that each state is to have beside the others. `None` where there are no rates.
+pub(super) fn surroundings(
+    system: &mut dyn System,
+    (t, x): (f64, &[f64]),
+    interval: f64,
+    magnitudes: &[f64],
+) -> Option<(f64, Vec<f64>)> {
+    let mut jacobian = Jacobian::new(system.sparsity());
+    let entries = entries(system, &mut jacobian, t, x, &mut vec![0.0; x.len()]).ok()?;
+    let couplings = Couplings::new(entries, interval, x.len());
+    let least = couplings.exchanged(magnitudes).iter().map(|magnitude| RIPPLE * magnitude).collect();
+    Some((couplings.shortest, least))
 }
 
 /// Absolute values of the Jacobian that are not 0; writes the rates.
@@ -168,6 +190,52 @@ impl Couplings {
         }
     }
 
+    /// What each state has or would have with the energy of those that it exchanges energy with, directly or through others:
+    /// along a tree of the strongest exchanges, as a weak one may be rounding.
+    fn exchanged(&self, magnitudes: &[f64]) -> Vec<f64> {
+        let tree = self.strongest();
+        let mut sizes = magnitudes.to_vec();
+        // On a tree every way is gone once, and back again nothing is won.
+        for _ in 0..sizes.len() {
+            let mut grew = false;
+            for &(a, b) in &tree {
+                for (on, by) in [(a, b), (b, a)] {
+                    let action = self.action(on, by);
+                    let reached = action * self.time(on, by, action) * sizes[by];
+                    if reached > 1.01 * sizes[on] && reached.is_finite() {
+                        (sizes[on], grew) = (reached, true);
+                    }
+                }
+            }
+            if !grew {
+                break;
+            }
+        }
+        sizes
+    }
+
+    /// Pairs of states that act on each other, the strongest first, as long as they close no ring.
+    fn strongest(&self) -> Vec<(usize, usize)> {
+        let strength = |&(a, b, action): &Entry| (a > b).then(|| (a, b, (action * self.action(b, a)).sqrt()));
+        let mut pairs: Vec<Entry> = self.entries.iter().filter_map(strength).filter(|pair| pair.2 > 0.0).collect();
+        pairs.sort_by(|a, b| b.2.total_cmp(&a.2).then((a.0, a.1).cmp(&(b.0, b.1))));
+        let mut greatest = vec![0.0_f64; self.own.len()];
+        for &(a, b, strength) in &pairs {
+            greatest[a] = greatest[a].max(strength);
+            greatest[b] = greatest[b].max(strength);
+        }
+        let mut group: Vec<usize> = (0..self.own.len()).collect();
+        let mut tree = vec![];
+        for (a, b, _) in pairs.into_iter().filter(|&(a, b, s)| s > WEAK * greatest[a].max(greatest[b])) {
+            let (a_group, b_group) = (root(&mut group, a), root(&mut group, b));
+            if a_group != b_group {
+                group[a_group] = b_group;
+                tree.push((a, b));
+            }
+        }
+        tree
+    }
+
     /// How long `by` acts on `on` until that acts back or is held by its own damping, which it shares with what else acts
     /// on it.
     fn time(&self, on: usize, by: usize, action: f64) -> f64 {
@@ -178,6 +246,15 @@ impl Couplings {
             false => self.shortest,
         }
     }
+}
+
+/// The state that stands for all in the group of this one.
+fn root(group: &mut [usize], mut state: usize) -> usize {
+    while group[state] != state {
+        group[state] = group[group[state]];
+        state = group[state];
+    }
+    state
 }
 
 /// The reciprocal of the spectral radius of a matrix of absolute values, by the growth of its powers.

@@ -4,6 +4,7 @@ mod first_step;
 mod library;
 mod magnitudes;
 mod radau;
+mod rounding;
 mod stiffness;
 mod tolerances;
 
@@ -66,9 +67,18 @@ trait Integrator {
         false
     }
 
+    /// Steps tried in vain so far.
+    fn rejected(&self) -> usize;
+
     /// Adds what it took so far, beside accepted steps and what the system counts.
     fn add_work(&self, counts: &mut Summary);
 }
+
+/// Steps tried in vain one after the other that rounding may be the reason of.
+const SUSPICIOUS: usize = 3;
+
+/// Accepted steps after which rounding is looked for, and whenever they are twice as many.
+const FIRST_LOOK: usize = 64;
 
 /// Why an integrator hands over.
 enum End {
@@ -78,6 +88,8 @@ enum End {
     Stiff,
     /// States have outgrown the magnitudes that the tolerances were made for.
     Grown,
+    /// Tolerances ask for less than rounding leaves; they no longer do. A step that still holds, in s.
+    Cleared(f64),
 }
 
 /// Integrates to the end.
@@ -86,11 +98,14 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
     let mut tolerances = Tolerances::new(run.options, &*shared.system(), x);
     let mut chatter = Chatter::new(run.options.to - run.options.from);
     let mut stiff = run.options.method == Method::Bdf && !x.is_empty();
+    // A step to go on with where only the tolerances have changed.
+    let mut step = None;
     loop {
         let atol = tolerances.clone();
+        let kept = step.take();
         let end = if run.options.method == Method::Radau {
             let mut method = radau::OnStates::new(shared, &atol);
-            Drive::new(run, shared, &mut method, &mut tolerances, &mut chatter, None).run(x)
+            Drive::new(run, shared, &mut method, &mut tolerances, &mut chatter, None).from(kept).run(x)
         } else if stiff {
             library::with_bdf(shared, &atol, |method| {
                 Drive::new(run, shared, method, &mut tolerances, &mut chatter, None).run(x)
@@ -98,12 +113,16 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
         } else {
             let watch = (run.options.method == Method::Auto).then(|| Stiffness::new(&atol));
             library::with_explicit(shared, &atol, |method| {
-                Drive::new(run, shared, method, &mut tolerances, &mut chatter, watch).run(x)
+                Drive::new(run, shared, method, &mut tolerances, &mut chatter, watch).from(kept).run(x)
             })
         };
         match end {
             Ok(End::Done) => return Ok(()),
-            Ok(End::Grown) => tolerances.grow(),
+            Ok(End::Grown) => {
+                let end = next_stop(run, shared);
+                tolerances.grow(&mut *shared.system(), run.time, x, end - run.time);
+            }
+            Ok(End::Cleared(kept)) => step = Some(kept),
             Ok(End::Stiff) => stiff = true,
             Err(Failure::StepTooSmall { .. }) if becomes_known(run, shared, &mut tolerances, x) => {}
             Err(Failure::StepTooSmall { .. }) if run.options.method == Method::Auto && !stiff => stiff = true,
@@ -115,10 +134,17 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
 
 /// A state of unknown magnitude that leaves 0 fails every test. `true` if its magnitude can be guessed a little later.
 fn becomes_known(run: &Run<'_>, shared: &Shared<'_>, tolerances: &mut Tolerances, x: &[f64]) -> bool {
+    let interval = next_stop(run, shared) - run.time;
     let system = &mut *shared.system();
-    let end = system.next_jump(run.time).map_or(run.options.to, |jump| jump.min(run.options.to));
-    let later = 1e-3 * (end - run.time);
+    let later = 1e-3 * interval;
     tolerances.guess(system, run.time + later, x, later).unwrap_or(false)
+        || tolerances.clear_rounding(system, (run.time, x), later, interval)
+}
+
+/// The next jump known in advance, or the end of the run.
+fn next_stop(run: &Run<'_>, shared: &Shared<'_>) -> f64 {
+    let jump = shared.system().next_jump(run.time);
+    jump.map_or(run.options.to, |jump| jump.min(run.options.to))
 }
 
 /// One integrator at work on a run.
@@ -138,6 +164,10 @@ struct Drive<'r, 'a, 'i, 's> {
     corner: bool,
     /// Longest step.
     longest: Option<f64>,
+    /// A first step that is known to do, in s.
+    first: Option<f64>,
+    /// Steps by this method.
+    steps: usize,
 }
 
 impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
@@ -167,7 +197,14 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             resume: None,
             corner: false,
             longest,
+            first: None,
+            steps: 0,
         }
+    }
+
+    /// With a first step that is known to do.
+    fn from(self, first: Option<f64>) -> Self {
+        Drive { first, ..self }
     }
 
     fn run(mut self, x: &mut [f64]) -> Result<End, Failure> {
@@ -203,8 +240,11 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
         let mut longest: f64 = 0.0;
         while self.run.time < stop {
             let stop_now = self.longest.map_or(stop, |longest| stop.min(self.run.time + longest));
+            let (rejected, tried) = (self.method.rejected(), self.method.next_step());
             self.method.step(stop_now)?;
             self.run.counts.steps += 1;
+            self.steps += 1;
+            let in_vain = self.method.rejected() - rejected;
             let end = if is_at(self.method.time(), stop, self.method.start()) { stop } else { self.method.time() };
             let (end, crossing) = self.exact_crossing(end)?;
             if let Some((time, switch)) = crossing {
@@ -227,8 +267,20 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             if let Some(end) = self.hand_over(stop, x) {
                 return Ok(Some(end));
             }
+            if self.run.time < stop && self.may_be_rounding(in_vain) {
+                let (time, interval) = (self.run.time, stop - self.run.time);
+                let system = &mut *self.shared.system();
+                if self.tolerances.clear_rounding(system, (time, x), tried.min(interval), interval) {
+                    return Ok(Some(End::Cleared(self.method.next_step())));
+                }
+            }
         }
         Ok(None)
+    }
+
+    /// Whether the steps are many, or the last one was tried so often in vain, that it may be rounding that asks for it.
+    fn may_be_rounding(&self, in_vain: usize) -> bool {
+        in_vain >= SUSPICIOUS || (self.steps >= FIRST_LOOK && self.steps.is_power_of_two())
     }
 
     /// Starts the method where the run stands, or goes on with it over a corner, where neither the state nor its rates
@@ -243,6 +295,10 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             if self.corner {
                 return self.method.resume(time, x, &rates, step.min(longest));
             }
+        }
+        if let Some(step) = self.first.take() {
+            self.shared.system().rates(time, x, &mut rates)?;
+            return self.method.restart(time, x, &rates, step.min(longest));
         }
         let order = self.method.first_order();
         let step = {

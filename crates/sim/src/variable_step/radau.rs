@@ -17,7 +17,7 @@ pub(super) struct OnStates<'s> {
 impl<'s> OnStates<'s> {
     pub(super) fn new(shared: &'s Shared<'s>, tolerances: &Tolerances) -> OnStates<'s> {
         let system = Explicit::new(shared);
-        let radau = Radau::new(&system, tolerances.relative(), &tolerances.absolute());
+        let radau = Radau::new(&system, tolerances.relative(), &tolerances.absolute(1.0));
         OnStates { shared, rates: vec![0.0; system.unknowns()], system, radau }
     }
 }
@@ -64,6 +64,9 @@ impl Integrator for OnStates<'_> {
     }
     fn shorten(&mut self, t: f64) -> bool {
         self.radau.shorten(&mut self.system, t)
+    }
+    fn rejected(&self) -> usize {
+        self.radau.work().rejected + self.radau.work().given_up
     }
     fn add_work(&self, counts: &mut Summary) {
         self.radau.work().add_to(counts);

@@ -1,17 +1,24 @@
 //! How exact each state has to be.
 
-use super::magnitudes::guess_magnitudes;
+use super::magnitudes::{guess_magnitudes, surroundings};
+use super::rounding::rounding;
 use crate::{AbsoluteTolerance, Failure, Options, System};
 
 /// Growth of a state beyond its magnitude after which the tolerances are taken anew.
 const GROWTH: f64 = 10.0;
 
 /// Absolute tolerance relative to the magnitude of a state, as a part of the relative one: states that shrink by as much
-/// keep their digits.
-const SHARE: f64 = 1e-3;
+/// keep their digits. One part at all tolerances, so that the work follows what is asked.
+const SHARE: f64 = 1e-2;
 
 /// Absolute tolerance relative to the magnitude of a state below which rounding would be mistaken for error.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING: f64 = 1e-14;
+
+/// How far the error allowed in a step is above what rounding makes of it.
+const CLEAR: f64 = 10.0;
+
+/// Part of the way to the next jump at which rounding is looked for where a state has no magnitude yet: sources may grow.
+const AHEAD: f64 = 0.1;
 
 /// Magnitude of a state of which nothing is known. Small enough not to hide anything, large enough to divide by.
 const UNKNOWN: f64 = 1e-100;
@@ -28,6 +35,8 @@ pub(super) struct Tolerances {
     greatest: Vec<f64>,
     /// Whether magnitudes were looked at for noise.
     looked: bool,
+    /// What rounding of the rates makes of each state, as far as it was looked for: no error below it counts.
+    floors: Vec<f64>,
 }
 
 impl Tolerances {
@@ -41,7 +50,7 @@ impl Tolerances {
         let greatest: Vec<f64> = x.iter().map(|x| x.abs()).collect();
         let mut magnitudes: Vec<f64> = greatest.iter().zip(system.scales()).map(|(x, scale)| x.max(*scale)).collect();
         magnitudes.iter_mut().for_each(|magnitude| *magnitude = magnitude.max(UNKNOWN));
-        Tolerances { relative: options.rtol, given, magnitudes, greatest, looked: false }
+        Tolerances { relative: options.rtol, given, magnitudes, greatest, looked: false, floors: vec![0.0; x.len()] }
     }
 
     /// The relative one.
@@ -49,10 +58,15 @@ impl Tolerances {
         self.relative
     }
 
-    /// One for each state.
-    pub(super) fn absolute(&self) -> Vec<f64> {
-        let scaled = || self.magnitudes.iter().map(|magnitude| self.share() * magnitude).collect();
-        self.given.clone().unwrap_or_else(scaled)
+    /// One for each state, `tightened` times what the user asks for.
+    pub(super) fn absolute(&self, tightened: f64) -> Vec<f64> {
+        match &self.given {
+            Some(given) => given.iter().map(|given| tightened * given).collect(),
+            None => {
+                let share = tightened * self.share();
+                self.magnitudes.iter().zip(&self.floors).map(|(m, floor)| (share * m).max(*floor)).collect()
+            }
+        }
     }
 
     /// Absolute tolerance of a state of magnitude 1.
@@ -64,7 +78,7 @@ impl Tolerances {
     pub(super) fn norm(&self, v: &[f64], x: &[f64]) -> f64 {
         let allowed = |i: usize| match &self.given {
             Some(given) => self.relative * x[i].abs() + given[i],
-            None => self.relative * x[i].abs() + self.share() * self.magnitudes[i],
+            None => self.relative * x[i].abs() + (self.share() * self.magnitudes[i]).max(self.floors[i]),
         };
         let parts = v.iter().enumerate().map(|(i, v)| v / allowed(i));
         let sum: f64 = parts.map(|part| part * part).sum();
@@ -79,7 +93,9 @@ impl Tolerances {
     /// Takes notice of a state reached. `true` if the tolerances should be taken anew.
     pub(super) fn watch(&mut self, x: &[f64]) -> bool {
         self.greatest.iter_mut().zip(x).for_each(|(greatest, x)| *greatest = greatest.max(x.abs()));
-        let mut grown = self.greatest.iter().zip(&self.magnitudes).map(|(greatest, magnitude)| greatest / magnitude);
+        let share = self.share();
+        let counted = self.magnitudes.iter().zip(&self.floors).map(|(magnitude, floor)| magnitude.max(floor / share));
+        let mut grown = self.greatest.iter().zip(counted).map(|(greatest, counted)| greatest / counted);
         self.given.is_none() && grown.any(|growth| growth > GROWTH)
     }
 
@@ -96,15 +112,61 @@ impl Tolerances {
         let before = self.magnitudes.clone();
         self.magnitudes.iter_mut().filter(|magnitude| **magnitude == UNKNOWN).for_each(|magnitude| *magnitude = 0.0);
         let guessed = guess_magnitudes(system, (t, x), interval, &mut self.magnitudes);
+        self.grow(system, t, x, interval);
         self.magnitudes.iter_mut().zip(&before).for_each(|(magnitude, before)| *magnitude = magnitude.max(*before));
+        if !looked && self.has_unknown() {
+            self.clear_rounding(system, (t, x), AHEAD * interval, interval);
+            return guessed.map(|()| true);
+        }
         guessed.map(|()| self.magnitudes != before)
     }
 
-    /// Takes the greatest values so far for the magnitudes where they are larger.
-    pub(super) fn grow(&mut self) {
-        self.magnitudes
-            .iter_mut()
-            .zip(&self.greatest)
-            .for_each(|(magnitude, greatest)| *magnitude = magnitude.max(*greatest));
+    /// Takes the greatest values so far for the magnitudes where they are larger, and what those around make of the others,
+    /// where the system stands at `(t, x)`, `interval` s before the next jump.
+    pub(super) fn grow(&mut self, system: &mut dyn System, t: f64, x: &[f64], interval: f64) {
+        let raise = |magnitudes: &mut [f64], by: &[f64]| {
+            magnitudes.iter_mut().zip(by).for_each(|(magnitude, by)| *magnitude = magnitude.max(*by));
+        };
+        raise(&mut self.magnitudes, &self.greatest);
+        if let Some((_, least)) = surroundings(system, (t, x), interval, &self.magnitudes) {
+            raise(&mut self.magnitudes, &least);
+        }
+    }
+
+    /// Whether nothing is known of a state: nothing has moved it, and nothing would.
+    pub(super) fn has_unknown(&self) -> bool {
+        self.given.is_none() && self.magnitudes.contains(&UNKNOWN)
+    }
+
+    /// Looks for what rounding of the rates makes of the states around `(t, x)` in steps of `h`, `interval` s before the next
+    /// jump. `true` if errors were counted that are less: the tolerances should be taken anew.
+    pub(super) fn clear_rounding(
+        &mut self,
+        system: &mut dyn System,
+        (t, x): (f64, &[f64]),
+        h: f64,
+        interval: f64,
+    ) -> bool {
+        if self.given.is_some() {
+            return false;
+        }
+        let Some((shortest, _)) = surroundings(system, (t, x), interval, &self.magnitudes) else { return false };
+        let reach = shortest.max(h);
+        let before = self.absolute(1.0);
+        for time in [t, t + h] {
+            // What becomes of states that have a magnitude is looked for again when they have it.
+            let ahead = time > t;
+            if ahead && !self.has_unknown() {
+                break;
+            }
+            let Some(rounding) = rounding(system, time, x, &self.magnitudes) else { continue };
+            for (state, rounding) in rounding.iter().enumerate() {
+                let clear = CLEAR * reach * rounding;
+                if clear.is_finite() && (!ahead || self.magnitudes[state] == UNKNOWN) {
+                    self.floors[state] = self.floors[state].max(clear);
+                }
+            }
+        }
+        before.iter().zip(&self.floors).any(|(before, floor)| *floor > 2.0 * before)
     }
 }

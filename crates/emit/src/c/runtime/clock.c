@@ -78,30 +78,70 @@ static double ha_bisect(ha_model *m, int i, int by_rate, double low, double high
     return high;
 }
 
-/* The change between two points, if the second is beyond a border or the way to it leads there; else infinity. */
-static double ha_change_between(ha_model *m, int i, double a, double rate_a, double b, double margin_b, double rate_b)
+/* The way of a margin since it was last seen not beyond the border: when that was, and the greatest rate since. */
+typedef struct {
+    double from;
+    double margin;
+    double fastest;
+} ha_way;
+
+/* Whether a curve that is shallow between first and its lowest point is a parabola there, and not rounding. */
+static int ha_is_dip(ha_model *m, int i, double first, double lowest, double depth)
 {
-    if (margin_b < 0.0) {
-        return ha_bisect(m, i, 0, a, b);
+    int quarter;
+    for (quarter = 1; quarter < 4; ++quarter) {
+        const double part = 0.25 * quarter;
+        const double square = part * part;
+        const double way = (first - lowest) * part;
+        const double wanted = depth * (1.0 - square);
+        double rate;
+        const double margin = ha_margin(m, i, lowest + way, &rate);
+        if (!(fabs(margin - wanted) <= -0.25 * depth)) {
+            return 0;
+        }
     }
-    if (rate_a < 0.0 && rate_b > 0.0) {
+    return 1;
+}
+
+/* The change between two points, if the second is beyond a border or the way to it leads there; else infinity. */
+static double ha_change_between(ha_model *m, int i, double a, double margin_a, double rate_a, double b, double margin_b, double rate_b, ha_way *way)
+{
+    way->fastest = ha_max(way->fastest, fabs(rate_b));
+    if (margin_b < 0.0) {
+        const double told = (b - way->from) * way->fastest;
+        return told >= 0.5 * (way->margin - margin_b) ? ha_bisect(m, i, 0, way->from, b) : HUGE_VAL;
+    }
+    way->from = b;
+    way->margin = margin_b;
+    way->fastest = fabs(rate_b);
+    if (margin_a >= 0.0 && rate_a < 0.0 && rate_b > 0.0) {
         const double lowest = ha_bisect(m, i, 1, a, b);
         double rate;
-        if (ha_margin(m, i, lowest, &rate) < 0.0) {
-            return ha_bisect(m, i, 0, a, lowest);
+        const double depth = ha_margin(m, i, lowest, &rate);
+        if (depth < 0.0) {
+            const double first = ha_bisect(m, i, 0, a, lowest);
+            if (-depth > 1e-9 * ha_max(margin_a, margin_b) || ha_is_dip(m, i, first, lowest, depth)) {
+                return first;
+            }
         }
     }
     return HUGE_VAL;
 }
 
-/* Searches a curve with steps in which a cubic follows it; gives the change, or where the search ended. */
+/* Searches a curve with steps in which a cubic follows it, or a straight line its rate, as beside a double zero, where values
+ * are all rounding, or in which it cannot come to its border; gives the change, or where the search ended. A value beyond the border counts where the rates on the way there tell of it: what they do not
+ * explain is rounding, as beside a double zero, which is no change. */
 static double ha_next_on_curve(ha_model *m, int i, double from, double until)
 {
     double t = from;
     double h = 1e-9 * ha_max(fabs(from), 1.0);
     double rate;
     double here = ha_margin(m, i, t, &rate);
+    ha_way way;
     int search;
+    way.from = t;
+    way.margin = here;
+    way.fastest = fabs(rate);
     for (search = 0; search < 4000; ++search) {
         double middle;
         double middle_rate;
@@ -109,7 +149,12 @@ static double ha_next_on_curve(ha_model *m, int i, double from, double until)
         double there_rate;
         double cubic;
         double error;
+        double size;
         double allowed;
+        double fastest;
+        double moved;
+        double bent;
+        int followed;
         double change;
         if (t > until) {
             return HUGE_VAL;
@@ -122,14 +167,19 @@ static double ha_next_on_curve(ha_model *m, int i, double from, double until)
         cubic = 0.125 * h * (rate - there_rate);
         cubic = 0.5 * (here + there) + cubic;
         error = fabs(middle - cubic);
-        allowed = 1e-3 * ha_max(ha_max(fabs(here), fabs(there)), fabs(middle));
-        if (error > allowed && h > 1e-12 * ha_max(fabs(t), 1e-6)) {
+        size = ha_max(ha_max(fabs(here), fabs(there)), fabs(middle));
+        allowed = 1e-3 * size;
+        fastest = ha_max(ha_max(fabs(rate), fabs(there_rate)), fabs(middle_rate));
+        moved = h * fastest;
+        bent = fabs(middle_rate - 0.5 * (rate + there_rate));
+        followed = error <= allowed || bent <= 1e-2 * fastest || moved <= 0.5 * size;
+        if (!followed && h > 1e-12 * ha_max(fabs(t), 1e-6)) {
             h *= 0.5;
             continue;
         }
-        change = ha_change_between(m, i, t, rate, t + 0.5 * h, middle, middle_rate);
+        change = ha_change_between(m, i, t, here, rate, t + 0.5 * h, middle, middle_rate, &way);
         if (change == HUGE_VAL) {
-            change = ha_change_between(m, i, t + 0.5 * h, middle_rate, t + h, there, there_rate);
+            change = ha_change_between(m, i, t + 0.5 * h, middle, middle_rate, t + h, there, there_rate, &way);
         }
         if (change != HUGE_VAL) {
             return change > from ? change : HUGE_VAL;
@@ -137,7 +187,7 @@ static double ha_next_on_curve(ha_model *m, int i, double from, double until)
         t = t + h;
         here = there;
         rate = there_rate;
-        if (error < 0.1 * allowed) {
+        if (error <= 0.1 * allowed || bent <= 1e-3 * fastest || moved <= 0.125 * size) {
             h *= 2.0;
         }
     }

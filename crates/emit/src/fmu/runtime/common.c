@@ -49,6 +49,10 @@ typedef struct ha_fmu {
     ha_state s;
     int exchange;
     int logging;
+    /* Whether what failed last is but a trial of the importer: the model has no value there, and goes on from elsewhere. */
+    int discarded;
+    /* Whether what is said last is a warning. */
+    int warned;
     char name[128];
     void *environment;
     void (*log)(struct ha_fmu *f, const char *message);
@@ -79,8 +83,24 @@ static int ha_failed(ha_fmu *f)
     return 0;
 }
 
+/* A point at which the model has no value. In continuous time it is one that the integrator of the importer tries: the run
+ * goes on from any other. */
+static int ha_without_value(ha_fmu *f)
+{
+    const int mode = f->s.mode;
+    f->discarded = f->exchange && mode == HA_CONTINUOUS;
+    (void)ha_failed(f);
+    if (f->discarded) {
+        f->s.mode = mode;
+        f->s.m.failure.code = MODEL_OK;
+    }
+    return 0;
+}
+
 static int ha_refuse(ha_fmu *f, const char *what)
 {
+    f->discarded = 0;
+    f->warned = 0;
     ha_say(f, what);
     return 0;
 }
@@ -92,6 +112,8 @@ static int ha_is_in(ha_fmu *f, int modes, const char *function)
         "instantiated", "initialization", "event", "continuous-time", "step", "terminated", "failed"
     };
     char text[256];
+    f->discarded = 0;
+    f->warned = 0;
     if ((modes >> f->s.mode) & 1) {
         return 1;
     }
@@ -139,7 +161,7 @@ static int ha_rates(ha_fmu *f)
 {
     if (f->s.rates_due) {
         if (MODEL_rates(&f->s.m, f->s.m.t, f->s.m.x, f->s.dx) != MODEL_OK) {
-            return ha_failed(f);
+            return ha_without_value(f);
         }
         f->s.rates_due = 0;
     }
@@ -150,7 +172,7 @@ static int ha_outputs(ha_fmu *f)
 {
     if (f->s.outputs_due) {
         if (MODEL_observe(&f->s.m, f->s.m.t, f->s.m.x, f->s.y) != MODEL_OK) {
-            return ha_failed(f);
+            return ha_without_value(f);
         }
         f->s.outputs_due = 0;
     }
@@ -164,7 +186,7 @@ static int ha_indicators(ha_fmu *f, double *values)
 //if switches
     int i;
     if (MODEL_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != MODEL_OK) {
-        return ha_failed(f);
+        return ha_without_value(f);
     }
     for (i = 0; i < HA_NG; ++i) {
         const double behind = 1e-12 * f->s.scales[i] + 1e-300;
@@ -290,10 +312,23 @@ static int ha_event(ha_fmu *f, double *next)
     return 1;
 }
 
-/* An integrator has made a step. */
+/* An integrator has made a step. Where it is too long to follow the solution of an equation, or its importer does not tell of
+ * every step, the solution is taken anew, as after a jump, and that is said. */
 static int ha_stepped(ha_fmu *f)
 {
-    return MODEL_accept(&f->s.m, f->s.m.t, f->s.m.x) == MODEL_OK ? ha_scale(f) : ha_failed(f);
+    MODEL *m = &f->s.m;
+    if (MODEL_accept(m, m->t, m->x) != MODEL_OK) {
+        const MODEL_failure failure = m->failure;
+        m->failure.code = MODEL_OK;
+        if (MODEL_cross(m, m->t, m->x) != MODEL_OK) {
+            m->failure = failure;
+            return ha_failed(f);
+        }
+        f->warned = 1;
+        ha_say(f, "the way since the last completed step is too long to follow the solution of an equation: it is taken anew");
+        ha_changed(f);
+    }
+    return ha_scale(f);
 }
 
 /* Steps of the fixed method from one communication point to the next; one that is no multiple of them ends in a shorter
@@ -353,7 +388,7 @@ static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const 
         }
     }
     if (MODEL_directional(&f->s.m, f->s.m.t, f->s.m.x, v, w, dv, dy) != MODEL_OK) {
-        return ha_failed(f);
+        return ha_without_value(f);
     }
     for (i = 0; i < rows; ++i) {
         const int r = unknowns[i] < HA_REFERENCES ? (int)unknowns[i] : -1;

@@ -6,6 +6,12 @@
 COMMON
 /* ---- FMI 2.0 ---- */
 
+/* How bad it is what is said. */
+static fmi2Status ha_severity(const ha_fmu *f)
+{
+    return f->warned ? fmi2Warning : f->discarded ? fmi2Discard : fmi2Error;
+}
+
 static void ha_log2(ha_fmu *f, const char *message)
 {
     const fmi2CallbackFunctions *functions = (const fmi2CallbackFunctions *)f->logger;
@@ -23,12 +29,18 @@ static void ha_log2(ha_fmu *f, const char *message)
         text[to++] = message[from];
     }
     text[to] = 0;
-    functions->logger(f->environment, f->name, fmi2Error, "logStatusError", text);
+    functions->logger(f->environment, f->name, ha_severity(f), f->warned ? "logStatusWarning" : f->discarded ? "logStatusDiscard" : "logStatusError", text);
 }
 
 static fmi2Status ha_status(int good)
 {
     return good ? fmi2OK : fmi2Error;
+}
+
+/* What a point that may be a trial of the importer gives. */
+static fmi2Status ha_tried(const ha_fmu *f, int good)
+{
+    return good && !f->warned ? fmi2OK : ha_severity(f);
 }
 
 #define HA_CHECK(modes, function) \
@@ -149,7 +161,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     HA_CHECK(HA_ANY | HA_IN(HA_FAILED), "fmi2GetReal")
     for (i = 0; i < nvr; ++i) {
         if (!ha_get(f, vr[i], &value[i])) {
-            return fmi2Error;
+            return ha_tried(f, 0);
         }
     }
     return fmi2OK;
@@ -233,7 +245,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
     HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING | HA_IN(HA_TERMINATED), "fmi2GetDirectionalDerivative")
-    return ha_status(ha_direction(f, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
+    return ha_tried(f, ha_direction(f, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
 }
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
@@ -273,7 +285,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
     (void)noSetFMUStatePriorToCurrentPoint;
     *enterEventMode = fmi2False;
     *terminateSimulation = fmi2False;
-    return ha_status(ha_stepped(f));
+    return ha_tried(f, ha_stepped(f));
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
@@ -299,7 +311,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx
 {
     HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING, "fmi2GetDerivatives")
     if (nx != HA_NX || !ha_started(f) || !ha_rates(f)) {
-        return fmi2Error;
+        return ha_tried(f, 0);
     }
     memcpy(derivatives, f->s.dx, nx * sizeof *derivatives);
     return fmi2OK;
@@ -308,7 +320,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
 {
     HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING, "fmi2GetEventIndicators")
-    return ha_status(ni == HA_NG && ha_started(f) && ha_indicators(f, eventIndicators));
+    return ha_tried(f, ni == HA_NG && ha_started(f) && ha_indicators(f, eventIndicators));
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)

@@ -6,6 +6,12 @@
 COMMON
 /* ---- FMI 3.0 ---- */
 
+/* How bad it is what is said. */
+static fmi3Status ha_severity(const ha_fmu *f)
+{
+    return f->warned ? fmi3Warning : f->discarded ? fmi3Discard : fmi3Error;
+}
+
 static void ha_log3(ha_fmu *f, const char *message)
 {
     fmi3LogMessageCallback log;
@@ -13,7 +19,7 @@ static void ha_log3(ha_fmu *f, const char *message)
         return;
     }
     memcpy(&log, f->logger, sizeof log);
-    log(f->environment, fmi3Error, "logStatusError", message);
+    log(f->environment, ha_severity(f), f->warned ? "logStatusWarning" : f->discarded ? "logStatusDiscard" : "logStatusError", message);
 }
 
 static fmi3Status ha_status(int good)
@@ -29,6 +35,12 @@ static fmi3Status ha_not_there(fmi3Instance instance, const char *function)
         ha_say((ha_fmu *)instance, text);
     }
     return fmi3Error;
+}
+
+/* What a point that may be a trial of the importer gives. */
+static fmi3Status ha_tried(const ha_fmu *f, int good)
+{
+    return good && !f->warned ? fmi3OK : ha_severity(f);
 }
 
 #define HA_CHECK(modes, function) \
@@ -178,7 +190,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     }
     for (i = 0; i < nValues; ++i) {
         if (!ha_get(f, valueReferences[i], &values[i])) {
-            return fmi3Error;
+            return ha_tried(f, 0);
         }
     }
     return fmi3OK;
@@ -276,7 +288,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     if (nSeed != nKnowns || nSensitivity != nUnknowns) {
         return ha_status(ha_refuse(f, "all variables are scalars"));
     }
-    return ha_status(ha_direction(f, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
+    return ha_tried(f, ha_direction(f, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
 }
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
@@ -323,7 +335,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
     (void)noSetFMUStatePriorToCurrentPoint;
     *enterEventMode = fmi3False;
     *terminateSimulation = fmi3False;
-    return ha_status(ha_stepped(f));
+    return ha_tried(f, ha_stepped(f));
 }
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
@@ -349,7 +361,7 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 
 {
     HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING, "fmi3GetContinuousStateDerivatives")
     if (nContinuousStates != HA_NX || !ha_started(f) || !ha_rates(f)) {
-        return fmi3Error;
+        return ha_tried(f, 0);
     }
     memcpy(derivatives, f->s.dx, nContinuousStates * sizeof *derivatives);
     return fmi3OK;
@@ -358,7 +370,7 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
 {
     HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING, "fmi3GetEventIndicators")
-    return ha_status(nEventIndicators == HA_NG && ha_started(f) && ha_indicators(f, eventIndicators));
+    return ha_tried(f, nEventIndicators == HA_NG && ha_started(f) && ha_indicators(f, eventIndicators));
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)

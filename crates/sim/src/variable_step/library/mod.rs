@@ -69,11 +69,10 @@ fn problem<'s, M: Matrix<T = f64>>(
     implicit_share: Option<f64>,
 ) -> OdeSolverProblem<Equations<'s, M>> {
     let share = implicit_share.unwrap_or(1.0);
-    let absolute = tolerances.absolute().iter().map(|atol| share * atol).collect();
     OdeSolverProblem {
         eqn: Equations::new(shared, implicit_share.is_some()),
         rtol: (share * tolerances.relative()).max(LEAST),
-        atol: M::V::from_vec(absolute, M::C::default()),
+        atol: M::V::from_vec(tolerances.absolute(share), M::C::default()),
         t0: 0.0,
         h0: 1.0,
         integrate_out: false,
@@ -275,8 +274,12 @@ where
         }
     }
 
+    fn rejected(&self) -> usize {
+        self.rejected + self.rejected_by_solver()
+    }
+
     fn add_work(&self, counts: &mut Summary) {
-        counts.rejected += self.rejected + self.rejected_by_solver();
+        counts.rejected += self.rejected();
         counts.factorisations += self.factorisations + self.factorisations_by_solver();
     }
 }
