@@ -320,6 +320,9 @@ pub struct Simulate {
     /// What to record instead of states and outputs: names with commas between them, or `all`
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub record: Vec<String>,
+    /// Say what took how long, and of each state what scale and which error in a step it was given
+    #[arg(long)]
+    pub timings: bool,
     /// Where to write the trajectory: a .csv or .parquet file, or `-` for CSV on stdout; may be repeated
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,

@@ -23,7 +23,7 @@ pub use report::report;
 pub use run::simulate;
 pub use sweep::sweep;
 
-use halfarrow::{Error, Model, Override};
+use halfarrow::{Error, FixedMethod, Form, Model, Override, Start};
 
 use crate::arguments::ModelArguments;
 use crate::screen;
@@ -37,6 +37,13 @@ fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u
         go_on(&model)
     });
     outcome.unwrap_or_else(|error| screen::fail(&error, arguments.model.json))
+}
+
+/// Says, before anything is done with it, if a fixed step is too long for what the model does at its start; gives what was said.
+fn warn_of_step(model: &Model, form: Form, (method, step): (FixedMethod, f64), start: Start) -> Vec<String> {
+    let said: Vec<String> = model.step_advice(form, method, step, start).into_iter().collect();
+    said.iter().for_each(|note| screen::note(&format!("warning: {note}")));
+    said
 }
 
 /// What `--set` gives.

@@ -56,9 +56,12 @@ pub(crate) fn advice(system: &exec::Model, x: &[f64], method: FixedMethod, step:
     Some(words(method, step, mode, longest, &state))
 }
 
-/// The eigenvalues of a system at its start `x`; `None` if it has too many states, or none can be had.
-pub(crate) fn rates_at_start(system: &exec::Model, x: &[f64]) -> Option<Vec<[f64; 2]>> {
-    eigenvalues(&matrix_at(system, x)?)
+/// The eigenvalues of a system at its start `x`, if one may be greater than `rate`, in 1/s; `None` also if it has too many states,
+/// or none can be had.
+pub(crate) fn fast_at_start(system: &exec::Model, x: &[f64], rate: f64) -> Option<Vec<[f64; 2]>> {
+    let matrix = matrix_at(system, x)?;
+    let size = matrix.iter().map(|row| row.iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max);
+    if size > rate { eigenvalues(&matrix) } else { None }
 }
 
 /// Derivatives of the rates by the states, just after the start.

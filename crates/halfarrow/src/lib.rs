@@ -11,9 +11,11 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod advice;
 mod audited;
 mod check;
 mod compare;
+mod cost;
 mod disk;
 mod draw;
 mod equations;
@@ -57,7 +59,7 @@ pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, Loo
 pub use model::{Model, format_text, read_text};
 pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, duration, frequency};
 pub use report::{Page, Report};
-pub use run::{Record, Run, RunReport, Simulated, Start, Stopped};
+pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance, Stopped, Timings};
 pub use stage::Stage;
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
 pub use verdict::Verdict;

@@ -17,6 +17,7 @@ use halfarrow_trace::read_inputs;
 use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
+use crate::cost;
 use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::run::{Record, Run, Start, choose, connect, units};
@@ -28,6 +29,8 @@ const MOST_EVALUATIONS: usize = 50;
 const REHEARSED: f64 = 100.0;
 /// The clock spins for this long before a tick.
 const SPIN: Duration = Duration::from_micros(200);
+/// Ticks over which the stops that delays and samples ask for are counted.
+const TICKS: f64 = 1000.0;
 /// Bytes of a datagram at most.
 const DATAGRAM: usize = 1472;
 
@@ -152,6 +155,7 @@ impl Model {
         let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
         connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
         choose(&mut system, &run.record)?;
+        cost::held(&system, TICKS / run.rate)?;
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
         let audit = self.rehearse(&system, run, &x)?;

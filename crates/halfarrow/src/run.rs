@@ -4,17 +4,22 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
-use halfarrow_sim::{AbsoluteTolerance, Failure, Method, Options, Sink, Summary, simulate, simulate_implicit};
+use halfarrow_sim::{
+    AbsoluteTolerance, Crawl, Failure, Method, Options, Sink, Summary, System, simulate, simulate_implicit,
+};
 use halfarrow_trace::{Trace, read_inputs};
 use serde::Serialize;
 
+use crate::advice::advice;
 use crate::audited::{AuditReport, Audited};
+use crate::cost;
 use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::verdict::Made;
@@ -125,6 +130,43 @@ pub struct RunReport {
     pub audit: AuditReport,
     /// What was left out or is to be known.
     pub notes: Vec<String>,
+    /// How exact each state was kept in the end; of methods of variable step in explicit form.
+    #[serde(skip)]
+    pub tolerances: Vec<StateTolerance>,
+    /// What took how long.
+    #[serde(skip)]
+    pub timings: Timings,
+}
+
+/// How exact a state is kept, in SI units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateTolerance {
+    /// The state.
+    pub name: String,
+    /// The magnitude that it is taken to have.
+    pub scale: f64,
+    /// Absolute error allowed in a step.
+    pub absolute: f64,
+}
+
+/// What took how long, in s.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Timings {
+    /// Causality, equations and their program.
+    pub equations: f64,
+    /// Consistent start values.
+    pub start: f64,
+    /// The run, recording and audit included.
+    pub run: f64,
+}
+
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress<'a> {
+    /// The time reached, in s.
+    pub time: f64,
+    /// What is to be known at once; all of them are in the report too.
+    pub note: Option<&'a str>,
 }
 
 /// A run that stopped before its end.
@@ -176,31 +218,70 @@ fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, E
 }
 
 impl Model {
-    /// Computes a trajectory. `progress` is told the time reached after every step and says whether to go on.
+    /// Computes a trajectory. `progress` is told the time reached after every step, and what is to be known as soon as it is,
+    /// and says whether to go on.
     ///
     /// # Errors
     /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
-    pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(f64) -> bool) -> Result<Simulated, Error> {
+    pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
+        let begun = Instant::now();
         let equations = self.equations_in(run.form)?;
+        let mut timings = Timings { equations: begun.elapsed().as_secs_f64(), ..Timings::default() };
+        let done = self.simulate_with(&equations, run, &mut timings, progress);
+        timings.run = begun.elapsed().as_secs_f64() - timings.equations - timings.start;
+        let done = match done {
+            Ok(mut done) => {
+                done.report.timings = timings;
+                Ok(done)
+            }
+            Err(Error::Run(mut stopped)) => {
+                stopped.report.timings = timings;
+                Err(Error::Run(stopped))
+            }
+            other => other,
+        };
+        judged(done, &Made::by(run))
+    }
+
+    fn simulate_with(
+        &self,
+        equations: &Equations,
+        run: &Run,
+        timings: &mut Timings,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
+    ) -> Result<Simulated, Error> {
+        let begun = Instant::now();
         if matches!(run.form, Form::Minimal | Form::Kane) {
-            let mut system = self.system(&equations)?;
+            let mut system = self.system(equations)?;
             connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
-            let notes = choose(&mut system, &run.record)?;
+            let mut notes = choose(&mut system, &run.record)?;
             let start = self.start(&mut system, run.start)?;
-            let done = self.integrate(&mut system, start, &options(run)?, notes, progress);
-            return judged(done, &Made::by(run));
+            timings.start = begun.elapsed().as_secs_f64();
+            let options = options(run)?;
+            if options.check(start.len()).is_ok() {
+                cost::check(&system, &start, &options, system.observed())?;
+            }
+            if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
+                notes.extend(advice(&system, &start, method, step));
+            }
+            return self.integrate(&mut system, start, &options, notes, progress);
         }
         let explicit = equations.residuals.is_empty();
-        let mut system = self.implicit_system(&equations, run)?;
+        let mut system = self.implicit_system(equations, run)?;
         let notes = choose(&mut system, &run.record)?;
         let x = self.start(system.reference_mut(), run.start)?;
         quicken(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
-        let done = match explicit {
-            true => self.integrate(&mut system.into_form(), y, &options(run)?, notes, progress),
-            false => self.integrate_implicit(&mut system, (y, yp), &implicit_options(run)?, notes, progress),
-        };
-        judged(done, &Made::by(run))
+        timings.start = begun.elapsed().as_secs_f64();
+        let options = if explicit { options(run)? } else { implicit_options(run)? };
+        if options.check(y.len()).is_ok() {
+            let recorded = Recording::recorded(&system).len();
+            cost::check(system.reference_mut(), &x, &options, recorded)?;
+        }
+        match explicit {
+            true => self.integrate(&mut system.into_form(), y, &options, notes, progress),
+            false => self.integrate_implicit(&mut system, (y, yp), &options, notes, progress),
+        }
     }
 
     fn integrate(
@@ -208,23 +289,32 @@ impl Model {
         system: &mut exec::Model,
         mut x: Vec<f64>,
         options: &Options,
-        mut notes: Vec<String>,
-        progress: &mut dyn FnMut(f64) -> bool,
+        notes: Vec<String>,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
             let evaluations = method.evaluations() * (options.to - options.from) / step;
             system.compile_for(evaluations, method.is_implicit());
         }
-        let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
+        let mut sink = Recorder::new(system, notes, progress);
+        let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
         let mut outcome = simulate(&mut audited, options, &mut x, &mut sink);
         if let Err(stopped) = &mut outcome {
             stopped.failure = audited.explain(stopped.failure.clone());
         }
+        let tolerances = sink.tolerances(names);
+        let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
-        self.ended(outcome, options, sink.trace, audit, notes)
+        let mut ended = self.ended(outcome, options, sink.trace, audit, notes);
+        match &mut ended {
+            Ok(done) => done.report.tolerances = tolerances,
+            Err(Error::Run(stopped)) => stopped.report.tolerances = tolerances,
+            Err(_) => {}
+        }
+        ended
     }
 
     fn integrate_implicit(
@@ -232,12 +322,13 @@ impl Model {
         system: &mut exec::ImplicitModel,
         (mut y, mut yp): (Vec<f64>, Vec<f64>),
         options: &Options,
-        mut notes: Vec<String>,
-        progress: &mut dyn FnMut(f64) -> bool,
+        notes: Vec<String>,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
-        let mut sink = Recorder { trace: empty_trace(system), units: units(system), row: Vec::new(), progress };
+        let mut sink = Recorder::new(system, notes, progress);
         let mut audited = Audited::new(system, &self.graph);
         let outcome = simulate_implicit(&mut audited, options, &mut y, &mut yp, &mut sink);
+        let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
@@ -300,6 +391,8 @@ impl Model {
             stiff: summary.stiff,
             audit,
             notes,
+            tolerances: Vec::new(),
+            timings: Timings::default(),
         }
     }
 
@@ -368,7 +461,6 @@ impl Model {
             let mut x = self.start(&mut system, Start::Given)?;
             let mut trace = empty_trace(&system);
             let mut values = vec![0.0; trace.columns.len()];
-            use halfarrow_sim::System;
             let observed = system.cross_jump(0.0, &mut x).and_then(|()| system.observe(0.0, &x, &mut values));
             observed.map_err(|failure| self.stopped(failure))?;
             trace.sample(0.0, &values);
@@ -428,7 +520,37 @@ struct Recorder<'p> {
     /// The unit of each column that is not given in SI units.
     units: Vec<Option<Unit>>,
     row: Vec<f64>,
-    progress: &'p mut dyn FnMut(f64) -> bool,
+    notes: Vec<String>,
+    /// Magnitude and absolute tolerance of each state.
+    kept: (Vec<f64>, Vec<f64>),
+    progress: &'p mut dyn FnMut(Progress<'_>) -> bool,
+}
+
+impl<'p> Recorder<'p> {
+    /// Tells what is to be known before the run.
+    fn new(
+        system: &impl Recording,
+        notes: Vec<String>,
+        progress: &'p mut dyn FnMut(Progress<'_>) -> bool,
+    ) -> Recorder<'p> {
+        for note in &notes {
+            // Whether to go on is asked after the first step.
+            let _ = progress(Progress { time: 0.0, note: Some(note) });
+        }
+        let (trace, units) = (empty_trace(system), units(system));
+        Recorder { trace, units, row: Vec::new(), notes, kept: (Vec::new(), Vec::new()), progress }
+    }
+
+    /// How exact the states of these names were kept.
+    fn tolerances(&self, names: Vec<String>) -> Vec<StateTolerance> {
+        let (scales, absolute) = &self.kept;
+        let values = scales.iter().zip(absolute);
+        names
+            .into_iter()
+            .zip(values)
+            .map(|(name, (&scale, &absolute))| StateTolerance { name, scale, absolute })
+            .collect()
+    }
 }
 
 impl Sink for Recorder<'_> {
@@ -439,7 +561,20 @@ impl Sink for Recorder<'_> {
         self.trace.sample(t, &self.row);
     }
     fn progress(&mut self, t: f64) -> ControlFlow<()> {
-        if (self.progress)(t) { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        let go_on = (self.progress)(Progress { time: t, note: None });
+        if go_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+    fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        self.kept = (magnitudes.to_vec(), absolute.to_vec());
+    }
+    fn crawls(&mut self, crawl: &Crawl) {
+        let Crawl { time, steps, step, state } = crawl;
+        let note = format!(
+            "the run crawls: {steps} steps up to t = {time:e} s, the last of {step:e} s; it is {state} that asks for steps this \
+             short (its scale stands under --timings; --atol sets what is allowed)"
+        );
+        let _ = (self.progress)(Progress { time: *time, note: Some(&note) });
+        self.notes.push(note);
     }
 }
 

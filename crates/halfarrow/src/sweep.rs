@@ -105,6 +105,7 @@ impl Model {
         let reducers = reducers(sweep, &mut system)?;
         let options = options(&sweep.run)?;
         options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+        crate::cost::check_stops(&system, &options)?;
         let columns = columns(&plan, &reducers, &system);
         let identity = self.identity(sweep, &plan, &columns);
         let unwritable = |why: io::Error| Error::from(Problem::Unwritable { path: out.into(), why: why.to_string() });

@@ -28,6 +28,6 @@ pub use implicit::simulate_implicit;
 pub use implicit_system::ImplicitSystem;
 pub use options::{AbsoluteTolerance, Method, Options};
 pub use signal::{Signal, SignalError};
-pub use simulate::{Sink, Stopped, Summary, simulate};
+pub use simulate::{Crawl, Sink, Stopped, Summary, simulate};
 pub use sparsity::Sparsity;
 pub use system::System;

@@ -22,6 +22,30 @@ pub trait Sink {
         let _ = t;
         ControlFlow::Continue(())
     }
+
+    /// How exact each state is kept from now on by a method of variable step: the magnitude that it is taken to have, and the
+    /// absolute error allowed in a step, each in its own unit.
+    fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        let _ = (magnitudes, absolute);
+    }
+
+    /// The run takes so many steps that its end is far away. Told a few times at most.
+    fn crawls(&mut self, crawl: &Crawl) {
+        let _ = crawl;
+    }
+}
+
+/// A run that takes very many steps. Times in s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crawl {
+    /// How far it has come.
+    pub time: f64,
+    /// Steps so far.
+    pub steps: usize,
+    /// The present step.
+    pub step: f64,
+    /// The state that asks for steps that short: its rate changes most for what is allowed of it.
+    pub state: String,
 }
 
 /// What a run took.
@@ -144,6 +168,16 @@ impl<'a> Run<'a> {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Failure::Interrupted { time: t }),
         }
+    }
+
+    /// Says how exact each state is kept.
+    pub(crate) fn tell_tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        self.sink.tolerances(magnitudes, absolute);
+    }
+
+    /// Says that the run crawls.
+    pub(crate) fn tell_crawl(&mut self, crawl: &Crawl) {
+        self.sink.crawls(crawl);
     }
 
     /// Samples where the run stands, if that is due. On a grid the sample bears the time of the grid, from which the run

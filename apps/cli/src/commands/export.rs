@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Error, Export, ExportReport, File, FixedMethod, Problem, Target, write_whole};
+use halfarrow::{Error, Export, ExportReport, File, FixedMethod, Problem, Start, Target, write_whole};
 use serde_json::json;
 
 use super::analyse::form;
-use super::with_model;
+use super::{warn_of_step, with_model};
 use crate::arguments::{self, FixedSolver};
 use crate::screen;
 
@@ -15,12 +15,18 @@ use crate::screen;
 pub fn export(arguments: &arguments::Export) -> u8 {
     with_model(&arguments.model, |model| {
         check_name(arguments)?;
-        let exported = model.export(&asked(arguments))?;
+        let asked = asked(arguments);
+        let exported = model.export(&asked)?;
+        let notes = match asked.target {
+            Target::Latex => Vec::new(),
+            _ => warn_of_step(model, asked.form, (asked.method, asked.step), Start::Given),
+        };
         let written = write_files(arguments, &exported.files)?;
         match arguments.model.model.json {
             true => {
                 let mut object = json!(exported.report);
                 object["written"] = json!(written);
+                object["notes"] = json!(notes);
                 screen::print_json(&object)
             }
             false => screen::print(&summary(&exported.report, &written)),

@@ -5,11 +5,11 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
-use halfarrow::{Durations, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Source, Statistics, frequency};
+use halfarrow::{Durations, Form, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Source, Statistics, frequency};
 use serde_json::json;
 
 use super::run::{method, record, start};
-use super::with_model;
+use super::{warn_of_step, with_model};
 use crate::arguments::{self, RunArguments};
 use crate::page::Page;
 use crate::screen;
@@ -22,6 +22,7 @@ const LOOK: Duration = Duration::from_millis(250);
 pub fn run(arguments: &RunArguments) -> u8 {
     with_model(&arguments.model, |model| {
         let run = asked(arguments)?;
+        let notes = warn_of_step(model, Form::Minimal, (run.method, 1.0 / run.rate), run.start);
         let stop = stop::on_signals();
         let (statistics, over) = (Statistics::default(), AtomicBool::new(false));
         let outcome = std::thread::scope(|scope| {
@@ -38,7 +39,11 @@ pub fn run(arguments: &RunArguments) -> u8 {
             screen::note(&format!("error: {error}"));
         }
         match arguments.model.model.json {
-            true => screen::print_json(&json!(report)),
+            true => {
+                let mut object = json!(report);
+                object["notes"] = json!(notes);
+                screen::print_json(&object)
+            }
             false => screen::print(&text(&report, Page::of(&arguments.page))),
         }?;
         Ok(if report.error.is_some() { 3 } else { 0 })

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, DrawOptions, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated,
-    Start, Stopped, Trace, csv_text, write_csv, write_parquet,
+    Start, Stopped, Timings, Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -27,20 +27,25 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         }
         let mut progress = Progress::new(arguments.to);
         let stop = stop::on_signals();
-        let outcome = model.simulate(&run(arguments), &mut |t| {
-            progress.reach(t);
+        let mut told: Vec<String> = Vec::new();
+        let outcome = model.simulate(&run(arguments), &mut |come| {
+            if let Some(note) = come.note {
+                screen::note(&format!("warning: {note}"));
+                told.push(note.to_string());
+            }
+            progress.reach(come.time);
             !stop.load(Relaxed)
         });
         progress.finish();
         match outcome {
             Ok(done) => {
-                finish(arguments, model, &done, None)?;
+                finish(arguments, model, &done, (&told, None))?;
                 Ok(0)
             }
             Err(Error::Run(stopped)) => {
                 let Stopped { failure, trace, report } = *stopped;
                 screen::note(&format!("error: {failure}"));
-                finish(arguments, model, &Simulated { trace, report }, Some(&failure.to_string()))?;
+                finish(arguments, model, &Simulated { trace, report }, (&told, Some(&failure.to_string())))?;
                 Ok(3)
             }
             Err(error) => Err(error),
@@ -117,15 +122,24 @@ fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Writes and shows what was computed; `error` says why it stopped, if it did. Of a run that never began there is nothing to
-/// write.
-fn finish(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&str>) -> Result<(), Error> {
+/// Writes and shows what was computed, and says what was not yet told; `error` says why it stopped, if it did. Of a run that
+/// never began there is nothing to write.
+fn finish(
+    arguments: &Simulate,
+    model: &Model,
+    done: &Simulated,
+    (told, error): (&[String], Option<&str>),
+) -> Result<(), Error> {
     if done.trace.samples() > 0 || error.is_none() {
         write_files(arguments, &done.trace)?;
         write_plots(arguments, model, &run(arguments), done)?;
     }
     let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
-    done.report.notes.iter().for_each(|note| screen::note(&format!("warning: {note}")));
+    let untold = done.report.notes.iter().filter(|note| !told.contains(note));
+    untold.for_each(|note| screen::note(&format!("warning: {note}")));
+    if arguments.timings && !arguments.model.model.json {
+        screen::note(timings(&done.report, Page::of(&arguments.page)).trim_end());
+    }
     if arguments.model.model.json {
         if !to_stdout {
             screen::print_json(&json_of(arguments, done, error))?;
@@ -164,7 +178,24 @@ fn json_of(arguments: &Simulate, done: &Simulated, error: Option<&str>) -> Value
         object["values"] = columns.map(|c| (c.name.clone(), json!(c.values))).collect::<serde_json::Map<_, _>>().into();
     }
     object["complete"] = json!(done.report.reached >= arguments.to);
+    if arguments.timings {
+        object["timings"] = json!(done.report.timings);
+        object["tolerances"] = json!(done.report.tolerances);
+    }
     object
+}
+
+/// What took how long, and how exact each state was kept.
+fn timings(report: &RunReport, page: Page) -> String {
+    let Timings { equations, start, run } = report.timings;
+    let [equations, start, run] = [equations, start, run].map(screen::short);
+    let mut text = format!("equations {equations} s, start {start} s, run {run} s\n");
+    if !report.tolerances.is_empty() {
+        let rows = report.tolerances.iter();
+        let rows = rows.map(|kept| [kept.name.clone(), screen::short(kept.scale), format!("{:.1e}", kept.absolute)]);
+        text += &page.table(["state", "scale (SI)", "error allowed in a step"], rows);
+    }
+    text
 }
 
 /// Start, end, least and greatest value of every column.

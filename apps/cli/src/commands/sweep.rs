@@ -2,11 +2,11 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use halfarrow::{Error, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
+use halfarrow::{Error, Method, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
 use serde_json::json;
 
 use super::run::{method, misses, start};
-use super::with_model;
+use super::{warn_of_step, with_model};
 use crate::arguments;
 use crate::screen::{self, Progress};
 use crate::stop;
@@ -18,6 +18,10 @@ const SHOWN: usize = 10;
 pub fn sweep(arguments: &arguments::Sweep) -> u8 {
     with_model(&arguments.model, |model| {
         let sweep = asked(arguments)?;
+        let notes = match (sweep.run.method, sweep.run.step) {
+            (Method::Fixed(method), Some(step)) => warn_of_step(model, sweep.run.form, (method, step), sweep.run.start),
+            _ => Vec::new(),
+        };
         let mut bar: Option<Progress> = None;
         let stop = stop::on_signals();
         let outcome = model.sweep(&sweep, &arguments.out, &mut |done, sets| {
@@ -30,7 +34,11 @@ pub fn sweep(arguments: &arguments::Sweep) -> u8 {
         let report = outcome?;
         let wrong = told(&report.audit);
         match arguments.model.model.json {
-            true => screen::print_json(&json!(report)),
+            true => {
+                let mut object = json!(report);
+                object["notes"] = json!(notes);
+                screen::print_json(&object)
+            }
             false => screen::print(&text(&report, arguments)),
         }?;
         Ok(if report.failed == report.sets || wrong { 3 } else { 0 })

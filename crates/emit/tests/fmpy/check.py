@@ -18,8 +18,9 @@ import tempfile
 from pathlib import Path
 
 import fmpy
-from fmpy import fmi2, fmi3
+from fmpy import fmi2, fmi3, sundials
 from fmpy.build import build_platform_binary
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 HERE = Path(__file__).resolve().parent
@@ -27,7 +28,10 @@ ROOT = HERE.parents[3]
 STEP, EVERY, POINTS = 1e-3, 0.01, 40
 FAULTS = []
 # Models at rest at the start: their magnitudes are not known, so CVODE takes its tolerance for an absolute one.
-AT_REST = {"bridge": 1e-11}
+AT_REST = {"bridge": 1e-11, "rectifier": 1e-11}
+# Models of which CVODE tries points at which they have no value: they are discarded, and the run goes on.
+DISCARDED = {"rectifier"}
+DISCARDS = 0
 # CMake stands beside this Python.
 os.environ["PATH"] = str(Path(sys.executable).parent) + os.pathsep + os.environ["PATH"]
 
@@ -36,6 +40,7 @@ MODELS = [
     (ROOT / "models/quarter_car/model.bond", 1e-5),
     (ROOT / "models/slider_crank/model.bond", 1e-5),
     (ROOT / "models/rc_bridge_diode/model.bond", 1e-5),
+    (ROOT / "models/rectifier/model.bond", 1e-4),
     (ROOT / "models/gearbox_ratio/model.bond", 1e-5),
     (ROOT / "models/source_jumps/model.bond", 1e-5),
     (ROOT / "models/series_springs/model.bond", 1e-5),
@@ -49,6 +54,23 @@ MODELS = [
     (HERE.parent / "models/names.bond", 1e-5),
     (HERE / "tuned.bond", 1e-5),
 ]
+
+
+right_side = sundials.CVodeSolver.f
+
+
+def right_side_or_shorter(solver, t, y, ydot, data):
+    """The right side for CVODE, which shortens its step where a point is discarded; FMPy alone would raise in a callback."""
+    global DISCARDS
+    try:
+        return right_side(solver, t, y, ydot, data)
+    except FMICallException as error:
+        DISCARDS += error.status == DISCARD
+        return 1 if error.status == DISCARD else -1
+
+
+sundials.CVodeSolver.f = right_side_or_shorter
+DISCARD = 2
 
 
 def fault(where, what):
@@ -211,9 +233,12 @@ def model_exchange(where, file, reference, tolerance):
     fmu = Fmu(file, exchange=True)
     names = recorded(fmu, reference)
     fmu.close()
+    before = DISCARDS
     result = fmpy.simulate_fmu(
         str(file), fmi_type="ModelExchange", solver="CVode", relative_tolerance=AT_REST.get(file.stem[:-2], 1e-9), stop_time=POINTS / 100,
         output_interval=EVERY, output=names, record_events=False)
+    if file.stem[:-2] in DISCARDED and DISCARDS == before:
+        fault(where, "no point is discarded: a test that tests nothing")
     for name in names:
         wanted = reference[name]
         scale = max(map(abs, wanted)) or 1.0

@@ -11,7 +11,7 @@ mod tolerances;
 use crate::events::{Chatter, first_crossing};
 use crate::shared::Shared;
 use crate::simulate::Run;
-use crate::{Failure, Method, Summary, System};
+use crate::{Crawl, Failure, Method, Summary, System};
 use first_step::first_step;
 use stiffness::Stiffness;
 use tolerances::Tolerances;
@@ -80,6 +80,12 @@ const SUSPICIOUS: usize = 3;
 /// Accepted steps after which rounding is looked for, and whenever they are twice as many.
 const FIRST_LOOK: usize = 64;
 
+/// Steps after which it is looked whether the run crawls, and whenever they are four times as many.
+const MANY: usize = 4096;
+
+/// Steps still to come, at the present pace, from which on it does.
+const ENDLESS: f64 = 1e6;
+
 /// Why an integrator hands over.
 enum End {
     /// The run is at its end.
@@ -102,6 +108,7 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
     let mut step = None;
     loop {
         let atol = tolerances.clone();
+        run.tell_tolerances(atol.magnitudes(), &atol.absolute(1.0));
         let kept = step.take();
         let end = if run.options.method == Method::Radau {
             let mut method = radau::OnStates::new(shared, &atol);
@@ -264,6 +271,7 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             } else {
                 self.run.settle(x)?;
             }
+            self.watch_pace(x);
             if let Some(end) = self.hand_over(stop, x) {
                 return Ok(Some(end));
             }
@@ -276,6 +284,28 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             }
         }
         Ok(None)
+    }
+
+    /// Says so if the run crawls, and which state asks for it: the one whose rate changes most over the next step for what is
+    /// allowed of it.
+    fn watch_pace(&mut self, x: &[f64]) {
+        let steps = self.run.counts.steps;
+        let due = steps >= MANY && steps.is_power_of_two() && steps.trailing_zeros().is_multiple_of(2);
+        let (time, step) = (self.run.time, self.method.time() - self.method.start());
+        let pace = step.max((time - self.run.options.from) / steps as f64);
+        if !due || (self.run.options.to - time) / pace < ENDLESS {
+            return;
+        }
+        let system = &mut *self.shared.system();
+        let (mut here, mut there) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+        let next = |here: &[f64]| -> Vec<f64> { x.iter().zip(here).map(|(x, rate)| x + step * rate).collect() };
+        let known =
+            system.rates(time, x, &mut here).is_ok() && system.rates(time + step, &next(&here), &mut there).is_ok();
+        if known && !x.is_empty() {
+            there.iter_mut().zip(&here).for_each(|(there, here)| *there -= here);
+            let state = system.state_name(self.tolerances.greatest_part(&there, x));
+            self.run.tell_crawl(&Crawl { time, steps, step, state });
+        }
     }
 
     /// Whether the steps are many, or the last one was tried so often in vain, that it may be rounding that asks for it.

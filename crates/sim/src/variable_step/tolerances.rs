@@ -85,6 +85,13 @@ impl Tolerances {
         (sum / v.len().max(1) as f64).sqrt()
     }
 
+    /// The component of `v` that is greatest relative to what is allowed at `x`.
+    pub(super) fn greatest_part(&self, v: &[f64], x: &[f64]) -> usize {
+        let absolute = self.absolute(1.0);
+        let part = |i: usize| v[i].abs() / (self.relative * x[i].abs() + absolute[i]);
+        (0..v.len()).fold(0, |most, i| if part(i) > part(most) { i } else { most })
+    }
+
     /// Magnitude of each state.
     pub(super) fn magnitudes(&self) -> &[f64] {
         &self.magnitudes

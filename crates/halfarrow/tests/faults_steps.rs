@@ -1,0 +1,170 @@
+//! Steps: how many there are, what asks for them, and what is said before they are taken.
+
+use std::path::{Path, PathBuf};
+
+use halfarrow::{Error, FixedMethod, Form, Method, Model, Record, Run, Simulated, Start};
+
+fn fault(name: &str) -> Model {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(format!("{name}.bond"));
+    Model::load(&path, &[]).unwrap_or_else(|error| panic!("{}", error.render(false)))
+}
+
+fn text(text: &str) -> Model {
+    Model::from_text("text.bond", text, &[]).unwrap_or_else(|error| panic!("{}", error.render(false)))
+}
+
+fn run(model: &Model, run: Run) -> Simulated {
+    model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{}", error.render(false)))
+}
+
+fn refused(model: &Model, run: Run) -> String {
+    match model.simulate(&run, &mut |_| false) {
+        Err(error @ Error::Usage(_)) => error.render(false),
+        other => panic!("not refused: {:?}", other.map(|done| done.report.steps)),
+    }
+}
+
+#[test]
+fn rounding_is_no_magnitude() {
+    // A state that is zero but for rounding, as flows grow beside it.
+    let report = run(&fault("atol"), Run { to: 3600.0, ..Run::default() }).report;
+    assert!(report.steps <= 40, "{} steps", report.steps);
+    let kept = report.tolerances.iter().find(|kept| kept.name == "tank.q").expect("a state");
+    assert!(kept.scale >= 2000.0 && kept.absolute <= 1e-6 * kept.scale, "{kept:?}");
+    // A chain that hangs at rest but for the rounding of a right angle.
+    let report = run(&fault("chain_at_rest"), Run { to: 20.0, ..Run::default() }).report;
+    assert!(report.steps <= 100, "{} steps", report.steps);
+}
+
+/// What runs down a chain comes to its end as a ripple of some decades below, and rounding with it.
+#[test]
+fn a_chain_takes_the_steps_that_its_motion_asks_for() {
+    let steps = [1e-8, 1e-9, 1e-10, 1e-11].map(|rtol| {
+        run(&fault("chain"), Run { to: 1.0, rtol, method: Method::Explicit, ..Run::default() }).report.steps
+    });
+    for pair in steps.windows(2) {
+        let growth = pair[1] as f64 / pair[0] as f64;
+        assert!((1.2..2.0).contains(&growth), "{steps:?}");
+    }
+    assert!(steps[3] < 1000, "{steps:?}");
+}
+
+#[test]
+fn a_double_zero_of_time_is_no_jump() {
+    for (name, to) in [("clock_t", 20.0), ("clock_hang", 36000.0)] {
+        let done = run(&fault(name), Run { to, ..Run::default() });
+        assert_eq!(done.report.jumps, 0, "{name}");
+        assert!(done.report.steps < 2000, "{name}: {} steps", done.report.steps);
+    }
+    // Real crossings beside it are still met: the sine changes its sign, 1 - cos only touches.
+    let model = text("model M\nSf:a(abs(sin(t)) + abs(1 - cos(t))) -> 0:n -> C:c(1)\nn -> R:r(1)\n");
+    let report = run(&model, Run { to: 10.0, ..Run::default() }).report;
+    assert_eq!(report.jumps, 3, "at pi, 2 pi and 3 pi");
+    // A shallow dip is a crossing.
+    let model = text("model M\nSf:a(abs(1 + 1e-7 - cos(t)) + abs(cos(t) - 1 + 1e-6)) -> 0:n -> C:c(1)\nn -> R:r(1)\n");
+    let report = run(&model, Run { to: 10.0, ..Run::default() }).report;
+    assert_eq!(report.jumps, 3, "beside 0, and before and after 2 pi");
+    // Rounding everywhere.
+    let model = text("model M\nSf:a(1 + abs(sin(t)^2 + cos(t)^2 - 1)) -> 0:n -> C:c(1)\nn -> R:r(1)\n");
+    let report = run(&model, Run { to: 1.0, ..Run::default() }).report;
+    assert!(report.steps < 1000, "{} steps", report.steps);
+}
+
+/// On every model, by every method of variable step: a decade of tolerance takes about as many more steps as the one
+/// before, down to 1e-12, and never fewer than a looser one.
+#[test]
+fn work_follows_the_tolerance() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let entries = std::fs::read_dir(folder).expect("models/").map(|entry| entry.expect("a folder").path());
+    let mut models: Vec<PathBuf> = entries.filter(|path| path.join("reference.json").is_file()).collect();
+    models.sort();
+    assert!(models.len() >= 30);
+    let faults: Vec<String> = models.iter().flat_map(|folder| work_faults(folder)).collect();
+    assert!(faults.is_empty(), "{} of {}:\n{}", faults.len(), 3 * models.len(), faults.join("\n"));
+}
+
+/// Steps below which the start and jumps decide.
+const FEW: usize = 60;
+
+fn work_faults(folder: &Path) -> Vec<String> {
+    let model = Model::load(&folder.join("model.bond"), &[]).expect("a model");
+    let reference: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("reference.json")).expect("a file")).expect("JSON");
+    let times = reference["t"].as_array().expect("times");
+    let last: f64 = times.last().and_then(|t| t.as_str()?.parse().ok()).expect("a time");
+    let inputs = reference["inputs"].as_object().cloned().unwrap_or_default();
+    let inputs: Vec<(String, PathBuf)> =
+        inputs.iter().map(|(name, file)| (name.clone(), folder.join(file.as_str().expect("a file")))).collect();
+    let mut faults = Vec::new();
+    for method in [Method::Explicit, Method::Bdf, Method::Radau] {
+        let steps: Vec<usize> = (6..=12)
+            .map(|digits| {
+                let run = Run {
+                    to: last.min(2.0),
+                    rtol: format!("1e-{digits}").parse().expect("a number"),
+                    method,
+                    inputs: inputs.clone(),
+                    record: Record::Names(Vec::new()),
+                    ..Run::default()
+                };
+                model.simulate(&run, &mut |_| true).map_or(0, |done| done.report.steps)
+            })
+            .collect();
+        let growth: Vec<f64> = steps.windows(2).map(|pair| pair[1] as f64 / pair[0].max(1) as f64).collect();
+        let straight = growth.windows(2).zip(&steps).all(|(pair, &steps)| {
+            let bend = pair[1] / pair[0];
+            steps < FEW || (0.7..1.5).contains(&bend)
+        });
+        let sound = growth.iter().zip(&steps).all(|(growth, &steps)| (0.98..2.2).contains(growth) || steps < FEW);
+        if !straight || !sound || steps.contains(&0) {
+            faults.push(format!("{} {method:?}: {steps:?}", folder.file_name().expect("a name").to_string_lossy()));
+        }
+    }
+    faults
+}
+
+const SPRING: &str = "model Spring\nparam k = 1e6, b = 2\n1:j -> I:m(1)\nj -> C:c(k = k, q0 = 1)\nj -> R:d(b)\n";
+
+#[test]
+fn a_step_that_is_too_long_is_told_with_the_state_that_asks_for_less() {
+    let model = text(SPRING);
+    let advice = |method, step| model.step_advice(Form::Minimal, method, step, Start::Given);
+    let said = advice(FixedMethod::Rk4, 0.01).expect("ten radians in a step");
+    assert!(said.contains("oscillates with 1000 rad/s") && said.contains("at most 0.0028 s"), "{said}");
+    assert_eq!(advice(FixedMethod::Rk4, 1e-3), None);
+    assert!(advice(FixedMethod::Rosenbrock, 0.01).is_some_and(|said| said.contains("do not follow")));
+    // The same is among the notes of a run, before it is made.
+    let mut told = Vec::new();
+    let asked = Run { to: 0.02, method: Method::Fixed(FixedMethod::Rk4), step: Some(0.01), ..Run::default() };
+    let _ = model.simulate(&asked, &mut |come| {
+        told.extend(come.note.map(str::to_string));
+        true
+    });
+    assert!(told.iter().any(|note| note.contains("at most 0.0028 s")), "{told:?}");
+    // Stiff: a time constant of a microsecond beside slow ones.
+    let stiff = text("model Stiff\nSe:e(1) -> 1:j -> R:r(1)\nj -> 0:n -> C:slow(1)\nj -> I:fast(1e-6)\n");
+    let said = stiff.step_advice(Form::Minimal, FixedMethod::Heun, 1e-3, Start::Given).expect("too long");
+    assert!(said.contains("fast") && said.contains("time constant of 1e-6 s") && said.contains("rosenbrock"), "{said}");
+    assert_eq!(stiff.step_advice(Form::Minimal, FixedMethod::Rosenbrock, 1e-3, Start::Given), None);
+}
+
+#[test]
+fn what_would_never_end_is_refused_with_its_cost() {
+    let base = Run { to: 1.0, ..Run::default() };
+    let held = |law: &str| text(&format!("model M\nSe:e(1 - {law}) -> 1:j -> R:r(1)\nj -> C:c(1)\n"));
+    let said = refused(&held("delay(c.e, 1e-12)"), base.clone());
+    assert!(said.contains("a delay of 1e-12 s") && said.contains("1.0e12 times"), "{said}");
+    let said = refused(&held("sample(c.e, 1e-9)"), Run { to: 10.0, ..base.clone() });
+    assert!(said.contains("a sampling period of 1e-9 s") && said.contains("1.0e10 times"), "{said}");
+    let lossless = text("model Lossless\n1:j -> I:m(1)\nj -> C:c(k = 1, q0 = 1)\n");
+    let said = refused(&lossless, Run { to: 1e300, ..base.clone() });
+    assert!(said.contains("1.0e300 radians") && said.contains("--to"), "{said}");
+    let said = refused(&lossless, Run { to: 1e6, every: Some(1e-8), ..base.clone() });
+    assert!(said.contains("1.0e14 points") && said.contains("GB of memory"), "{said}");
+    let fixed = Method::Fixed(FixedMethod::Rk4);
+    let said = refused(&lossless, Run { to: 1e3, step: Some(1e-9), method: fixed, ..base.clone() });
+    assert!(said.contains("1.0e12 steps"), "{said}");
+    // What comes to rest may go on as long as it likes.
+    let done = run(&held("c.e"), Run { to: 1e12, ..base });
+    assert_eq!(done.report.reached, 1e12);
+}
