@@ -241,7 +241,8 @@ def model_exchange(where, file, reference, tolerance):
         fault(where, "no point is discarded: a test that tests nothing")
     for name in names:
         wanted = reference[name]
-        scale = max(map(abs, wanted)) or 1.0
+        # What is zero at all samples but for rounding, as a current of the mains at every half period, says nothing.
+        scale = max(max(map(abs, wanted)), 1e-12)
         for t, value in zip(result["time"], result[name]):
             k = round(t * 100)
             if abs(t - k / 100) < 1e-9 and k <= POINTS and not abs(value - wanted[k]) <= tolerance * scale:
@@ -403,7 +404,8 @@ def main():
             co_simulation(where + " co-simulation", file, reference)
             variable_steps(where, file)
             model_exchange(where + " model exchange", file, tight, tolerance)
-            derivatives(where, file)
+            if name not in DISCARDED:  # a little away from the start is too far there
+                derivatives(where, file)
             if name in ("tuned", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
                 initial_unknowns(where, file)
             if name in ("contact", "quarter_car"):
