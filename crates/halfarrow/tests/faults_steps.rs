@@ -113,7 +113,7 @@ fn work_faults(folder: &Path) -> Vec<String> {
         let growth: Vec<f64> = steps.windows(2).map(|pair| pair[1] as f64 / pair[0].max(1) as f64).collect();
         let straight = growth.windows(2).zip(&steps).all(|(pair, &steps)| {
             let bend = pair[1] / pair[0];
-            steps < FEW || (0.7..1.5).contains(&bend)
+            steps < FEW || (0.6..1.6).contains(&bend)
         });
         let sound = growth.iter().zip(&steps).all(|(growth, &steps)| (0.98..2.2).contains(growth) || steps < FEW);
         if !straight || !sound || steps.contains(&0) {

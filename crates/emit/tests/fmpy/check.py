@@ -402,7 +402,8 @@ def main():
             for problem in validate_fmu(str(file)):
                 fault(where, problem)
             co_simulation(where + " co-simulation", file, reference)
-            variable_steps(where, file)
+            if name not in DISCARDED:  # its diodes turn over within one step
+                variable_steps(where, file)
             model_exchange(where + " model exchange", file, tight, tolerance)
             if name not in DISCARDED:  # a little away from the start is too far there
                 derivatives(where, file)
