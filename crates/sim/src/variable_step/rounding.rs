@@ -48,7 +48,10 @@ mod tests {
 
     #[test]
     fn a_cubic_has_no_scatter_and_errors_have_theirs() {
-        let cubic = |i: usize| (i as f64).powi(3) - 2.0 * i as f64;
+        let cubic = |i: usize| {
+            let x = i as f64;
+            x * x * x - 2.0 * x
+        };
         assert_eq!(scatter((0..POINTS).map(cubic).collect()), 0.0);
         // Errors of 1 with signs that follow no rule.
         let error = |i: usize| [1.0, -1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, -1.0][i];
