@@ -634,6 +634,7 @@ fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], s
             strokes.leave_out(bond);
         }
     }
+    strokes.release(members);
     let kept: Vec<ElementId> = solved.virtual_speeds.iter().map(|v| v.junction).collect();
     let _ = strokes.keep(&kept);
     for state in &solved.ports {
