@@ -117,9 +117,7 @@ impl Floating {
             let (known, free) = self.free.split_at_mut((place - rank) * n);
             let free = &mut free[..n];
             free.fill(0.0);
-            for i in 0..rank {
-                free[i] = -self.matrix[i * n + place];
-            }
+            free.iter_mut().take(rank).enumerate().for_each(|(i, v)| *v = -self.matrix[i * n + place]);
             back(&self.matrix, n, rank, free);
             free[place] = 1.0;
             known.chunks_exact(n).for_each(|other| take_off(free, other));
@@ -136,10 +134,10 @@ impl Floating {
 /// Solves the triangle of the first `rank` places.
 fn back(matrix: &[f64], n: usize, rank: usize, b: &mut [f64]) {
     for i in (0..rank).rev() {
-        for j in i + 1..rank {
-            b[i] -= matrix[i * n + j] * b[j];
-        }
-        b[i] /= matrix[i * n + i];
+        let row = &matrix[i * n..][..rank];
+        let (here, known) = b[i..rank].split_at_mut(1);
+        row[i + 1..].iter().zip(known).for_each(|(a, known)| here[0] -= a * *known);
+        here[0] /= row[i];
     }
 }
 
