@@ -61,7 +61,7 @@ pub(crate) fn rates(
                 (Some(x), Some(rate)) => {
                     let terms = vec![Term::of(Quantity::Of(stored), 1.0)];
                     let held = Held { name: &element.name, x, rate, terms };
-                    held.compare(values.times, settled, worst, || Vec::new());
+                    held.compare(values.times, settled, worst, Vec::new);
                 }
                 _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
             }

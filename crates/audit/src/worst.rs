@@ -39,7 +39,8 @@ impl Worst {
     /// where it would stand out.
     pub fn note(&mut self, miss: f64, scale: Scale, settled: &Settled, raw: impl FnOnce() -> Raw) {
         let value = scale.relative(miss);
-        if !self.now.as_ref().is_some_and(|(now, _)| now.value.is_nan() || value <= now.value) {
+        let above = |now: &Finding| !now.value.is_nan() && (value > now.value || value.is_nan());
+        if self.now.as_ref().is_none_or(|(now, _)| above(now)) {
             self.keep(raw(), settled);
         }
     }

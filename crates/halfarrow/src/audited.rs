@@ -221,8 +221,10 @@ impl Audited<'_, exec::Model> {
         // It has no value, which is why it is looked at; what has one is written.
         let _ = self.model.observe(t, &x, &mut self.book.values);
         match self.book.not_finite() {
-            Some(name) => Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") },
-            None => failure,
+            Some(name) if name != what => {
+                Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") }
+            }
+            _ => failure,
         }
     }
 }
