@@ -14,7 +14,13 @@ enum Law<'a> {
     /// A recorded column has the value of an expression.
     Value { left: &'a [f64], right: Expr, what: &'static str, of: Quantity },
     /// Signed columns sum to an expression times another.
-    Product { left: Vec<(f64, &'a [f64])>, factor: Expr, right: (&'a [f64], Quantity), what: &'static str, of: Quantity },
+    Product {
+        left: Vec<(f64, &'a [f64])>,
+        factor: Expr,
+        right: (&'a [f64], Quantity),
+        what: &'static str,
+        of: Quantity,
+    },
     /// An expression vanishes.
     Zero { expr: Expr, what: &'static str },
 }

@@ -26,8 +26,11 @@ const AT_MOST: usize = 200;
 /// Where the poles of a matrix are, and a note on those of which few digits are known.
 pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option<String>) {
     let known = if poles.len() <= AT_MOST { uncertainties(a, poles, ROUNDINGS) } else { None };
-    let off = known.unwrap_or_else(|| vec![0.0; poles.len()]);
+    let known = known.unwrap_or_else(|| vec![0.0; poles.len()]);
     let size = |p: &Complex| libm::hypot(p[0], p[1]);
+    // The iteration for eigenvalues itself leaves a rounding of the greatest one.
+    let floor = f64::EPSILON * poles.iter().map(size).fold(0.0, f64::max);
+    let off: Vec<f64> = known.iter().map(|off| off.max(floor)).collect();
     // A real part below rounding of its own pole is none, however near the neighbours are.
     let reach = |p: &Complex, off: f64| off.max(4.0 * f64::EPSILON * size(p));
     let beyond = |(p, off): (&Complex, &f64)| p[0] > reach(p, *off);
@@ -44,7 +47,7 @@ pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option
 /// The pole of which the fewest digits are known, if these are few.
 fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
     let digits = |p: &Complex, off: f64| -libm::log10(off / libm::hypot(p[0], p[1]));
-    let moving = poles.iter().zip(off).filter(|(p, off)| p[0] != 0.0 || p[1] != 0.0 || **off > 0.0);
+    let moving = poles.iter().zip(off).filter(|(p, _)| p[0] != 0.0 || p[1] != 0.0);
     let (pole, known) = moving
         .map(|(p, off)| (p, digits(p, *off)))
         .filter(|(_, known)| *known < DIGITS)
