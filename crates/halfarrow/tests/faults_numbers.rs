@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use halfarrow::{Error, Form, Linearize, Model, Record, Run, Simulated, Stability};
+use halfarrow::{Error, Linearize, Model, Record, Run, Simulated, Stability};
 
 fn text_of(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(format!("{name}.bond"));
@@ -296,19 +296,4 @@ fn a_truly_singular_position_says_what_vanishes() {
     let told = error.render(false);
     assert!(told.contains("`prefer`") && told.contains("vanishes there"), "{told}");
     assert!(told.len() < 600, "{told}");
-}
-
-#[test]
-fn curved_fields_keep_their_rates() {
-    let text = text_of("field_nonlinear");
-    let run = |form| {
-        let run = Run { to: 1.0, rtol: 1e-9, form, record: names(&["I1x.f", "x1s", "C1x.q"]), ..Run::default() };
-        model(&text).simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
-    };
-    let done = run(Form::Minimal);
-    assert!(done.report.audit.rates.as_ref().is_none_or(|miss| miss.value < 1e-6), "{:?}", done.report.audit);
-    let other = run(Form::Break);
-    for name in ["I1x.f", "x1s", "C1x.q"] {
-        near(*column(&done, name).last().unwrap(), *column(&other, name).last().unwrap(), 1e-6);
-    }
 }
