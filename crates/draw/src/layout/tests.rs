@@ -74,22 +74,31 @@ proptest! {
     }
     #[test]
     fn what_is_pinned_stays(net in network(6), some in proptest::collection::vec(any::<bool>(), 7)) {
-        let whole = lay_out(&net);
-        let pin = |v: usize| some[v % 7].then_some([whole.anchors[v][0] + 0.5, whole.anchors[v][1] - 7.0]);
-        let pinned: Vec<_> = (0..net.nodes.len()).map(pin).collect();
-        let placed = layout(&net, &pinned);
-        prop_assert_eq!(&placed, &layout(&net, &pinned), "the same graph gives the same picture");
-        for (v, p) in pinned.iter().enumerate().filter_map(|(v, p)| Some((v, (*p)?))) {
-            prop_assert_eq!(placed.anchors[v], p);
-        }
-        if pinned.iter().any(Option::is_some) {
-            for v in 0..net.nodes.len() {
-                let a = area(&net, &placed, v);
-                let corner = placed.corner;
-                prop_assert!((0..2).all(|k| a.min[k] >= corner[k] - 0.01 && a.max[k] <= corner[k] + placed.size[k] + 0.01));
-            }
-        }
+        check_pinned(&net, &some);
     }
+}
+
+/// Lays a graph out around some of its nodes, which are a little off their places.
+fn check_pinned(net: &Network, some: &[bool]) {
+    let whole = lay_out(net);
+    let off = |v: usize| [whole.anchors[v][0] + 0.5, whole.anchors[v][1] - 7.0];
+    let pinned: Vec<_> = (0..net.nodes.len()).map(|v| some[v % some.len()].then(|| off(v))).collect();
+    let placed = layout(net, &pinned);
+    assert_eq!(placed, layout(net, &pinned), "the same graph gives the same picture");
+    for (v, p) in pinned.iter().enumerate() {
+        assert!(p.is_none_or(|p| placed.anchors[v] == p), "node {v} has moved");
+    }
+    for v in 0..net.nodes.len() {
+        let (a, corner) = (area(net, &placed, v), placed.corner);
+        let inside = |k: usize| a.min[k] >= corner[k] - 0.01 && a.max[k] <= corner[k] + placed.size[k] + 0.01;
+        assert!(inside(0) && inside(1), "node {v} is on the paper");
+    }
+}
+
+#[test]
+fn new_nodes_of_a_ladder_find_places_around_the_old_ones() {
+    check_pinned(&ladder(9), &[true, true, false]);
+    check_pinned(&ladder(9), &[true, false, false, false, true]);
 }
 
 /// A ladder of so many sections: a chain of junctions with a one-port each.
