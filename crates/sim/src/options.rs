@@ -24,7 +24,7 @@ pub enum Method {
 /// Absolute error allowed in a step of a variable-step method, on top of the relative one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AbsoluteTolerance {
-    /// A part of the magnitude of each state: `rtol / 100`, or 1e-14 where that is less. The magnitude is the system's scale
+    /// A part of the magnitude of each state: `rtol / 1000`, or 1e-15 where that is less. The magnitude is the system's scale
     /// of the state or, if larger, the greatest value so far, and at least a small part of what those states make of it with
     /// which it exchanges energy; where the state is 0 and its scale not known, it is guessed from the rates and from how
     /// the states act on each other. What rounding of the rates makes of a state is allowed in any case.

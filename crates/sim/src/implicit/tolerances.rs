@@ -3,10 +3,10 @@
 use crate::{AbsoluteTolerance, Failure, ImplicitSystem, Options};
 
 /// Absolute tolerance relative to the magnitude of an unknown, as a part of the relative one.
-const SHARE: f64 = 1e-2;
+const SHARE: f64 = 1e-3;
 
 /// Absolute tolerance relative to the magnitude of an unknown below which rounding would be mistaken for error.
-const ROUNDING: f64 = 1e-14;
+const ROUNDING: f64 = 1e-15;
 
 /// Part of what its equations balance below which an unknown does not count.
 const NOISE: f64 = 1e-12;

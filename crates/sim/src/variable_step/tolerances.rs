@@ -9,10 +9,10 @@ const GROWTH: f64 = 10.0;
 
 /// Absolute tolerance relative to the magnitude of a state, as a part of the relative one: states that shrink by as much
 /// keep their digits. One part at all tolerances, so that the work follows what is asked.
-const SHARE: f64 = 1e-2;
+const SHARE: f64 = 1e-3;
 
 /// Absolute tolerance relative to the magnitude of a state below which rounding would be mistaken for error.
-const ROUNDING: f64 = 1e-14;
+const ROUNDING: f64 = 1e-15;
 
 /// How far the error allowed in a step is above what rounding makes of it.
 const CLEAR: f64 = 10.0;
