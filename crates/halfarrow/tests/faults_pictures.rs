@@ -24,7 +24,7 @@ fn report(model: &Model, wanted: &Report, told: &mut Vec<String>) -> String {
         told.push(what.to_string());
         true
     };
-    model.report(wanted, &mut tell).unwrap_or_else(|e| panic!("{}", e.render(false)))
+    model.report(wanted, &mut tell).unwrap_or_else(|e| panic!("{}", e.render(false))).html
 }
 
 #[test]
