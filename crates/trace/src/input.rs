@@ -305,6 +305,6 @@ mod tests {
         let mut trace = crate::Trace::new([("u", "V")]);
         [(0.0, 0.1), (1.0, 0.3), (1.0, -2.0), (4.0, 1e-9)].iter().for_each(|&(t, u)| trace.sample(t, &[u]));
         let signal = Signal::new(trace.times.clone(), trace.columns[0].values.clone()).unwrap();
-        assert_eq!(parse_inputs(&crate::csv_text(&trace)).unwrap()["u"], signal);
+        assert_eq!(parse_inputs(&crate::csv_text(&trace, false)).unwrap()["u"], signal);
     }
 }

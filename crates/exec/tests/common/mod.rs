@@ -151,6 +151,7 @@ impl Sketch {
             states: self.states,
             conserved: self.conserved,
             relations: Default::default(),
+            momenta: Vec::new(),
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,
