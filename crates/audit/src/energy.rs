@@ -60,6 +60,11 @@ pub(crate) fn rates(
             match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
                 (Some(x), Some(rate)) => {
                     let terms = vec![Term::of(Quantity::Of(stored), 1.0)];
+                    if let Some(k) = jumps(values.times, x, JUMPED * greatest(x)).iter().position(|j| *j != 0.0) {
+                        let (name, time) = (&element.name, values.times[k]);
+                        unchecked
+                            .push(format!("the impulse that {name} takes at t = {time} s: no effort or flow tells it"));
+                    }
                     let held = Held { name: &element.name, x, rate, terms };
                     held.compare(values.times, settled, worst, Vec::new);
                 }
@@ -110,7 +115,8 @@ impl Held<'_> {
         terms.push(Term::of(Quantity::Number, moved));
         terms.extend(more());
         let scale = settled.scale(&terms);
-        let miss = |k: usize| self.x[k] - self.x[0] - integral.values[k];
+        let jumps = jumps(times, self.x, JUMPED * greatest(self.x));
+        let miss = |k: usize| self.x[k] - self.x[0] - jumps[k] - integral.values[k];
         let stands_out = |k: usize| (scale.relative(miss(k)), scale.relative(integral.uncertainty[k]));
         let beyond = |a: usize, b: usize| above(stands_out(b), stands_out(a));
         let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
@@ -180,6 +186,25 @@ fn energy_held(graph: &BondGraph, values: &Values, port: PortRef) -> f64 {
     }
 }
 
+/// Jumps of what is held, added up, sample by sample: at a time given twice it may change by an impulse, which no rate tells.
+/// What changes by less than `least` there has not jumped.
+fn jumps(times: &[f64], x: &[f64], least: f64) -> Vec<f64> {
+    let mut sum = vec![0.0; x.len()];
+    for k in 1..x.len() {
+        let change = if times[k] <= times[k - 1] { x[k] - x[k - 1] } else { 0.0 };
+        sum[k] = sum[k - 1] + if change.abs() > least { change } else { 0.0 };
+    }
+    sum
+}
+
+/// The greatest magnitude.
+fn greatest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+/// Part of what it holds at most by which a stored quantity has to change at once to have jumped.
+const JUMPED: f64 = 1e-9;
+
 /// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample; `None` if its
 /// law is no function of its own stored quantity and parameters, or reads what is not known.
 fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Vec<f64>> {
@@ -194,9 +219,12 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Ve
         return None;
     }
     let z = |x: f64| graph.exprs.eval(law, &mut |s| if s == own { x } else { values.parameter(s).unwrap_or(f64::NAN) });
+    // What an impulse gives or takes is no power of any sample.
+    let jumps = jumps(values.times, x, JUMPED * greatest(x));
     let mut energy = vec![0.0; x.len()];
     for k in 1..x.len() {
-        energy[k] = energy[k - 1] + gauss(x[k - 1], x[k], z);
+        let by_impulse = jumps[k] != jumps[k - 1];
+        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { gauss(x[k - 1], x[k], z) };
     }
     Some(energy)
 }

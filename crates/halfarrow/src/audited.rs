@@ -112,7 +112,13 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         let infinite = self.book.infinite.iter();
         let mut notes: Vec<String> =
             infinite.map(|(i, time)| format!("`{}` is infinite at t = {time} s", name(i))).collect();
-        if let (Some(Failure::StepTooSmall { time, .. }), Some((name, value))) = (failure, self.book.grown()) {
+        let grown = match failure {
+            Some(Failure::StepTooSmall { .. }) => self.book.grown(GROWN),
+            // Steps may get past a pole; what grew so far is none of the run's own.
+            None => self.book.grown(POLE),
+            Some(_) => None,
+        };
+        if let Some((name, value, time)) = grown {
             notes.push(format!("{name} grows without bound: it is {value:e} at t = {time} s"));
         }
         notes
@@ -155,6 +161,9 @@ impl Parameters for exec::ImplicitModel {
 /// What has grown this many times over the run before grows without bound.
 const GROWN: f64 = 1e3;
 
+/// A source that is greater than it is for half of the time by this factor has a pole.
+const POLE: f64 = 1e9;
+
 impl Book {
     /// Keeps the values just observed at `t`.
     fn keep(&mut self, t: f64) -> Result<(), Failure> {
@@ -175,12 +184,29 @@ impl Book {
         found.map(|&i| self.names[i].as_str())
     }
 
-    /// What grew most before the end, if it did beyond all it was before, and to what.
-    fn grown(&self) -> Option<(&str, f64)> {
-        let last = self.times.len().checked_sub(1)?;
-        let before = |i: usize| self.columns[i][..=last / 2].iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let grew = |&&i: &&usize| self.columns[i][last].abs() > GROWN * before(i) && before(i) > 0.0;
-        self.suspects.iter().find(grew).map(|&i| (self.names[i].as_str(), self.columns[i][last]))
+    /// A value that is beyond all it is for half of the time by this factor at its greatest: its name, what it is then, when.
+    fn grown(&self, factor: f64) -> Option<(&str, f64, f64)> {
+        self.suspects.iter().find_map(|&i| {
+            let column = &self.columns[i];
+            let peak = (0..column.len()).max_by(|&a, &b| column[a].abs().total_cmp(&column[b].abs()))?;
+            let usual = self.usual(column);
+            let grew = usual > 0.0 && column[peak].abs() > factor * usual;
+            grew.then(|| (self.names[i].as_str(), column[peak], self.times[peak]))
+        })
+    }
+
+    /// The magnitude that a value stays below for half of the time.
+    fn usual(&self, column: &[f64]) -> f64 {
+        let mut held: Vec<(f64, f64)> =
+            self.times.windows(2).zip(column).map(|(t, value)| (value.abs(), t[1] - t[0])).collect();
+        held.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half = held.iter().map(|h| h.1).sum::<f64>() / 2.0;
+        let mut passed = 0.0;
+        let middle = held.iter().find(|h| {
+            passed += h.1;
+            passed >= half
+        });
+        middle.map_or(0.0, |h| h.0)
     }
 
     /// The values that the user asked for.

@@ -281,7 +281,8 @@ fn a_preference_that_cannot_be_met_is_told() {
     let rod = "constraint K1: x^2 + y^2 - l^2 = 0\n";
     let warned = |prefer: &str| -> Vec<String> {
         let model = model(&format!("{LEVEL}{rod}{prefer}"));
-        let all = model.warnings().diagnostics.0.iter().map(|d| format!("{} {}", d.code.name, d.title));
+        let found = model.check().unwrap_or_else(|e| panic!("{}", e.render(false)));
+        let all = found.diagnostics.0.iter().map(|d| format!("{} {}", d.code.name, d.title));
         all.filter(|told| told.starts_with("C009")).collect()
     };
     assert_eq!(warned("prefer along.f\n"), ["C009 along.f does not stay independent"]);

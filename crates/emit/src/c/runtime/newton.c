@@ -51,7 +51,7 @@ typedef struct {
     double *loose;
     double *order;
     double *rest;
-    double *free;
+    double *unseen;
     ha_lu lu;
 } ha_newton;
 
@@ -102,7 +102,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.order = ha_take(&place, n);
     w.rest = ha_take(&place, n);
     w.loose = ha_take(&place, n * n);
-    w.free = ha_take(&place, n * n);
+    w.unseen = ha_take(&place, n * n);
     w.lu = ha_lu_at(place, m->order, n);
     return w;
 }
@@ -415,7 +415,7 @@ static void ha_shortest(ha_newton *w, int rank)
     ha_fill(w->rest + rank, 0.0, n - rank);
     ha_back(w, rank, w->rest);
     for (place = rank; place < n; ++place) {
-        double *direction = w->free + (place - rank) * n;
+        double *direction = w->unseen + (place - rank) * n;
         double length;
         ha_fill(direction, 0.0, n);
         for (i = 0; i < rank; ++i) {
@@ -424,7 +424,7 @@ static void ha_shortest(ha_newton *w, int rank)
         ha_back(w, rank, direction);
         direction[place] = 1.0;
         for (i = 0; i < place - rank; ++i) {
-            ha_take_off(direction, w->free + i * n, n);
+            ha_take_off(direction, w->unseen + i * n, n);
         }
         length = sqrt(ha_dot(direction, direction, n));
         for (i = 0; i < n; ++i) {
