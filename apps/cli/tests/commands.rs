@@ -228,7 +228,7 @@ fn declared_units_hold_in_files() {
 #[test]
 fn a_start_at_rest_stays_at_rest() {
     let here = folder("rest");
-    halfarrow(&here, &["new", "m"]);
+    write(&here, "m.bond", "model M\nSe:push(10) -> 1:v -> I:mass(2)\nv -> C:spring(k = 800)\nv -> R:damper(6)\n");
     let arguments = ["simulate", "m.bond", "--to", "5", "--start", "equilibrium", "--json"];
     let report = json(&halfarrow(&here, &arguments));
     for value in report["values"]["spring.q"].as_array().unwrap() {

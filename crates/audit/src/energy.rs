@@ -59,7 +59,10 @@ pub(crate) fn rates(
             let rate = graph.storage_symbols(port).map(|(_, rate)| rate);
             match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
                 (Some(x), Some(rate)) => {
-                    let terms = vec![Term::of(Quantity::Of(stored), 1.0)];
+                    // What acts on it for as long as the run lasts makes that much by its rounding alone.
+                    let acts = graph.storage_symbols(port).map(|(_, rate)| scales.of(graph, rate));
+                    let mut terms = vec![Term::of(Quantity::Of(stored), 1.0)];
+                    terms.extend(acts.map(|acts| Term::beside(acts, scales.span())));
                     if let Some(k) = jumps(values.times, x, JUMPED * greatest(x)).iter().position(|j| *j != 0.0) {
                         let (name, time) = (&element.name, values.times[k]);
                         unchecked

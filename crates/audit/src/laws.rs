@@ -90,10 +90,14 @@ pub(crate) fn links(graph: &BondGraph, values: &Values, scales: &Scales, settled
                         Link { of, from, weight, straight }
                     }));
                 }
-                Law::Product { factor, right: (_, from), of, .. } => {
+                Law::Product { factor, right: (right, from), of, .. } => {
                     let Ok(reader) = values.reader(&[factor]) else { continue };
                     let weight = reader.values(middle, None).map_or(0.0, |v| v[0].abs());
                     links.push(Link { of, from, weight, straight: true });
+                    // A modulus that vanishes passes nothing on, but moves with what it reads.
+                    let made = |v: &[f64]| v[0] * right[middle];
+                    let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
+                    links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
                 Law::Sum { .. } | Law::Zero { .. } => {}
             }

@@ -13,8 +13,13 @@ const FRAME: usize = 96;
 /// The lines, as they stand in the comment at the head of the source.
 pub(super) fn lines(plan: &Plan, header: &str) -> String {
     let tables = !plan.newton.is_empty() || !plan.program.start.is_empty();
-    let indirect =
-        if tables { "through constant tables, to the equations of Newton blocks and of the start" } else { "none" };
+    let implicit = plan.export.method.is_implicit();
+    let indirect = match (tables, implicit) {
+        (true, true) => "through constant tables to the equations of Newton blocks and of the start, and to derivatives",
+        (true, false) => "through constant tables to the equations of Newton blocks and of the start",
+        (false, true) => "to derivatives of the rates, of functions named where they are called",
+        (false, false) => "none",
+    };
     let all: [(&str, String); 10] = [
         ("recursion", "none (MISRA C:2012 17.2)".into()),
         ("heap", "none: no malloc, calloc, realloc, free (21.3), no array of variable length (18.8)".into()),
