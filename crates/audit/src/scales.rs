@@ -197,8 +197,11 @@ impl Scales {
         for (port, stored) in storages(graph) {
             raise(Quantity::Of(stored), sorts[&sort_of_stored(graph, port, stored)].max(self.turnover(graph, port)));
         }
+        // What stands beside a variable stands beside what a law makes of it.
+        let near = beside.clone();
         for (&(quantity, from), weight) in &self.links {
-            raise(quantity, weight * self.seen(from));
+            let most = beside.entry(quantity).or_default();
+            *most = most.max(weight * near.get(&from).copied().unwrap_or(0.0));
         }
         self.raise_energies(graph, &mut beside);
         let size = |(&quantity, &beside): (&Quantity, &f64)| {
