@@ -190,7 +190,7 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
         let end_rates = interpolated.clone();
         // Without states no error tells how far a step may go: laws are followed in short ones.
         let options = run.options;
-        let blind = interpolated.is_empty().then(|| SHORT * (options.to - options.from));
+        let blind = interpolated.is_empty().then_some(SHORT * (options.to - options.from));
         let longest = options.step.into_iter().chain(blind).reduce(f64::min);
         Drive {
             run,
