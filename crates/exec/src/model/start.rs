@@ -230,10 +230,9 @@ impl Model {
         let routed = Routed { t, routine, group };
         // What is determined already stays, if the rest can be met so; then everything may move.
         let mut first = None;
-        for movable in [open.clone(), vec![true; open.len()]] {
-            if !movable.contains(&true) {
-                continue;
-            }
+        let all_open = vec![true; open.len()];
+        let rounds = if open.contains(&true) { vec![open.clone(), all_open] } else { vec![all_open] };
+        for movable in rounds {
             for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
                 let mut z = all.z.clone();
                 let offset = |j: usize| if k < 4 { beginning } else { beginning * (1.0 + j as f64 / 16.0) };
