@@ -640,10 +640,11 @@ fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], s
     for state in &solved.ports {
         let inertance = matches!(graph.elements[state.port.element].kind, Kind::Inertance(_));
         let here = match (imposes(graph, state.port), state.role) {
+            // A source that reads what it makes is a law, and has the stroke of one.
+            (_, Role::Algebraic(causality)) => sits_here(causality, false),
             (Some(effort), _) => !effort,
             (None, Role::Independent) => sits_here(PortCausality::Integral, inertance),
             (None, Role::Dependent) => sits_here(PortCausality::Derivative, inertance),
-            (None, Role::Algebraic(causality)) => sits_here(causality, false),
             (None, Role::Source | Role::Redundant) => continue,
         };
         // Where a flow circulates, what is true of the ports need not fit on the strokes.

@@ -156,11 +156,11 @@ impl Part<'_> {
         let Some(here) = sits_at(graph, &self.causal.strokes, port) else { return Ok(()) };
         let inertance = matches!(kind, Kind::Inertance(_));
         let asked = match (imposes(graph, port), state.role) {
-            (Some(effort), _) => Some(!effort),
-            (None, _) if self.forced => None,
-            (None, Role::Independent) => Some(sits_here(PortCausality::Integral, inertance)),
-            (None, Role::Dependent) => Some(sits_here(PortCausality::Derivative, inertance)),
-            (None, Role::Algebraic(causality)) => Some(sits_here(causality, false)),
+            (Some(effort), Role::Source | Role::Redundant) => Some(!effort),
+            (_, _) if self.forced => None,
+            (_, Role::Algebraic(causality)) => Some(sits_here(causality, false)),
+            (_, Role::Independent) => Some(sits_here(PortCausality::Integral, inertance)),
+            (_, Role::Dependent) => Some(sits_here(PortCausality::Derivative, inertance)),
             (None, _) => None,
         };
         match asked {
