@@ -210,12 +210,15 @@ pub fn fold(line: &str, most: usize) -> Vec<String> {
     pieces
 }
 
+/// What makes a place to break worse: beyond the width, in the first third, in brackets, at a product, farther left.
+type Merit = (bool, bool, isize, u8, std::cmp::Reverse<usize>);
+
 /// Where to break, and how many brackets are open there: the least of them first, a sum before a product, and as far on
 /// the right as goes, but not in the first third if there is another place.
 fn best_break(text: &[char], most: usize) -> Option<(usize, isize)> {
     let start = text.iter().take_while(|c| **c == ' ').count();
     let mut depth = 0isize;
-    let mut best: Option<((bool, bool, isize, u8, std::cmp::Reverse<usize>), usize, isize)> = None;
+    let mut best: Option<(Merit, usize, isize)> = None;
     for (at, &c) in text.iter().enumerate() {
         if at > most && best.is_some_and(|b| !b.0.0) {
             break;

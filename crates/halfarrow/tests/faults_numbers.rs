@@ -1,5 +1,6 @@
 //! Values over many decades, and machines that start where a modulus vanishes: what is computed is right to nearly all
 //! digits, whatever the order in which a model is written.
+#![allow(clippy::disallowed_methods, clippy::excessive_precision, reason = "values to compare with")]
 
 use std::path::Path;
 

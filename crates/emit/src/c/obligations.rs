@@ -15,7 +15,9 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
     let tables = !plan.newton.is_empty() || !plan.program.start.is_empty();
     let implicit = plan.export.method.is_implicit();
     let indirect = match (tables, implicit) {
-        (true, true) => "through constant tables to the equations of Newton blocks and of the start, and to derivatives",
+        (true, true) => {
+            "through constant tables to the equations of Newton blocks and of the start, and to derivatives"
+        }
         (true, false) => "through constant tables to the equations of Newton blocks and of the start",
         (false, true) => "to derivatives of the rates, of functions named where they are called",
         (false, false) => "none",
