@@ -2,6 +2,7 @@
 
 use crate::constraints::Share;
 use crate::scales::{Quantity, Scales, Settled, Term};
+use crate::terms::Terms;
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Node, Symbol};
@@ -260,9 +261,12 @@ impl Check<'_, '_> {
                 Ok(())
             }
             Law::Value { left, right, what, of } => {
-                let reader = self.values.reader(&[*right])?;
+                let mut parts = vec![*right];
+                let terms = Terms::of(&self.graph.exprs, *right, &mut parts);
+                let reader = self.values.reader(&parts)?;
                 let miss = |k: usize, v: &[f64]| left[k] - v[0];
-                self.read(name, what, *of, &reader, &miss, &|_, _| Vec::new());
+                let more = |_: usize, v: &[f64]| vec![Term::beside(Quantity::Number, terms.magnitude(v))];
+                self.read(name, what, *of, &reader, &miss, &more);
                 Ok(())
             }
             Law::Product { left, factor, right: (right, other), what, of } => {

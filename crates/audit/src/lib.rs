@@ -22,6 +22,7 @@ mod power;
 mod quadrature;
 mod regions;
 mod scales;
+mod terms;
 mod values;
 mod worst;
 

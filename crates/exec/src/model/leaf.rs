@@ -76,7 +76,10 @@ impl Ways {
     pub fn step(&self, along: &[f64]) -> Vec<f64> {
         let Ways::Few { columns, basis, size } = self else { return along.to_vec() };
         let part = |(row, size): (&[f64], &f64)| row.iter().zip(along).map(|(b, a)| b * a).sum::<f64>() * size;
-        basis.chunks((*columns).max(1)).zip(size).map(part).collect()
+        if *columns == 0 {
+            return vec![0.0; size.len()];
+        }
+        basis.chunks(*columns).zip(size).map(part).collect()
     }
 
     /// How far a step of the states goes along each way.

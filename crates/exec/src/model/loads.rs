@@ -40,6 +40,8 @@ impl Model {
         let size = leaf.map_or_else(|| self.sizes(t, start), |leaf| leaf.size.clone());
         let rows = match self.ways(leaf, t, start)? {
             Ways::All => (0..n).collect(),
+            // Nothing can move.
+            ways if ways.count(n) == 0 => return None,
             ways => leading_rows(&ways.along(&jacobian, n), ways.count(n)),
         };
         let curve = Curve { leaf, t, load, rows, size };
