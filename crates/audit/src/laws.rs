@@ -83,7 +83,11 @@ pub(crate) fn links(graph: &BondGraph, values: &Values, scales: &Scales, settled
         for law in laws.laws {
             match law {
                 Law::Value { right, of, .. } => {
-                    let Ok(reader) = values.reader(&[right]) else { continue };
+                    let mut parts = vec![right];
+                    let terms = Terms::of(&graph.exprs, right, &mut parts);
+                    let Ok(reader) = values.reader(&parts) else { continue };
+                    let weight = reader.values(middle, None).map_or(0.0, |v| terms.magnitude(&v));
+                    links.push(Link { of, from: Quantity::Number, weight, straight: false });
                     let moved = |by: f64| moved_by(graph, (scales, settled), &reader, (middle, by), |v| v[0]);
                     let pairs = moved(MOVED).into_iter().zip(moved(1.0));
                     links.extend(pairs.map(|((from, weight), (_, far))| {

@@ -198,8 +198,14 @@ impl Scales {
             raise(Quantity::Of(stored), sorts[&sort_of_stored(graph, port, stored)].max(self.turnover(graph, port)));
         }
         // What stands beside a variable stands beside what a law makes of it.
+        let (of_terms, of_variables): (Vec<_>, Vec<_>) =
+            self.links.iter().partition(|((_, from), _)| *from == Quantity::Number);
+        for (&(quantity, _), weight) in of_terms {
+            let most = beside.entry(quantity).or_default();
+            *most = most.max(*weight);
+        }
         let near = beside.clone();
-        for (&(quantity, from), weight) in &self.links {
+        for (&(quantity, from), weight) in of_variables {
             let most = beside.entry(quantity).or_default();
             *most = most.max(weight * near.get(&from).copied().unwrap_or(0.0));
         }

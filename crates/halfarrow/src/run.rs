@@ -251,7 +251,7 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let begun = Instant::now();
-        if matches!(run.form, Form::Minimal | Form::Kane) {
+        if run.form == Form::Minimal {
             let mut system = self.system(equations)?;
             connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
             let mut notes = choose(&mut system, &run.record)?;

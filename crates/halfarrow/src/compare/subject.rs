@@ -103,7 +103,7 @@ impl Model {
     pub(super) fn subject(&self, run: &Run) -> Result<Subject<'_>, Error> {
         let equations = self.equations_in(run.form)?;
         let graph = &self.graph;
-        if matches!(run.form, Form::Minimal | Form::Kane) {
+        if run.form == Form::Minimal {
             let mut system = self.system(&equations)?;
             connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
             let x = self.start(&mut system, run.start)?;
