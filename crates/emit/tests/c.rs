@@ -41,6 +41,7 @@ fn c_follows_parameters_and_inputs() {
         (own("delay"), "dead", 0.0331),
         (own("sampled"), "period", 5e-3),
         (own("bridge"), "c", 2e-6),
+        (own("closure"), "coupler0", 1.0),
     ];
     let all: Vec<Exported> = cases.iter().map(|(path, ..)| export(path, Method::Heun, 1e-3)).collect();
     let of = |one: &Exported| {

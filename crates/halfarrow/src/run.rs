@@ -6,6 +6,8 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::bond_graph::Kind;
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Input, Program, schedule};
@@ -427,19 +429,55 @@ impl Model {
     fn no_start(&self, error: StartError) -> Error {
         match error {
             StartError::Failure(failure) => self.stopped(failure),
-            StartError::Conflict(conflict) => self.fault(conflict_diagnostic(&conflict).into()),
+            StartError::Conflict(conflict) => self.fault(self.conflict_diagnostic(&conflict).into()),
             StartError::NoNumber { value, span, .. } => {
                 let d = Diagnostic::error(codes::I005, error.to_string(), span, format!("this comes to {value}"));
                 self.fault(
                     d.hint("look for a root or a logarithm of what is below zero, or for a division by zero").into(),
                 )
             }
-            StartError::NotFound(_) => {
+            StartError::NotFound { ref searched, .. } => {
                 let span = halfarrow_compiler::span::Span::default();
                 let d = Diagnostic::error(codes::I004, error.to_string(), span, "in this model");
-                self.fault(d.hint("give start values nearer to ones that fit").into())
+                let hint = "give start values nearer to ones that fit";
+                let hint = match self.guess_for(searched) {
+                    Some(guess) => format!("{hint}, or a guess from where they are searched, such as `{guess}`"),
+                    None => hint.to_string(),
+                };
+                self.fault(d.hint(hint).into())
             }
         }
+    }
+
+    /// A statement that guesses the first of what is searched for which there can be one.
+    fn guess_for(&self, searched: &[String]) -> Option<String> {
+        let graph = &self.graph;
+        let signals = graph.signals.values().map(|s| s.symbol);
+        let stored = graph.elements.values().flat_map(|e| match &e.kind {
+            Kind::Inertance(storage) | Kind::Compliance(storage) => storage.stored.as_slice(),
+            _ => &[],
+        });
+        let all: Vec<Symbol> = signals.chain(stored.copied()).collect();
+        let of = |name: &String| all.iter().copied().find(|s| graph.exprs.name(*s) == name);
+        let symbol = searched.iter().find_map(of)?;
+        let unit =
+            graph.variables.get(&symbol).and_then(|v| v.unit.as_ref()).map_or(String::new(), |u| format!(" {u}"));
+        Some(format!("guess {} = 0.4{}", graph.exprs.name(symbol), unit.trim_end()))
+    }
+
+    /// Start values that contradict each other, at their places, with what would fit.
+    fn conflict_diagnostic(&self, conflict: &exec::StartConflict) -> Diagnostic {
+        let say = |v: &exec::StartValue| format!("{} = {} asked, {} would fit", v.name, v.asked, v.fitting);
+        let mut values = conflict.values.iter();
+        let first = values.next().map_or((Default::default(), String::new()), |v| (v.span, say(v)));
+        let title = "start values contradict each other or a constraint";
+        let d = Diagnostic::error(codes::I003, title, first.0, first.1);
+        let d = values.fold(d, |d, v| d.also(v.span, say(v)));
+        let hint = "take the values that would fit, or leave out all but one of them";
+        d.hint(match self.guess_for(&conflict.searched) {
+            Some(guess) => format!("{hint}; where they do fit somewhere, guess a place near it, such as `{guess}`"),
+            None => hint.to_string(),
+        })
     }
 
     /// That there is a start.
@@ -469,17 +507,6 @@ impl Model {
         let columns = found.map(|trace| trace.columns).unwrap_or_default();
         columns.into_iter().map(|c| (c.name, c.values[0])).collect()
     }
-}
-
-/// Start values that contradict each other, at their places, with what would fit.
-fn conflict_diagnostic(conflict: &exec::StartConflict) -> Diagnostic {
-    let say = |v: &exec::StartValue| format!("{} = {} asked, {} would fit", v.name, v.asked, v.fitting);
-    let mut values = conflict.values.iter();
-    let first = values.next().map_or((Default::default(), String::new()), |v| (v.span, say(v)));
-    let title = "start values contradict each other or a constraint";
-    let d = Diagnostic::error(codes::I003, title, first.0, first.1);
-    let d = values.fold(d, |d, v| d.also(v.span, say(v)));
-    d.hint("take the values that would fit, or leave out all but one of them")
 }
 
 /// What records variables by name.

@@ -54,6 +54,7 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
             });
         }
         StatementKind::Stroke(s) => write_stroke(out, s),
+        StatementKind::Guess(list) => write_guesses(out, list),
         StatementKind::Constraint(c) => {
             *out += &format!("constraint {}: {} = {}", c.name.text, shown(&c.left), shown(&c.right));
             write_doc(out, &c.doc);
@@ -107,6 +108,16 @@ fn write_declarations(out: &mut String, word: &str, list: &[Declaration]) {
             *out += &format!(" = {}", shown(value));
         }
         write_doc(out, &d.doc);
+    });
+}
+
+fn write_guesses(out: &mut String, list: &[Guess]) {
+    *out += "guess";
+    separated(out, " ", list, |out, g| {
+        write_path(out, &g.what);
+        write_unit(out, &g.unit);
+        *out += &format!(" = {}", shown(&g.value));
+        write_doc(out, &g.doc);
     });
 }
 

@@ -91,6 +91,8 @@ pub enum StatementKind {
     Causality(Vec<ForcedCausality>),
     /// `stroke a -> b at b`.
     Stroke(Box<ForcedStroke>),
+    /// `guess th2 = 0.4 rad, spring.q = 0.1 m`: where the search of the start begins.
+    Guess(Vec<Guess>),
     /// `constraint hinge: left = right`.
     Constraint(Box<Constraint>),
     /// `domain thermal pseudo { ... }`.
@@ -116,6 +118,21 @@ pub struct Declaration {
     /// have none.
     pub doc: Option<Doc>,
     /// The whole declaration.
+    pub span: Span,
+}
+
+/// `th2 = 0.4 : rad "doc"` in a list of guesses, with the unit in one of two places as in a [`Declaration`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guess {
+    /// The integrated signal or stored quantity.
+    pub what: Path,
+    /// The unit after `:`.
+    pub unit: Option<UnitText>,
+    /// The expression after `=`.
+    pub value: Expr,
+    /// The text that follows.
+    pub doc: Option<Doc>,
+    /// The whole guess.
     pub span: Span,
 }
 

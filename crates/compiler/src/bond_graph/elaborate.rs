@@ -89,6 +89,7 @@ fn build(
     let later = b.later.take();
     let kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
     b.later = later;
+    let guesses = b.guesses();
     b.settle_units();
     b.finish_blocks();
     let preferences = b.preferences();
@@ -111,6 +112,7 @@ fn build(
     graph.preferences = preferences;
     graph.forced_causality = forced_causality;
     graph.forced_strokes = forced_strokes;
+    graph.guesses = guesses;
     b.build_constraints(&mut graph, &relations);
     let repeated = b.recognise_storages(&mut graph, &rates);
     let mut graph = b.finish(graph);
@@ -143,6 +145,7 @@ impl Builder<'_, '_> {
             preferences: Vec::new(),
             forced_causality: Vec::new(),
             forced_strokes: Vec::new(),
+            guesses: Vec::new(),
             constraints: Vec::new(),
             time: self.time,
         }
@@ -277,6 +280,10 @@ impl BondGraph {
         self.held.iter_mut().for_each(|(_, h)| visit(&mut h.source));
         self.lets.iter_mut().chain(&mut self.outputs).for_each(|n| visit(&mut n.value));
         self.constraints.iter_mut().for_each(|c| visit(&mut c.expr));
+        for guess in &mut self.guesses {
+            visit(&mut guess.what);
+            visit(&mut guess.value);
+        }
     }
 }
 

@@ -160,6 +160,7 @@ pub(super) struct Flat<'a> {
     pub prefer: Vec<(ScopeId, &'a ast::Path)>,
     pub causality: Vec<(ScopeId, &'a ast::ForcedCausality)>,
     pub strokes: Vec<(ScopeId, &'a ast::ForcedStroke, Span)>,
+    pub guesses: Vec<(ScopeId, &'a ast::Guess)>,
     pub constraints: Vec<(ScopeId, &'a ast::Constraint, Span)>,
     pub faults: Vec<Diagnostic>,
     chains: Vec<(ScopeId, &'a ast::Chain, bool)>,
@@ -239,6 +240,7 @@ impl<'a> Flat<'a> {
                 StatementKind::Output(_) => "an output",
                 StatementKind::State(_) => "a state",
                 StatementKind::Constraint(_) => "a constraint",
+                StatementKind::Guess(_) => "a guess",
                 StatementKind::Prefer(_) | StatementKind::Causality(_) | StatementKind::Stroke(_) => "causality",
                 StatementKind::Domain(d) => {
                     self.refuse_in_import(&d.body);
@@ -284,6 +286,7 @@ impl<'a> Flat<'a> {
                 StatementKind::Prefer(paths) => self.prefer.extend(paths.iter().map(|p| (scope, p))),
                 StatementKind::Causality(list) => self.causality.extend(list.iter().map(|c| (scope, c))),
                 StatementKind::Stroke(s) => self.strokes.push((scope, s, statement.span)),
+                StatementKind::Guess(list) => self.guesses.extend(list.iter().map(|g| (scope, g))),
                 StatementKind::Constraint(c) => {
                     let node = Node::Constraint(self.constraints.len());
                     self.place(scope, &c.name, node);

@@ -17,6 +17,7 @@ mod elaborate;
 mod elements;
 mod files;
 mod flatten;
+mod guesses;
 mod intent;
 mod load;
 mod lookup;
@@ -109,6 +110,8 @@ pub struct BondGraph {
     pub forced_causality: Vec<ForcedCausality>,
     /// `stroke`.
     pub forced_strokes: Vec<ForcedStroke>,
+    /// `guess`, in order.
+    pub guesses: Vec<Guess>,
     /// `constraint`.
     pub constraints: Vec<Constraint>,
     /// Time, as a symbol.
@@ -451,6 +454,17 @@ pub struct ForcedStroke {
     pub span: Span,
 }
 
+/// One entry of `guess`: where the search of the start begins, never a condition on it.
+#[derive(Debug, Clone, Copy)]
+pub struct Guess {
+    /// The integrated signal or stored quantity; that, up to a constant, which it repeats if it is not integrated itself.
+    pub what: Expr,
+    /// Where its search begins, in parameters, SI.
+    pub value: Expr,
+    /// Where it stands.
+    pub span: Span,
+}
+
 /// A `constraint`, already built into the graph as a zero compliance behind (modulated) transformers.
 #[derive(Debug, Clone)]
 pub struct Constraint {
@@ -488,6 +502,7 @@ impl BondGraph {
             preferences: self.preferences.clone(),
             forced_causality: self.forced_causality.clone(),
             forced_strokes: self.forced_strokes.clone(),
+            guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
             time: self.time,
         }

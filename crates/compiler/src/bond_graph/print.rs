@@ -190,6 +190,12 @@ impl BondGraph {
             let at = if s.at_to { bond.to } else { bond.from };
             writeln!(f, "  stroke of bond {} at {}", s.bond.index() + 1, self.port(at))?;
         }
+        if !self.guesses.is_empty() {
+            writeln!(f, "\nguesses (SI)")?;
+        }
+        for g in &self.guesses {
+            writeln!(f, "  {} = {}", self.text(g.what), self.text(g.value))?;
+        }
         Ok(())
     }
 }

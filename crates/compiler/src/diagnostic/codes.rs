@@ -95,10 +95,12 @@ codes! {
     L009 "a matrix of the wrong shape";
     L010 "a signal block that cannot be";
     I001 "a start value of the wrong kind";
-    I002 "a start value given twice";
+    I002 "a start value or a guess given twice";
     I003 "start values that contradict each other or a constraint";
     I004 "start values that no iteration brings together";
     I005 "a start value that is no number";
+    I006 "a guess of what is never searched";
+    I007 "a guess that is never used (warning)";
 }
 
 #[cfg(test)]

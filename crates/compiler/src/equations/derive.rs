@@ -205,6 +205,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         let free = freedom::conditions(&mut d, causal, &conserved, &sums, &conditions);
         conditions.extend(free);
     }
+    let guesses = if own_start { observed::guesses(&mut d) } else { Vec::new() };
     let domains = domains::domains(&mut d, &states);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
         Step::Newton { unknowns, .. } => unknowns.clone(),
@@ -230,6 +231,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         steps: ordered.steps,
         observed,
         conditions,
+        guesses,
         domains,
         definitions: d.of,
         rows: ordered.rows,

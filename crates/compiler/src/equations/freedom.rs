@@ -1,4 +1,4 @@
-//! Freedom that the start values leave is zero in the storages.
+//! Freedom that the start values leave is zero in the storages, or what is guessed of them.
 //!
 //! A constant of the minimal form, and a sum of momenta that is its state, is no storage: if such a sum were zero, a storage
 //! beside one that starts with something would start with it too, and other forms would start elsewhere. So the storages
@@ -22,7 +22,7 @@ pub(super) struct Sum {
     pub speed: Symbol,
 }
 
-/// The conditions that are missing: `storage = 0`. `given` is what the start has to satisfy anyway.
+/// The conditions that are missing: `storage = 0`, or its guess. `given` is what the start has to satisfy anyway.
 pub(super) fn conditions(
     d: &mut Definitions,
     causal: &CausalGraph,
@@ -49,14 +49,18 @@ pub(super) fn conditions(
         free.extend(own.get(&conserved.replaced).or(Some(&conserved.replaced)));
     }
     free.retain(|s| !reached.contains(s) && !d.missing.contains_key(s));
-    let mut zero = |symbol: Symbol| Condition {
-        residual: d.x.sym(symbol),
-        name: d.x.name(symbol).trim_end_matches('*').to_string(),
-        value: ZERO,
-        firm: false,
-        span: Default::default(),
+    let mut begins = |symbol: Symbol| {
+        let own = d.x.sym(symbol);
+        let value = d.graph.guesses.iter().find(|g| g.what == own).map_or(ZERO, |g| g.value);
+        Condition {
+            residual: d.x.sub(own, value),
+            name: d.x.name(symbol).trim_end_matches('*').to_string(),
+            value,
+            firm: false,
+            span: Default::default(),
+        }
     };
-    free.into_iter().map(&mut zero).collect()
+    free.into_iter().map(&mut begins).collect()
 }
 
 /// For each state that is a sum: what the storage, or the junction, that it is kept for holds itself.

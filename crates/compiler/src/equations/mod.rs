@@ -75,6 +75,8 @@ pub struct Equations {
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
     pub conditions: Vec<Condition>,
+    /// Where the search of the start begins.
+    pub guesses: Vec<Guess>,
     /// Where laws have a value, for messages.
     pub domains: Vec<Domain>,
     /// What defines each variable, before loops were opened.
@@ -297,6 +299,19 @@ pub struct Condition {
     pub value: Expr,
     /// It is a constraint: it holds whatever start values are given.
     pub firm: bool,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Where the search of the start begins for something: where `residual` is 0. It never has to be.
+#[derive(Debug, Clone)]
+pub struct Guess {
+    /// What is guessed less its guess, in symbols that the steps define, states and parameters.
+    pub residual: Expr,
+    /// What is guessed, as shown: `spring.q`.
+    pub name: String,
+    /// The guess.
+    pub value: Expr,
     /// Where it stands.
     pub span: Span,
 }

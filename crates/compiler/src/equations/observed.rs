@@ -6,7 +6,7 @@ use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
 use super::definitions::Definitions;
-use super::{Condition, Observed, State, Unavailable};
+use super::{Condition, Guess, Observed, State, Unavailable};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{BondGraph, Kind};
 use crate::unit::Unit;
@@ -115,6 +115,22 @@ fn variables(graph: &BondGraph) -> Vec<(String, Symbol)> {
     for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
         all.push((format!("{}.e", bond.name), bond.effort));
         all.push((format!("{}.f", bond.name), bond.flow));
+    }
+    all
+}
+
+/// Where the search of the start begins; not for what has no value.
+pub fn guesses(d: &mut Definitions) -> Vec<Guess> {
+    let graph = d.graph;
+    let mut all = Vec::new();
+    for guess in &graph.guesses {
+        let symbols = d.x.symbols_of(guess.what);
+        if symbols.iter().any(|s| d.missing.contains_key(s)) {
+            continue;
+        }
+        let name = symbols.iter().next().map_or(String::new(), |s| d.x.name(*s).to_string());
+        let residual = d.x.sub(guess.what, guess.value);
+        all.push(Guess { residual, name, value: guess.value, span: guess.span });
     }
     all
 }

@@ -16,6 +16,7 @@ impl Program {
         let below = |v: Value| of(v).iter().copied().filter(|&s| s < states).collect();
         self.dependence = self.states.iter().map(|s| below(s.rate)).collect();
         self.start.iter_mut().for_each(|c| c.reads = of(c.residual).to_vec());
+        self.guesses.iter_mut().for_each(|g| g.reads = of(g.residual).to_vec());
     }
 
     /// The states, and after them the conserved constants, that each value reads; of values that one other value reads
@@ -48,6 +49,7 @@ impl Program {
     fn readers(&self) -> Vec<u32> {
         let mut readers = vec![0; self.values.len()];
         let wanted = self.states.iter().map(|s| s.rate).chain(self.start.iter().map(|c| c.residual));
+        let wanted = wanted.chain(self.guesses.iter().map(|g| g.residual));
         wanted.for_each(|v| readers[v.index()] += 2);
         self.blocks.values().flat_map(|b| b.reads()).for_each(|v| readers[v.index()] += 1);
         self.values.iter().for_each(|(_, op)| op.for_each_operand(|v| readers[v.index()] += 1));

@@ -98,6 +98,8 @@ pub struct Program {
     pub observed: Vec<Observed>,
     /// What the start of a run has to satisfy.
     pub start: Vec<StartCondition>,
+    /// Where the search of the start begins, in the order in which they are placed.
+    pub guesses: Vec<StartGuess>,
     /// Divisors that must not vanish.
     pub watches: Vec<Watch>,
     /// What must hold for laws to have values, for messages.
@@ -219,6 +221,23 @@ pub struct StartCondition {
     /// It is a constraint: it holds whatever start values are given.
     pub firm: bool,
     /// States (by index) and, after them, conserved constants that the residual reads, ascending.
+    pub reads: Vec<u32>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Where the search of the start begins for one unknown: there `residual` vanishes, as far as one step of Newton tells.
+#[derive(Debug, Clone)]
+pub struct StartGuess {
+    /// What is guessed, as shown.
+    pub name: String,
+    /// The guess.
+    pub asked: Value,
+    /// What vanishes.
+    pub residual: Value,
+    /// The state (by index) or, after them, conserved constant that is placed.
+    pub unknown: u32,
+    /// States and, after them, conserved constants that the residual reads, ascending.
     pub reads: Vec<u32>,
     /// Where it stands.
     pub span: Span,

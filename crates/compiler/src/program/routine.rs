@@ -280,6 +280,7 @@ impl Program {
         let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).chain(more.iter().copied()).collect();
         wanted.extend(self.observed.iter().filter_map(|o| o.value.clone().ok()));
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
+        wanted.extend(self.guesses.iter().flat_map(|g| [g.residual, g.asked]));
         wanted.extend(self.held.iter().flat_map(|h| [h.source, h.time]));
         wanted.extend(self.momenta.values());
         wanted.extend(self.inputs.iter().map(|i| i.default));

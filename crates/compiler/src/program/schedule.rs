@@ -6,7 +6,7 @@ use super::sharing::share;
 use super::values::{Op, Reads};
 use super::{
     Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Moved, Observed,
-    Parameter, Program, Relations, StartCondition, State, Value, Watch, first_of,
+    Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Meaning, ParameterId};
@@ -305,6 +305,18 @@ impl Schedule<'_> {
                     span: c.span,
                 })
                 .collect(),
+            guesses: equations
+                .guesses
+                .iter()
+                .map(|g| StartGuess {
+                    name: g.name.clone(),
+                    asked: lower.value(g.value),
+                    residual: lower.value(g.residual),
+                    unknown: 0,
+                    reads: Vec::new(),
+                    span: g.span,
+                })
+                .collect(),
             domains: equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect(),
             relations: relations(lower, graph, &equations.relations),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
@@ -316,6 +328,7 @@ impl Schedule<'_> {
             dependence: Vec::new(),
         };
         program.find_dependence();
+        program.place_guesses();
         find_causes(&mut program, &self.kinks);
         program.kept = kept(&program, equations);
         program

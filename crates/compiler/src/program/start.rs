@@ -1,8 +1,8 @@
-//! Which start conditions belong together.
+//! Which start conditions belong together, and which unknown each guess is for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::Program;
+use super::{Program, StartGuess};
 
 /// Start conditions that share unknowns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,6 +33,25 @@ impl Program {
             }
         }
         groups.into_values().collect()
+    }
+
+    /// Gives each guess the unknown that it places: the only one that it reads which is not placed yet; where there is no
+    /// such guess, the first one of the first guess. Brings the guesses into this order and leaves out those for which no
+    /// unknown is left.
+    pub(super) fn place_guesses(&mut self) {
+        let mut left = std::mem::take(&mut self.guesses);
+        let mut placed: BTreeSet<u32> = BTreeSet::new();
+        loop {
+            let open = |g: &StartGuess| g.reads.iter().filter(|u| !placed.contains(u)).count();
+            left.retain(|g| open(g) > 0);
+            if left.is_empty() {
+                return;
+            }
+            let mut guess = left.remove(left.iter().position(|g| open(g) == 1).unwrap_or(0));
+            guess.unknown = *guess.reads.iter().find(|u| !placed.contains(u)).expect("one is open");
+            placed.insert(guess.unknown);
+            self.guesses.push(guess);
+        }
     }
 }
 

@@ -71,6 +71,7 @@ pub fn empty(name: &str) -> BondGraph {
         preferences: Vec::new(),
         forced_causality: Vec::new(),
         forced_strokes: Vec::new(),
+        guesses: Vec::new(),
         constraints: Vec::new(),
         time,
     }

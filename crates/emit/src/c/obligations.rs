@@ -12,7 +12,7 @@ const FRAME: usize = 96;
 
 /// The lines, as they stand in the comment at the head of the source.
 pub(super) fn lines(plan: &Plan, header: &str) -> String {
-    let tables = !plan.newton.is_empty() || !plan.program.start.is_empty();
+    let tables = !plan.newton.is_empty() || plan.solves_start();
     let implicit = plan.export.method.is_implicit();
     let indirect = match (tables, implicit) {
         (true, true) => {

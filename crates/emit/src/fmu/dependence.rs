@@ -59,8 +59,8 @@ pub(super) fn knowns_of(p: &Program, wanted: &[Value]) -> Knowns {
     knowns
 }
 
-/// What each unknown of the start (states, then conserved constants) follows from: the start conditions that it shares
-/// with others.
+/// What each unknown of the start (states, then conserved constants) follows from: the start conditions, and guesses, that
+/// it shares with others.
 pub(super) fn starts(p: &Program) -> Vec<Knowns> {
     let n = p.states.len() + p.conserved.len();
     let mut leader: Vec<usize> = (0..n).collect();
@@ -70,7 +70,8 @@ pub(super) fn starts(p: &Program) -> Vec<Knowns> {
         }
         u
     }
-    for pair in p.start.iter().flat_map(|c| c.reads.windows(2)) {
+    let reads = p.start.iter().map(|c| &c.reads).chain(p.guesses.iter().map(|g| &g.reads));
+    for pair in reads.flat_map(|reads| reads.windows(2)) {
         let (a, b) = (find(&leader, pair[0] as usize), find(&leader, pair[1] as usize));
         leader[a.max(b)] = a.min(b);
     }
@@ -80,6 +81,9 @@ pub(super) fn starts(p: &Program) -> Vec<Knowns> {
             let knowns = knowns_of(p, &[condition.residual, condition.asked]);
             groups[find(&leader, first as usize)].add(&knowns);
         }
+    }
+    for guess in &p.guesses {
+        groups[find(&leader, guess.unknown as usize)].add(&knowns_of(p, &[guess.residual]));
     }
     // Held signals start with what the start makes of them: all of it.
     if !p.held.is_empty() {

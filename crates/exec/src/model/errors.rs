@@ -91,6 +91,8 @@ pub struct StartValue {
 pub struct StartConflict {
     /// All that take part.
     pub values: Vec<StartValue>,
+    /// Names of the unknowns that were searched with them.
+    pub searched: Vec<String>,
 }
 
 /// Why there is no start.
@@ -98,8 +100,13 @@ pub struct StartConflict {
 pub enum StartError {
     /// Start values contradict each other, or what the model imposes.
     Conflict(StartConflict),
-    /// The start values are curves that the iteration did not bring together: their names.
-    NotFound(Vec<String>),
+    /// The start values are curves that the iteration did not bring together.
+    NotFound {
+        /// Names of the start values and constraints.
+        conditions: Vec<String>,
+        /// Names of the unknowns that were searched.
+        searched: Vec<String>,
+    },
     /// A start value is no number.
     NoNumber {
         /// The variable, as `I1.f`.
@@ -123,8 +130,8 @@ impl fmt::Display for StartError {
                 }
                 write!(f, " leave out one of them or give fitting ones")
             }
-            StartError::NotFound(names) => {
-                write!(f, "no start was found with {}: give start values nearer to each other", names.join(", "))
+            StartError::NotFound { conditions, .. } => {
+                write!(f, "no start was found with {}: give start values nearer to each other", conditions.join(", "))
             }
             StartError::NoNumber { name, value, .. } => {
                 write!(f, "the start value of {name} comes to {value}: it has to be a finite number")

@@ -18,6 +18,8 @@ const ITERATIONS: usize = 60;
 /// Where unknowns begin that nothing determines yet: at zero; then beside it, where laws have a slope, later ones a bit more
 /// than those before.
 const BEGINNINGS: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3];
+/// How far beside its guess an unknown may begin.
+const BESIDE: f64 = 1e-3;
 /// Part of the greatest derivative by an unknown that is what rounding left of one.
 const NOISE: f64 = 1e-14;
 /// More states than this are not linearised to find typical magnitudes.
@@ -25,7 +27,9 @@ const MOST_LINEARISED: usize = 200;
 
 /// The unknowns of the start: states, then conserved constants.
 struct Unknowns {
+    /// Those that are not known are where their search begins.
     z: Vec<f64>,
+    guessed: Vec<bool>,
     known: Vec<bool>,
     /// Start conditions that hold because an unknown was solved from them.
     met: Vec<bool>,
@@ -47,7 +51,7 @@ pub(super) struct Constraint {
 
 impl Model {
     /// The state at the start of a run at `t`, which meets all start conditions; unknowns that they leave free are as
-    /// near to zero as they allow. Fixes the conserved constants. The run starts anew.
+    /// near to zero, or to what is guessed, as they allow. Fixes the conserved constants. The run starts anew.
     ///
     /// # Errors
     /// Start values that contradict each other, with fitting ones.
@@ -58,8 +62,7 @@ impl Model {
         let n = states + self.conserved.len();
         let mut z = vec![0.0; n];
         for _ in 0..20 {
-            let met = vec![false; self.program.start.len()];
-            let mut unknowns = Unknowns { z: vec![0.0; n], known: vec![false; n], met };
+            let mut unknowns = self.begin_search(t, n);
             self.solve_direct(t, &mut unknowns)?;
             self.solve_groups(t, &mut unknowns)?;
             let settled = z == unknowns.z;
@@ -78,12 +81,32 @@ impl Model {
         Ok(z)
     }
 
+    /// The unknowns where their search begins, none of them known.
+    fn begin_search(&mut self, t: f64, n: usize) -> Unknowns {
+        let mut z = vec![0.0; n];
+        let mut guessed = vec![false; n];
+        for guess in self.program.guesses.clone() {
+            let unknown = guess.unknown as usize;
+            let routine = self.routine_for(&[guess.residual]);
+            guessed[unknown] = true;
+            if self.residuals(t, &routine, &z, Some(&[unknown])).is_err() {
+                continue;
+            }
+            let out = routine.outputs[0] as usize;
+            let place = z[unknown] - self.frame.r[out] / self.frame.d[out];
+            z[unknown] = if place.is_finite() { place } else { z[unknown] };
+        }
+        let met = vec![false; self.program.start.len()];
+        Unknowns { z, guessed, known: vec![false; n], met }
+    }
+
     /// That every start value is a number.
     fn check_asked(&self) -> Result<(), StartError> {
         let value = |asked: &Value| self.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
-        for start in &self.program.start {
-            if let Some(value) = value(&start.asked).filter(|v| !v.is_finite()) {
-                return Err(StartError::NoNumber { name: start.name.clone(), value, span: start.span });
+        let given = self.program.start.iter().map(|s| (&s.asked, &s.name, s.span));
+        for (asked, name, span) in given.chain(self.program.guesses.iter().map(|g| (&g.asked, &g.name, g.span))) {
+            if let Some(value) = value(asked).filter(|v| !v.is_finite()) {
+                return Err(StartError::NoNumber { name: name.clone(), value, span });
             }
         }
         Ok(())
@@ -135,6 +158,7 @@ impl Model {
         let wanted: Vec<Value> = chosen.values().map(|&c| self.program.start[c].residual).collect();
         let routine = self.routine_for(&wanted);
         let targets: Vec<usize> = chosen.keys().map(|&u| u as usize).collect();
+        let begin: Vec<f64> = targets.iter().map(|&u| unknowns.z[u]).collect();
         let mut best: Vec<(f64, f64)> = targets.iter().map(|&u| (f64::INFINITY, unknowns.z[u])).collect();
         let mut step = vec![0.0; targets.len()];
         let mut done = vec![false; targets.len()];
@@ -161,11 +185,11 @@ impl Model {
                 break;
             }
         }
-        for ((&unknown, &condition), &done) in targets.iter().zip(chosen.values()).zip(&done) {
+        for (((&unknown, &condition), &done), begin) in targets.iter().zip(chosen.values()).zip(&done).zip(begin) {
             unknowns.known[unknown] = done;
             unknowns.met[condition] = done;
             if !done {
-                unknowns.z[unknown] = 0.0;
+                unknowns.z[unknown] = begin;
             }
         }
         done.iter().filter(|&&done| done).count()
@@ -225,8 +249,8 @@ impl Model {
     ) -> Result<(), StartError> {
         let names: Vec<String> = group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
         let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
-        let not_found = StartError::NotFound(names);
         let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
+        let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
         let routed = Routed { t, routine, group };
         // What is determined already stays, if the rest can be met so; then everything may move.
         let mut first = None;
@@ -236,7 +260,11 @@ impl Model {
             for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
                 let mut z = all.z.clone();
                 let offset = |j: usize| if k < 4 { beginning } else { beginning * (1.0 + j as f64 / 16.0) };
-                (0..open.len()).filter(|&j| open[j]).for_each(|j| z[group.unknowns[j] as usize] = offset(j));
+                for j in (0..open.len()).filter(|&j| open[j]) {
+                    let u = group.unknowns[j] as usize;
+                    // What is guessed begins there, or close beside it.
+                    z[u] += if all.guessed[u] && beginning.abs() > BESIDE { 0.0 } else { offset(j) };
+                }
                 if let Some(at) = self.linearised(t, routine, group, &z) {
                     let (z, residual, jacobian) = self.nearest(routed, z, at, &movable);
                     if self.missed(group, &z, &residual, &jacobian).is_empty() {
@@ -273,7 +301,17 @@ impl Model {
             group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
             return Ok(());
         }
-        Err(self.conflict(routed, &z, (&residual, &jacobian), &weights).unwrap_or(not_found))
+        Err(match self.conflict(routed, &z, (&residual, &jacobian), &weights) {
+            Some(values) => StartError::Conflict(StartConflict { values, searched }),
+            None => StartError::NotFound { conditions: names, searched },
+        })
+    }
+
+    /// Names of unknowns: states, then conserved constants.
+    fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
+        let (states, conserved) = (&self.program.states, &self.program.conserved);
+        let name = |u: usize| states.get(u).map_or_else(|| &conserved[u - states.len()], |s| &s.name).clone();
+        unknowns.map(|u| name(u as usize)).collect()
     }
 
     /// Where damped steps of minimum norm lead, of the unknowns that may move.
@@ -328,14 +366,14 @@ impl Model {
         false
     }
 
-    /// The contradiction, if the point is as near as any to all conditions.
+    /// What contradicts each other, if the point is as near as any to all conditions.
     fn conflict(
         &mut self,
         Routed { t, group, .. }: Routed,
         z: &[f64],
         (residual, jacobian): (&[f64], &[f64]),
         weights: &[f64],
-    ) -> Option<StartError> {
+    ) -> Option<Vec<StartValue>> {
         let n = group.unknowns.len();
         let weighed: Vec<f64> = residual.iter().zip(weights).map(|(r, w)| r * w).collect();
         let most = weighed.iter().fold(0.0f64, |most, r| most.max(r.abs()));
@@ -359,8 +397,7 @@ impl Model {
         if !involved.iter().all(firm) && !(0..residual.len()).all(met) {
             return None;
         }
-        let values = involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect();
-        Some(StartError::Conflict(StartConflict { values }))
+        Some(involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect())
     }
 
     /// The constraints on displacements.

@@ -138,6 +138,7 @@ impl Sketch {
             preferences: Vec::new(),
             forced_causality: Vec::new(),
             forced_strokes: Vec::new(),
+            guesses: Vec::new(),
             constraints: Vec::new(),
             time: self.time,
         };
@@ -155,6 +156,7 @@ impl Sketch {
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,
+            guesses: Vec::new(),
             domains: Vec::new(),
             definitions: Map::new(),
             rows: Vec::new(),

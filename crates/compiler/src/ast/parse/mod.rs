@@ -47,13 +47,14 @@ const MAX_NESTING: usize = 120;
 pub(super) const RESERVED: [&str; 6] = ["and", "else", "if", "not", "or", "then"];
 
 /// Words that begin a statement.
-pub(super) const KEYWORDS: [&str; 15] = [
+pub(super) const KEYWORDS: [&str; 16] = [
     "causality",
     "component",
     "const",
     "constraint",
     "domain",
     "for",
+    "guess",
     "import",
     "input",
     "let",

@@ -153,6 +153,7 @@ impl Parser<'_> {
             "component" => StatementKind::Component(Box::new(self.component()?)),
             "prefer" => StatementKind::Prefer(self.listed(|p| p.element_path("a variable or an element"))),
             "causality" => StatementKind::Causality(self.listed(Self::forced_causality)),
+            "guess" => StatementKind::Guess(self.listed(Self::guess)),
             "stroke" => StatementKind::Stroke(Box::new(self.stroke()?)),
             "constraint" => StatementKind::Constraint(Box::new(self.constraint()?)),
             "domain" => StatementKind::Domain(Box::new(self.domain()?)),
@@ -241,6 +242,21 @@ impl Parser<'_> {
         let unit = self.second_unit(unit);
         let doc = self.doc();
         Some(Declaration { name, unit, value, doc, span: self.since(start) })
+    }
+
+    /// `path : unit = value : unit "doc"`, with the unit in one of the two places.
+    fn guess(&mut self) -> Option<Guess> {
+        let start = self.span();
+        let what = self.element_path("a state, or `q` of a C or `p` of an I,")?;
+        let unit = self.unit();
+        if !self.eat(TokenKind::Assign) {
+            self.expected("`= value`");
+            return None;
+        }
+        let value = self.expr();
+        let unit = self.second_unit(unit);
+        let doc = self.doc();
+        Some(Guess { what, unit, value, doc, span: self.since(start) })
     }
 
     fn unit(&mut self) -> Option<UnitText> {

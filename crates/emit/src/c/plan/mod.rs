@@ -199,13 +199,14 @@ impl<'a> Plan<'a> {
             text += &along(&mut writer, "ha_observe_along", &observe_code, tangent);
         }
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
-        let residual = |c: &usize| program.start[*c].residual;
-        let wanted = self.passes.iter().map(|p| ("pass", &p.conditions));
-        let wanted = wanted.map(Some).chain(self.groups.iter().map(|g| g.together.then_some(("group", &g.conditions))));
-        for (i, wanted) in wanted.enumerate() {
-            let number = if i < self.passes.len() { i } else { i - self.passes.len() };
-            let Some((kind, conditions)) = wanted else { continue };
-            let routine = program.routine(&layout, &conditions.iter().map(residual).collect::<Vec<_>>());
+        let residuals =
+            |conditions: &[usize]| conditions.iter().map(|&c| program.start[c].residual).collect::<Vec<_>>();
+        let passes = self.passes.iter().enumerate().map(|(i, p)| ("pass", i, residuals(&p.conditions)));
+        let groups = self.groups.iter().enumerate().filter(|(_, g)| g.together);
+        let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
+        let guesses = program.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
+        for (kind, number, wanted) in passes.chain(groups).chain(guesses) {
+            let routine = program.routine(&layout, &wanted);
             routine.solves.iter().for_each(|s| {
                 blocks.insert(s.block, s.outer.len());
             });
@@ -369,8 +370,7 @@ impl<'a> Plan<'a> {
         text += &piece(method);
         text += &piece(include_str!("../runtime/step.c"));
         let begin = piece(include_str!("../runtime/start.c"));
-        let solve =
-            if self.program.start.is_empty() { String::new() } else { piece(include_str!("../runtime/start_solve.c")) };
+        let solve = if self.solves_start() { piece(include_str!("../runtime/start_solve.c")) } else { String::new() };
         text += &begin.replace("START_CODE\n", &solve);
         text += &messages::messages(self);
         let text =
@@ -390,7 +390,7 @@ impl<'a> Plan<'a> {
         let held = !self.program.held.is_empty();
         let conditions = &self.program.conditions;
         let drift = self.export.method.is_linearly_implicit();
-        let all: [(&str, bool); 33] = [
+        let all: [(&str, bool); 34] = [
             ("tables", !self.program.tables.is_empty()),
             ("conditions", !conditions.is_empty()),
             ("conditions_along", !conditions.is_empty()),
@@ -425,10 +425,16 @@ impl<'a> Plan<'a> {
             ("inputs", !self.program.inputs.is_empty()),
             ("parameters", !self.program.parameters.is_empty()),
             ("linear_constant", self.sizes.factored > 0),
-            ("solves_start", !self.program.start.is_empty()),
+            ("solves_start", self.solves_start()),
+            ("guesses", !self.program.guesses.is_empty()),
             ("start_groups", self.groups.iter().any(|g| g.together)),
         ];
         all.into_iter().filter(|(_, holds)| *holds).map(|(flag, _)| flag).collect()
+    }
+
+    /// Whether a start may differ from the exported one.
+    pub fn solves_start(&self) -> bool {
+        !(self.program.start.is_empty() && self.program.guesses.is_empty())
     }
 
     /// Whether the rates have a function for their derivatives.

@@ -94,6 +94,7 @@ impl Plan<'_> {
             ("START_TABLES", self.start_tables()),
             ("START_CONDITIONS", program.start.len().to_string()),
             ("START_GROUPS", self.groups.len().to_string()),
+            ("GUESSES", program.guesses.len().to_string()),
             ("PASSES", self.passes.len().to_string()),
             ("MOST_AT_ONCE", self.passes.iter().map(|p| p.unknowns.len()).max().unwrap_or(1).to_string()),
             ("MOST_ROWS", most(&|g| g.conditions.len()).to_string()),
@@ -153,6 +154,26 @@ impl Plan<'_> {
         text + "\n" + &list + "};\n"
     }
 
+    /// Where the search of the start begins, and for which unknowns; nothing without guesses.
+    fn guess_tables(&self) -> String {
+        let program = self.program;
+        if program.guesses.is_empty() {
+            return String::new();
+        }
+        let guessed = |u: usize| program.guesses.iter().any(|g| g.unknown as usize == u);
+        let guessed = (0..program.states.len() + program.conserved.len()).map(|u| u8::from(guessed(u)).to_string());
+        let mut text = "static const ha_guess ha_guesses[] = {\n".to_string();
+        for (i, guess) in program.guesses.iter().enumerate() {
+            text += &format!("    {{{}, ha_start_guess_{i}}},\n", guess.unknown);
+        }
+        text += "};\n";
+        if self.groups.iter().any(|g| g.together) {
+            let guessed: Vec<String> = guessed.collect();
+            text += &format!("static const unsigned char ha_guessed[] = {{{}}};\n", guessed.join(", "));
+        }
+        text
+    }
+
     fn start_tables(&self) -> String {
         let mut text = String::new();
         let ints = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
@@ -183,7 +204,10 @@ impl Plan<'_> {
                 group.unknowns.len()
             );
         }
-        text + &list + "};\n" + &groups + "};\n"
+        if self.groups.is_empty() {
+            groups += "    {0, 0, NULL, NULL, NULL}\n";
+        }
+        text + &list + "};\n" + &groups + "};\n" + &self.guess_tables()
     }
 }
 

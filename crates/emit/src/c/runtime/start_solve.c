@@ -17,6 +17,14 @@ typedef struct {
     ha_start_code code;
 } ha_group;
 
+//if guesses
+/* Where the search of an unknown begins: as far as one step of Newton tells, where the code gives 0. */
+typedef struct {
+    int unknown;
+    ha_start_code code;
+} ha_guess;
+
+//end
 START_TABLES
 enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = MOST_AT_ONCE, HA_MOST_ROWS = MOST_ROWS, HA_MOST_COLUMNS = MOST_COLUMNS };
 
@@ -37,6 +45,25 @@ static double *ha_along_unknown(ha_model *m, int unknown)
     return &m->along[unknown < HA_NX ? HA_STATES_AT + unknown : HA_CONSERVED_AT + unknown - HA_NX];
 }
 
+//if guesses
+/* Places the unknowns that are guessed. */
+static void ha_begin_search(ha_model *m, double t, double *z)
+{
+    int i;
+    for (i = 0; i < GUESSES; ++i) {
+        const int unknown = ha_guesses[i].unknown;
+        double out;
+        double slope;
+        ha_fill(m->along, 0.0, HA_DIRECTION);
+        *ha_along_unknown(m, unknown) = 1.0;
+        if (ha_start_residuals(m, t, ha_guesses[i].code, z, &out, &slope) == MODEL_OK) {
+            const double place = z[unknown] - out / slope;
+            z[unknown] = ha_finite(place) ? place : z[unknown];
+        }
+    }
+}
+
+//end
 /* Newton for each unknown of a pass by itself. */
 static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z, unsigned char *known, unsigned char *met)
 {
@@ -45,12 +72,14 @@ static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z,
     double least[HA_MOST_AT_ONCE];
     double best[HA_MOST_AT_ONCE];
     double step[HA_MOST_AT_ONCE];
+    double begin[HA_MOST_AT_ONCE];
     unsigned char done[HA_MOST_AT_ONCE];
     int iteration;
     int i;
     for (i = 0; i < pass->count; ++i) {
         least[i] = HUGE_VAL;
-        best[i] = z[pass->unknowns[i]];
+        begin[i] = z[pass->unknowns[i]];
+        best[i] = begin[i];
         step[i] = 0.0;
         done[i] = 0;
     }
@@ -87,7 +116,7 @@ static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z,
         known[pass->unknowns[i]] = done[i];
         met[pass->conditions[i]] = done[i];
         if (!done[i]) {
-            z[pass->unknowns[i]] = 0.0;
+            z[pass->unknowns[i]] = begin[i];
         }
     }
 }
@@ -323,7 +352,13 @@ static int ha_solve_from(ha_model *m, double t, const ha_group *g, const unsigne
     int i;
     for (i = 0; i < g->columns; ++i) {
         if (open[g->unknowns[i]]) {
-            z[g->unknowns[i]] = beginning * (1.0 + offset * (double)i);
+//if guesses
+            /* What is guessed begins there, or close beside it. */
+            if (fabs(beginning) > 1e-3 && ha_guessed[g->unknowns[i]]) {
+                continue;
+            }
+//end
+            z[g->unknowns[i]] += beginning * (1.0 + offset * (double)i);
         }
     }
     if (!ha_linearised(m, t, g, z, residual, jacobian)) {
@@ -375,7 +410,7 @@ static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, u
 }
 
 //end
-/* What is given holds, the rest is solved for, remaining freedom is zero. */
+/* What is given holds, the rest is solved for, remaining freedom is zero or what is guessed. */
 static int ha_solve_start_once(ha_model *m, double t, double *z)
 {
     unsigned char known[HA_START_UNKNOWNS + 1];
@@ -385,6 +420,9 @@ static int ha_solve_start_once(ha_model *m, double t, double *z)
     memset(known, 0, sizeof known);
     memset(met, 0, sizeof met);
     ha_fill(z, 0.0, HA_START_UNKNOWNS);
+//if guesses
+    ha_begin_search(m, t, z);
+//end
     for (i = 0; i < PASSES; ++i) {
         ha_solve_each(m, t, &ha_passes[i], z, known, met);
     }
