@@ -54,6 +54,7 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     let (graph, more) =
         build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &BTreeSet::new());
     faults.extend(more);
+    faults.extend(graph.iter().flat_map(super::guesses::idle));
     in_order(&mut faults);
     let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error)).map(|mut graph| {
         if let Some(header) = header {

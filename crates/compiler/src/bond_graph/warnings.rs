@@ -8,12 +8,11 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 
 /// The warnings of this stage, in the order of the elements: junctions that join nothing, parts that nothing connects,
-/// fields whose laws come from no energy, guesses of what is given.
+/// fields whose laws come from no energy.
 pub fn warnings(graph: &BondGraph) -> Vec<Diagnostic> {
     let mut found = lonely_junctions(graph);
     found.extend(isolated_parts(graph));
     found.extend(fields_without_energy(graph));
-    found.extend(super::guesses::idle(graph));
     found
 }
 

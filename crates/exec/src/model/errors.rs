@@ -172,7 +172,7 @@ impl fmt::Display for EquilibriumError {
             }
             EquilibriumError::Missed(constraint, miss) => write!(
                 f,
-                "no equilibrium was found: where all rates vanish the constraint {constraint} is missed by {miss:e}; start nearer to the position that is meant"
+                "no equilibrium was found: where all rates vanish the constraint {constraint} is missed by {miss:e}; start nearer to the position that is meant, by start values or `guess`"
             ),
             EquilibriumError::Failure(failure) => failure.fmt(f),
         }
