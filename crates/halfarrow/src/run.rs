@@ -460,9 +460,9 @@ impl Model {
         let all: Vec<Symbol> = signals.chain(stored.copied()).collect();
         let of = |name: &String| all.iter().copied().find(|s| graph.exprs.name(*s) == name);
         let symbol = searched.iter().find_map(of)?;
-        let unit =
-            graph.variables.get(&symbol).and_then(|v| v.unit.as_ref()).map_or(String::new(), |u| format!(" {u}"));
-        Some(format!("guess {} = 0.4{}", graph.exprs.name(symbol), unit.trim_end()))
+        let unit = graph.variables.get(&symbol).and_then(|v| v.unit.as_ref()).map(Unit::to_string);
+        let unit = unit.filter(|u| u != "1").map_or(String::new(), |u| format!(" {u}"));
+        Some(format!("guess {} = 0.4{unit}", graph.exprs.name(symbol)))
     }
 
     /// Start values that contradict each other, at their places, with what would fit.

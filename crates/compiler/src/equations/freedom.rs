@@ -30,7 +30,8 @@ pub(super) fn conditions(
     sums: &[Sum],
     given: &[Condition],
 ) -> Vec<Condition> {
-    if sums.is_empty() && (conserved.is_empty() || given.is_empty()) {
+    let begun = !given.is_empty() || !d.graph.guesses.is_empty();
+    if sums.is_empty() && (conserved.is_empty() || !begun) {
         return Vec::new();
     }
     let own = own_storages(d, causal, sums);
