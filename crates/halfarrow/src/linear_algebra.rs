@@ -26,7 +26,7 @@ pub(crate) fn eigenvalues(rows: &[Vec<f64>]) -> Option<Vec<Complex>> {
 }
 
 /// By how much each eigenvalue is uncertain if every entry of the matrix is known to so many roundings only: the distance
-/// to the nearest eigenvalue of matrices that differ by that. `None` if they are not found.
+/// to its own eigenvalue of matrices that differ by that. `None` if they are not found.
 pub(crate) fn uncertainties(rows: &[Vec<f64>], values: &[Complex], roundings: f64) -> Option<Vec<f64>> {
     let mut most = vec![0.0f64; values.len()];
     for seed in 1..=TRIALS {
@@ -38,12 +38,27 @@ pub(crate) fn uncertainties(rows: &[Vec<f64>], values: &[Complex], roundings: f6
             *entry *= 1.0 + roundings * f64::EPSILON * (f64::from(noise) / f64::from(u32::MAX) * 2.0 - 1.0);
         }
         let others = eigenvalues(&shaken)?;
-        for (most, z) in most.iter_mut().zip(values) {
-            let near = others.iter().map(|w| libm::hypot(w[0] - z[0], w[1] - z[1])).fold(f64::INFINITY, f64::min);
-            *most = most.max(near);
-        }
+        most.iter_mut().zip(moved(values, &others)).for_each(|(most, by)| *most = most.max(by));
     }
     Some(most)
+}
+
+/// How far each value is from its own one among others: the nearest pairs belong together, and each value is in one pair, so
+/// that a value in the middle of a cluster is not taken for all that have moved around it.
+fn moved(values: &[Complex], others: &[Complex]) -> Vec<f64> {
+    let apart = |z: &Complex, w: &Complex| libm::hypot(w[0] - z[0], w[1] - z[1]);
+    let row =
+        |(i, z): (usize, &Complex)| others.iter().enumerate().map(|(j, w)| (apart(z, w), i, j)).collect::<Vec<_>>();
+    let mut pairs: Vec<(f64, usize, usize)> = values.iter().enumerate().flat_map(row).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut taken = vec![false; others.len()];
+    let mut by: Vec<Option<f64>> = vec![None; values.len()];
+    for (apart, i, j) in pairs {
+        if by[i].is_none() && !taken[j] {
+            (by[i], taken[j]) = (Some(apart), true);
+        }
+    }
+    by.into_iter().map(|by| by.unwrap_or(f64::INFINITY)).collect()
 }
 
 /// Singular values, descending; `None` if they are not found.

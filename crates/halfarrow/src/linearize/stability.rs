@@ -47,7 +47,10 @@ pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option
 /// The pole of which the fewest digits are known, if these are few.
 fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
     let digits = |p: &Complex, off: f64| -libm::log10(off / libm::hypot(p[0], p[1]));
-    let moving = poles.iter().zip(off).filter(|(p, _)| p[0] != 0.0 || p[1] != 0.0);
+    // A pole below a rounding of the greatest one is zero, and known as that.
+    let size = |p: &Complex| libm::hypot(p[0], p[1]);
+    let zero = 4.0 * f64::EPSILON * poles.iter().map(size).fold(0.0, f64::max);
+    let moving = poles.iter().zip(off).filter(|(p, _)| size(p) > zero);
     let (pole, known) = moving
         .map(|(p, off)| (p, digits(p, *off)))
         .filter(|(_, known)| *known < DIGITS)
@@ -77,6 +80,9 @@ mod tests {
         assert_eq!(told(&[vec![1e-9, 1.0], vec![-4.0, 0.0]]), (Stability::Unstable, None));
         assert_eq!(told(&[vec![-6.7e-17]]), (Stability::Asymptotic, None));
         assert_eq!(told(&[]), (Stability::Asymptotic, None));
+        // An angle and the spring that follows it: one pole is zero, up to rounding.
+        let kept = [vec![-10.0, -894.427, 100.0], vec![0.447214, 0.0, -5e-26], vec![1.0, 0.0, 0.0]];
+        assert_eq!(told(&kept), (Stability::Marginal, None));
     }
 
     #[test]
