@@ -9,7 +9,7 @@ use super::{
     Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, PlainNames, Symbol, ascii};
-use crate::bond_graph::{BondGraph, ElementId, Meaning, ParameterId};
+use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
 use crate::equations::{Equations, Momentum, Step};
 use crate::ids::{Id, Table};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -340,7 +340,12 @@ fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
     if program.implicit.is_some() {
         return Vec::new();
     }
-    let of_state = |m: &Momentum| equations.tracked.iter().position(|s| *s == m.speed);
+    // The state is the variable itself, or what its storage holds.
+    let held = |m: &Momentum| stored_with(&equations.graph, m.speed);
+    let of_state = |m: &Momentum| {
+        let held = held(m);
+        equations.tracked.iter().position(|s| *s == m.speed || Some(*s) == held)
+    };
     // A sum that is itself the state keeps its value anyway.
     let is_sum = |i: usize| equations.meanings.iter().any(|(s, _)| *s == equations.states[i].symbol);
     let moved = equations.momenta.iter().filter(|m| m.moved);
@@ -351,6 +356,17 @@ fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
     let jumps = |op: Op| condition_of(op).is_some() || matches!(op, Op::Held(_));
     let jumps = program.values.iter().any(|(v, op)| live[v.index()] && jumps(op));
     if jumps { kept } else { Vec::new() }
+}
+
+/// What the storage holds whose co-energy variable this is.
+fn stored_with(graph: &BondGraph, variable: Symbol) -> Option<Symbol> {
+    graph.outer_ports().into_iter().find_map(|port| {
+        let (z, _) = graph.storage_symbols(port)?;
+        match &graph.elements[port.element].kind {
+            Kind::Inertance(s) | Kind::Compliance(s) if z == variable => Some(s.stored[port.port as usize]),
+            _ => None,
+        }
+    })
 }
 
 /// What the equations are, where they are no explicit rates.
