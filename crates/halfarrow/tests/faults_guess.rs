@@ -1,4 +1,5 @@
 //! Where positions have several solutions a guess says which of them is meant.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::collections::BTreeMap;
 use std::fs;
