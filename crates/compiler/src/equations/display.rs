@@ -371,8 +371,13 @@ pub fn from_sides(x: &mut Exprs, symbols: &[Symbol], mut sides: Vec<Expr>) -> Di
     let whole = shortest_sides(x, &sides);
     let length = |sides: &[Expr]| sides.iter().map(|&e| x.printed_length(e)).sum::<u64>();
     let sides = if length(&whole) <= length(&plain) + 4 { whole } else { plain };
+    gathered(x, symbols, &sides)
+}
+
+/// The equation of symbols with their coefficients, the last side being what they add up to.
+pub(super) fn gathered(x: &mut Exprs, symbols: &[Symbol], sides: &[Expr]) -> DisplayEquation {
     let mut left = Vec::with_capacity(symbols.len());
-    for (&symbol, &coefficient) in symbols.iter().zip(&sides) {
+    for (&symbol, &coefficient) in symbols.iter().zip(sides) {
         let symbol = x.sym(symbol);
         left.push(x.mul(&[coefficient, symbol]));
     }

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::blocks::{LinearRow, Ordered};
 use super::definitions::Definitions;
 use super::display::{
-    Dependent, DisplayEquation, Page, ShownDefinition, aliases, assign_rows, equation, from_sides, named_sources,
-    put_in, put_in_shown,
+    Dependent, DisplayEquation, Page, ShownDefinition, aliases, assign_rows, equation, from_sides, gathered,
+    named_sources, put_in, put_in_shown,
 };
 use super::{Equations, Step};
 use crate::algebra::{Expr, Exprs, Node, ONE, Shared, Symbol};
@@ -256,15 +256,7 @@ fn shown_row(x: &mut Exprs, symbols: &[Symbol], sides: &[Expr], work: u64) -> Di
             x.bound_search(work);
             from_sides(x, symbols, sides)
         }
-        _ => {
-            let mut left = Vec::with_capacity(symbols.len());
-            for (&symbol, &coefficient) in symbols.iter().zip(&sides) {
-                let symbol = x.sym(symbol);
-                left.push(x.mul(&[coefficient, symbol]));
-            }
-            let left = x.add(&left);
-            equation(left, sides[symbols.len()])
-        }
+        _ => gathered(x, symbols, &sides),
     }
 }
 
