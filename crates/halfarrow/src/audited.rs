@@ -1,9 +1,9 @@
 //! A system whose every step is recorded for the audit.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
-use halfarrow_compiler::bond_graph::{BondGraph, Kind};
+use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
 use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 use serde::Serialize;
@@ -65,6 +65,8 @@ struct Book {
     shown: Vec<usize>,
     /// The order in which a value that is not finite is looked for: what sources give comes first.
     suspects: Vec<usize>,
+    /// How many of these, the first ones, are values of sources.
+    sources: usize,
     /// What the user records that was infinite, and when first.
     infinite: BTreeMap<usize, f64>,
     /// Where rates had no finite value last.
@@ -84,6 +86,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         // Every name is known to have a value, so this cannot fail.
         let _ = model.record(&all);
         let known = graph.parameters.values().map(|p| p.name.clone());
+        let (suspects, sources) = suspects(graph, &names);
         let book = Book {
             parameters: known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect(),
             shown: (names.len()..count).collect(),
@@ -91,7 +94,8 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             values: vec![0.0; count],
             times: Vec::new(),
             auditor: Auditor::new(graph),
-            suspects: suspects(graph, &names),
+            suspects,
+            sources,
             infinite: BTreeMap::new(),
             failed: None,
             names,
@@ -113,9 +117,9 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         let mut notes: Vec<String> =
             infinite.map(|(i, time)| format!("`{}` is infinite at t = {time} s", name(i))).collect();
         let grown = match failure {
-            Some(Failure::StepTooSmall { .. }) => self.book.grown(GROWN),
+            Some(Failure::StepTooSmall { .. }) => self.book.grown(&self.book.suspects, GROWN),
             // Steps may get past a pole; what grew so far is none of the run's own.
-            None => self.book.grown(POLE),
+            None => self.book.grown(&self.book.suspects[..self.book.sources], POLE),
             Some(_) => None,
         };
         if let Some((name, value, time)) = grown {
@@ -125,19 +129,19 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     }
 }
 
-/// The values of the graph, those that sources give first, then inputs and held signals, then all others.
-fn suspects(graph: &BondGraph, names: &[String]) -> Vec<usize> {
-    let of_source = |name: &String| {
-        graph.elements.values().any(|e| match e.kind {
-            Kind::EffortSource { .. } => *name == format!("{}.e", e.name),
-            Kind::FlowSource { .. } => *name == format!("{}.f", e.name),
-            _ => false,
-        })
+/// The values of the graph, those that sources give first, then inputs and held signals, then all others; and how many sources
+/// give.
+fn suspects(graph: &BondGraph, names: &[String]) -> (Vec<usize>, usize) {
+    let given = |e: &Element| match e.kind {
+        Kind::EffortSource { .. } => Some(format!("{}.e", e.name)),
+        Kind::FlowSource { .. } => Some(format!("{}.f", e.name)),
+        _ => None,
     };
-    let rank = |name: &String| if of_source(name) { 0 } else { 1 + usize::from(name.contains('.')) };
+    let given: BTreeSet<String> = graph.elements.values().filter_map(given).collect();
+    let rank = |name: &String| if given.contains(name) { 0 } else { 1 + usize::from(name.contains('.')) };
     let mut all: Vec<usize> = (0..names.len()).collect();
-    all.sort_by_key(|&i| rank(&names[i]));
-    all
+    all.sort_by_cached_key(|&i| rank(&names[i]));
+    (all, names.iter().filter(|name| given.contains(*name)).count())
 }
 
 /// What knows the values of parameters.
@@ -185,8 +189,8 @@ impl Book {
     }
 
     /// A value that is beyond all it is for half of the time by this factor at its greatest: its name, what it is then, when.
-    fn grown(&self, factor: f64) -> Option<(&str, f64, f64)> {
-        self.suspects.iter().find_map(|&i| {
+    fn grown(&self, among: &[usize], factor: f64) -> Option<(&str, f64, f64)> {
+        among.iter().find_map(|&i| {
             let column = &self.columns[i];
             let peak = (0..column.len()).max_by(|&a, &b| column[a].abs().total_cmp(&column[b].abs()))?;
             let usual = self.usual(column);
