@@ -26,6 +26,7 @@ mod terms;
 mod values;
 mod worst;
 
+use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::BondGraph;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -152,6 +153,11 @@ impl Auditor {
             worst.end_part();
         }
         self.unchecked.extend(unchecked);
+    }
+
+    /// The method of the run neglected what happens to a state or unknown below this magnitude, in its own unit.
+    pub fn neglect(&mut self, symbol: Symbol, magnitude: f64) {
+        self.scales.neglect(&self.graph, symbol, magnitude);
     }
 
     /// What was found.

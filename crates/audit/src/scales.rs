@@ -80,6 +80,8 @@ pub(crate) struct Scales {
     links: BTreeMap<(Quantity, Quantity), f64>,
     /// Integrals of the magnitudes of efforts and flows.
     turnovers: BTreeMap<Quantity, f64>,
+    /// Magnitudes below which the method of the run neglected what happens.
+    neglected: BTreeMap<Quantity, f64>,
     begun: Option<f64>,
     /// Length of the run so far, in s.
     span: f64,
@@ -93,6 +95,7 @@ impl Scales {
             seen: BTreeMap::new(),
             links: BTreeMap::new(),
             turnovers: BTreeMap::new(),
+            neglected: BTreeMap::new(),
             begun: None,
             span: 0.0,
         }
@@ -139,6 +142,13 @@ impl Scales {
                 *known = known.max(weight);
             }
         }
+    }
+
+    /// Takes note of the magnitude below which the method neglected what happens to a variable.
+    pub fn neglect(&mut self, graph: &BondGraph, symbol: Symbol, magnitude: f64) {
+        let quantity = self.of(graph, symbol);
+        let least = self.neglected.entry(quantity).or_default();
+        *least = least.max(magnitude);
     }
 
     fn note(&mut self, quantity: Quantity, magnitude: f64) {
@@ -213,7 +223,42 @@ impl Scales {
         let size = |(&quantity, &beside): (&Quantity, &f64)| {
             (quantity, Size { own: self.seen(quantity).max(FLOOR * beside), beside })
         };
-        Settled { of: beside.iter().map(size).collect() }
+        let mut of: BTreeMap<Quantity, Size> = beside.iter().map(size).collect();
+        for (stored, least) in self.least_stored(graph) {
+            let size = of.entry(stored).or_default();
+            size.own = size.own.max(least);
+        }
+        Settled { of }
+    }
+
+    /// What the stored quantities count as at least, since the method neglected what is less. It is believed up to what
+    /// would be there if the storage held the energy of the greatest: it may have been wrong about a magnitude. Storages
+    /// that depend on others go with them: what holds less energy than was neglected of any state is neglected.
+    fn least_stored(&self, graph: &BondGraph) -> Vec<(Quantity, f64)> {
+        let energy = |port: PortRef, stored: Symbol| {
+            let acts = graph.storage_symbols(port).map_or(0.0, |(z, _)| self.seen(self.of(graph, z)));
+            acts * self.seen(Quantity::Of(stored))
+        };
+        let held: Vec<(Quantity, f64)> =
+            storages(graph).map(|(port, stored)| (Quantity::Of(stored), energy(port, stored))).collect();
+        let most = held.iter().fold(0.0, |most: f64, (_, energy)| most.max(*energy));
+        let neglected = |(quantity, held): &(Quantity, f64)| {
+            let share = self.neglected_of(*quantity)? / self.seen(*quantity);
+            (*held > 0.0).then(|| (held * share * share).min(most))
+        };
+        let shared = held.iter().filter_map(neglected).fold(0.0, f64::max);
+        let least = |of: &(Quantity, f64)| {
+            let energy = neglected(of).unwrap_or(shared);
+            (of.0, self.seen(of.0) * if of.1 > 0.0 { (energy / of.1).sqrt() } else { 0.0 })
+        };
+        held.iter().map(least).collect()
+    }
+
+    /// The magnitude below which the method neglected a quantity, told of itself or of what a law joins it with.
+    fn neglected_of(&self, quantity: Quantity) -> Option<f64> {
+        let through = self.links.iter().filter(|((of, _), _)| *of == quantity);
+        let through = through.filter_map(|((_, from), weight)| Some(weight * self.neglected.get(from)?));
+        self.neglected.get(&quantity).copied().into_iter().chain(through).reduce(f64::max)
     }
 
     /// The greatest quantity of each sort.

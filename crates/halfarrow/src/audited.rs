@@ -1,11 +1,14 @@
 //! A system whose every step is recorded for the audit.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 
 use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
-use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
+use halfarrow_sim::{
+    Crawl, Failure, ImplicitSystem, Options, Sink, Sparsity, Stopped, Summary, System, simulate, simulate_implicit,
+};
 use serde::Serialize;
 
 use crate::run::Recording;
@@ -57,6 +60,8 @@ pub struct Audited<'a, M> {
 /// What is recorded.
 struct Book {
     auditor: Auditor,
+    /// What the method was allowed to neglect of each state, as far as it said so.
+    neglected: Vec<f64>,
     parameters: BTreeMap<String, f64>,
     names: Vec<String>,
     times: Vec<f64>,
@@ -94,6 +99,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             values: vec![0.0; count],
             times: Vec::new(),
             auditor: Auditor::new(graph),
+            neglected: Vec::new(),
             suspects,
             sources,
             infinite: BTreeMap::new(),
@@ -105,6 +111,8 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
 
     /// What was found.
     pub fn finish(mut self) -> AuditReport {
+        let tracked = self.model.program().tracked.iter();
+        tracked.zip(&self.book.neglected).for_each(|(&symbol, error)| self.book.auditor.neglect(symbol, *error));
         self.book.audit();
         AuditReport::from(self.book.auditor.finish())
     }
@@ -244,6 +252,18 @@ impl Book {
 }
 
 impl Audited<'_, exec::Model> {
+    /// Runs it, as [`simulate`].
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub fn simulate(&mut self, options: &Options, x: &mut [f64], sink: &mut dyn Sink) -> Result<Summary, Stopped> {
+        let mut sink = Told { sink, rtol: options.rtol, neglected: Vec::new() };
+        let done = simulate(self, options, x, &mut sink);
+        self.book.neglected = sink.neglected;
+        done
+    }
+
     /// Names the source behind rates that are not finite, if there is one.
     pub fn explain(&mut self, failure: Failure) -> Failure {
         let Failure::NotFinite { time, what } = &failure else { return failure };
@@ -256,6 +276,48 @@ impl Audited<'_, exec::Model> {
             }
             _ => failure,
         }
+    }
+}
+
+impl Audited<'_, exec::ImplicitModel> {
+    /// Runs it, as [`simulate_implicit`].
+    ///
+    /// # Errors
+    /// As [`simulate_implicit`].
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub fn simulate(
+        &mut self,
+        options: &Options,
+        (y, yp): (&mut [f64], &mut [f64]),
+        sink: &mut dyn Sink,
+    ) -> Result<Summary, Stopped> {
+        let mut sink = Told { sink, rtol: options.rtol, neglected: Vec::new() };
+        let done = simulate_implicit(self, options, y, yp, &mut sink);
+        self.book.neglected = sink.neglected;
+        done
+    }
+}
+
+/// A sink that remembers the magnitude below which the method neglects what happens to each state.
+struct Told<'a> {
+    sink: &'a mut dyn Sink,
+    rtol: f64,
+    neglected: Vec<f64>,
+}
+
+impl Sink for Told<'_> {
+    fn sample(&mut self, t: f64, values: &[f64]) {
+        self.sink.sample(t, values);
+    }
+    fn progress(&mut self, t: f64) -> ControlFlow<()> {
+        self.sink.progress(t)
+    }
+    fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        self.neglected = absolute.iter().map(|error| error / self.rtol).collect();
+        self.sink.tolerances(magnitudes, absolute);
+    }
+    fn crawls(&mut self, crawl: &Crawl) {
+        self.sink.crawls(crawl);
     }
 }
 
@@ -361,8 +423,8 @@ impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
     fn observed_name(&self, value: usize) -> String {
         self.model.observed_name(self.book.shown[value])
     }
-    fn scales(&self) -> &[f64] {
-        self.model.scales()
+    fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
+        self.model.scales(t, span)
     }
     fn index(&self, unknown: usize) -> u8 {
         self.model.index(unknown)

@@ -13,9 +13,7 @@ use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
-use halfarrow_sim::{
-    AbsoluteTolerance, Crawl, Failure, Method, Options, Sink, Summary, System, simulate, simulate_implicit,
-};
+use halfarrow_sim::{AbsoluteTolerance, Crawl, Failure, ImplicitSystem as _, Method, Options, Sink, Summary, System};
 use halfarrow_trace::{Trace, read_inputs};
 use serde::Serialize;
 
@@ -132,7 +130,7 @@ pub struct RunReport {
     pub audit: AuditReport,
     /// What was left out or is to be known.
     pub notes: Vec<String>,
-    /// How exact each state was kept in the end; of methods of variable step in explicit form.
+    /// How exact each state or unknown was kept in the end; of methods of variable step.
     #[serde(skip)]
     pub tolerances: Vec<StateTolerance>,
     /// What took how long.
@@ -301,7 +299,7 @@ impl Model {
         let mut sink = Recorder::new(system, notes, progress);
         let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
-        let mut outcome = simulate(&mut audited, options, &mut x, &mut sink);
+        let mut outcome = audited.simulate(options, &mut x, &mut sink);
         if let Err(stopped) = &mut outcome {
             stopped.failure = audited.explain(stopped.failure.clone());
         }
@@ -310,13 +308,7 @@ impl Model {
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
-        let mut ended = self.ended(outcome, options, sink.trace, audit, notes);
-        match &mut ended {
-            Ok(done) => done.report.tolerances = tolerances,
-            Err(Error::Run(stopped)) => stopped.report.tolerances = tolerances,
-            Err(_) => {}
-        }
-        ended
+        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances)
     }
 
     fn integrate_implicit(
@@ -328,13 +320,15 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder::new(system, notes, progress);
+        let names: Vec<String> = (0..y.len()).map(|i| system.unknown_name(i)).collect();
         let mut audited = Audited::new(system, &self.graph);
-        let outcome = simulate_implicit(&mut audited, options, &mut y, &mut yp, &mut sink);
+        let outcome = audited.simulate(options, (&mut y, &mut yp), &mut sink);
+        let tolerances = sink.tolerances(names);
         let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
-        self.ended(outcome, options, sink.trace, audit, notes)
+        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances)
     }
 
     fn ended(
@@ -578,6 +572,16 @@ impl<'p> Recorder<'p> {
             .map(|(name, (&scale, &absolute))| StateTolerance { name, scale, absolute })
             .collect()
     }
+}
+
+/// What ended, with how exact its states were kept.
+fn kept(mut ended: Result<Simulated, Error>, tolerances: Vec<StateTolerance>) -> Result<Simulated, Error> {
+    match &mut ended {
+        Ok(done) => done.report.tolerances = tolerances,
+        Err(Error::Run(stopped)) => stopped.report.tolerances = tolerances,
+        Err(_) => {}
+    }
+    ended
 }
 
 impl Sink for Recorder<'_> {

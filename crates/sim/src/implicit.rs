@@ -80,7 +80,9 @@ fn by_bdf(
     yp: &mut [f64],
     sink: &mut dyn Sink,
 ) -> Result<Summary, Stopped> {
-    let mut states = SemiExplicit::new(system, differential.clone());
+    let scales = system.scales(options.from, options.to - options.from);
+    let scales = scales.map_err(|failure| Stopped { failure, time: options.from, summary: Summary::default() })?;
+    let mut states = SemiExplicit::new(system, differential.clone(), scales);
     let end = {
         let shared = Shared::semi_explicit(&mut states, differential);
         let mut run = Run::new(shared.scene(), options, sink);

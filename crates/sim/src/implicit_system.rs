@@ -49,9 +49,12 @@ pub trait ImplicitSystem {
         format!("recorded value {}", value + 1)
     }
 
-    /// Typical magnitude of each unknown, one entry an unknown, each at least 0; 0 where it is not known. Absolute
-    /// tolerances come from it when the user gives none.
-    fn scales(&self) -> &[f64];
+    /// Typical magnitude of each unknown where a run starts at `t`, `span` s before its end, one entry an unknown, each at
+    /// least 0; 0 where it is not known. Absolute tolerances come from it when the user gives none.
+    ///
+    /// # Errors
+    /// As [`residual`](ImplicitSystem::residual).
+    fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure>;
 
     /// Index of an unknown: 1, 2 or 3.
     fn index(&self, unknown: usize) -> u8;

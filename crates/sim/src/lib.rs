@@ -31,3 +31,4 @@ pub use signal::{Signal, SignalError};
 pub use simulate::{Crawl, Sink, Stopped, Summary, simulate};
 pub use sparsity::Sparsity;
 pub use system::System;
+pub use variable_step::magnitudes;

@@ -14,7 +14,6 @@ type Derivatives = fn(f64, &[f64], &[f64], &mut [f64], &mut [f64]);
 struct Form {
     index: Vec<u8>,
     start: (Vec<f64>, Vec<f64>),
-    scales: Vec<f64>,
     sparsity: Sparsity,
     residual: Residual,
     derivatives: Derivatives,
@@ -33,7 +32,6 @@ impl Form {
         Form {
             index: index.to_vec(),
             start: (start.0.to_vec(), start.1.to_vec()),
-            scales: vec![0.0; index.len()],
             sparsity: Sparsity::dense(index.len()),
             residual,
             derivatives,
@@ -63,8 +61,8 @@ impl ImplicitSystem for Form {
     fn unknowns(&self) -> usize {
         self.index.len()
     }
-    fn scales(&self) -> &[f64] {
-        &self.scales
+    fn scales(&mut self, _: f64, _: f64) -> Result<Vec<f64>, Failure> {
+        Ok(vec![0.0; self.index.len()])
     }
     fn index(&self, unknown: usize) -> u8 {
         self.index[unknown]

@@ -276,13 +276,6 @@ impl ImplicitModel {
         self.form.cross_jump(t, &mut y)?;
         self.take_rates(t, &y, &mut yp)?;
         self.settle(t, &mut y, &mut yp)?;
-        self.form.scales = y.iter().map(|y| y.abs()).collect();
-        let tracked = &self.reference.program.tracked;
-        for (i, symbol) in self.form.program.tracked.iter().enumerate() {
-            if let Some(k) = tracked.iter().position(|s| s == symbol) {
-                self.form.scales[i] = self.reference.scales[k].max(self.form.scales[i]);
-            }
-        }
         self.begun = true;
         Ok((y, yp))
     }
@@ -610,8 +603,13 @@ impl ImplicitSystem for ImplicitModel {
         System::observed_name(&self.form, value)
     }
 
-    fn scales(&self) -> &[f64] {
-        System::scales(&self.form)
+    /// Those of the minimal form where it has the same unknown.
+    fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
+        let ImplicitModel { reference, form, x, .. } = self;
+        let known = halfarrow_sim::magnitudes(reference, (t, x), span)?;
+        let tracked = &reference.program.tracked;
+        let of = |symbol| tracked.iter().position(|tracked| tracked == symbol).map_or(0.0, |k| known[k]);
+        Ok(form.program.tracked.iter().map(of).collect())
     }
 
     fn index(&self, unknown: usize) -> u8 {

@@ -94,6 +94,11 @@ impl Ways {
 impl Model {
     /// The leaf of `x`, if states keep relations at all.
     pub(super) fn leaf(&mut self, t: f64, x: &[f64]) -> Option<Leaf> {
+        self.leaf_by(t, x, |model| model.sizes(t, x))
+    }
+
+    /// The same where `own` tells what those states count as one of that stand in no relation.
+    fn leaf_by(&mut self, t: f64, x: &[f64], own: impl FnOnce(&mut Model) -> Vec<f64>) -> Option<Leaf> {
         if self.program.relations.rows.is_empty() {
             return None;
         }
@@ -123,7 +128,7 @@ impl Model {
             size: vec![1.0; x.len()],
             constraints: self.constraints(),
         };
-        let own = self.sizes(t, x);
+        let own = own(self);
         leaf.size = match self.structure(&leaf, t, x) {
             Some((moves, drives)) => (0..x.len()).map(|j| reach(&moves, &drives, j).unwrap_or(own[j])).collect(),
             None => own,
@@ -137,6 +142,12 @@ impl Model {
         let noise = NOISE * size.iter().fold(0.0f64, |most, s| most.max(*s));
         let least = size.iter().copied().filter(|s| *s > noise).fold(f64::INFINITY, f64::min);
         size.into_iter().map(|s| if s > noise { s } else { least.min(1.0) }).collect()
+    }
+
+    /// The ways from `x` along its leaf before any magnitude is known.
+    pub(super) fn first_ways(&mut self, t: f64, x: &[f64]) -> Option<Ways> {
+        let leaf = self.leaf_by(t, x, |_| vec![1.0; x.len()]);
+        self.ways(leaf.as_ref(), t, x)
     }
 
     /// The ways from `x` along the leaf. `None` if something has no value there.

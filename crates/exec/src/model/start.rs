@@ -114,6 +114,9 @@ impl Model {
 
     /// Typical magnitudes of the states: how great they are at the start, how far they are from where the linearised
     /// motion would take them, and what that motion makes of them in the shortest time it knows. 0 where nothing moves.
+    ///
+    /// States go only where the junction structure lets them: by itself, a displacement that moves with a spring's has no
+    /// effect but rounding.
     pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
@@ -121,14 +124,16 @@ impl Model {
             return sizes;
         }
         let Ok((rates, jacobian)) = self.at_rest(t, x) else { return sizes };
-        let Some(way) = minimum_norm::step(&jacobian, &rates, n) else { return sizes };
+        let Some(ways) = self.first_ways(t, x) else { return sizes };
+        let Some(way) = minimum_norm::step(&ways.along(&jacobian, n), &rates, ways.count(n)) else { return sizes };
+        let step = ways.step(&way.step);
         let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
         let fastest =
             (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
         for (i, size) in sizes.iter_mut().enumerate() {
-            let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * way.step[j]).abs()).sum();
+            let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum();
             let soon = if fastest > 0.0 { pull.max(rates[i].abs()) / fastest } else { 0.0 };
-            *size = size.max(way.step[i].abs()).max(soon);
+            *size = size.max(step[i].abs()).max(soon);
         }
         sizes
     }

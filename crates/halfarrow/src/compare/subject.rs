@@ -221,14 +221,13 @@ impl Subject<'_> {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(&[]);
                 let mut audited = Audited::new(&mut system, self.graph);
-                let ended = simulate(&mut audited, &options, &mut x, &mut Patient::new(None, settings));
+                let ended = audited.simulate(&options, &mut x, &mut Patient::new(None, settings));
                 given(ended, audited.finish())
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(&[]);
                 let mut audited = Audited::new(&mut system, self.graph);
-                let ended =
-                    simulate_implicit(&mut audited, &options, &mut y, &mut yp, &mut Patient::new(None, settings));
+                let ended = audited.simulate(&options, (&mut y, &mut yp), &mut Patient::new(None, settings));
                 given(ended, audited.finish())
             }
         }?;

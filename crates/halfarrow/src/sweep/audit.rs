@@ -1,6 +1,6 @@
 //! A sample of the sets of a sweep, run once more and audited.
 
-use halfarrow_sim::{Sink, simulate};
+use halfarrow_sim::Sink;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -74,7 +74,7 @@ impl Model {
         let mut x = prepare(&mut system, self, work.plan, set, run.start).ok()?;
         system.record(&[]).ok()?;
         let mut audited = Audited::new(&mut system, &self.graph);
-        simulate(&mut audited, work.options, &mut x, &mut Nobody).ok()?;
+        audited.simulate(work.options, &mut x, &mut Nobody).ok()?;
         let mut report = audited.finish();
         report.judge(&Made::by(run));
         Some(report)

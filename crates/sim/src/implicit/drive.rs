@@ -19,7 +19,7 @@ const UNKNOWN: f64 = 1e-6;
 /// Integrates to the end. The point holds all unknowns, then all their rates.
 pub(super) fn run(run: &mut Run<'_>, shared: &RefCell<Implicit<'_>>, point: &mut [f64]) -> Result<(), Failure> {
     run.start(point)?;
-    let tolerances = Tolerances::new(run.options, &*shared.borrow().0);
+    let tolerances = Tolerances::new(run.options, &mut *shared.borrow_mut().0)?;
     let radau = Radau::new(&*shared.borrow().0, tolerances.relative(), tolerances.absolute());
     let chatter = Chatter::new(run.options.to - run.options.from);
     let inside = point.to_vec();
@@ -84,7 +84,7 @@ impl Drive<'_, '_, '_, '_> {
                 self.run.settle(point)?;
             }
             self.tolerances.watch(self.radau.state());
-            self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
+            self.take_tolerances();
         }
         Ok(())
     }
@@ -98,12 +98,18 @@ impl Drive<'_, '_, '_, '_> {
             return Ok(());
         }
         self.tolerances.guess(&mut *self.shared.borrow_mut().0, time, (y, yp), stop - time)?;
-        self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
+        self.take_tolerances();
         let moved = self.radau.rates_alone(&mut *self.shared.borrow_mut().0, time, y, yp)?;
         let (size, speed) = (self.tolerances.norm(y, y), self.tolerances.norm(&moved, y));
         let step = if size < 1e-5 || speed < 1e-5 { UNKNOWN * longest } else { CAREFUL * size / speed };
         self.radau.restart(time, y, yp, step.min(longest));
         Ok(())
+    }
+
+    /// Makes the method follow the tolerances, and says what they are.
+    fn take_tolerances(&mut self) {
+        self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
+        self.run.tell_tolerances(self.tolerances.magnitudes(), self.tolerances.absolute());
     }
 
     /// Whether the jump left the unknowns alone and the step that ended there would not have told their rates from its own.

@@ -7,6 +7,7 @@ use crate::{Failure, ImplicitSystem, Sparsity, System};
 pub(super) struct SemiExplicit<'a> {
     system: &'a mut dyn ImplicitSystem,
     differential: Vec<bool>,
+    scales: Vec<f64>,
     /// Rates that the residual is asked at, always 0, so that it is `-f`.
     rest: Vec<f64>,
     /// All unknowns, then their rates, where they were asked for last.
@@ -18,11 +19,16 @@ pub(super) struct SemiExplicit<'a> {
 }
 
 impl<'a> SemiExplicit<'a> {
-    pub(super) fn new(system: &'a mut dyn ImplicitSystem, differential: Vec<bool>) -> SemiExplicit<'a> {
+    pub(super) fn new(
+        system: &'a mut dyn ImplicitSystem,
+        differential: Vec<bool>,
+        scales: Vec<f64>,
+    ) -> SemiExplicit<'a> {
         let (size, nonzeros) = (differential.len(), system.sparsity().nonzeros());
         SemiExplicit {
             system,
             differential,
+            scales,
             rest: vec![0.0; size],
             point: vec![0.0; 2 * size],
             dy: vec![0.0; nonzeros],
@@ -73,7 +79,7 @@ impl System for SemiExplicit<'_> {
         self.system.observed_name(value)
     }
     fn scales(&self) -> &[f64] {
-        self.system.scales()
+        &self.scales
     }
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
         self.system.residual(t, x, &self.rest, dx)?;

@@ -33,7 +33,11 @@ pub(super) struct Tolerances {
 }
 
 impl Tolerances {
-    pub(super) fn new(options: &Options, system: &dyn ImplicitSystem) -> Tolerances {
+    /// Those of a run of `system`, which stands at its start.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub(super) fn new(options: &Options, system: &mut dyn ImplicitSystem) -> Result<Tolerances, Failure> {
         let size = system.unknowns();
         let given = match &options.atol {
             AbsoluteTolerance::Scaled => None,
@@ -41,7 +45,8 @@ impl Tolerances {
             AbsoluteTolerance::Each(atol) => Some(atol.clone()),
         };
         let absolute = given.clone().unwrap_or(vec![0.0; size]);
-        Tolerances { relative: options.rtol, given, magnitudes: system.scales().to_vec(), absolute, looked: false }
+        let magnitudes = system.scales(options.from, options.to - options.from)?;
+        Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, looked: false })
     }
 
     /// The relative one.
@@ -52,6 +57,11 @@ impl Tolerances {
     /// One for each unknown.
     pub(super) fn absolute(&self) -> &[f64] {
         &self.absolute
+    }
+
+    /// Magnitude of each unknown; 0 where it is not known.
+    pub(super) fn magnitudes(&self) -> &[f64] {
+        &self.magnitudes
     }
 
     /// Takes notice of values reached.
@@ -85,7 +95,12 @@ impl Tolerances {
         (y, yp): (&[f64], &[f64]),
         interval: f64,
     ) -> Result<(), Failure> {
-        self.watch(y);
+        // What is there may be rounding, and then its time would be as well: what is known besides comes first.
+        let told = !self.looked && self.magnitudes.iter().any(|&magnitude| magnitude > 0.0);
+        if !told {
+            self.watch(y);
+        }
+        let time = self.short_time(yp, interval);
         let looked = std::mem::replace(&mut self.looked, true);
         if self.given.is_some() || (looked && self.magnitudes.iter().all(|&magnitude| magnitude > 0.0)) {
             return Ok(());
@@ -93,15 +108,25 @@ impl Tolerances {
         let entries = system.sparsity().nonzeros();
         let (mut dy, mut dyp) = (vec![0.0; entries], vec![0.0; entries]);
         system.jacobian(t, y, yp, &mut dy, &mut dyp)?;
-        let time = self.short_time(yp, interval);
         let matrix: Vec<f64> = dy.iter().zip(&dyp).map(|(dy, dyp)| dyp / time + dy).collect();
-        self.silence(system, &matrix);
+        if !told {
+            self.silence(system, &matrix);
+        }
         if self.magnitudes.iter().all(|&magnitude| magnitude > 0.0) {
+            self.watch(y);
             return Ok(());
         }
         let grown = grown(system, t + time, y, &matrix);
         let unknown: Vec<usize> = (0..y.len()).filter(|&i| self.magnitudes[i] == 0.0).collect();
-        unknown.iter().for_each(|&i| self.magnitudes[i] = grown[i]);
+        if told {
+            self.spread(system, &matrix);
+            // An equation in which an unknown hardly counts tells it too great.
+            let balanced = self.balanced(system, &matrix);
+            for &i in unknown.iter().filter(|&&i| balanced[i] > 0.0) {
+                self.magnitudes[i] = self.magnitudes[i].min(balanced[i]);
+            }
+        }
+        unknown.iter().for_each(|&i| self.magnitudes[i] = self.magnitudes[i].max(grown[i]));
         self.spread(system, &matrix);
         // What grew may be rounding: never less than a part of what the equations balance.
         let balanced = self.balanced(system, &matrix);
@@ -141,18 +166,27 @@ impl Tolerances {
         self.magnitudes.iter_mut().zip(balanced).for_each(noise);
     }
 
-    /// The value of each unknown at which it would balance the known terms of one of its equations: the least of them; 0 if
-    /// none has any.
+    /// The value of each unknown at which it would balance the other known terms of one of its equations: the least of them;
+    /// 0 if none has any.
     fn balanced(&self, system: &dyn ImplicitSystem, matrix: &[f64]) -> Vec<f64> {
-        let mut sizes = vec![0.0_f64; self.magnitudes.len()];
+        // The two greatest terms of each equation, the first with its unknown.
+        let mut sizes = vec![(0.0_f64, 0, 0.0_f64); self.magnitudes.len()];
         for ((row, column), entry) in system.sparsity().entries().zip(matrix) {
-            sizes[row] = sizes[row].max(entry.abs() * self.magnitudes[column]);
+            let (size, (first, _, second)) = (entry.abs() * self.magnitudes[column], sizes[row]);
+            match size > first {
+                true => sizes[row] = (size, column, first),
+                false => sizes[row].2 = second.max(size),
+            }
         }
         let mut balanced = vec![f64::INFINITY; sizes.len()];
         for ((row, column), entry) in system.sparsity().entries().zip(matrix).filter(|(_, entry)| **entry != 0.0) {
-            let value = sizes[row] / entry.abs();
+            let (first, greatest, second) = sizes[row];
+            let value = if greatest == column { second } else { first } / entry.abs();
             balanced[column] = if value > 0.0 { balanced[column].min(value) } else { balanced[column] };
         }
+        // Where a slope is infinite, the other equations tell nothing of the unknown's size.
+        let steep = system.sparsity().entries().zip(matrix).filter(|(_, entry)| !entry.is_finite());
+        steep.for_each(|((_, column), _)| balanced[column] = 0.0);
         balanced.iter_mut().filter(|value| value.is_infinite()).for_each(|value| *value = 0.0);
         balanced
     }

@@ -57,8 +57,8 @@ impl ImplicitSystem for Explicit<'_> {
     fn observed_name(&self, value: usize) -> String {
         self.shared.system().observed_name(value)
     }
-    fn scales(&self) -> &[f64] {
-        &self.scales
+    fn scales(&mut self, _: f64, _: f64) -> Result<Vec<f64>, Failure> {
+        Ok(self.scales.clone())
     }
     fn index(&self, _: usize) -> u8 {
         1

@@ -10,7 +10,6 @@ type Derivatives = fn(f64, &[f64], &[f64], &mut [f64], &mut [f64]);
 /// A system with a dense pattern.
 struct Dense {
     index: Vec<u8>,
-    scales: Vec<f64>,
     sparsity: Sparsity,
     residual: Residual,
     derivatives: Derivatives,
@@ -20,8 +19,8 @@ struct Dense {
 impl Dense {
     fn new(index: &[u8], residual: Residual, derivatives: Derivatives) -> Dense {
         let size = index.len();
-        let (scales, sparsity) = (vec![0.0; size], Sparsity::dense(size));
-        Dense { index: index.to_vec(), scales, sparsity, residual, derivatives, residuals: 0 }
+        let sparsity = Sparsity::dense(size);
+        Dense { index: index.to_vec(), sparsity, residual, derivatives, residuals: 0 }
     }
 }
 
@@ -29,8 +28,8 @@ impl ImplicitSystem for Dense {
     fn unknowns(&self) -> usize {
         self.index.len()
     }
-    fn scales(&self) -> &[f64] {
-        &self.scales
+    fn scales(&mut self, _: f64, _: f64) -> Result<Vec<f64>, Failure> {
+        Ok(vec![0.0; self.index.len()])
     }
     fn index(&self, unknown: usize) -> u8 {
         self.index[unknown]

@@ -25,6 +25,24 @@ const POWERS: usize = 16;
 /// A nonzero of the Jacobian: row, column and absolute value, in 1/s once row and column are measured alike.
 type Entry = (usize, usize, f64);
 
+/// Magnitudes of the states of a system that starts at `(t, x)`, `span` s before the end of its run: what it tells, what is
+/// there, and what its motion makes of the others. 0 where nothing is known.
+///
+/// # Errors
+/// What the system reports at `(t, x)`.
+pub fn magnitudes(system: &mut dyn System, (t, x): (f64, &[f64]), span: f64) -> Result<Vec<f64>, Failure> {
+    let interval = system.next_jump(t).map_or(span, |jump| span.min(jump - t));
+    let mut magnitudes: Vec<f64> = x.iter().zip(system.scales()).map(|(x, scale)| scale.max(x.abs())).collect();
+    let before = magnitudes.clone();
+    guess_magnitudes(system, (t, x), interval, &mut magnitudes)?;
+    let least = surroundings(system, (t, x), interval, &magnitudes).map(|(_, least)| least);
+    let floors = [before, least.unwrap_or_default()];
+    for floor in floors {
+        magnitudes.iter_mut().zip(floor).for_each(|(magnitude, floor)| *magnitude = magnitude.max(floor));
+    }
+    Ok(magnitudes)
+}
+
 /// Guesses the magnitudes that are 0 or mere noise in `magnitudes`, where the system stands at `(t, x)`, `interval` s before the next
 /// jump. A state that nothing can move keeps 0. A low guess costs steps, a high one accuracy.
 ///

@@ -8,6 +8,8 @@ mod rounding;
 mod stiffness;
 mod tolerances;
 
+pub use magnitudes::magnitudes;
+
 use crate::events::{Chatter, first_crossing};
 use crate::shared::Shared;
 use crate::simulate::Run;
