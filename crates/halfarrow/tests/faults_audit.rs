@@ -75,6 +75,26 @@ fn what_is_zero_but_for_rounding_raises_no_alarm() {
     }
 }
 
+/// Compliances in parallel, one of which is flat at 0, where all of them start: its inverse has an infinite slope there.
+#[test]
+fn a_dependent_storage_with_a_flat_law_runs_in_its_own_variable() {
+    let model = fault("field_nonlinear");
+    let end = |form: Form, method: Method| {
+        let wanted = Run { to: 2.0, form, method, rtol: 1e-9, record: Record::All, ..Run::default() };
+        let done = run(&model, &wanted).unwrap_or_else(|stopped| panic!("{form:?}: {}", stopped.failure));
+        let column =
+            |name: &str| done.trace.columns.iter().find(|c| c.name == name).map(|c| c.values[c.values.len() - 1]);
+        ["x1s", "I1x.f", "C1x.e"].map(|name| column(name).unwrap_or(f64::NAN))
+    };
+    let wanted = end(Form::Minimal, Method::Auto);
+    for (form, method) in [(Form::Minimal, Method::Radau), (Form::Break, Method::Auto), (Form::Lagrange, Method::Auto)]
+    {
+        for (value, wanted) in end(form, method).into_iter().zip(wanted) {
+            assert!((value - wanted).abs() <= 1e-6 * wanted.abs(), "{form:?}: {value}, not {wanted}");
+        }
+    }
+}
+
 #[test]
 fn a_pole_stops_the_run_with_the_name_of_its_source() {
     let model = fault("pole");

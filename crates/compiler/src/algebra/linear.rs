@@ -78,6 +78,18 @@ impl Exprs {
         Some((coefficient, self.add(&rest)))
     }
 
+    /// Whether the slope of the expression may be infinite: a root of what is not known to be nonzero.
+    pub fn is_steep(&mut self, e: Expr) -> bool {
+        let parts = self.below(&[e], &|_| true);
+        parts.into_iter().any(|part| match *self.node(part) {
+            Node::Pow(base, n) => {
+                let root = self.is_number(n).is_some_and(|n| n.signum() > 0 && *n < Rational::from(1));
+                root && !self.nonzero(base)
+            }
+            _ => false,
+        })
+    }
+
     /// What the expression divides by that is not known to be nonzero.
     pub fn divisors(&self, e: Expr) -> Vec<Expr> {
         let mut found = Vec::new();

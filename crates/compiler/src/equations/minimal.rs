@@ -303,7 +303,8 @@ impl<'a> Assembled<'a> {
                 let z = self.d.x.sym(cell.z);
                 let residual = self.d.x.sub(z, e);
                 let others = cell.storage.stored.iter().any(|s| *s != cell.stored && self.d.x.depends_on(e, *s));
-                if others { None } else { self.d.solve_for(residual, cell.stored) }
+                let inverse = if others { None } else { self.d.solve_for(residual, cell.stored) };
+                inverse.filter(|&e| !self.d.x.is_steep(e))
             }
             StorageLaw::Implicit(e) => self.d.solve_for(e, cell.stored),
             StorageLaw::Known { .. } => None,
@@ -428,10 +429,7 @@ impl<'a> Assembled<'a> {
                 (Role::Dependent, stored, _) => {
                     match stored {
                         Some(stored) => self.d.set(cell.stored, stored),
-                        None => {
-                            let residual = self.law_residual(cell);
-                            self.d.set_root(cell.stored, residual);
-                        }
+                        None => self.dependent_by_law(cell),
                     }
                     self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
                 }
@@ -472,10 +470,7 @@ impl<'a> Assembled<'a> {
         for cell in &dependent {
             match self.stored_of(cell) {
                 Some(stored) => self.d.set(cell.stored, stored),
-                None => {
-                    let residual = self.law_residual(cell);
-                    self.d.set_root(cell.stored, residual);
-                }
+                None => self.dependent_by_law(cell),
             }
             // While running nothing needs the rates of dependent storages; who looks at them gets them by differentiation.
             self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
@@ -501,6 +496,18 @@ impl<'a> Assembled<'a> {
             let (sum, state) = self.momentum_state(None, v.speed, v.reaction, place, followers);
             let residual = self.d.x.sub(state, sum);
             self.d.set_root(v.speed, residual);
+        }
+    }
+
+    /// `X` of a dependent storage from its law as written. Where the inverse has an infinite slope the law is solved for `X`
+    /// by iteration, and its rate from the law's own slope.
+    fn dependent_by_law(&mut self, cell: &Cell) {
+        let residual = self.law_residual(cell);
+        match self.d.solve_for(residual, cell.stored) {
+            Some(inverse) if self.d.x.is_steep(inverse) => {
+                self.d.of.insert(cell.stored, Definition::Implicit(residual));
+            }
+            _ => self.d.set_root(cell.stored, residual),
         }
     }
 

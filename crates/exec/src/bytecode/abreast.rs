@@ -425,6 +425,10 @@ impl Space {
                 let step = each(|l| self.step[i][l].abs());
                 let scale = scale(&self.size[i], &step);
                 good = each(|l| if step[l] < f64::INFINITY { good[l] } else { 0.0 });
+                if iteration == 0 {
+                    // What rests is measured otherwise.
+                    good = each(|l| if (step[l] == 0.0) & (self.size[i][l] == 0.0) { 0.0 } else { good[l] });
+                }
                 size = greater(&size, &each(|l| step[l] / scale[l]));
             }
             self.evaluate(group, true);

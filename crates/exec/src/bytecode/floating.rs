@@ -10,6 +10,8 @@ use halfarrow_compiler::program::{Instruction, Solve};
 
 /// A residual below this part of its terms is rounding.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Residuals above this many times their rounding are none, whatever steps do.
+const BORROWED: f64 = 1e6;
 /// Steps at most.
 const STEPS: usize = 30;
 /// By how much the residuals have to shrink in a step.
@@ -158,6 +160,12 @@ impl Frame {
     pub(super) fn is_at_rounding(&mut self, solve: &Solve) -> bool {
         self.measure(solve);
         self.floating_of(solve).rest() <= 1.0
+    }
+
+    /// Whether they are not far above that: rounding that came from elsewhere.
+    pub(super) fn is_near_rounding(&mut self, solve: &Solve) -> bool {
+        self.measure(solve);
+        self.floating_of(solve).rest() <= BORROWED
     }
 
     /// From `newton.kept` in steps by what the equations tell of the unknowns, to where the residuals are rounding; only

@@ -173,6 +173,31 @@ impl Newton {
         (self.following, self.fresh) = (true, false);
     }
 
+    /// Gives an unknown that is 0, and stays so in the first step, the magnitude at which it would count in one of the
+    /// equations: what little it moves afterwards is no failure of the step. The last of a flat law is such a one.
+    fn weigh_what_rests(&mut self, solve: &Solve, r: &[f64]) {
+        let n = self.x.len();
+        for j in 0..n {
+            if self.size[j] != 0.0 || self.step[j] != 0.0 {
+                continue;
+            }
+            let mut least = f64::INFINITY;
+            for row in solve.matrix.chunks_exact(n) {
+                let own = r[row[j] as usize].abs();
+                let mut others = 0.0;
+                for k in (0..n).filter(|&k| k != j) {
+                    others += r[row[k] as usize].abs() * self.size[k].max(self.step[k].abs());
+                }
+                if own > 0.0 && others > 0.0 {
+                    least = least.min(others / own);
+                }
+            }
+            if least < f64::INFINITY {
+                self.size[j] = least;
+            }
+        }
+    }
+
     /// How far `next` is from the first step, measured as steps are.
     fn off_the_lead(&self) -> f64 {
         let mut most: f64 = 0.0;
@@ -612,6 +637,7 @@ impl Frame {
                 for (i, &right) in solve.right.iter().enumerate() {
                     newton.opening[i] = newton.offset[i] - r[right as usize];
                 }
+                newton.weigh_what_rests(solve, r);
             }
             let size = self.relative_step(solve);
             if !size.is_finite() {
@@ -667,7 +693,7 @@ impl Frame {
                 _ => SHORTEST,
             };
             if fraction < shortest || newton.exhausted() {
-                let rounding = self.is_rounding(solve) || self.is_at_rounding(solve);
+                let rounding = self.is_rounding(solve) && self.is_near_rounding(solve) || self.is_at_rounding(solve);
                 return if rounding { (Damped::Done, true) } else { (Damped::Stuck, false) };
             }
         }

@@ -194,6 +194,38 @@ static double ha_next_step(ha_newton *w)
     return most;
 }
 
+/* Gives an unknown that is 0, and stays so in the first step, the magnitude at which it would count in one of the
+ * equations: what little it moves afterwards is no failure of the step. */
+static void ha_weigh_what_rests(ha_newton *w)
+{
+    const int n = w->n;
+    int i;
+    int j;
+    int k;
+    for (j = 0; j < n; ++j) {
+        double least = HUGE_VAL;
+        if (w->size[j] != 0.0 || w->step[j] != 0.0) {
+            continue;
+        }
+        for (i = 0; i < n; ++i) {
+            const double own = fabs(w->matrix[i * n + j]);
+            double others = 0.0;
+            for (k = 0; k < n; ++k) {
+                if (k != j) {
+                    const double term = fabs(w->matrix[i * n + k]) * ha_max(w->size[k], fabs(w->step[k]));
+                    others += term;
+                }
+            }
+            if (own > 0.0 && others > 0.0) {
+                least = others / own < least ? others / own : least;
+            }
+        }
+        if (ha_finite(least)) {
+            w->size[j] = least;
+        }
+    }
+}
+
 /* Leaves a point at which the Jacobian is singular. */
 static void ha_nudge(ha_newton *w, int iteration)
 {
@@ -314,6 +346,13 @@ static int ha_is_at_rounding(ha_model *m, ha_newton *w)
 {
     ha_measure(m, w);
     return ha_rest(w) <= 1.0;
+}
+
+/* Whether they are not far above that: rounding that came from elsewhere. */
+static int ha_is_near_rounding(ha_model *m, ha_newton *w)
+{
+    ha_measure(m, w);
+    return ha_rest(w) <= 1e6;
 }
 
 static void ha_swap(double *a, double *b)
@@ -511,7 +550,7 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
             break;
         }
     }
-    *near = ha_is_rounding(m, w) || ha_is_at_rounding(m, w);
+    *near = (ha_is_rounding(m, w) && ha_is_near_rounding(m, w)) || ha_is_at_rounding(m, w);
     return *near ? HA_DONE : HA_STUCK;
 }
 
@@ -556,6 +595,7 @@ static int ha_attempt(ha_model *m, ha_newton *w, int trust)
             for (i = 0; i < n; ++i) {
                 w->opening[i] = w->offset[i] - w->right[i];
             }
+            ha_weigh_what_rests(w);
         }
         size = ha_relative_step(w);
         if (!ha_finite(size)) {
