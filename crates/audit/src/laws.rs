@@ -5,8 +5,9 @@ use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::terms::Terms;
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
-use halfarrow_compiler::algebra::{Expr, Node, Symbol};
+use halfarrow_compiler::algebra::{Expr, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw};
+use std::collections::BTreeMap;
 
 /// A law in values: what stands against what, and the quantity that it is about.
 enum Law<'a> {
@@ -18,6 +19,8 @@ enum Law<'a> {
     Product {
         left: Vec<(f64, &'a [f64])>,
         factor: Expr,
+        /// What they are multiplied by themselves.
+        divisor: Option<Expr>,
         right: (&'a [f64], Quantity),
         what: &'static str,
         of: Quantity,
@@ -26,9 +29,24 @@ enum Law<'a> {
     Zero { expr: Expr, what: &'static str },
 }
 
+/// Moduli that are written as quotients whose divisor may vanish: what stands over and under the line.
+pub(crate) type Quotients = BTreeMap<Expr, (Expr, Expr)>;
+
+/// Those of a graph, over the graph whose pool has their parts.
+pub(crate) fn quotients(graph: BondGraph) -> (BondGraph, Quotients) {
+    let mut x = graph.exprs.clone();
+    let modulus = |element: &Element| match element.kind {
+        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => Some(modulus),
+        _ => None,
+    };
+    let all = graph.elements.values().filter_map(modulus).map(|modulus| (modulus, x.over_and_under(modulus)));
+    let quotients = all.filter(|(_, (_, under))| *under != ONE).collect();
+    (graph.with_exprs(x), quotients)
+}
+
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
-    (graph, shares): (&BondGraph, &[Share]),
+    (graph, shares, quotients): (&BondGraph, &[Share], &Quotients),
     values: &Values,
     (scales, settled): (&Scales, &Settled),
     worst: &mut Worst,
@@ -40,7 +58,7 @@ pub(crate) fn residual(
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
     }
     for element in graph.elements.values() {
-        let mut laws = Laws { graph, values, scales, laws: Vec::new(), missing: false };
+        let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
         if laws.missing {
             unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
@@ -70,15 +88,20 @@ fn share_of_constraint<'a>(values: &Values<'a>, scales: &Scales, share: &Share) 
     let multiplier = scales.of_bond(share.multiplier, false);
     let of = share.bonds.first().map_or(multiplier, |b| scales.of_bond(b.1, false));
     let right = (values.effort(share.multiplier)?, multiplier);
-    Some(Law::Product { left, factor: share.factor, right, what: "what a constraint puts on it", of })
+    Some(Law::Product { left, factor: share.factor, divisor: None, right, what: "what a constraint puts on it", of })
 }
 
 /// How much the variables of each law make of each other, at the sample in the middle: pairs with weights.
-pub(crate) fn links(graph: &BondGraph, values: &Values, scales: &Scales, settled: &Settled) -> Vec<Link> {
+pub(crate) fn links(
+    (graph, quotients): (&BondGraph, &Quotients),
+    values: &Values,
+    scales: &Scales,
+    settled: &Settled,
+) -> Vec<Link> {
     let mut links = Vec::new();
     let middle = values.times.len() / 2;
     for element in graph.elements.values() {
-        let mut laws = Laws { graph, values, scales, laws: Vec::new(), missing: false };
+        let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
         for law in laws.laws {
             match law {
@@ -95,12 +118,14 @@ pub(crate) fn links(graph: &BondGraph, values: &Values, scales: &Scales, settled
                         Link { of, from, weight, straight }
                     }));
                 }
-                Law::Product { factor, right: (right, from), of, .. } => {
-                    let Ok(reader) = values.reader(&[factor]) else { continue };
-                    let weight = reader.values(middle, None).map_or(0.0, |v| v[0].abs());
+                Law::Product { factor, divisor, right: (right, from), of, .. } => {
+                    let parts: Vec<Expr> = [factor].into_iter().chain(divisor).collect();
+                    let Ok(reader) = values.reader(&parts) else { continue };
+                    let quotient = |v: &[f64]| v[1..].first().map_or(v[0], |divisor| v[0] / divisor);
+                    let weight = reader.values(middle, None).map_or(0.0, |v| quotient(&v).abs());
                     links.push(Link { of, from, weight, straight: true });
                     // A modulus that vanishes passes nothing on, but moves with what it reads.
-                    let made = |v: &[f64]| v[0] * right[middle];
+                    let made = |v: &[f64]| quotient(v) * right[middle];
                     let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
@@ -126,6 +151,7 @@ struct Laws<'a, 'b> {
     graph: &'b BondGraph,
     values: &'b Values<'a>,
     scales: &'b Scales,
+    quotients: &'b Quotients,
     laws: Vec<Law<'a>>,
     missing: bool,
 }
@@ -242,7 +268,10 @@ impl<'a> Laws<'a, '_> {
             let of = self.scales.of_bond(left, left_flow);
             let other = self.scales.of_bond(right, right_flow);
             if let (Some(left), Some(right)) = (self.column(left, left_flow), self.column(right, right_flow)) {
-                self.laws.push(Law::Product { left: vec![(1.0, left)], factor, right: (right, other), what, of });
+                let quotient = self.quotients.get(&factor).map(|&(over, under)| (over, Some(under)));
+                let (factor, divisor) = quotient.unwrap_or((factor, None));
+                let left = vec![(1.0, left)];
+                self.laws.push(Law::Product { left, factor, divisor, right: (right, other), what, of });
             }
         }
     }
@@ -273,10 +302,20 @@ impl Check<'_, '_> {
                 self.read(name, what, *of, &reader, &miss, &more);
                 Ok(())
             }
-            Law::Product { left, factor, right: (right, other), what, of } => {
-                let reader = self.values.reader(&[*factor])?;
+            Law::Product { left, factor, divisor, right: (right, other), what, of } => {
+                let parts: Vec<Expr> = [*factor].into_iter().chain(*divisor).collect();
+                let reader = self.values.reader(&parts)?;
                 let sum = |k: usize| left.iter().map(|(sign, column)| sign * column[k]).sum::<f64>();
-                let miss = |k: usize, v: &[f64]| sum(k) - v[0] * right[k];
+                let (own, others) = (self.settled.of(*of), self.settled.of(*other));
+                let ratio = if own > 0.0 { others / own } else { 0.0 };
+                let miss = |k: usize, v: &[f64]| match v[1..].first() {
+                    None => sum(k) - v[0] * right[k],
+                    // Where the divisor vanishes, what is divided does.
+                    Some(divisor) => {
+                        (divisor * sum(k) - v[0] * right[k])
+                            / divisor.abs().max(v[0].abs() * ratio).max(f64::MIN_POSITIVE)
+                    }
+                };
                 self.read(name, what, *of, &reader, &miss, &|_, v| vec![Term::beside(*other, v[0].abs())]);
                 Ok(())
             }

@@ -104,6 +104,7 @@ pub fn magnitudes(graph: &BondGraph, run: &Run) -> BTreeMap<String, f64> {
 pub struct Auditor {
     graph: BondGraph,
     shares: Vec<constraints::Share>,
+    quotients: laws::Quotients,
     scales: scales::Scales,
     power: worst::Worst,
     energy: worst::Worst,
@@ -117,10 +118,12 @@ impl Auditor {
     pub fn new(graph: &BondGraph) -> Auditor {
         let none = worst::Worst::default;
         let (graph, shares) = constraints::shares(graph);
+        let (graph, quotients) = laws::quotients(graph);
         Auditor {
             scales: scales::Scales::new(&graph),
             graph,
             shares,
+            quotients,
             power: none(),
             energy: none(),
             residual: none(),
@@ -141,12 +144,12 @@ impl Auditor {
         let balance = energy::balance(graph, &values, &mut unchecked);
         self.scales.absorb(graph, &values);
         balance.iter().for_each(|balance| self.scales.absorb_energy(balance.moved));
-        let links = laws::links(graph, &values, &self.scales, &self.scales.settled(graph));
+        let links = laws::links((graph, &self.quotients), &values, &self.scales, &self.scales.settled(graph));
         self.scales.absorb_links(&links);
         let settled = self.scales.settled(graph);
         let scales = (&self.scales, &settled);
         power::power(graph, &values, scales, &mut self.power, &mut unchecked);
-        laws::residual((graph, &self.shares), &values, scales, &mut self.residual, &mut unchecked);
+        laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
         for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {

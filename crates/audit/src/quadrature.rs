@@ -1,5 +1,8 @@
 //! Integrals over samples.
 
+/// An interval that is longer than both beside it by this factor stands apart.
+const APART: f64 = 4.0;
+
 /// Integrals from the first sample to each, and what they are uncertain by.
 pub(crate) struct Integral {
     pub values: Vec<f64>,
@@ -7,7 +10,7 @@ pub(crate) struct Integral {
 }
 
 /// Integrates samples: between jumps (times given twice) by the quintics through the six nearest samples; the
-/// uncertainty is the sum of the differences to quartics.
+/// uncertainty is the sum of the differences to quartics, and to straight lines where samples are far apart.
 pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
     let n = times.len();
     let mut integral = Integral { values: vec![0.0; n], uncertainty: vec![0.0; n] };
@@ -24,6 +27,9 @@ pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
             if end - start < 5 {
                 doubt = doubt.max((fine - piece(times, rates, (start, end), k, (end - start).max(1))).abs());
             }
+            if stands_apart(times, (start, end), k) {
+                doubt = doubt.max((fine - piece(times, rates, (start, end), k, 2)).abs());
+            }
         } else {
             start = k;
         }
@@ -31,6 +37,14 @@ pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
         integral.uncertainty[k] = integral.uncertainty[k - 1] + doubt;
     }
     integral
+}
+
+/// Whether the interval that ends at sample `k` is so much longer than those beside it that polynomials through their samples
+/// tell little of it.
+fn stands_apart(times: &[f64], (first, last): (usize, usize), k: usize) -> bool {
+    let own = times[k] - times[k - 1];
+    let beside = [(k - 1 > first).then(|| times[k - 1] - times[k - 2]), (k < last).then(|| times[k + 1] - times[k])];
+    beside.into_iter().flatten().reduce(f64::max).is_some_and(|longest| own > APART * longest)
 }
 
 /// Integral from sample `k - 1` to `k` of the polynomial through up to `count` samples around them in `[first, last]`.

@@ -138,6 +138,14 @@ pub struct RunReport {
     pub timings: Timings,
 }
 
+impl RunReport {
+    /// What the audit says, beside what else is to be known.
+    fn take_notes(&mut self) {
+        let RunReport { audit, notes, .. } = self;
+        notes.extend(audit.notes.iter().chain(&audit.warnings).cloned());
+    }
+}
+
 /// How exact a state is kept, in SI units.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateTolerance {
@@ -205,12 +213,12 @@ fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, E
             if let Some(failure) = done.report.audit.refusal(made) {
                 return Err(Error::Run(Box::new(Stopped { failure, trace: done.trace, report: done.report })));
             }
-            done.report.notes.extend(done.report.audit.warnings.iter().cloned());
+            done.report.take_notes();
             Ok(done)
         }
         Err(Error::Run(mut stopped)) => {
             stopped.report.audit.judge(made);
-            stopped.report.notes.extend(stopped.report.audit.warnings.iter().cloned());
+            stopped.report.take_notes();
             Err(Error::Run(stopped))
         }
         error => error,
@@ -346,7 +354,7 @@ impl Model {
             }
             Err(stopped) => {
                 let report = self.run_report(&stopped.summary, stopped.time, audit, notes);
-                Err(Error::Run(Box::new(Stopped { failure: stopped.failure, trace, report })))
+                Err(Error::Run(Box::new(Stopped { failure: self.blame_start(stopped.failure), trace, report })))
             }
         }
     }
@@ -396,6 +404,26 @@ impl Model {
         exec::Model::new(schedule(equations)).map_err(|failure| self.stopped(failure))
     }
 
+    /// Says of a value that is not finite at the start which stored quantity it comes from, if that starts at 0 since nothing
+    /// else is given.
+    fn blame_start(&self, failure: Failure) -> Failure {
+        let Failure::NotFinite { time: 0.0, what } = &failure else { return failure };
+        let element = self
+            .graph
+            .elements
+            .values()
+            .find(|e| what.strip_prefix(e.name.as_str()).is_some_and(|rest| rest.starts_with('.')));
+        let not_given = element.and_then(|element| match &element.kind {
+            Kind::Inertance(storage) if storage.initial.is_empty() => Some((element, storage, "p0")),
+            Kind::Compliance(storage) if storage.initial.is_empty() => Some((element, storage, "q0")),
+            _ => None,
+        });
+        let Some((element, storage, start)) = not_given else { return failure };
+        let stored = self.graph.exprs.name(storage.stored[0]);
+        let what = format!("{what}, where {stored} starts at 0 since `{}` gives no `{start}`,", element.name);
+        Failure::NotFinite { time: 0.0, what }
+    }
+
     /// A run that stopped with nothing recorded.
     pub(crate) fn stopped_at(&self, stopped: halfarrow_sim::Stopped) -> Error {
         let report = self.run_report(&stopped.summary, stopped.time, AuditReport::default(), Vec::new());
@@ -405,7 +433,7 @@ impl Model {
     /// A run that never began.
     pub(crate) fn stopped(&self, failure: Failure) -> Error {
         let report = self.run_report(&Summary::default(), 0.0, AuditReport::default(), Vec::new());
-        Error::Run(Box::new(Stopped { failure, trace: Trace::default(), report }))
+        Error::Run(Box::new(Stopped { failure: self.blame_start(failure), trace: Trace::default(), report }))
     }
 
     pub(crate) fn start(&self, system: &mut exec::Model, start: Start) -> Result<Vec<f64>, Error> {

@@ -104,6 +104,34 @@ fn speeds_that_jump_are_not_exported() {
     assert!(error.contains("jumps") && error.contains("minimal"), "{error}");
 }
 
+/// A factor the other way round is used as it is given: at 0 it passes nothing on.
+#[test]
+fn factors_from_out_to_in_may_vanish() {
+    let lever = |two_port: &str| {
+        text(&format!(
+            "model M\nstate x' = w.f from 0\n0:n -> C:c(1, e0 = 2)\n1:w -> I:m(1, f0 = 1)\nw -> I:m2(1)\nw -> R:r(0.3)\n{two_port}\n"
+        ))
+    };
+    let swing = |two_port: &str| {
+        text(&format!("model M\nlet x = t - 1\n1:n -> C:c(1, q0 = 2)\nn -> R:r(1)\n0:k -> C:kk(1)\n{two_port}\n"))
+    };
+    let pairs = [
+        (lever("n -> TF:t(e_out = x) -> w"), lever("w -> TF:t(f_out = -x) -> n"), ["m.f", "c.q"]),
+        (swing("n -> GY:t(f_out = x) -> k"), swing("n -> GY:g(1) -> 1:j -> TF:t(f_out = x) -> k"), ["c.q", "kk.q"]),
+    ];
+    for (given, turned, names) in &pairs {
+        let wanted = ends(turned, &run(Form::Minimal, 2.0, names)).unwrap_or_else(|e| panic!("{e}"));
+        for form in FORMS {
+            let found = ends(given, &run(form, 2.0, names)).unwrap_or_else(|e| panic!("{}: {e}", form.name()));
+            agree(&found, &wanted, 1e-7, form.name());
+        }
+        // The factor is 0 exactly at a step.
+        let method = Method::Fixed(FixedMethod::Rk4);
+        let fixed = Run { method, step: Some(0.125), ..run(Form::Minimal, 2.0, names) };
+        agree(&ends(given, &fixed).unwrap_or_else(|e| panic!("{e}")), &wanted, 1e-3, "rk4");
+    }
+}
+
 #[test]
 fn a_vanishing_slope_does_not_hide_a_flow() {
     let model = fault("break_rate");

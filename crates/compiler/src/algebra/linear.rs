@@ -78,6 +78,25 @@ impl Exprs {
         Some((coefficient, self.add(&rest)))
     }
 
+    /// The expression as a quotient: what stands over and under its line, where only factors that may vanish stand under it.
+    pub fn over_and_under(&mut self, e: Expr) -> (Expr, Expr) {
+        let factors: Parts = match self.node(e) {
+            Node::Mul(factors) => factors.clone(),
+            _ => smallvec![e],
+        };
+        let (mut over, mut under) = (Parts::new(), Parts::new());
+        for factor in factors {
+            match *self.node(factor) {
+                Node::Pow(base, n) if self.is_number(n).is_some_and(|n| n.signum() < 0) && !self.nonzero(base) => {
+                    let n = self.neg(n);
+                    under.push(self.pow(base, n));
+                }
+                _ => over.push(factor),
+            }
+        }
+        (self.mul(&over), self.mul(&under))
+    }
+
     /// Whether the slope of the expression may be infinite: a root of what is not known to be nonzero.
     pub fn is_steep(&mut self, e: Expr) -> bool {
         let parts = self.below(&[e], &|_| true);

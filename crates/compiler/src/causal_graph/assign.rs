@@ -547,10 +547,13 @@ pub(super) fn wished(graph: &BondGraph, port: PortRef) -> PortCausality {
 }
 
 /// Whether nothing in the part asks for exact elimination: residual sinks, and moduli that vanish.
-fn is_plain(x: &Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
+fn is_plain(x: &mut Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
     members.iter().all(|&m| match graph.elements[m].kind {
         Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. } => false,
-        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => !x.is_zero_given(modulus),
+        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
+            let (over, under) = x.over_and_under(modulus);
+            !x.is_zero_given(over) && !x.is_zero_given(under)
+        }
         _ => true,
     })
 }

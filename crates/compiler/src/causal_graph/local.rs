@@ -59,19 +59,21 @@ pub fn definitions(
             Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
                 let transformer = matches!(graph.elements[element].kind, Kind::Transformer { .. });
                 let ((e_in, f_in), (e_out, f_out)) = (pair(0), pair(1));
-                if at(0) && !x.nonzero(modulus) {
-                    divisors.push(modulus);
-                    x.assume_nonzero(modulus);
+                let (over, under) = x.over_and_under(modulus);
+                let (factor, divisor) = if at(0) { (under, over) } else { (over, under) };
+                if !x.nonzero(divisor) {
+                    divisors.push(divisor);
+                    x.assume_nonzero(divisor);
                 }
-                let inverse = |x: &mut Exprs| x.recip(modulus);
-                let [(a, b, ab), (c, d, cd)] = match (transformer, at(0)) {
-                    (true, false) => [(e_in, e_out, modulus), (f_out, f_in, modulus)],
-                    (true, true) => [(e_out, e_in, inverse(x)), (f_in, f_out, inverse(x))],
-                    (false, false) => [(e_in, f_out, modulus), (e_out, f_in, modulus)],
-                    (false, true) => [(f_out, e_in, inverse(x)), (f_in, e_out, inverse(x))],
+                let factor = x.div(factor, divisor);
+                let [(a, b), (c, d)] = match (transformer, at(0)) {
+                    (true, false) => [(e_in, e_out), (f_out, f_in)],
+                    (true, true) => [(e_out, e_in), (f_in, f_out)],
+                    (false, false) => [(e_in, f_out), (e_out, f_in)],
+                    (false, true) => [(f_out, e_in), (f_in, e_out)],
                 };
-                all.push((a, Combination(vec![(b, ab)])));
-                all.push((c, Combination(vec![(d, cd)])));
+                all.push((a, Combination(vec![(b, factor)])));
+                all.push((c, Combination(vec![(d, factor)])));
             }
             _ => {}
         }

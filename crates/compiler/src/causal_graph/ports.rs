@@ -268,14 +268,16 @@ impl Net {
                 self.junction(columns.iter().map(|c| (c.1, c.0, c.2)).collect(), one, minus);
             }
             Kind::Transformer { modulus } => {
-                let m = x.neg(modulus);
-                self.push(vec![(columns[0].0, one), (columns[1].0, m)]);
-                self.push(vec![(columns[1].1, one), (columns[0].1, m)]);
+                let (m, under) = x.over_and_under(modulus);
+                let m = x.neg(m);
+                self.push(vec![(columns[0].0, under), (columns[1].0, m)]);
+                self.push(vec![(columns[1].1, under), (columns[0].1, m)]);
             }
             Kind::Gyrator { modulus } => {
-                let r = x.neg(modulus);
-                self.push(vec![(columns[0].0, one), (columns[1].1, r)]);
-                self.push(vec![(columns[1].0, one), (columns[0].1, r)]);
+                let (r, under) = x.over_and_under(modulus);
+                let r = x.neg(r);
+                self.push(vec![(columns[0].0, under), (columns[1].1, r)]);
+                self.push(vec![(columns[1].0, under), (columns[0].1, r)]);
             }
             _ => {}
         }

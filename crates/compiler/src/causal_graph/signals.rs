@@ -209,8 +209,8 @@ impl Gain {
             Gain::Minus => exprs.int(-1),
             Gain::Modulus(m) => *m,
             Gain::Inverse(m) => {
-                let one = exprs.int(1);
-                exprs.div(one, *m)
+                let (over, under) = exprs.over_and_under(*m);
+                exprs.div(under, over)
             }
             Gain::ModulusSlope { modulus, inverse, read, by } => {
                 let slope = modulus_slope(*modulus, *inverse, *read, exprs);
