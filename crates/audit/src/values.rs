@@ -266,7 +266,8 @@ impl Reader<'_, '_> {
         let t = values.times[sample];
         let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
         let t = match side {
-            Side::Before if self.timed => t - reach,
+            // A run that ends at a jump stands before it.
+            Side::Before | Side::Inside if self.timed => t - reach,
             Side::After if self.timed => t + reach,
             _ => t,
         };

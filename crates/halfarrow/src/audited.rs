@@ -182,11 +182,12 @@ impl Book {
         if let Some(what) = self.not_finite() {
             return Err(Failure::NotFinite { time: t, what: what.to_string() });
         }
-        self.times.push(t);
-        self.columns.iter_mut().zip(&self.values).for_each(|(column, value)| column.push(*value));
-        if self.times.len() >= CHUNK {
+        // A part of the run never ends between the two samples of a jump.
+        if self.times.len() >= CHUNK && self.times.last() != Some(&t) {
             self.audit();
         }
+        self.times.push(t);
+        self.columns.iter_mut().zip(&self.values).for_each(|(column, value)| column.push(*value));
         Ok(())
     }
 

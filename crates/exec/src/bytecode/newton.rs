@@ -37,6 +37,8 @@ pub(super) const NEAR: f64 = 0.25;
 /// A step that shrinks as the last one did, with the same Jacobian, leaves about twice its square over the last: below
 /// this, rounding.
 pub(super) const FINISHED: f64 = 0.125 * f64::EPSILON;
+/// Halvings of the way to a kink.
+const KINK_HALVINGS: usize = 60;
 /// Residuals below this part of their terms are rounding.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// Points at which the way to a solution that is not near is looked at.
@@ -693,10 +695,66 @@ impl Frame {
                 _ => SHORTEST,
             };
             if fraction < shortest || newton.exhausted() {
+                if trust == Trust::Damped && self.crosses_kink(solve) {
+                    self.accept_trial(solve);
+                    return (Damped::Moved, false);
+                }
                 let rounding = self.is_rounding(solve) && self.is_near_rounding(solve) || self.is_at_rounding(solve);
                 return if rounding { (Damped::Done, true) } else { (Damped::Stuck, false) };
             }
         }
+    }
+
+    /// Goes along the step to just beyond where the Jacobian changes, if no residual grows on that way: where a law has a
+    /// kink, its slope before tells nothing of the way behind. Ends with an evaluation of the trial point, or at `x`.
+    fn crosses_kink(&mut self, solve: &Solve) -> bool {
+        if !self.evaluate(solve, false) {
+            return false;
+        }
+        self.keep_jacobian(solve);
+        let Frame { r, solvers, .. } = &mut *self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        for (i, &right) in solve.right.iter().enumerate() {
+            newton.next[i] = (r[right as usize] - newton.offset[i]).abs();
+        }
+        let (mut before, mut beyond) = (0.0, 1.0);
+        for _ in 0..KINK_HALVINGS {
+            let newton = self.newton_of(solve);
+            for i in 0..newton.x.len() {
+                newton.trial[i] = newton.x[i] + beyond * newton.step[i];
+            }
+            let finite = self.evaluate(solve, true);
+            match !finite || self.has_another_slope(solve) {
+                true if finite && self.has_less_left(solve) => return true,
+                true => beyond = 0.5 * (before + beyond),
+                false if before == 0.0 && beyond == 1.0 => break,
+                false => {
+                    let end = beyond;
+                    beyond += beyond - before;
+                    before = end;
+                }
+            }
+        }
+        self.evaluate(solve, false);
+        false
+    }
+
+    /// Whether the Jacobian evaluated last is far from the one kept.
+    fn has_another_slope(&self, solve: &Solve) -> bool {
+        let n = solve.right.len();
+        let kept = &self.solvers[solve.block.0 as usize].newton.jacobian;
+        kept.chunks(n).zip(solve.matrix.chunks(n)).any(|(row, entries)| {
+            let most = row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
+            row.iter().zip(entries).any(|(j, &m)| (self.r[m as usize] - j).abs() > 0.5 * most)
+        })
+    }
+
+    /// Whether no residual evaluated last is greater than those kept in `next`, and one is less.
+    fn has_less_left(&self, solve: &Solve) -> bool {
+        let newton = &self.solvers[solve.block.0 as usize].newton;
+        let now = |i: usize| (self.r[solve.right[i] as usize] - newton.offset[i]).abs();
+        (0..solve.right.len()).all(|i| now(i) <= newton.next[i])
+            && (0..solve.right.len()).any(|i| now(i) < newton.next[i])
     }
 
     fn accept_trial(&mut self, solve: &Solve) {

@@ -148,7 +148,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Everything that can be recorded: name, SI unit.
+    /// Everything that can be recorded and has a value of its own, which the drift of a constraint has not: name, SI unit.
     pub(super) fn variables(&self) -> Vec<(String, String)> {
         let program = match &self.system {
             Ready::Explicit(system, _) => system.program(),
@@ -156,7 +156,9 @@ impl Subject<'_> {
         };
         let unit =
             |o: &halfarrow_compiler::program::Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
-        program.observed.iter().filter(|o| o.value.is_ok()).map(|o| (o.name.clone(), unit(o))).collect()
+        let drifts: Vec<String> = self.graph.constraints.iter().map(|c| format!("{}.drift", c.name)).collect();
+        let known = program.observed.iter().filter(|o| o.value.is_ok() && !drifts.contains(&o.name));
+        known.map(|o| (o.name.clone(), unit(o))).collect()
     }
 
     /// Names of the states.

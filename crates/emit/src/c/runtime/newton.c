@@ -514,6 +514,80 @@ static int ha_floats(ha_model *m, ha_newton *w)
 enum { HA_DAMPED, HA_KINK, HA_CONTRACTION };
 enum { HA_DONE, HA_MOVED, HA_STUCK };
 
+/* Whether the Jacobian evaluated last is far from the one kept. */
+static int ha_has_another_slope(const ha_newton *w)
+{
+    const int n = w->n;
+    int i;
+    int j;
+    for (i = 0; i < n; ++i) {
+        double most = 0.0;
+        for (j = 0; j < n; ++j) {
+            most = ha_max(most, fabs(w->jacobian[i * n + j]));
+        }
+        for (j = 0; j < n; ++j) {
+            if (fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) > 0.5 * most) {
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Whether no residual evaluated last is greater than those kept in w->next, and one is less. */
+static int ha_has_less_left(const ha_newton *w)
+{
+    int less = 0;
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        const double now = fabs(w->right[i] - w->offset[i]);
+        if (!(now <= w->next[i])) {
+            return 0;
+        }
+        less = less || now < w->next[i];
+    }
+    return less;
+}
+
+/* Goes along the step to just beyond where the Jacobian changes, if no residual grows on that way: where a law has a
+ * kink, its slope before tells nothing of the way behind. Ends with an evaluation of the trial point, or at w->x. */
+static int ha_crosses_kink(ha_model *m, ha_newton *w)
+{
+    double before = 0.0;
+    double beyond = 1.0;
+    int halving;
+    int i;
+    if (!ha_look_at(m, w, w->x)) {
+        return 0;
+    }
+    ha_copy(w->jacobian, w->matrix, w->n * w->n);
+    for (i = 0; i < w->n; ++i) {
+        w->next[i] = fabs(w->right[i] - w->offset[i]);
+    }
+    for (halving = 0; halving < 60; ++halving) {
+        int finite;
+        for (i = 0; i < w->n; ++i) {
+            const double move = beyond * w->step[i];
+            w->trial[i] = w->x[i] + move;
+        }
+        finite = ha_look_at(m, w, w->trial);
+        if (!finite || ha_has_another_slope(w)) {
+            if (finite && ha_has_less_left(w)) {
+                return 1;
+            }
+            beyond = 0.5 * (before + beyond);
+        } else if (before == 0.0 && beyond == 1.0) {
+            break;
+        } else {
+            const double end = beyond;
+            beyond += beyond - before;
+            before = end;
+        }
+    }
+    (void)ha_look_at(m, w, w->x);
+    return 0;
+}
+
 /* Takes the step, or as much of it as makes the next one shorter; near: whether all of it left little to do. */
 static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *near)
 {
@@ -549,6 +623,11 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
         if (fraction < shortest || w->evaluations >= w->limit) {
             break;
         }
+    }
+    if (trust == HA_DAMPED && ha_crosses_kink(m, w)) {
+        ha_accept_trial(w);
+        *near = 0;
+        return HA_MOVED;
     }
     *near = (ha_is_rounding(m, w) && ha_is_near_rounding(m, w)) || ha_is_at_rounding(m, w);
     return *near ? HA_DONE : HA_STUCK;
