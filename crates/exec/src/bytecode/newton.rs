@@ -37,6 +37,9 @@ pub(super) const NEAR: f64 = 0.25;
 /// A step that shrinks as the last one did, with the same Jacobian, leaves about twice its square over the last: below
 /// this, rounding.
 pub(super) const FINISHED: f64 = 0.125 * f64::EPSILON;
+/// A Jacobian whose entries change by more than this part of their row at once has a kink, by less than that none yet.
+const OTHER_SLOPE: f64 = 0.5;
+const SAME_SLOPE: f64 = 1e-3;
 /// Halvings of the way to a kink.
 const KINK_HALVINGS: usize = 60;
 /// Residuals below this part of their terms are rounding.
@@ -724,11 +727,17 @@ impl Frame {
                 newton.trial[i] = newton.x[i] + beyond * newton.step[i];
             }
             let finite = self.evaluate(solve, true);
-            match !finite || self.has_another_slope(solve) {
-                true if finite && self.has_less_left(solve) => return true,
-                true => beyond = 0.5 * (before + beyond),
-                false if before == 0.0 && beyond == 1.0 => break,
-                false => {
+            let change = if finite { self.change_of_slope(solve) } else { f64::INFINITY };
+            match change {
+                change if change > OTHER_SLOPE => {
+                    if beyond - before <= SAME_SLOPE * beyond && finite && self.has_less_left(solve) {
+                        return true;
+                    }
+                    beyond = 0.5 * (before + beyond);
+                }
+                // No kink: the slope changes little by little, or not at all.
+                change if change > SAME_SLOPE || before == 0.0 && beyond == 1.0 => break,
+                _ => {
                     let end = beyond;
                     beyond += beyond - before;
                     before = end;
@@ -739,14 +748,16 @@ impl Frame {
         false
     }
 
-    /// Whether the Jacobian evaluated last is far from the one kept.
-    fn has_another_slope(&self, solve: &Solve) -> bool {
+    /// How far the Jacobian evaluated last is from the one kept, relative to the entries of a row.
+    fn change_of_slope(&self, solve: &Solve) -> f64 {
         let n = solve.right.len();
         let kept = &self.solvers[solve.block.0 as usize].newton.jacobian;
-        kept.chunks(n).zip(solve.matrix.chunks(n)).any(|(row, entries)| {
-            let most = row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
-            row.iter().zip(entries).any(|(j, &m)| (self.r[m as usize] - j).abs() > 0.5 * most)
-        })
+        let mut change: f64 = 0.0;
+        for (row, entries) in kept.chunks(n).zip(solve.matrix.chunks(n)) {
+            let most = row.iter().fold(f64::MIN_POSITIVE, |most, j| most.max(j.abs()));
+            row.iter().zip(entries).for_each(|(j, &m)| change = change.max((self.r[m as usize] - j).abs() / most));
+        }
+        change
     }
 
     /// Whether no residual evaluated last is greater than those kept in `next`, and one is less.

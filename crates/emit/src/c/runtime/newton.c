@@ -514,24 +514,23 @@ static int ha_floats(ha_model *m, ha_newton *w)
 enum { HA_DAMPED, HA_KINK, HA_CONTRACTION };
 enum { HA_DONE, HA_MOVED, HA_STUCK };
 
-/* Whether the Jacobian evaluated last is far from the one kept. */
-static int ha_has_another_slope(const ha_newton *w)
+/* How far the Jacobian evaluated last is from the one kept, relative to the entries of a row. */
+static double ha_change_of_slope(const ha_newton *w)
 {
     const int n = w->n;
+    double change = 0.0;
     int i;
     int j;
     for (i = 0; i < n; ++i) {
-        double most = 0.0;
+        double most = DBL_MIN;
         for (j = 0; j < n; ++j) {
             most = ha_max(most, fabs(w->jacobian[i * n + j]));
         }
         for (j = 0; j < n; ++j) {
-            if (fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) > 0.5 * most) {
-                return 1;
-            }
+            change = ha_max(change, fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) / most);
         }
     }
-    return 0;
+    return change;
 }
 
 /* Whether no residual evaluated last is greater than those kept in w->next, and one is less. */
@@ -566,17 +565,20 @@ static int ha_crosses_kink(ha_model *m, ha_newton *w)
     }
     for (halving = 0; halving < 60; ++halving) {
         int finite;
+        double change;
         for (i = 0; i < w->n; ++i) {
             const double move = beyond * w->step[i];
             w->trial[i] = w->x[i] + move;
         }
         finite = ha_look_at(m, w, w->trial);
-        if (!finite || ha_has_another_slope(w)) {
-            if (finite && ha_has_less_left(w)) {
+        change = finite ? ha_change_of_slope(w) : HUGE_VAL;
+        if (change > 0.5) {
+            if (beyond - before <= 1e-3 * beyond && finite && ha_has_less_left(w)) {
                 return 1;
             }
             beyond = 0.5 * (before + beyond);
-        } else if (before == 0.0 && beyond == 1.0) {
+        } else if (change > 1e-3 || (before == 0.0 && beyond == 1.0)) {
+            /* No kink: the slope changes little by little, or not at all. */
             break;
         } else {
             const double end = beyond;
