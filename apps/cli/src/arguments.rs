@@ -104,6 +104,7 @@ Examples:
 Examples:
   halfarrow export c car.bond --out car                C99 into the folder car, with a CMake file
   halfarrow export c car.bond --out car --method heun --step 0.5e-3
+  halfarrow export c car.bond --out car --real float   in single precision, for a microcontroller
   halfarrow export fmu3 car.bond --out car.fmu         with a binary by the C compiler cc, or what CC names
   halfarrow export fmu2 car.bond --out car.fmu --source-only
   halfarrow export latex car.bond --out car.tex        the equations as a document")]
@@ -623,9 +624,21 @@ pub struct Export {
     /// The length of a step, in s
     #[arg(long, value_name = "TIME", default_value = "1e-3", value_parser = duration, allow_hyphen_values = true)]
     pub step: f64,
+    /// The real numbers of C
+    #[arg(long, default_value = "double")]
+    pub real: Real,
     /// FMUs: no binary for this machine, sources alone
     #[arg(long)]
     pub source_only: bool,
+}
+
+/// Real numbers of C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Real {
+    /// Double precision, with the bits of `simulate`
+    Double,
+    /// Single precision, for processors that compute in it; time stays double
+    Float,
 }
 
 /// Reads `start`, `equilibrium` or a time.

@@ -87,6 +87,42 @@ impl Method {
     }
 }
 
+/// Real numbers of exported C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Real {
+    /// `double`, with the bits of the interpreter.
+    #[default]
+    Double,
+    /// `float`; time, and what follows from it or from parameters alone, in `double`.
+    Float,
+}
+
+impl Real {
+    /// Its name, as on the command line and in C.
+    pub fn name(self) -> &'static str {
+        match self {
+            Real::Double => "double",
+            Real::Float => "float",
+        }
+    }
+
+    /// The distance from 1 to the next number.
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Real::Double => f64::EPSILON,
+            Real::Float => f64::from(f32::EPSILON),
+        }
+    }
+
+    /// Whether a number is held with all digits: it is neither too great nor too close to zero. What is not finite is no
+    /// number.
+    pub fn holds(self, value: f64) -> bool {
+        let size = value.abs();
+        let range = f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MAX);
+        self == Real::Double || value == 0.0 || !value.is_finite() || range.contains(&size)
+    }
+}
+
 /// The model at the start of a run at time 0 with all parameters and inputs at their defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Start {
@@ -100,6 +136,8 @@ pub struct Start {
     pub times: Vec<f64>,
     /// Values of its parameters.
     pub parameters: Vec<f64>,
+    /// Values that follow from parameters alone, as they stand in the equations.
+    pub derived: Vec<f64>,
     /// Values of its inputs.
     pub inputs: Vec<f64>,
     /// What is recorded, at the start; NaN where it has no value.
@@ -115,6 +153,8 @@ pub enum EmitError {
     Jumps(Vec<String>),
     /// The step is not a finite number above zero.
     Step(f64),
+    /// A value does not fit real numbers of single precision: what it is, and the value.
+    Range(String, f64),
     /// A delay would keep too many points with this step: its name, and how many.
     Delay(String, f64),
 }
@@ -129,6 +169,12 @@ impl fmt::Display for EmitError {
                 states.join(", ")
             ),
             EmitError::Step(step) => write!(f, "the step is {step}: it has to be a finite number above zero"),
+            EmitError::Range(what, value) => write!(
+                f,
+                "{what} is {value:?} in SI units, which does not fit `float`: its numbers are from {:?} to {:?} in size; export with `--real double`, or change the value",
+                f32::MIN_POSITIVE,
+                f32::MAX
+            ),
             EmitError::Delay(name, points) => write!(
                 f,
                 "{name} would keep {points:.0} points with this step: there is no heap to put them on; choose a longer step"

@@ -3,7 +3,7 @@
 use halfarrow_compiler::equations::{Form, show};
 use halfarrow_compiler::program::Program;
 use halfarrow_emit::fmu::{self, Version};
-use halfarrow_emit::{self as emit, EmitError, File, latex};
+use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::System;
 use halfarrow_sim::fixed_step::FixedMethod;
@@ -50,6 +50,8 @@ pub struct Export {
     pub method: FixedMethod,
     /// The length of a step, in s.
     pub step: f64,
+    /// The real numbers of C; FMUs have `double`.
+    pub real: Real,
     /// FMUs: whether a binary for this machine stands in it, made by its C compiler; sources always do.
     pub binary: bool,
 }
@@ -57,7 +59,7 @@ pub struct Export {
 impl Default for Export {
     /// C with the minimal form, the classical Runge-Kutta method and steps of 1 ms.
     fn default() -> Export {
-        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3, binary: true }
+        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3, real: Real::Double, binary: true }
     }
 }
 
@@ -83,6 +85,8 @@ pub struct ExportReport {
     pub method: Option<&'static str>,
     /// The length of a step, in s, if there is code.
     pub step: Option<f64>,
+    /// `double` or `float`, if there is code.
+    pub real: Option<&'static str>,
     /// Names of the states.
     pub states: Vec<String>,
     /// Names of the inputs.
@@ -123,6 +127,9 @@ impl Model {
     /// # Errors
     /// The model has errors or no start, or something is asked that cannot be.
     pub fn export(&self, export: &Export) -> Result<Exported, Error> {
+        if export.real == Real::Float && export.target != Target::C {
+            return Err(not_single(export.target));
+        }
         match export.target {
             Target::C => self.export_c(export),
             Target::Fmu2 => self.export_fmu(export, Version::V2),
@@ -145,6 +152,7 @@ impl Model {
             name: String::new(),
             method: None,
             step: None,
+            real: None,
             states,
             inputs: Vec::new(),
             parameters: Vec::new(),
@@ -210,6 +218,7 @@ impl<'a> Code<'a> {
             step: self.export.step,
             recorded: &self.recorded,
             derivatives,
+            real: self.export.real,
         })
     }
 
@@ -235,6 +244,7 @@ impl<'a> Code<'a> {
             name: name.to_string(),
             method: Some(method(self.export.method).name()),
             step: Some(self.export.step),
+            real: Some(self.export.real.name()),
             states: p.states.iter().map(|s| s.name.clone()).collect(),
             inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
             parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
@@ -260,6 +270,7 @@ fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarro
         scales: system.scales().to_vec(),
         times: p.held.iter().map(|h| system.constant(h.time).unwrap_or(f64::NAN)).collect(),
         parameters: p.parameters.iter().map(|p| system.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
+        derived: system.derived().to_vec(),
         inputs: p.inputs.iter().map(|i| system.constant(i.default).unwrap_or(0.0)).collect(),
         observed,
     })
@@ -274,6 +285,15 @@ fn method(method: FixedMethod) -> emit::Method {
         FixedMethod::LinearlyImplicitEuler => emit::Method::LinearlyImplicitEuler,
         FixedMethod::Rosenbrock => emit::Method::Rosenbrock,
     }
+}
+
+/// Why something else than C is not written with numbers of single precision.
+fn not_single(target: Target) -> Error {
+    let why = match target {
+        Target::Latex => "equations as a document have no numbers of single precision",
+        _ => "the variables of FMUs are double",
+    };
+    Problem::BadOption { reason: format!("{why}: `--real float` is for `export c`") }.into()
 }
 
 fn refused(error: EmitError) -> Error {

@@ -44,7 +44,7 @@ pub use halfarrow_compiler::bond_graph::Override;
 pub use halfarrow_compiler::compile::Found;
 pub use halfarrow_compiler::equations::Form;
 pub use halfarrow_draw::{DrawOptions, DrawnPaths, positions};
-pub use halfarrow_emit::File;
+pub use halfarrow_emit::{File, Real};
 pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Error, Export, ExportReport, File, FixedMethod, Problem, Start, Target, write_whole};
+use halfarrow::{Error, Export, ExportReport, File, FixedMethod, Problem, Real, Start, Target, write_whole};
 use serde_json::json;
 
 use super::analyse::form;
@@ -53,6 +53,10 @@ fn asked(arguments: &arguments::Export) -> Export {
             FixedSolver::Rosenbrock => FixedMethod::Rosenbrock,
         },
         step: arguments.step,
+        real: match arguments.real {
+            arguments::Real::Double => Real::Double,
+            arguments::Real::Float => Real::Float,
+        },
         binary: !arguments.source_only,
     }
 }

@@ -6,7 +6,8 @@ use halfarrow_compiler::unit::Unit;
 
 use super::cost::{Cost, MOST_JUMPS};
 use super::plan::Plan;
-use super::{Export, Names, messages, template};
+use super::{Export, Names, messages, real, template};
+use crate::Real;
 
 /// The header file.
 pub(super) fn header(export: &Export, plan: &Plan, names: &Names, cost: &Cost) -> String {
@@ -63,13 +64,14 @@ pub(super) fn header(export: &Export, plan: &Plan, names: &Names, cost: &Cost) -
         ("switches", !plan.switches.is_empty()),
         ("delays", !plan.delays.is_empty()),
         ("samples", held && !plan.samples.is_empty()),
+        ("single", export.real == Real::Float),
     ] {
         if holds {
             flags.insert(flag);
         }
     }
     text = template::fill(&template::choose(&text, &flags), &words);
-    template::name(&text, &plan.name)
+    template::name(&real::of(&text, export.real), &plan.name)
 }
 
 /// The parts of the model that are nobody's affair, with what they are.
@@ -85,18 +87,23 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
         }
     };
     part(true, format!("double c[{}]; /* what follows from parameters */", n(s.derived)));
+    let single = export.real == Real::Float;
+    let parameters = p.parameters.len();
+    part(single && parameters > 0, format!("ha_wide p_exact[{parameters}]; /* parameters in double precision */"));
+    part(s.exact > 0, format!("ha_wide c_exact[{}]; /* of what follows from them, what time needs */", s.exact));
+    part(single, format!("double rest[{0}], trial_rest[{0}]; /* of states, what is less than their last digit */", n(nx)));
     part(true, format!("double k[{}]; /* conserved constants */", n(p.conserved.len())));
     part(true, format!("double z[{}]; /* held signals */", n(p.held.len())));
     part(true, format!("unsigned char set[{}]; /* which parameters are set */", n(p.parameters.len())));
     part(true, "int changed; /* whether any is set */".into());
     part(true, "int begun; /* whether the run has begun */".into());
     part(true, "int cross_due; /* whether a parameter or an input has jumped */".into());
-    part(true, "double crossed; /* when the last jump was crossed */".into());
+    part(true, "ha_wide crossed; /* when the last jump was crossed */".into());
     part(true, format!("double u_crossed[{}]; /* inputs then */", n(nu)));
     part(true, format!("double u_default[{}]; /* inputs that nobody sets */", n(nu)));
-    part(true, "double tick_from, tick_next, tick_index, tick_rate; /* times of steps */".into());
+    part(true, "ha_wide tick_from, tick_next, tick_index, tick_rate; /* times of steps */".into());
     let conditions = p.conditions.len();
-    part(conditions > 0, format!("double held[{}]; /* conditions as held */", n(conditions)));
+    part(conditions > 0, format!("ha_wide held[{}]; /* conditions as held */", n(conditions)));
     let clocks = p
         .conditions
         .values()
@@ -105,8 +112,8 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
         })
         .count();
     part(clocks > 0, "int clock_hold; /* what is done with those of time */".into());
-    part(clocks > 0, "double clock_next; /* when they change next */".into());
-    part(clocks > 0, format!("double clock_operand[{0}], clock_rate[{0}];", n(clocks)));
+    part(clocks > 0, "ha_wide clock_next; /* when they change next */".into());
+    part(clocks > 0, format!("ha_wide clock_operand[{0}], clock_rate[{0}];", n(clocks)));
     let switches = plan.switches.len();
     part(switches > 0, "int state_hold; /* what is done with those of the state */".into());
     part(switches > 0, format!("int sides[{}]; /* sides of the indicators */", n(s.indicators)));
@@ -130,6 +137,7 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     part(true, format!("double stages[{}], trial[{}], dx[{}];", n(nx * export.method.stages()), n(nx), n(nx)));
     part(true, format!("double beside[{}]; /* a state beside another one */", n(nx)));
     part(true, format!("double w[{}]; /* values from one piece of code to the next */", n(s.crossing)));
+    part(s.wide > 0, format!("ha_wide wide[{}]; /* the same, where they follow from time alone */", s.wide));
     part(
         true,
         format!(
@@ -143,6 +151,9 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     part(s.order > 0, format!("int order[{}];", n(s.order)));
     let implicit = export.method.is_implicit();
     part(implicit, format!("double matrix[{}], matrix_scale[{1}], matrix_work[{1}];", n(nx * nx), n(nx)));
+    part(implicit && single, format!("double matrix_columns[{}];", n(nx)));
+    let half_way = single && export.method == crate::Method::ImplicitMidpoint;
+    part(half_way, format!("double half_way[{}]; /* from the beginning of a step to its middle */", n(nx)));
     part(implicit, format!("int matrix_order[{}];", n(nx)));
     part(implicit, format!("double middle[{0}], sizes[{0}], correction[{0}], direction[{0}], product[{0}];", n(nx)));
     text.trim_end().to_string()

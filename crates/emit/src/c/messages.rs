@@ -5,6 +5,7 @@ use std::fmt::Write;
 use halfarrow_compiler::program::{Domain, DomainKind, Watch, first_of};
 
 use super::plan::Plan;
+use crate::Real;
 
 /// Failures, each with the texts of all places where it may happen.
 fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
@@ -67,8 +68,20 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
                 all => all.iter().map(|p| format!("{} is set to a value that is not finite, or is a constant", p.name)).collect(),
             },
         ),
+        ("OUT_OF_RANGE", out_of_range(plan)),
         ("NOT_STARTED", vec!["the model has not been started".into()]),
     ]
+}
+
+/// What does not fit real numbers of single precision; nothing where they are double.
+fn out_of_range(plan: &Plan) -> Vec<String> {
+    let text = |what: String| format!("{what} does not fit float: it is too great, or too close to zero");
+    let parameters = plan.program.parameters.iter().map(|p| text(format!("the parameter {}", p.name)));
+    let derived = std::iter::once(text("what follows from parameters".into()));
+    match plan.export.real {
+        Real::Double => Vec::new(),
+        Real::Float => parameters.chain(derived).collect(),
+    }
 }
 
 fn vanished(watch: &Watch) -> String {
@@ -113,10 +126,12 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "TOO_MANY_JUMPS" => "more jumps than a step may hold",
         "NO_ROOM" => "a delay keeps more points than there is room for",
         "NO_START" => "no start was found for these parameters",
+        "OUT_OF_RANGE" => "a parameter, or what follows from it, does not fit float",
         "BAD_PARAMETER" => "no such parameter, a constant, or a value that is not finite",
         _ => "a step before the start",
     };
-    texts(plan).into_iter().map(|(code, _)| (code, meaning(code))).collect()
+    let there = |code: &str| code != "OUT_OF_RANGE" || plan.export.real == Real::Float;
+    texts(plan).into_iter().filter(|(code, _)| there(code)).map(|(code, _)| (code, meaning(code))).collect()
 }
 
 /// The function that gives them.

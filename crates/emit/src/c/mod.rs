@@ -9,6 +9,8 @@ mod messages;
 mod obligations;
 mod plan;
 mod project;
+mod range;
+mod real;
 mod slopes;
 mod ssa;
 mod start;
@@ -20,7 +22,7 @@ pub use cost::Cost;
 
 use halfarrow_compiler::program::Program;
 
-use crate::{EmitError, Method, Start, names};
+use crate::{EmitError, Method, Real, Start, names};
 
 /// What is to be written.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +39,8 @@ pub struct Export<'a> {
     pub recorded: &'a [usize],
     /// Whether exact directional derivatives are wanted.
     pub derivatives: bool,
+    /// Its real numbers.
+    pub real: Real,
 }
 
 /// What was written.
@@ -74,7 +78,7 @@ pub struct Names {
 /// Writes a program.
 ///
 /// # Errors
-/// The program is implicit, the step makes no sense, or a delay is too long for it.
+/// The program is implicit, the step makes no sense, a delay is too long for it, or a value does not fit the real numbers.
 pub fn write(export: &Export) -> Result<Written, EmitError> {
     if export.program.implicit.is_some() {
         return Err(EmitError::Implicit);
@@ -86,6 +90,7 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     if !(export.step > 0.0 && export.step.is_finite()) {
         return Err(EmitError::Step(export.step));
     }
+    range::check(export)?;
     let program = export.program;
     let name = names::of_model(&program.name);
     let list = |names: &mut dyn Iterator<Item = &str>| names::unique(names.collect::<Vec<_>>().into_iter());

@@ -3,7 +3,7 @@
 use halfarrow_compiler::bond_graph::HeldKind;
 
 use super::plan::Plan;
-use crate::Method;
+use crate::{Method, Real};
 
 /// Bytes of stack for all functions that do not depend on the model.
 const OWN_STACK: usize = 6 * 1024;
@@ -22,7 +22,13 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
         (false, true) => "to derivatives of the rates, of functions named where they are called",
         (false, false) => "none",
     };
-    let all: [(&str, String); 10] = [
+    let reals = match plan.export.real {
+        Real::Double => "double".to_string(),
+        Real::Float => "float; double where time or parameters alone are read, never by accident".into(),
+    };
+    let flags = if plan.export.real == Real::Float { " -Wdouble-promotion -Wfloat-conversion" } else { "" };
+    let all: [(&str, String); 11] = [
+        ("real numbers", reals),
         ("recursion", "none (MISRA C:2012 17.2)".into()),
         ("heap", "none: no malloc, calloc, realloc, free (21.3), no array of variable length (18.8)".into()),
         ("global data", "none that is written: all static data are constant; the model is the caller's".into()),
@@ -37,8 +43,8 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
             "no goto (15.1), no union (19.2), no stdarg (17.1); functions have several returns (against 15.5)".into(),
         ),
         ("stack", format!("at most {} bytes (gcc, 64 bits, -O2)", stack(plan))),
-        ("state", format!("at most {} bytes, all in one MODEL", state(header, &plan.name))),
-        ("conversions", "no warning by gcc -std=c99 -Wall -Wextra -Wconversion -pedantic".into()),
+        ("state", format!("at most {} bytes, all in one MODEL", state(header, &plan.name, plan.export.real == Real::Float))),
+        ("conversions", format!("no warning by gcc -std=c99 -Wall -Wextra -Wconversion -pedantic{flags}")),
     ];
     all.iter()
         .map(|(what, how)| format!(" *     {:17} {how}\n", format!("{what}:")))
@@ -81,7 +87,7 @@ fn frame(function: &str) -> usize {
         }
     };
     let of_line = |line: &str| match line.trim_start().strip_prefix("const ").unwrap_or(line.trim_start()) {
-        declared if declared.starts_with("double ") => match declared.split_once(" = ") {
+        declared if declared.starts_with("double ") || declared.starts_with("ha_wide ") => match declared.split_once(" = ") {
             Some((name, value)) if !value.starts_with('{') => 8 * array(name),
             _ => 8 * array(declared),
         },
@@ -91,13 +97,13 @@ fn frame(function: &str) -> usize {
 }
 
 /// Bytes of the model: its members, each in whole words.
-fn state(header: &str, name: &str) -> usize {
+fn state(header: &str, name: &str, single: bool) -> usize {
     let members = header.split(&format!("typedef struct {name} {{")).nth(1);
     let members = members.and_then(|rest| rest.split(&format!("}} {name};")).next()).unwrap_or_default();
-    members.lines().map(member).sum()
+    members.lines().map(|line| member(line, single)).sum()
 }
 
-fn member(line: &str) -> usize {
+fn member(line: &str, single: bool) -> usize {
     let line = line.split("/*").next().unwrap_or_default().trim().trim_end_matches(';');
     let line = line.strip_prefix("unsigned ").unwrap_or(line);
     let Some((kind, names)) = line.split_once(' ') else { return 0 };
@@ -105,7 +111,9 @@ fn member(line: &str) -> usize {
         "char" => 1,
         "int" => 4,
         "double" => 8,
+        "float" => 4,
         kind if kind.ends_with("_failure") => 16,
+        kind if kind.ends_with("_point") && single => 24,
         kind if ["_delay", "_point", "_sample"].iter().any(|end| kind.ends_with(end)) => 32,
         _ => return 0,
     };

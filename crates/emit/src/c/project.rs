@@ -6,6 +6,7 @@ use halfarrow_compiler::program::Observed;
 use halfarrow_compiler::unit::Unit;
 
 use super::{Export, messages, template};
+use crate::Real;
 
 /// `main.c`.
 pub(super) fn main(export: &Export, name: &str) -> String {
@@ -16,7 +17,11 @@ pub(super) fn main(export: &Export, name: &str) -> String {
     let units: String = recorded.iter().map(|o| field(&unit(o))).collect();
     let mut lines = String::new();
     for (i, o) in recorded.iter().enumerate() {
-        let _ = writeln!(lines, "    printf(\",%.17g\", {});", declared(i, o.unit.as_ref()));
+        let (digits, value) = match export.real {
+            Real::Double => (17, format!("m->y[{i}]")),
+            Real::Float => (9, format!("(double)m->y[{i}]")),
+        };
+        let _ = writeln!(lines, "    printf(\",%.{digits}g\", {});", declared(&value, o.unit.as_ref()));
     }
     let text = include_str!("runtime/main.c")
         .replace("PRINT_OUTPUTS\n", &lines)
@@ -27,14 +32,13 @@ pub(super) fn main(export: &Export, name: &str) -> String {
 }
 
 /// An output in the unit that the model declares for it, as C.
-fn declared(i: usize, unit: Option<&Unit>) -> String {
-    let si = format!("m->y[{i}]");
+fn declared(si: &str, unit: Option<&Unit>) -> String {
     match unit.filter(|unit| !unit.is_si()) {
-        None => si,
+        None => si.to_string(),
         Some(unit) => {
             let offset = unit.to_si_f64(0.0);
             let factor = unit.to_si_f64(1.0) - offset;
-            let shifted = if offset == 0.0 { si } else { format!("({si} - {offset:?})") };
+            let shifted = if offset == 0.0 { si.to_string() } else { format!("({si} - {offset:?})") };
             format!("{shifted} / {factor:?} /* {} */", unit.to_string().replace("*/", "* /"))
         }
     }

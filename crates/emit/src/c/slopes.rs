@@ -8,10 +8,11 @@ use super::ssa::Act;
 use super::write::number;
 
 /// A whole power by repeated squaring, in the order of `math::powi`; gives the expression of the result.
-pub(super) fn power(text: &mut String, name: &str, a: &str, n: u32) -> String {
+pub(super) fn power(text: &mut String, (name, wide): (&str, bool), a: &str, n: u32) -> String {
     if n == 0 {
         return "1.0".into();
     }
+    let kind = if wide { "ha_wide" } else { "double" };
     let (mut result, mut square, mut left, mut at) = (None::<String>, a.to_string(), n, 0);
     loop {
         if left & 1 == 1 {
@@ -19,7 +20,7 @@ pub(super) fn power(text: &mut String, name: &str, a: &str, n: u32) -> String {
                 None => square.clone(),
                 Some(before) if left == 1 => return format!("{before} * {square}"),
                 Some(before) => {
-                    let _ = writeln!(text, "    const double {name}_r{at} = {before} * {square};");
+                    let _ = writeln!(text, "    const {kind} {name}_r{at} = {before} * {square};");
                     format!("{name}_r{at}")
                 }
             });
@@ -29,7 +30,7 @@ pub(super) fn power(text: &mut String, name: &str, a: &str, n: u32) -> String {
             return result.unwrap_or_else(|| "1.0".into());
         }
         at += 1;
-        let _ = writeln!(text, "    const double {name}_s{at} = {square} * {square};");
+        let _ = writeln!(text, "    const {kind} {name}_s{at} = {square} * {square};");
         square = format!("{name}_s{at}");
     }
 }

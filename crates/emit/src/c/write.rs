@@ -1,5 +1,6 @@
 //! Steps as C functions: straight lines in chunks, what crosses from one to the next in the model's work array.
 
+use std::cell::RefCell;
 use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
@@ -12,6 +13,7 @@ use super::header::comment;
 use super::slopes::{call, power, rate_of};
 use super::ssa::{Act, Arg, Code, Step};
 use super::variables::Variables;
+use crate::Real;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
 const CHUNK: usize = 250;
@@ -32,6 +34,8 @@ pub(super) struct Shape {
     pub time: &'static str,
     /// The fixed registers that move, if derivatives are wanted: ranges within the direction.
     pub along: Option<Moving>,
+    /// Whether what it gives is in double precision whatever real numbers are.
+    pub wide: bool,
 }
 
 /// What has derivatives.
@@ -44,6 +48,12 @@ pub(super) struct Moving {
     pub states: bool,
     /// What a Newton block reads from outside.
     pub outer: bool,
+}
+
+/// Numbers that `lu.c` takes for a matrix: twice the matrix, scales of rows, work, what is left, and in single precision the
+/// magnitudes of columns.
+pub(super) fn elimination_room(n: usize, real: Real) -> usize {
+    2 * n * n + if real == Real::Double { 3 * n } else { 4 * n }
 }
 
 /// Where linear blocks with a constant matrix keep their factors.
@@ -68,6 +78,12 @@ pub(super) struct Writer<'a> {
     /// Places of the work array taken so far.
     pub crossing: usize,
     variables: Variables,
+    /// The size of real numbers.
+    pub real: Real,
+    /// Places of the array for what crosses in double precision, if real numbers are less.
+    pub wide_crossing: usize,
+    /// The place of each fixed register computed from parameters that is read in double precision.
+    pub exact: RefCell<FxHashMap<Register, usize>>,
 }
 
 /// A number as C reads it back to the bit.
@@ -94,7 +110,7 @@ pub(super) fn numbers(values: &[f64]) -> String {
 }
 
 impl<'a> Writer<'a> {
-    pub fn new(program: &'a Program, layout: &'a Layout) -> Writer<'a> {
+    pub fn new(program: &'a Program, layout: &'a Layout, real: Real) -> Writer<'a> {
         let constants: FxHashMap<Register, f64> = layout.constants.iter().copied().collect();
         let first = program.parameters.len() as Register;
         let computed = (first..layout.time).filter(|r| !constants.contains_key(r));
@@ -106,12 +122,23 @@ impl<'a> Writer<'a> {
             if n > 1 && matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
                 let number = factored.places.len();
                 factored.places.insert(id.0, (number, factored.size, factored.orders));
-                factored.size += 2 * n * n + 3 * n;
+                factored.size += elimination_room(n, real);
                 factored.orders += n;
             }
         }
         let variables = Variables::of(program, layout);
-        Writer { program, layout, derived, constants, factored, crossing: 0, variables }
+        Writer {
+            program,
+            layout,
+            derived,
+            constants,
+            factored,
+            crossing: 0,
+            variables,
+            real,
+            wide_crossing: 0,
+            exact: RefCell::default(),
+        }
     }
 
     /// A fixed register in C.
@@ -129,6 +156,43 @@ impl<'a> Writer<'a> {
             r if r < l.states => format!("m->k[{}]", r - l.conserved),
             r => format!("x[{}]", r - l.states),
         }
+    }
+
+    /// A fixed register in C, in double precision.
+    pub fn fixed_wide(&self, r: Register) -> String {
+        let constant = self.constants.contains_key(&r);
+        match r {
+            _ if self.real == Real::Double || constant || r == self.layout.time => self.fixed(r),
+            r if r < self.program.parameters.len() as Register => format!("m->p_exact[{r}]"),
+            r if r < self.layout.time => {
+                let mut exact = self.exact.borrow_mut();
+                let next = exact.len();
+                format!("m->c_exact[{}]", exact.entry(r).or_insert(next))
+            }
+            r => format!("ha_widen({})", self.fixed(r)),
+        }
+    }
+
+    /// Which locals are in double precision whatever real numbers are: those that follow from time and parameters alone,
+    /// so that time has its digits in long runs.
+    fn wide(&self, code: &Code) -> Vec<bool> {
+        let mut wide = vec![false; code.locals as usize];
+        if self.real == Real::Double {
+            return wide;
+        }
+        for step in &code.steps {
+            let solved = matches!(
+                step.act,
+                Act::Linear(_) | Act::Newton(_) | Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..)
+            );
+            let all = step.args.iter().all(|&a| match a {
+                Arg::Fixed(r) => r <= self.layout.time,
+                Arg::Local(i) => wide[i as usize],
+                Arg::Outer(_) | Arg::Guess(_) => false,
+            });
+            step.outs.iter().for_each(|&out| wide[out as usize] = all && !solved);
+        }
+        wide
     }
 
     /// Whether a fixed register moves, and where it stands in the direction.
@@ -152,6 +216,7 @@ impl<'a> Writer<'a> {
         let mut f = Body {
             shape,
             moves,
+            wide: self.wide(code),
             read: code.read(),
             home: vec![0; code.locals as usize],
             place: vec![usize::MAX; code.locals as usize],
@@ -216,11 +281,12 @@ impl<'a> Writer<'a> {
 
     fn cross(&mut self, f: &mut Body, local: usize) {
         if f.place[local] == usize::MAX {
-            f.place[local] = self.crossing;
-            self.crossing += 1;
+            let crossing = if f.wide[local] { &mut self.wide_crossing } else { &mut self.crossing };
+            f.place[local] = *crossing;
+            *crossing += 1;
             if f.moves[local] {
-                f.rate_place[local] = self.crossing;
-                self.crossing += 1;
+                f.rate_place[local] = *crossing;
+                *crossing += 1;
             }
         }
     }
@@ -281,55 +347,111 @@ impl<'a> Writer<'a> {
         let wanted: Vec<(usize, Arg)> = code.outputs.iter().copied().enumerate().filter(|(_, a)| here(*a, f)).collect();
         for (i, a) in wanted {
             if let Some(place) = values.get(i) {
-                let value = self.arg(f, a);
+                let value = self.arg(f, a, f.shape.wide);
                 let _ = writeln!(f.text, "    {place} = {value};");
             }
             if let Some(place) = rates.get(i) {
-                let rate = self.rate(f, a).unwrap_or_else(|| "0.0".into());
+                let rate = self.rate(f, a, f.shape.wide).unwrap_or_else(|| "0.0".into());
                 let _ = writeln!(f.text, "    {place} = {rate};");
             }
         }
         let fixed: Vec<(Register, Arg)> = code.fixed.iter().copied().filter(|(_, a)| here(*a, f)).collect();
         for (r, a) in fixed {
-            let (place, value) = (self.fixed(r), self.arg(f, a));
+            let (place, value) = (self.fixed(r), self.arg(f, a, false));
             let _ = writeln!(f.text, "    {place} = {value};");
+            if self.real == Real::Float {
+                self.keep_exact(f, r, a);
+            }
         }
     }
 
-    fn arg(&self, f: &Body, a: Arg) -> String {
-        match a {
-            Arg::Fixed(r) => self.fixed(r),
-            Arg::Local(i) if f.home[i as usize] == f.chunk => format!("v{i}"),
-            Arg::Local(i) => format!("m->w[{}]", f.place[i as usize]),
-            Arg::Outer(i) => format!("o[{i}]"),
-            Arg::Guess(i) => format!("g[{i}]"),
+    /// Keeps what follows from parameters in double precision too where that is read, and sees that it fits.
+    fn keep_exact(&self, f: &mut Body, r: Register, a: Arg) {
+        let value = self.arg(f, a, true);
+        let count = self.program.parameters.len();
+        if (r as usize) < count || self.exact.borrow().contains_key(&r) {
+            let _ = writeln!(f.text, "    {} = {value};", self.fixed_wide(r));
+        }
+        let _ = writeln!(
+            f.text,
+            "    if (!ha_fits({value})) {{\n        return ha_fail(m, MODEL_OUT_OF_RANGE, {}, {});\n    }}",
+            count.min(r as usize),
+            f.shape.time
+        );
+    }
+
+    /// A value, in double precision or in that of real numbers.
+    fn arg(&self, f: &Body, a: Arg, wide: bool) -> String {
+        let local = |i: u32| match (f.home[i as usize] == f.chunk, f.wide[i as usize]) {
+            (true, _) => format!("v{i}"),
+            (false, true) => format!("m->wide[{}]", f.place[i as usize]),
+            (false, false) => format!("m->w[{}]", f.place[i as usize]),
+        };
+        let (text, is_wide) = match a {
+            Arg::Fixed(r) if wide => (self.fixed_wide(r), true),
+            Arg::Fixed(r) => (self.fixed(r), r == self.layout.time),
+            Arg::Local(i) => (local(i), f.wide[i as usize]),
+            Arg::Outer(i) => (format!("o[{i}]"), false),
+            Arg::Guess(i) => (format!("g[{i}]"), false),
+        };
+        self.cast(text, is_wide, wide)
+    }
+
+    fn cast(&self, text: String, from_wide: bool, to_wide: bool) -> String {
+        match (from_wide, to_wide) {
+            _ if self.real == Real::Double => text,
+            (true, false) => format!("ha_narrow({text})"),
+            (false, true) => format!("ha_widen({text})"),
+            _ => text,
         }
     }
 
     /// The derivative, if it moves.
-    fn rate(&self, f: &Body, a: Arg) -> Option<String> {
+    fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<String> {
         let moving = f.shape.along?;
-        match a {
-            Arg::Fixed(r) => self.fixed_rate(r, moving),
-            Arg::Local(i) if !f.moves[i as usize] => None,
-            Arg::Local(i) if f.home[i as usize] == f.chunk => Some(format!("d{i}")),
-            Arg::Local(i) => Some(format!("m->w[{}]", f.rate_place[i as usize])),
-            Arg::Outer(i) => moving.outer.then(|| format!("e[{i}]")),
-            Arg::Guess(_) => None,
+        let (text, is_wide) = match a {
+            Arg::Fixed(r) => (self.fixed_rate(r, moving)?, false),
+            Arg::Local(i) if !f.moves[i as usize] => return None,
+            Arg::Local(i) => {
+                let (place, is_wide) = (f.rate_place[i as usize], f.wide[i as usize]);
+                match f.home[i as usize] == f.chunk {
+                    true => (format!("d{i}"), is_wide),
+                    false => (format!("m->{}[{place}]", if is_wide { "wide" } else { "w" }), is_wide),
+                }
+            }
+            Arg::Outer(i) => (moving.outer.then(|| format!("e[{i}]"))?, false),
+            Arg::Guess(_) => return None,
+        };
+        Some(self.cast(text, is_wide, wide))
+    }
+
+    /// Whether a step is computed in double precision, and whether its derivative is, if real numbers are less.
+    fn precision(&self, f: &Body, step: &Step) -> (bool, bool) {
+        let single = self.real == Real::Float;
+        let all = || step.args.iter().all(|&a| matches!(a, Arg::Local(i) if f.wide[i as usize]) || matches!(a, Arg::Fixed(r) if r <= self.layout.time));
+        match step.act {
+            Act::Side(_) | Act::Floor(_) => (single, single),
+            Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => (single, false),
+            Act::Watch(_) => (single && all(), false),
+            _ => {
+                let wide = step.outs.first().is_some_and(|&out| f.wide[out as usize]);
+                (wide, wide)
+            }
         }
     }
 
     fn step(&self, f: &mut Body, step: &Step, place: usize) {
-        let a: Vec<String> = step.args.iter().map(|&a| self.arg(f, a)).collect();
-        let d: Vec<Option<String>> = step.args.iter().map(|&a| self.rate(f, a)).collect();
+        let (wide, wide_rate) = self.precision(f, step);
+        let a: Vec<String> = step.args.iter().map(|&a| self.arg(f, a, wide)).collect();
+        let d: Vec<Option<String>> = step.args.iter().map(|&a| self.rate(f, a, wide_rate)).collect();
         match step.act {
             Act::Watch(watch) => {
+                let rounding = 64.0 * if wide { f64::EPSILON } else { self.real.epsilon() };
+                let holds = format!("{0} != 0.0 && fabs({0}) > {1} * {2}", a[0], number(rounding), a[1]);
+                let holds = if wide { format!("HA_WIDE({holds})") } else { format!("({holds})") };
                 let _ = writeln!(
                     f.text,
-                    "    if (!({0} != 0.0 && fabs({0}) > {1} * {2})) {{\n        return ha_fail(m, MODEL_VANISHED, {watch}, {3});\n    }}",
-                    a[0],
-                    number(64.0 * f64::EPSILON),
-                    a[1],
+                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {watch}, {});\n    }}",
                     f.shape.time
                 );
             }
@@ -351,7 +473,11 @@ impl<'a> Writer<'a> {
         let pair = f.turns.entry(angle(step.args[0])).or_default();
         let number = *pair.get_or_insert(place);
         if number == place {
-            let _ = writeln!(f.text, "    double h{place}[2];\n    ha_turn({}, h{place});", a[0]);
+            let call = format!("ha_turn({}, h{place})", a[0]);
+            let _ = match f.wide[out as usize] {
+                true => writeln!(f.text, "    ha_wide h{place}[2];\n    HA_WIDE({call});"),
+                false => writeln!(f.text, "    double h{place}[2];\n    {call};"),
+            };
         }
         let value = format!("h{number}[{}]", usize::from(step.act == Act::Call(Function::Cos)));
         let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
@@ -361,22 +487,23 @@ impl<'a> Writer<'a> {
     fn plain(&self, f: &mut Body, step: &Step, a: &[String], d: &[Option<String>]) {
         let out = step.outs[0];
         if let Act::Powi(n) = step.act {
-            let value = power(&mut f.text, &format!("v{out}"), &a[0], n);
+            let wide = f.wide[out as usize];
+            let value = power(&mut f.text, (&format!("v{out}"), wide), &a[0], n);
             self.put(f, out, &value, None);
             if f.moves[out as usize] {
-                let below = power(&mut f.text, &format!("d{out}"), &a[0], n.saturating_sub(1));
+                let below = power(&mut f.text, (&format!("d{out}"), wide), &a[0], n.saturating_sub(1));
                 let slope = format!("{} * ({below})", number(f64::from(n)));
                 let rate = d[0].as_ref().map(|d| format!("ha_along({slope}, {d})"));
                 self.put_rate(f, out, &rate.unwrap_or_else(|| "0.0".into()));
             }
             return;
         }
-        let value = self.value(f, step.act, a, d);
+        let value = self.value(f, (step.act, out), a, d);
         let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
         self.put(f, out, &value, rate.as_deref());
     }
 
-    fn value(&self, f: &Body, act: Act, a: &[String], d: &[Option<String>]) -> String {
+    fn value(&self, f: &Body, (act, out): (Act, u32), a: &[String], d: &[Option<String>]) -> String {
         match act {
             Act::Neg => format!("-{}", a[0]),
             Act::Add => format!("{} + {}", a[0], a[1]),
@@ -394,8 +521,14 @@ impl<'a> Writer<'a> {
             Act::Or => format!("{} != 0.0 || {} != 0.0 ? 1.0 : 0.0", a[0], a[1]),
             Act::Not => format!("{} == 0.0 ? 1.0 : 0.0", a[0]),
             Act::Select => format!("{} != 0.0 ? {} : {}", a[0], a[1], a[2]),
-            Act::Parameter(index) => format!("m->set[{index}] ? m->p[{index}] : {}", a[0]),
-            Act::Side(condition) | Act::Floor(condition) => self.condition(f, condition, &a[0], d[0].as_deref()),
+            Act::Parameter(index) => {
+                let given = self.fixed_wide(index);
+                format!("m->set[{index}] ? {given} : {}", a[0])
+            }
+            Act::Side(condition) | Act::Floor(condition) => {
+                let taken = self.condition(f, condition, &a[0], d[0].as_deref());
+                self.cast(taken, true, f.wide[out as usize])
+            }
             Act::Powi(_) | Act::Watch(_) | Act::Linear(_) | Act::Newton(_) => unreachable!("written elsewhere"),
             Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => unreachable!("written elsewhere"),
         }
@@ -463,7 +596,7 @@ impl<'a> Writer<'a> {
         let (matrix, right) = a.split_at(n * n);
         let symmetric = self.program.blocks[BlockId(block)].is_symmetric();
         if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
-            f.text += &definite(matrix, right, number, &fail);
+            f.text += &definite(matrix, right, (number, self.real.epsilon()), &fail);
             return self.solved(f, step, number);
         }
         let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
@@ -530,9 +663,13 @@ impl<'a> Writer<'a> {
 
     fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
         let name = f.names[out as usize].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
-        let _ = writeln!(f.text, "    const double v{out} = {value};{name}");
+        let _ = match f.wide[out as usize] {
+            true => writeln!(f.text, "    const ha_wide v{out} = HA_WIDE({value});{name}"),
+            false => writeln!(f.text, "    const double v{out} = {value};{name}"),
+        };
         if f.place[out as usize] != usize::MAX {
-            let _ = writeln!(f.text, "    m->w[{}] = v{out};", f.place[out as usize]);
+            let array = if f.wide[out as usize] { "wide" } else { "w" };
+            let _ = writeln!(f.text, "    m->{array}[{}] = v{out};", f.place[out as usize]);
         }
         if let Some(rate) = rate {
             self.put_rate(f, out, rate);
@@ -540,9 +677,13 @@ impl<'a> Writer<'a> {
     }
 
     fn put_rate(&self, f: &mut Body, out: u32, rate: &str) {
-        let _ = writeln!(f.text, "    const double d{out} = {rate};");
+        let _ = match f.wide[out as usize] {
+            true => writeln!(f.text, "    const ha_wide d{out} = HA_WIDE({rate});"),
+            false => writeln!(f.text, "    const double d{out} = {rate};"),
+        };
         if f.rate_place[out as usize] != usize::MAX {
-            let _ = writeln!(f.text, "    m->w[{}] = d{out};", f.rate_place[out as usize]);
+            let array = if f.wide[out as usize] { "wide" } else { "w" };
+            let _ = writeln!(f.text, "    m->{array}[{}] = d{out};", f.rate_place[out as usize]);
         }
     }
 }
@@ -551,6 +692,8 @@ impl<'a> Writer<'a> {
 struct Body {
     shape: Shape,
     moves: Vec<bool>,
+    /// Which locals are in double precision whatever real numbers are.
+    wide: Vec<bool>,
     read: Vec<bool>,
     /// The chunk that computes each local.
     home: Vec<usize>,
@@ -588,7 +731,7 @@ fn turns(steps: &[Step]) -> FxHashMap<Angle, Option<usize>> {
 }
 
 /// Symmetric linear equations, solved as `lu.c` does where the matrix is definite; else by it. Solution in `s<number>`.
-fn definite(matrix: &[String], right: &[String], number: usize, fail: &str) -> String {
+fn definite(matrix: &[String], right: &[String], (number, epsilon): (usize, f64), fail: &str) -> String {
     let n = right.len();
     let mut text = format!("    double s{number}[{n}];\n    {{\n");
     let mut line = |words: String| {
@@ -599,7 +742,7 @@ fn definite(matrix: &[String], right: &[String], number: usize, fail: &str) -> S
     let mut good = Vec::new();
     for k in 0..n {
         line(format!("const double p{k} = sign * {};", u[k * n + k]));
-        let rounding = self::number(f64::EPSILON * n as f64);
+        let rounding = self::number(epsilon * n as f64);
         good.push(format!("p{k} > 0.0 && p{k} > {rounding} * (sign * {}) && ha_finite(p{k})", matrix[k * n + k]));
         line(format!("const double i{k} = 1.0 / {};", u[k * n + k]));
         for j in k + 1..n {
@@ -638,7 +781,9 @@ fn without_the_unused(text: &str) -> String {
     let mut kept = Vec::new();
     for line in text.lines().rev() {
         let code = line.split(" /* ").next().unwrap_or(line);
-        let declared = code.trim_start().strip_prefix("const double ").and_then(|rest| rest.split([' ', '[']).next());
+        let bare = code.trim_start();
+        let declared = bare.strip_prefix("const double ").or_else(|| bare.strip_prefix("const ha_wide "));
+        let declared = declared.and_then(|rest| rest.split([' ', '[']).next());
         if declared.is_some_and(|name| !seen.contains(name)) {
             continue;
         }

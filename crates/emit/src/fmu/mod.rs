@@ -11,7 +11,7 @@ mod units;
 mod variables;
 
 use crate::c::{self, Cost, template};
-use crate::{EmitError, File};
+use crate::{EmitError, File, Real};
 use variables::Variables;
 
 /// Versions of the interface.
@@ -51,7 +51,7 @@ pub fn write(export: &c::Export, version: Version) -> Result<Written, EmitError>
     let recorded: Vec<usize> = at.iter().map(|&k| export.recorded[k]).collect();
     let mut start = export.start.clone();
     start.observed = at.iter().map(|&k| start.observed.get(k).copied().unwrap_or(f64::NAN)).collect();
-    let export = c::Export { recorded: &recorded, start: &start, derivatives: true, ..*export };
+    let export = c::Export { recorded: &recorded, start: &start, derivatives: true, real: Real::Double, ..*export };
     let written = c::write(&export)?;
     let variables = Variables::of(&export);
     let api = match version {

@@ -5,7 +5,7 @@ use halfarrow_compiler::bond_graph::{FileError, Files};
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::Form;
 use halfarrow_emit::c::{Export, Written, write};
-use halfarrow_emit::{Method, Start};
+use halfarrow_emit::{Method, Real, Start};
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Options, Sink, System, simulate};
@@ -83,11 +83,12 @@ pub fn export_program(
         scales: model.scales().to_vec(),
         times: program.held.iter().map(|h| model.constant(h.time).unwrap_or(f64::NAN)).collect(),
         parameters: program.parameters.iter().map(|p| model.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
+        derived: model.derived().to_vec(),
         inputs: program.inputs.iter().map(|i| model.constant(i.default).unwrap_or(0.0)).collect(),
         observed: vec![f64::NAN; model.observed()],
     };
     let recorded = model.recorded().to_vec();
-    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives };
+    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real: Real::Double };
     let written = write(&export).expect("an explicit program");
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());

@@ -211,6 +211,11 @@ impl Model {
         (self.program.values.reads(value) == Reads::PARAMETERS).then(|| self.frame.r[register as usize])
     }
 
+    /// All values that follow from parameters alone, as they stand in the equations.
+    pub fn derived(&self) -> &[f64] {
+        &self.frame.r[self.program.parameters.len()..self.layout.time as usize]
+    }
+
     /// Connects a table of values over time to an input: straight lines between the points, the first value before
     /// them, the last one after them. A time given twice is a jump.
     ///

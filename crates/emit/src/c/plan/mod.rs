@@ -13,22 +13,23 @@ use halfarrow_compiler::program::{
 use super::cost::{Cost, Work};
 use super::ssa::{self, Code, Inner};
 use super::start::{self, Group, Pass};
-use super::write::{Moving, Shape, Writer, number};
-use super::{Export, messages, template};
-use crate::{EmitError, Method};
+use super::write::{Moving, Shape, Writer, elimination_room, number};
+use super::{Export, messages, real, template};
+use crate::{EmitError, Method, Real};
 
 /// Points that all delays together may keep.
 const MOST_POINTS: f64 = 1e6;
 
 const PLAIN: Shape = Shape {
-    parameters: "ha_model *m, double t, const double *x, double *out",
+    parameters: "ha_model *m, ha_wide t, const double *x, double *out",
     arguments: "m, t, x, out",
     void: false,
     time: "t",
     along: None,
+    wide: false,
 };
 const ALONG: Shape = Shape {
-    parameters: "ha_model *m, double t, const double *x, const double *e, double *out, double *rates",
+    parameters: "ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates",
     arguments: "m, t, x, e, out, rates",
     ..PLAIN
 };
@@ -65,6 +66,9 @@ pub(super) struct Plan<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sizes {
     pub derived: usize,
+    /// Of those computed from parameters that are read in double precision, and of what crosses in it.
+    pub exact: usize,
+    pub wide: usize,
     pub crossing: usize,
     pub memory: usize,
     pub work: usize,
@@ -120,18 +124,16 @@ impl<'a> Plan<'a> {
     fn write_functions(&mut self) {
         let program = self.program;
         let layout = self.layout.clone();
-        let mut writer = Writer::new(program, &layout);
+        let mut writer = Writer::new(program, &layout, self.export.real);
         let mut inner = Inner::default();
         let mut text = String::new();
         let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
 
         let preamble = ssa::of_routine(program, &layout, &program.preamble(&layout), &mut inner);
-        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "(double)NAN", ..PLAIN };
         let preamble = Code { outputs: Vec::new(), ..preamble };
-        text += &writer.function("ha_preamble_code", shape, &preamble, &[], &[]);
-        text += &self.of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default));
-        text += &self.of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time));
-        text += &self.of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked));
+        text += &self.of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false);
+        text += &self.of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true);
+        text += &self.of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false);
 
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = program.watched_routine(&layout, &rates);
@@ -177,9 +179,10 @@ impl<'a> Plan<'a> {
         let of = |routine: &Routine, inner: &mut Inner| ssa::of_routine(program, &layout, routine, inner);
         let clock_code = of(&clock, &mut inner);
         let shape = Shape {
-            parameters: "ha_model *m, double t, double *out, double *rates",
+            parameters: "ha_model *m, ha_wide t, ha_wide *out, ha_wide *rates",
             arguments: "m, t, out, rates",
             along: Some(Moving { time: true, ..Moving::default() }),
+            wide: true,
             ..PLAIN
         };
         let n = clock_code.outputs.len();
@@ -214,6 +217,10 @@ impl<'a> Plan<'a> {
             text += &along(&mut writer, &format!("ha_start_{kind}_{number}"), &code, begin);
         }
 
+        // Last, once it is known what is read in double precision.
+        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
+        text = writer.function("ha_preamble_code", shape, &preamble, &[], &[]) + &text;
+
         let used: Vec<BlockId> = {
             let mut used: Vec<BlockId> = inner.keys().copied().collect();
             used.sort_unstable();
@@ -239,10 +246,14 @@ impl<'a> Plan<'a> {
     }
 
     /// Values of parameters alone, from where the preamble leaves them.
-    fn of_parameters(&self, writer: &Writer, name: &str, values: impl Iterator<Item = Value>) -> String {
-        let mut text = format!("static void {name}(const ha_model *m, double *out)\n{{\n");
+    fn of_parameters(&self, writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> String {
+        let kind = if wide { "ha_wide" } else { "double" };
+        let mut text = format!("static void {name}(const ha_model *m, {kind} *out)\n{{\n");
         for (i, value) in values.enumerate() {
-            let place = self.layout.registers.get(&value).map_or("0.0".into(), |&r| writer.fixed(r));
+            let place = self.layout.registers.get(&value).map_or("0.0".into(), |&r| match wide {
+                true => format!("HA_WIDE({})", writer.fixed_wide(r)),
+                false => writer.fixed(r),
+            });
             text += &format!("    out[{i}] = {place};\n");
         }
         text + "    (void)m;\n    (void)out;\n}\n\n"
@@ -256,6 +267,7 @@ impl<'a> Plan<'a> {
             void: true,
             time: "0.0",
             along: None,
+            wide: false,
         };
         let right = (0..n).map(|i| format!("right[{i}]"));
         let values: Vec<String> = right.chain((0..n * n).map(|i| format!("matrix[{i}]"))).collect();
@@ -295,7 +307,7 @@ impl<'a> Plan<'a> {
             if self.program.values.reads(domain.argument) == Reads::PARAMETERS {
                 let a = writer.fixed(routine.outputs[i]);
                 text += &format!(
-                    "    if (ha_finite({a}) && !ha_is_within({i}, {a})) {{\n        return ha_fail(m, MODEL_OUT_OF_DOMAIN, {i}, (double)NAN);\n    }}\n"
+                    "    if (ha_finite({a}) && !ha_is_within({i}, {a})) {{\n        return ha_fail(m, MODEL_OUT_OF_DOMAIN, {i}, HA_WIDE((double)NAN));\n    }}\n"
                 );
             }
         }
@@ -308,10 +320,12 @@ impl<'a> Plan<'a> {
         let most_linear = linear.max().unwrap_or(0);
         let newton: Vec<(usize, usize)> =
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (program.blocks[*b].size(), reads)).collect();
-        let lu = |n: usize| 2 * n * n + 3 * n;
+        let lu = |n: usize| elimination_room(n, self.export.real);
         let work = |&(n, reads): &(usize, usize)| 16 * n + reads + 4 * n * n + lu(n);
         self.sizes = Sizes {
             derived: writer.derived.len(),
+            exact: writer.exact.borrow().len(),
+            wide: writer.wide_crossing,
             crossing: writer.crossing,
             memory: newton.iter().map(|(n, reads)| 2 * (n + reads + n * n)).sum(),
             work: newton.iter().map(work).max().unwrap_or(0).max(lu(most_linear)),
@@ -340,9 +354,17 @@ impl<'a> Plan<'a> {
         let (flags, mut words) = (self.flags(), self.words());
         words.insert("OBLIGATION_LINES".into(), obligations.to_string());
         words.insert("MODEL_TITLE".into(), super::header::comment(&self.program.name));
-        let piece = |text: &str| template::fill(&template::choose(text, &flags), &words);
+        let size = self.export.real;
+        let filled = |text: &str| template::fill(&template::choose(text, &flags), &words);
+        let piece = |text: &str| real::of(&filled(text), size);
         let mut text = piece(include_str!("../runtime/top.c"));
         text += math::C_SOURCE;
+        text += "\n/* ---- small things ---- */\n\n";
+        if size == Real::Float {
+            text += include_str!("../runtime/single.c");
+            text += &real::wide(&filled(include_str!("../runtime/small.c")), size);
+        }
+        text += &piece(include_str!("../runtime/small.c"));
         text += &piece(include_str!("../runtime/helpers.c"));
         if self.sizes.order > 0 {
             text += &piece(include_str!("../runtime/lu.c"));
@@ -350,11 +372,12 @@ impl<'a> Plan<'a> {
         if !self.newton.is_empty() {
             text += &piece(include_str!("../runtime/newton.c"));
         }
-        text += &piece(include_str!("../runtime/conditions.c"));
+        text += &piece(include_str!("../runtime/tables.c"));
+        text += &real::wide(&filled(include_str!("../runtime/conditions.c")), size);
         text += "\n/* ---- the equations ---- */\n\n";
-        text += &self.functions;
+        text += &real::of(&self.functions, size);
         if !self.clocks.is_empty() {
-            text += &piece(include_str!("../runtime/clock.c"));
+            text += &real::wide(&filled(include_str!("../runtime/clock.c")), size);
         }
         text += &piece(include_str!("../runtime/held.c"));
         text += &piece(include_str!("../runtime/system.c"));
@@ -390,7 +413,8 @@ impl<'a> Plan<'a> {
         let held = !self.program.held.is_empty();
         let conditions = &self.program.conditions;
         let drift = self.export.method.is_linearly_implicit();
-        let all: [(&str, bool); 34] = [
+        let all: [(&str, bool); 35] = [
+            ("single", self.export.real == Real::Float),
             ("tables", !self.program.tables.is_empty()),
             ("conditions", !conditions.is_empty()),
             ("conditions_along", !conditions.is_empty()),

@@ -8,7 +8,7 @@ use halfarrow_compiler::program::{BlockId, Cause, ConditionId, ConditionKind};
 use super::super::start::Group;
 use super::super::write::{number, numbers};
 use super::Plan;
-use crate::Method;
+use crate::{Method, Real};
 
 impl Plan<'_> {
     /// Each word with its text.
@@ -108,7 +108,18 @@ impl Plan<'_> {
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
         let more = linearly_implicit(self.export.method);
-        words.into_iter().chain(more).map(|(word, text)| (word.to_string(), text)).collect()
+        words.into_iter().chain(more).chain(tolerances(self.export.real)).map(|(word, text)| (word.to_string(), text)).collect()
+    }
+
+    /// Numbers of a table in double precision whatever real numbers are.
+    fn wide_numbers(&self, values: &[f64]) -> String {
+        match self.export.real {
+            Real::Double => numbers(values),
+            Real::Float => {
+                let rows = values.chunks(4).map(|row| row.iter().map(|&v| format!("HA_WIDE({})", number(v))));
+                rows.map(|row| format!("    {}", row.collect::<Vec<_>>().join(", "))).collect::<Vec<_>>().join(",\n")
+            }
+        }
     }
 
     fn tables(&self) -> String {
@@ -117,7 +128,7 @@ impl Plan<'_> {
         for (i, table) in self.program.tables.iter().enumerate() {
             let pieces: Vec<String> =
                 table.pieces().iter().map(|c| format!("    {{{}}}", c.map(number).join(", "))).collect();
-            text += &format!("static const double ha_table_{i}_x[] = {{\n{}\n}};\n", numbers(table.x()));
+            text += &format!("static const ha_wide ha_table_{i}_x[] = {{\n{}\n}};\n", self.wide_numbers(table.x()));
             text += &format!("static const double ha_table_{i}_y[] = {{\n{}\n}};\n", numbers(table.y()));
             text += &format!("static const double ha_table_{i}_pieces[][4] = {{\n{}\n}};\n", pieces.join(",\n"));
             let outside = match table.outside() {
@@ -209,6 +220,17 @@ impl Plan<'_> {
         }
         text + &list + "};\n" + &groups + "};\n" + &self.guess_tables()
     }
+}
+
+/// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value;
+/// and how far beside a point is another one.
+fn tolerances(real: Real) -> [(&'static str, String); 4] {
+    let words = ["CLOSE_TO_ROUNDING", "ROUNDING_OF_ENTRIES", "ROUNDING_OF_RANK", "BESIDE"];
+    let values = match real {
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e-8],
+        Real::Float => [3e-5, 5e-6, 2e-5, 3e-4],
+    };
+    [0, 1, 2, 3].map(|i| (words[i], number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.

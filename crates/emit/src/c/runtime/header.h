@@ -11,6 +11,12 @@
  * All values are in SI units. Every function but MODEL_message gives 0 or the code of a failure, which then stands in
  * m.failure; MODEL_message says what it means. After a failure the model has to be started again.
  *
+//if single
+ * Real numbers are float. Time is double, so that it does not stand still in long runs; so is what follows from time or from
+ * parameters alone, until something else reads it. What a step adds to a state is carried on where it is less than its last
+ * digit.
+ *
+//end
  * Method: METHOD_NAME with a step of STEP_LENGTH s. What a step costs at most:
 COST_LINES
  */
@@ -71,29 +77,31 @@ typedef struct MODEL_failure {
     /* Which of its kind: of the equations, states, laws... */
     int where;
     /* When, in s; not a number if at any time. */
-    double time;
+    ha_wide time;
 } MODEL_failure;
 
 //if delays
 typedef struct MODEL_point {
-    double t, value, slope, jump;
+    ha_wide t;
+    double value, slope, jump;
 } MODEL_point;
 
 typedef struct MODEL_delay {
-    double time, start;
+    ha_wide time, start;
     int first, count, full;
 } MODEL_delay;
 
 //end
 //if samples
 typedef struct MODEL_sample {
-    double period, value, next, taken;
+    ha_wide period, next, taken;
+    double value;
 } MODEL_sample;
 
 //end
 typedef struct MODEL {
-    double t; /* time, in s */
-    double step; /* length of a step, in s; may be changed before the start */
+    ha_wide t; /* time, in s */
+    ha_wide step; /* length of a step, in s; may be changed before the start */
     double x[SIZE_STATES]; /* states */
     double u[SIZE_INPUTS]; /* inputs */
     double p[SIZE_PARAMETERS]; /* parameters */
@@ -109,20 +117,20 @@ PRIVATE_PARTS
 int MODEL_reset(MODEL *m);
 
 /* Sets a parameter. Before a start the start values follow it; during a run it is a jump at the present time. */
-int MODEL_set_parameter(MODEL *m, int parameter, double value);
+int MODEL_set_parameter(MODEL *m, int parameter, ha_wide value);
 
 /* Begins a run at a time with the start values of the model; outputs are then those at the start. They were found by the
  * exporter; for other parameters, inputs or times they are solved for here, or MODEL_NO_START says that they were not. */
-int MODEL_start(MODEL *m, double t);
+int MODEL_start(MODEL *m, ha_wide t);
 
 /* Begins a run at a time with these states. */
-int MODEL_start_from(MODEL *m, double t, const double *x);
+int MODEL_start_from(MODEL *m, ha_wide t, const double *x);
 
 /* One step; jumps within it are met exactly. */
 int MODEL_step(MODEL *m);
 
 /* One step that ends at another time than the next one: not more than m.step away. */
-int MODEL_step_until(MODEL *m, double end);
+int MODEL_step_until(MODEL *m, ha_wide end);
 
 /* Counts steps from the present time on. */
 void MODEL_align(MODEL *m);
@@ -133,37 +141,37 @@ const char *MODEL_message(const MODEL *m);
 /* ---- for another integrator: what MODEL_step is made of ---- */
 
 /* Rates of the states, as in the present interval between jumps. */
-int MODEL_rates(MODEL *m, double t, const double *x, double *dx);
+int MODEL_rates(MODEL *m, ha_wide t, const double *x, double *dx);
 
 /* Outputs. */
-int MODEL_observe(MODEL *m, double t, const double *x, double *y);
+int MODEL_observe(MODEL *m, ha_wide t, const double *x, double *y);
 
 //if tangent
 /* Derivatives of the rates along a direction v of the states, exactly. */
-int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv);
+int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double *dv);
 
 //end
 //if derivatives
 /* Derivatives of rates (dv) and outputs (dy), where asked for, along a direction of the states (v) and inputs (w), exactly. */
-int MODEL_directional(MODEL *m, double t, const double *x, const double *v, const double *w, double *dv, double *dy);
+int MODEL_directional(MODEL *m, ha_wide t, const double *x, const double *v, const double *w, double *dv, double *dy);
 
 //end
 //if switches
 /* Functions of the state that change their sign where a condition switches. */
-int MODEL_indicators(MODEL *m, double t, const double *x, double *g);
+int MODEL_indicators(MODEL *m, ha_wide t, const double *x, double *g);
 
 /* Whether one of them has another sign than at the last jump. */
-int MODEL_switched(MODEL *m, double t, const double *x, int *switched);
+int MODEL_switched(MODEL *m, ha_wide t, const double *x, int *switched);
 
 //end
 /* The next time after t at which something jumps, infinite if nothing does. */
-double MODEL_next_jump(MODEL *m, double t);
+ha_wide MODEL_next_jump(MODEL *m, ha_wide t);
 
 /* The run stands at a jump, at a switch, or at its beginning: conditions are taken anew, samples taken. */
-int MODEL_cross(MODEL *m, double t, const double *x);
+int MODEL_cross(MODEL *m, ha_wide t, const double *x);
 
 /* The run has come to (t, x): solutions and delays go on from there. */
-int MODEL_accept(MODEL *m, double t, const double *x);
+int MODEL_accept(MODEL *m, ha_wide t, const double *x);
 
 #ifdef __cplusplus
 }

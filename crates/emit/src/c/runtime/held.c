@@ -14,7 +14,7 @@ static MODEL_point *ha_point(ha_model *m, int d, int k)
     return &m->points[first + (m->delays[d].first + k) % room];
 }
 
-static void ha_delay_push(ha_model *m, int d, double t, double value, double slope, double jump)
+static void ha_delay_push(ha_model *m, int d, ha_wide t, double value, double slope, double jump)
 {
     const int room = ha_delay_room[d + 1] - ha_delay_room[d];
     MODEL_point *point;
@@ -30,7 +30,7 @@ static void ha_delay_push(ha_model *m, int d, double t, double value, double slo
     ++m->delays[d].count;
 }
 
-static void ha_delay_begin(ha_model *m, int d, double t, double value, double slope)
+static void ha_delay_begin(ha_model *m, int d, ha_wide t, double value, double slope)
 {
     m->delays[d].start = t;
     m->delays[d].first = 0;
@@ -39,7 +39,7 @@ static void ha_delay_begin(ha_model *m, int d, double t, double value, double sl
 }
 
 /* The signal has come to a value, smoothly. */
-static void ha_delay_append(ha_model *m, int d, double t, double value, double slope)
+static void ha_delay_append(ha_model *m, int d, ha_wide t, double value, double slope)
 {
     const int room = ha_delay_room[d + 1] - ha_delay_room[d];
     if (m->delays[d].count == 0) {
@@ -55,7 +55,7 @@ static void ha_delay_append(ha_model *m, int d, double t, double value, double s
 }
 
 /* The signal has jumped at the time of the last point, or changed its slope. */
-static void ha_delay_jump(ha_model *m, int d, double t, double value, double slope)
+static void ha_delay_jump(ha_model *m, int d, ha_wide t, double value, double slope)
 {
     MODEL_point *last;
     if (m->delays[d].count == 0) {
@@ -74,10 +74,10 @@ static void ha_delay_jump(ha_model *m, int d, double t, double value, double slo
     }
 }
 
-static void ha_cubic(const MODEL_point *a, const MODEL_point *b, double s, double *value, double *slope)
+static void ha_cubic(const MODEL_point *a, const MODEL_point *b, ha_wide s, double *value, double *slope)
 {
-    const double h = b->t - a->t;
-    const double u = (s - a->t) / h;
+    const double h = ha_narrow(b->t - a->t);
+    const double u = ha_narrow(s - a->t) / h;
     const double v = 1.0 - u;
     const double rise = b->value - a->value;
     const double ends = v * a->slope;
@@ -96,11 +96,11 @@ static void ha_cubic(const MODEL_point *a, const MODEL_point *b, double s, doubl
 }
 
 /* Value and slope of a delayed signal at t. */
-static double ha_delay_at(ha_model *m, int d, double t, double *slope)
+static double ha_delay_at(ha_model *m, int d, ha_wide t, double *slope)
 {
     const int count = m->delays[d].count;
-    const double time = m->delays[d].time;
-    const double s = t - time;
+    const ha_wide time = m->delays[d].time;
+    const ha_wide s = t - time;
     int low = 0;
     int high = count;
     double value;
@@ -135,7 +135,7 @@ static double ha_delay_at(ha_model *m, int d, double t, double *slope)
         ha_cubic(ha_point(m, d, low - 2), ha_point(m, d, low - 1), s, &value, slope);
     } else {
         const MODEL_point *last = ha_point(m, d, low - 1);
-        const double way = last->slope * (s - last->t);
+        const double way = last->slope * ha_narrow(s - last->t);
         *slope = last->slope;
         value = last->value + way;
     }
@@ -143,11 +143,11 @@ static double ha_delay_at(ha_model *m, int d, double t, double *slope)
 }
 
 /* The next time after t at which a jump arrives or a step has to end because nothing later is recorded yet. */
-static double ha_delay_next(ha_model *m, int d, double t)
+static ha_wide ha_delay_next(ha_model *m, int d, ha_wide t)
 {
-    const double time = m->delays[d].time;
-    const double whole = floor((t - m->delays[d].start) / time) + 1.0;
-    double next = HUGE_VAL;
+    const ha_wide time = m->delays[d].time;
+    const ha_wide whole = HA_WIDE(floor((t - m->delays[d].start) / time) + 1.0);
+    ha_wide next = HA_WIDE(HUGE_VAL);
     int i;
     for (i = 0; i < m->delays[d].count; ++i) {
         if (ha_point(m, d, i)->jump != 0.0 && ha_point(m, d, i)->t + time > t) {
@@ -156,8 +156,8 @@ static double ha_delay_next(ha_model *m, int d, double t)
         }
     }
     for (i = 0; i < 2; ++i) {
-        const double steps = (whole + (double)i) * time;
-        const double horizon = m->delays[d].start + steps;
+        const ha_wide steps = HA_WIDE((whole + (double)i) * time);
+        const ha_wide horizon = m->delays[d].start + steps;
         if (horizon > t) {
             return horizon < next ? horizon : next;
         }
@@ -167,17 +167,17 @@ static double ha_delay_next(ha_model *m, int d, double t)
 
 //end
 //if samples
-static double ha_sample_next(const ha_model *m, int s)
+static ha_wide ha_sample_next(const ha_model *m, int s)
 {
     return m->samples[s].next * m->samples[s].period;
 }
 
 /* Samples up to t are taken. */
-static void ha_sample_pass(ha_model *m, int s, double t)
+static void ha_sample_pass(ha_model *m, int s, ha_wide t)
 {
     int i;
-    for (i = 0; i < 8 && m->samples[s].period > 0.0 && ha_sample_next(m, s) <= t; ++i) {
-        m->samples[s].next += 1.0;
+    for (i = 0; i < 8 && HA_WIDE(m->samples[s].period > 0.0) && ha_sample_next(m, s) <= t; ++i) {
+        m->samples[s].next += HA_WIDE(1.0);
     }
 }
 

@@ -1,10 +1,11 @@
-/* ---- small things ---- */
-
-static int ha_finite(double a)
+//if single
+/* Whether a number computed in double precision fits single precision, with all its digits. */
+static int ha_fits(ha_wide a)
 {
-    return a - a == 0.0;
+    return HA_WIDE(!ha_finite(a) || a == 0.0 || (fabs(a) >= (double)FLT_MIN && fabs(a) <= (double)FLT_MAX));
 }
 
+//end
 static int ha_all_finite(const double *a, int n)
 {
     int i;
@@ -32,19 +33,6 @@ static void ha_fill(double *to, double value, int n)
     }
 }
 
-/* A slope times a rate; what does not move has no rate even where the slope is infinite. */
-static double ha_along(double slope, double rate)
-{
-    return rate == 0.0 ? 0.0 : slope * rate;
-}
-
-static double ha_pow_along(double value, double a, double da, double b, double db)
-{
-    const double base = da == 0.0 ? 0.0 : b * ha_pow(a, b - 1.0) * da;
-    const double exponent = db == 0.0 || value == 0.0 ? 0.0 : value * ha_log(a) * db;
-    return base + exponent;
-}
-
 /* Whether an entry can be divided by: not 0 to rounding, and finite. */
 static int ha_is_pivot(double a)
 {
@@ -54,7 +42,7 @@ static int ha_is_pivot(double a)
 }
 
 /* Takes note of a failure. */
-static int ha_fail(ha_model *m, int code, int where, double t)
+static int ha_fail(ha_model *m, int code, int where, ha_wide t)
 {
     m->failure.code = code;
     m->failure.where = where;

@@ -9,10 +9,13 @@ typedef struct {
     double *scale;
     double *work;
     double *rest;
+//if single
+    double *columns;
+//end
     int *order;
 } ha_lu;
 
-/* Its parts in a row: 2 n*n + 3 n numbers. */
+/* Its parts in a row. */
 static ha_lu ha_lu_at(double *place, int *order, int n)
 {
     ha_lu l;
@@ -22,6 +25,9 @@ static ha_lu ha_lu_at(double *place, int *order, int n)
     l.scale = l.factors + n * n;
     l.work = l.scale + n;
     l.rest = l.work + n;
+//if single
+    l.columns = l.rest + n;
+//end
     l.order = order;
     return l;
 }
@@ -31,6 +37,9 @@ static int ha_lu_pivot(const ha_lu *l, int k)
 {
     double weight;
     const int best = ha_pivot_row(l->factors, l->scale, l->n, k, &weight);
+//if single
+    weight /= l->columns[k];
+//end
     return weight > DBL_EPSILON * (double)l->n && ha_finite(weight) ? best : -1;
 }
 
@@ -162,10 +171,23 @@ static int ha_lu_factor(ha_lu *l)
     if (ha_lu_factor_definite(l)) {
         return 1;
     }
+//if single
+    /* The magnitudes of columns: few digits tell units from a singular matrix only if these are known. */
+    for (j = 0; j < n; ++j) {
+        l->columns[j] = DBL_MIN;
+        for (row = 0; row < n; ++row) {
+            l->columns[j] = ha_max(l->columns[j], fabs(l->matrix[row * n + j]));
+        }
+    }
+//end
     for (row = 0; row < n; ++row) {
         double most = DBL_MIN;
         for (j = 0; j < n; ++j) {
+//if single
+            const double size = fabs(l->matrix[row * n + j]) / l->columns[j];
+//else
             const double size = fabs(l->matrix[row * n + j]);
+//end
             l->factors[row * n + j] = l->matrix[row * n + j];
             if (size > most) {
                 most = size;

@@ -20,11 +20,25 @@ static int ha_dense_factor(ha_model *m)
     int row;
     int j;
     int k;
+//if single
+    /* The magnitudes of columns: few digits tell units from a singular matrix only if these are known. */
+    for (j = 0; j < HA_NX; ++j) {
+        m->matrix_columns[j] = DBL_MIN;
+        for (row = 0; row < HA_NX; ++row) {
+            m->matrix_columns[j] = ha_max(m->matrix_columns[j], fabs(a[row * HA_NX + j]));
+        }
+    }
+//end
     for (row = 0; row < HA_NX; ++row) {
         double most = DBL_MIN;
         for (j = 0; j < HA_NX; ++j) {
-            if (fabs(a[row * HA_NX + j]) > most) {
-                most = fabs(a[row * HA_NX + j]);
+//if single
+            const double size = fabs(a[row * HA_NX + j]) / m->matrix_columns[j];
+//else
+            const double size = fabs(a[row * HA_NX + j]);
+//end
+            if (size > most) {
+                most = size;
             }
         }
         m->matrix_order[row] = row;
@@ -33,6 +47,9 @@ static int ha_dense_factor(ha_model *m)
     for (k = 0; k < HA_NX; ++k) {
         double weight;
         const int best = ha_pivot_row(a, m->matrix_scale, HA_NX, k, &weight);
+//if single
+        weight /= m->matrix_columns[k];
+//end
         if (!(weight > DBL_EPSILON * (double)HA_NX)) {
             return k;
         }
@@ -87,7 +104,7 @@ static void ha_dense_solve(ha_model *m, double *b)
 }
 
 /* Puts 1 - factor * Jacobian at x into m->matrix; m->sizes takes up what its rows add up where the states are. */
-static int ha_step_matrix(ha_model *m, double t, const double *x, double factor)
+static int ha_step_matrix(ha_model *m, ha_wide t, const double *x, double factor)
 {
     int group;
     int i;

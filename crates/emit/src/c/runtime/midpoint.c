@@ -7,7 +7,7 @@ SCALES
 };
 
 /* One Newton iteration on the midpoint. */
-static int ha_correct(ha_model *m, double t, double half, const double *x)
+static int ha_correct(ha_model *m, ha_wide t, double half, const double *x)
 {
     int status = MODEL_rates(m, t, m->middle, m->stages);
     int i;
@@ -23,12 +23,21 @@ static int ha_correct(ha_model *m, double t, double half, const double *x)
     }
     for (i = 0; i < HA_NX; ++i) {
         const double move = half * m->stages[i];
+//if single
+        m->correction[i] = move - m->half_way[i];
+//else
         const double end = x[i] + move;
         m->correction[i] = end - m->middle[i];
+//end
     }
     ha_dense_solve(m, m->correction);
     for (i = 0; i < HA_NX; ++i) {
+//if single
+        m->half_way[i] += m->correction[i];
+        m->middle[i] = x[i] + m->half_way[i];
+//else
         m->middle[i] += m->correction[i];
+//end
     }
     return MODEL_OK;
 }
@@ -49,20 +58,27 @@ static double ha_relative_correction(const ha_model *m)
 }
 
 /* From t to t + h: the end in m->trial. */
-static int ha_method(ha_model *m, double t, double h, const double *x)
+static int ha_method(ha_model *m, ha_wide t, double h, const double *x)
 {
-    const double middle_time = t + 0.5 * h;
+    const ha_wide middle_time = t + ha_widen(0.5 * h);
     int iteration;
     int i;
     ha_copy(m->middle, x, HA_NX);
+//if single
+    ha_fill(m->half_way, 0.0, HA_NX);
+//end
     for (iteration = 0; iteration < 20; ++iteration) {
         const int status = ha_correct(m, middle_time, 0.5 * h, x);
         if (status != MODEL_OK) {
             return status;
         }
-        if (ha_relative_correction(m) <= 1e-9) {
+        if (ha_relative_correction(m) <= CLOSE_TO_ROUNDING) {
             for (i = 0; i < HA_NX; ++i) {
+//if single
+                ha_move(m, x, i, 2.0 * m->half_way[i]);
+//else
                 m->trial[i] = 2.0 * m->middle[i] - x[i];
+//end
             }
             return MODEL_OK;
         }

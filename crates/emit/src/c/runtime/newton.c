@@ -278,7 +278,7 @@ static int ha_is_linear(ha_model *m, ha_newton *w)
                 most = ha_max(most, fabs(w->jacobian[i * n + j]));
             }
             for (j = 0; j < n; ++j) {
-                if (!(fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) <= 1e-9 * most)) {
+                if (!(fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) <= CLOSE_TO_ROUNDING * most)) {
                     same = 0;
                 }
             }
@@ -494,7 +494,7 @@ static int ha_floats(ha_model *m, ha_newton *w)
             return 0;
         }
         rank = ha_eliminate(w);
-        if (rank == n && !(fabs(w->loose[n * n - 1]) < 1.0 / 1e-9)) {
+        if (rank == n && !(fabs(w->loose[n * n - 1]) < 1.0 / CLOSE_TO_ROUNDING)) {
             return 0;
         }
         ha_shortest(w, rank);
@@ -607,7 +607,7 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
             const double next = ha_next_step(w);
             if (next <= (1.0 - 0.25 * fraction) * size || size <= 2.0 * DBL_EPSILON) {
                 ha_accept_trial(w);
-                *near = fraction == 1.0 && (next <= 0.25 * size || size <= 1e-9);
+                *near = fraction == 1.0 && (next <= 0.25 * size || size <= CLOSE_TO_ROUNDING);
                 if (*near && next * next <= 0.125 * DBL_EPSILON * size) {
                     ha_take_next_step(w);
                     return HA_DONE;
@@ -615,7 +615,7 @@ static int ha_damped(ha_model *m, ha_newton *w, double size, int trust, int *nea
                 return size <= 4.0 * DBL_EPSILON ? HA_DONE : HA_MOVED;
             }
         }
-        if (size <= 1e-9) {
+        if (size <= CLOSE_TO_ROUNDING) {
             /* Rounding keeps the step from shrinking: it is as good as it gets. */
             (void)ha_look_at(m, w, w->x);
             *near = 1;
@@ -713,7 +713,7 @@ static double ha_off_the_lead(const ha_newton *w)
 static int ha_goes_on(ha_newton *w)
 {
     const int n = w->n;
-    double most = 1e-9;
+    double most = CLOSE_TO_ROUNDING;
     double off;
     int still = 1;
     int i;
@@ -780,7 +780,7 @@ static int ha_is_straight_at(ha_model *m, ha_newton *w, int looks)
             return 0;
         }
         rest = ha_next_step(w);
-        if (rest != rest || rest > before * (1.0 + 1e-9) + 1e-9) {
+        if (rest != rest || rest > before * (1.0 + CLOSE_TO_ROUNDING) + CLOSE_TO_ROUNDING) {
             return 0;
         }
         before = rest;

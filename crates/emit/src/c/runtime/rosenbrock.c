@@ -2,7 +2,7 @@
 /* ---- a linearly implicit method: one matrix and a fixed number of stages ---- */
 
 /* From t to t + h: the end in m->trial. */
-static int ha_method(ha_model *m, double t, double h, const double *x)
+static int ha_method(ha_model *m, ha_wide t, double h, const double *x)
 {
     static const double nodes[] = {NODES};
     static const double drifts[] = {DRIFTS};
@@ -24,7 +24,7 @@ static int ha_method(ha_model *m, double t, double h, const double *x)
     for (stage = 0; stage < STAGES; ++stage) {
         double *own = m->stages + stage * HA_NX;
         if (!repeats[stage]) {
-            const double part = nodes[stage] * h;
+            const ha_wide part = ha_widen(nodes[stage] * h);
             ha_advance(m, x, 1.0, states[stage], stage, m->trial);
             status = MODEL_rates(m, t + part, m->trial, m->middle);
             if (status != MODEL_OK) {
@@ -44,6 +44,6 @@ static int ha_method(ha_model *m, double t, double h, const double *x)
         }
         ha_dense_solve(m, own);
     }
-    ha_advance(m, x, 1.0, states[STAGES], STAGES, m->trial);
+    ha_arrive(m, x, 1.0, states[STAGES]);
     return MODEL_OK;
 }

@@ -58,7 +58,7 @@ static int ha_parameters(ha_model *m)
 static void ha_restart(ha_model *m)
 {
     m->begun = 0;
-    m->crossed = -HUGE_VAL;
+    m->crossed = HA_WIDE(-HUGE_VAL);
 //if clocks
     m->clock_hold = HA_FOLLOW;
 //end
@@ -76,7 +76,7 @@ static void ha_restart(ha_model *m)
 //end
 //if held
     {
-        double times[HA_NZ];
+        ha_wide times[HA_NZ];
         ha_times_code(m, times);
 //if delays
         {
@@ -84,7 +84,7 @@ static void ha_restart(ha_model *m)
             int d;
             for (d = 0; d < DELAYS; ++d) {
                 m->delays[d].time = times[places[d]];
-                m->delays[d].start = (double)NAN;
+                m->delays[d].start = HA_WIDE((double)NAN);
                 m->delays[d].first = 0;
                 m->delays[d].count = 0;
                 m->delays[d].full = 0;
@@ -98,8 +98,8 @@ static void ha_restart(ha_model *m)
             for (s = 0; s < SAMPLES; ++s) {
                 m->samples[s].period = times[held[s]];
                 m->samples[s].value = 0.0;
-                m->samples[s].next = (double)NAN;
-                m->samples[s].taken = (double)NAN;
+                m->samples[s].next = HA_WIDE((double)NAN);
+                m->samples[s].taken = HA_WIDE((double)NAN);
             }
         }
 //end
@@ -110,23 +110,29 @@ static void ha_restart(ha_model *m)
 int MODEL_reset(MODEL *m)
 {
     memset(m, 0, sizeof *m);
-    m->step = STEP_LENGTH;
+    m->step = HA_WIDE(STEP_LENGTH);
 //if newton
     m->most_evaluations = 2000;
 //end
     return ha_parameters(m);
 }
 
-int MODEL_set_parameter(MODEL *m, int parameter, double value)
+int MODEL_set_parameter(MODEL *m, int parameter, ha_wide value)
 {
 //if parameters
     static const unsigned char constant[] = {
 CONSTANT_PARAMETERS
     };
-    if (parameter < 0 || parameter >= HA_NP || constant[parameter] || !ha_finite(value)) {
+    if (parameter < 0 || parameter >= HA_NP || constant[parameter] || !HA_WIDE(ha_finite(value))) {
         return ha_fail(m, MODEL_BAD_PARAMETER, parameter < 0 || parameter >= HA_NP ? 0 : parameter, m->t);
     }
-    m->p[parameter] = value;
+//if single
+    if (!ha_fits(value)) {
+        return ha_fail(m, MODEL_OUT_OF_RANGE, parameter, m->t);
+    }
+    m->p_exact[parameter] = value;
+//end
+    m->p[parameter] = ha_narrow(value);
     m->set[parameter] = 1;
     m->changed = 1;
     m->cross_due = 1;
@@ -143,9 +149,9 @@ CONSTANT_PARAMETERS
 START_CODE
 //end
 /* The state at the start: as exported, or solved for other parameters, inputs or times. */
-static int ha_start_values(ha_model *m, double t)
+static int ha_start_values(ha_model *m, ha_wide t)
 {
-    int exported = t == 0.0 && !m->changed;
+    int exported = HA_WIDE(t == 0.0) && !m->changed;
     int i;
     for (i = 0; i < HA_NU; ++i) {
         if (m->u[i] != m->u_default[i]) {
@@ -167,7 +173,7 @@ static int ha_start_values(ha_model *m, double t)
 //end
 }
 
-int MODEL_start_from(MODEL *m, double t, const double *x)
+int MODEL_start_from(MODEL *m, ha_wide t, const double *x)
 {
     int status;
     ha_restart(m);
@@ -177,6 +183,9 @@ int MODEL_start_from(MODEL *m, double t, const double *x)
         ha_copy(m->x, x, HA_NX);
     }
     ha_ticks_from(m, t);
+//if single
+    ha_fill(m->rest, 0.0, HA_NX);
+//end
     status = MODEL_cross(m, t, m->x);
     if (status == MODEL_OK) {
         status = MODEL_accept(m, t, m->x);
@@ -184,7 +193,7 @@ int MODEL_start_from(MODEL *m, double t, const double *x)
     return status == MODEL_OK ? MODEL_observe(m, t, m->x, m->y) : status;
 }
 
-int MODEL_start(MODEL *m, double t)
+int MODEL_start(MODEL *m, ha_wide t)
 {
     int status;
     m->failure.code = MODEL_OK;

@@ -1,5 +1,5 @@
 /* Start conditions in which one unknown is left, solved together: unknowns (states, then conserved constants) and code. */
-typedef int (*ha_start_code)(ha_model *m, double t, const double *x, const double *e, double *out, double *rates);
+typedef int (*ha_start_code)(ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates);
 
 typedef struct {
     int count;
@@ -29,7 +29,7 @@ START_TABLES
 enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = MOST_AT_ONCE, HA_MOST_ROWS = MOST_ROWS, HA_MOST_COLUMNS = MOST_COLUMNS };
 
 /* Residuals at z and their derivatives along the direction in m->along. */
-static int ha_start_residuals(ha_model *m, double t, ha_start_code code, const double *z, double *out, double *rates)
+static int ha_start_residuals(ha_model *m, ha_wide t, ha_start_code code, const double *z, double *out, double *rates)
 {
 //if conserved
     ha_copy(m->k, z + HA_NX, HA_NK);
@@ -47,7 +47,7 @@ static double *ha_along_unknown(ha_model *m, int unknown)
 
 //if guesses
 /* Places the unknowns that are guessed. */
-static void ha_begin_search(ha_model *m, double t, double *z)
+static void ha_begin_search(ha_model *m, ha_wide t, double *z)
 {
     int i;
     for (i = 0; i < GUESSES; ++i) {
@@ -65,14 +65,14 @@ static void ha_begin_search(ha_model *m, double t, double *z)
 
 //end
 /* Newton for each unknown of a pass by itself. */
-static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z, unsigned char *known, unsigned char *met)
+static void ha_solve_each(ha_model *m, ha_wide t, const ha_pass *pass, double *z, unsigned char *known, unsigned char *met)
 {
     double out[HA_MOST_AT_ONCE];
     double slope[HA_MOST_AT_ONCE];
     double least[HA_MOST_AT_ONCE];
-    double best[HA_MOST_AT_ONCE];
-    double step[HA_MOST_AT_ONCE];
-    double begin[HA_MOST_AT_ONCE];
+    double best[HA_MOST_AT_ONCE] = {0.0};
+    double step[HA_MOST_AT_ONCE] = {0.0};
+    double begin[HA_MOST_AT_ONCE] = {0.0};
     unsigned char done[HA_MOST_AT_ONCE];
     int iteration;
     int i;
@@ -123,7 +123,7 @@ static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, double *z,
 
 //if start_groups
 /* Residuals of a group and their derivatives, row by row; whether all are finite. */
-static int ha_linearised(ha_model *m, double t, const ha_group *g, const double *z, double *residual, double *jacobian)
+static int ha_linearised(ha_model *m, ha_wide t, const ha_group *g, const double *z, double *residual, double *jacobian)
 {
     double rates[HA_MOST_ROWS];
     int i;
@@ -156,7 +156,7 @@ static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const doub
             const double term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
             size += fabs(term);
         }
-        if (!(fabs(residual[i]) <= 1e-9 * size)) {
+        if (!(fabs(residual[i]) <= CLOSE_TO_ROUNDING * size)) {
             return 0;
         }
     }
@@ -178,7 +178,7 @@ static void ha_weights(int rows, int columns, const double *jacobian, double *we
         double most = 0.0;
         for (j = 0; j < columns; ++j) {
             const double size = fabs(jacobian[i * columns + j]);
-            most = ha_max(most, size > 0.0 && size <= 1e-14 * greatest[j] ? greatest[j] : size);
+            most = ha_max(most, size > 0.0 && size <= ROUNDING_OF_ENTRIES * greatest[j] ? greatest[j] : size);
         }
         weights[i] = most > 0.0 ? 1.0 / most : 1.0;
     }
@@ -270,7 +270,7 @@ static int ha_shortest_step(int rows, int columns, const double *jacobian, const
         for (k = 0; k < length; ++k) {
             square += b[k * n + j] * b[k * n + j];
         }
-        if (!(sqrt(square) > 1e-11 * sqrt(greatest))) {
+        if (!(sqrt(square) > ROUNDING_OF_RANK * sqrt(greatest))) {
             continue;
         }
         for (k = 0; k < rows; ++k) {
@@ -298,7 +298,7 @@ static double ha_weighed(const double *residual, const double *weights, int n)
 }
 
 /* One damped step of Gauss-Newton of minimum norm, of the unknowns that are not fixed; whether it helped. */
-static int ha_nearer(ha_model *m, double t, const ha_group *g, const unsigned char *fixed, double *z, double *residual, double *jacobian)
+static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *fixed, double *z, double *residual, double *jacobian)
 {
     double moving[HA_MOST_ROWS * HA_MOST_COLUMNS];
     double weights[HA_MOST_ROWS];
@@ -345,7 +345,7 @@ static int ha_nearer(ha_model *m, double t, const ha_group *g, const unsigned ch
 }
 
 /* From one beginning of the unknowns that are open: whether all conditions are met. */
-static int ha_solve_from(ha_model *m, double t, const ha_group *g, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
+static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
 {
     double residual[HA_MOST_ROWS];
     double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
@@ -373,7 +373,7 @@ static int ha_solve_from(ha_model *m, double t, const ha_group *g, const unsigne
 }
 
 /* What is determined already stays, if the rest can be met so; then everything may move. */
-static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, unsigned char *known)
+static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, double *z, unsigned char *known)
 {
     static const double beginnings[] = {0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3};
     double before[HA_START_UNKNOWNS + 1];
@@ -411,7 +411,7 @@ static int ha_solve_group(ha_model *m, double t, const ha_group *g, double *z, u
 
 //end
 /* What is given holds, the rest is solved for, remaining freedom is zero or what is guessed. */
-static int ha_solve_start_once(ha_model *m, double t, double *z)
+static int ha_solve_start_once(ha_model *m, ha_wide t, double *z)
 {
     unsigned char known[HA_START_UNKNOWNS + 1];
     unsigned char met[START_CONDITIONS + 1];
@@ -461,7 +461,7 @@ static int ha_solve_start_once(ha_model *m, double t, double *z)
     return MODEL_OK;
 }
 
-static int ha_solve_start(ha_model *m, double t)
+static int ha_solve_start(ha_model *m, ha_wide t)
 {
 //if held
     double before[HA_START_UNKNOWNS + 1];

@@ -2,35 +2,35 @@
 /* ---- steps ---- */
 
 /* The times from + i * step, walked through in order; each is the nearest number to what is meant where 1 / step is whole. */
-static void ha_ticks_pass(ha_model *m, double t)
+static void ha_ticks_pass(ha_model *m, ha_wide t)
 {
-    const double slack = 1e-9 * m->step;
+    const ha_wide slack = HA_WIDE(1e-9 * m->step);
     int i;
     for (i = 0; i < 4 && m->tick_next <= t + slack; ++i) {
-        m->tick_index = ha_max(m->tick_index + 1.0, floor((t - m->tick_from) / m->step));
-        if (m->tick_rate > 0.0) {
+        m->tick_index = HA_WIDE(ha_max(m->tick_index + 1.0, floor((t - m->tick_from) / m->step)));
+        if (HA_WIDE(m->tick_rate > 0.0)) {
             m->tick_next = m->tick_from + m->tick_index / m->tick_rate;
         } else {
-            const double way = m->tick_index * m->step;
+            const ha_wide way = m->tick_index * m->step;
             m->tick_next = m->tick_from + way;
         }
     }
 }
 
-static void ha_ticks_from(ha_model *m, double t)
+static void ha_ticks_from(ha_model *m, ha_wide t)
 {
-    const double rate = round(1.0 / m->step);
+    const ha_wide rate = HA_WIDE(round(1.0 / m->step));
     m->tick_from = t;
     m->tick_next = t;
-    m->tick_index = 0.0;
-    m->tick_rate = rate >= 1.0 && 1.0 / rate == m->step ? rate : 0.0;
+    m->tick_index = HA_WIDE(0.0);
+    m->tick_rate = HA_WIDE(rate >= 1.0 && 1.0 / rate == m->step ? rate : 0.0);
 }
 
 /* From m->t to a target, without a jump between them. */
-static int ha_step_to(ha_model *m, double target, int jumps)
+static int ha_step_to(ha_model *m, ha_wide target, int jumps)
 {
     int switched = 0;
-    int status = ha_method(m, m->t, target - m->t, m->x);
+    int status = ha_method(m, m->t, ha_narrow(target - m->t), m->x);
     int i;
     if (status != MODEL_OK) {
         return status;
@@ -41,6 +41,9 @@ static int ha_step_to(ha_model *m, double target, int jumps)
         }
     }
     ha_copy(m->x, m->trial, HA_NX);
+//if single
+    ha_copy(m->rest, m->trial_rest, HA_NX);
+//end
 //if switches
     status = MODEL_switched(m, target, m->x, &switched);
     if (status != MODEL_OK) {
@@ -55,9 +58,9 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     return status;
 }
 
-int MODEL_step_until(MODEL *m, double end)
+int MODEL_step_until(MODEL *m, ha_wide end)
 {
-    const double slack = 1e-9 * m->step;
+    const ha_wide slack = HA_WIDE(1e-9 * m->step);
     int i;
     int status = m->failure.code;
     if (status != MODEL_OK) {
@@ -78,7 +81,7 @@ int MODEL_step_until(MODEL *m, double end)
         status = MODEL_cross(m, m->t, m->x);
     }
     for (i = 0; i <= MODEL_MOST_JUMPS && status == MODEL_OK && m->t + slack < end; ++i) {
-        const double jump = MODEL_next_jump(m, m->t);
+        const ha_wide jump = MODEL_next_jump(m, m->t);
         const int jumps = jump <= end + slack;
         status = ha_step_to(m, jumps ? jump : end, jumps);
     }

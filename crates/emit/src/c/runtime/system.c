@@ -3,7 +3,7 @@
 
 //if held
 /* Puts what is delayed or sampled where it is read. */
-static void ha_place(ha_model *m, double t)
+static void ha_place(ha_model *m, ha_wide t)
 {
 //if delays
     static const int places[] = {DELAY_PLACES};
@@ -28,11 +28,11 @@ static void ha_place(ha_model *m, double t)
 }
 
 //end
-typedef int (*ha_code)(ha_model *m, double t, const double *x, double *out);
+typedef int (*ha_code)(ha_model *m, ha_wide t, const double *x, double *out);
 
 /* Runs code with conditions as held. Beyond a switch the held branch may have no value any more: then the conditions are
  * followed instead. */
-static int ha_run(ha_model *m, ha_code code, double t, const double *x, double *out, int n)
+static int ha_run(ha_model *m, ha_code code, ha_wide t, const double *x, double *out, int n)
 {
     int status;
 //if held
@@ -61,7 +61,7 @@ static int ha_run(ha_model *m, ha_code code, double t, const double *x, double *
 
 //if domains
 /* The failure behind a value that is not a number: the first law without a value, if there is one. */
-static int ha_explain(ha_model *m, double t, const double *x, int code, int where)
+static int ha_explain(ha_model *m, ha_wide t, const double *x, int code, int where)
 {
     double arguments[DOMAINS];
     int i;
@@ -78,7 +78,7 @@ static int ha_explain(ha_model *m, double t, const double *x, int code, int wher
 }
 
 //end
-int MODEL_rates(MODEL *m, double t, const double *x, double *dx)
+int MODEL_rates(MODEL *m, ha_wide t, const double *x, double *dx)
 {
     const int status = ha_run(m, ha_rates_code, t, x, dx, HA_NX);
     int i;
@@ -97,7 +97,7 @@ int MODEL_rates(MODEL *m, double t, const double *x, double *dx)
     return MODEL_OK;
 }
 
-int MODEL_observe(MODEL *m, double t, const double *x, double *y)
+int MODEL_observe(MODEL *m, ha_wide t, const double *x, double *y)
 {
 //if outputs
     const int status = ha_run(m, ha_observe_code, t, x, y, HA_NY);
@@ -135,7 +135,7 @@ int MODEL_observe(MODEL *m, double t, const double *x, double *y)
 
 //if time_passes
 /* Sets the direction of derivatives to that of time: what is delayed moves, states and inputs do not. */
-static void ha_let_time_pass(ha_model *m, double t)
+static void ha_let_time_pass(ha_model *m, ha_wide t)
 {
     ha_fill(m->along, 0.0, HA_DIRECTION);
     m->along[0] = 1.0;
@@ -155,10 +155,10 @@ static void ha_let_time_pass(ha_model *m, double t)
 //end
 //if tangent
 /* Code for derivatives along e. */
-typedef int ha_along_code(ha_model *m, double t, const double *x, const double *e, double *out, double *rates);
+typedef int ha_along_code(ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates);
 
 /* Derivatives of the rates along m->along, by code for it, as they are at x. */
-static int ha_slopes_at(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
+static int ha_slopes_at(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
 {
     double *e = m->along;
     double *dx = m->along_out;
@@ -181,7 +181,7 @@ static int ha_slopes_at(ha_model *m, double t, const double *x, ha_along_code *c
 }
 
 /* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead. */
-static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code, double *dv)
+static int ha_slopes(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
 {
     const double *dx = m->along_out;
     int status = ha_slopes_at(m, t, x, code, dv);
@@ -190,8 +190,8 @@ static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code
         for (i = 0; i < HA_NX; ++i) {
             const double rate = ha_finite(dx[i]) ? dx[i] : 0.0;
             const double size = rate < 0.0 ? -fabs(x[i]) : fabs(x[i]);
-            const double way = 1e-8 * (size + rate);
-            m->beside[i] = x[i] + (way == 0.0 ? 1e-8 * 1e-8 : way);
+            const double way = BESIDE * (size + rate);
+            m->beside[i] = x[i] + (way == 0.0 ? BESIDE * BESIDE : way);
         }
         status = ha_slopes_at(m, t, m->beside, code, dv);
     }
@@ -205,7 +205,7 @@ static int ha_slopes(ha_model *m, double t, const double *x, ha_along_code *code
     }
     return MODEL_OK;
 }
-int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *dv)
+int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double *dv)
 {
     ha_fill(m->along, 0.0, HA_DIRECTION);
     ha_copy(m->along + HA_STATES_AT, v, HA_NX);
@@ -218,7 +218,7 @@ int MODEL_tangent(MODEL *m, double t, const double *x, const double *v, double *
 //end
 //if drift
 /* Derivatives of the rates by time, states and inputs at rest. */
-static int ha_drift(ha_model *m, double t, const double *x, double *dv)
+static int ha_drift(ha_model *m, ha_wide t, const double *x, double *dv)
 {
     ha_let_time_pass(m, t);
 //if held
@@ -229,7 +229,7 @@ static int ha_drift(ha_model *m, double t, const double *x, double *dv)
 
 //end
 //if derivatives
-int MODEL_directional(MODEL *m, double t, const double *x, const double *v, const double *w, double *dv, double *dy)
+int MODEL_directional(MODEL *m, ha_wide t, const double *x, const double *v, const double *w, double *dv, double *dy)
 {
     double *e = m->along;
     int status = MODEL_OK;
@@ -254,7 +254,7 @@ int MODEL_directional(MODEL *m, double t, const double *x, const double *v, cons
 
 //end
 //if switches
-int MODEL_indicators(MODEL *m, double t, const double *x, double *g)
+int MODEL_indicators(MODEL *m, ha_wide t, const double *x, double *g)
 {
     static const int conditions[] = {SWITCH_CONDITIONS};
     const int status = ha_run(m, ha_switching_code, t, x, m->operands, SWITCHES);
@@ -264,23 +264,23 @@ int MODEL_indicators(MODEL *m, double t, const double *x, double *g)
         return status;
     }
     for (i = 0; i < SWITCHES; ++i) {
-        double low;
-        double high;
+        ha_wide low;
+        ha_wide high;
         if (ha_kinds[conditions[i]] == 0) {
             g[next] = m->operands[i];
             ++next;
             continue;
         }
         ha_borders(m, conditions[i], &low, &high);
-        g[next] = low - m->operands[i];
-        g[next + 1] = m->operands[i] - high;
+        g[next] = ha_narrow(low - ha_widen(m->operands[i]));
+        g[next + 1] = ha_narrow(ha_widen(m->operands[i]) - high);
         next += 2;
     }
     return MODEL_OK;
 }
 
 /* Takes the sides at (t, x). */
-static int ha_take_sides(ha_model *m, double t, const double *x)
+static int ha_take_sides(ha_model *m, ha_wide t, const double *x)
 {
     static const int conditions[] = {SWITCH_CONDITIONS};
     int status;
@@ -294,17 +294,17 @@ static int ha_take_sides(ha_model *m, double t, const double *x)
         switch (ha_kinds[conditions[i]]) {
 //if sign_conditions
         case 0:
-            (void)ha_side(m, HA_TAKE, conditions[i], m->operands[i]);
+            (void)ha_side(m, HA_TAKE, conditions[i], ha_widen(m->operands[i]));
             break;
 //end
 //if floor_conditions
         case 1:
-            (void)ha_whole(m, HA_TAKE, conditions[i], m->operands[i]);
+            (void)ha_whole(m, HA_TAKE, conditions[i], ha_widen(m->operands[i]));
             break;
 //end
         default:
 //if piece_conditions
-            (void)ha_piece(m, HA_TAKE, conditions[i], ha_kinds[conditions[i]] - 2, m->operands[i]);
+            (void)ha_piece(m, HA_TAKE, conditions[i], ha_kinds[conditions[i]] - 2, ha_widen(m->operands[i]));
 //end
             break;
         }
@@ -313,7 +313,7 @@ static int ha_take_sides(ha_model *m, double t, const double *x)
     return status;
 }
 
-int MODEL_switched(MODEL *m, double t, const double *x, int *switched)
+int MODEL_switched(MODEL *m, ha_wide t, const double *x, int *switched)
 {
     const int status = MODEL_indicators(m, t, x, m->beyond);
     int i;
@@ -335,7 +335,7 @@ int MODEL_switched(MODEL *m, double t, const double *x, int *switched)
 //end
 //if held
 /* Values and rates of what is delayed or sampled. */
-static int ha_sources(ha_model *m, double t, const double *x)
+static int ha_sources(ha_model *m, ha_wide t, const double *x)
 {
     const int status = MODEL_rates(m, t, x, m->dx);
     if (status != MODEL_OK) {
@@ -347,7 +347,7 @@ static int ha_sources(ha_model *m, double t, const double *x)
 }
 
 /* Held signals at the start of a run. They may read each other: passes until nothing changes. */
-static int ha_begin_held(ha_model *m, double t, const double *x)
+static int ha_begin_held(ha_model *m, ha_wide t, const double *x)
 {
     int pass;
     for (pass = 0; pass < HA_NZ; ++pass) {
@@ -371,7 +371,7 @@ static int ha_begin_held(ha_model *m, double t, const double *x)
             for (s = 0; s < SAMPLES; ++s) {
                 m->samples[s].value = m->source[held[s]];
                 m->samples[s].taken = t;
-                m->samples[s].next = floor(t / m->samples[s].period);
+                m->samples[s].next = HA_WIDE(floor(t / m->samples[s].period));
                 ha_sample_pass(m, s, t);
             }
         }
@@ -384,7 +384,7 @@ static int ha_begin_held(ha_model *m, double t, const double *x)
 //if samples
 /* Takes the samples that are due, in order: each sees those taken before it. One that was taken at this very instant is
  * taken again if an input or a parameter has changed. */
-static int ha_take_samples(ha_model *m, double t, const double *x)
+static int ha_take_samples(ha_model *m, ha_wide t, const double *x)
 {
     static const int held[] = {SAMPLE_PLACES};
     int s;
@@ -405,7 +405,7 @@ static int ha_take_samples(ha_model *m, double t, const double *x)
 //end
 //if follows
 /* Goes on with the Newton solutions at (t, x). */
-static int ha_follow_solutions(ha_model *m, double t, const double *x)
+static int ha_follow_solutions(ha_model *m, ha_wide t, const double *x)
 {
     int status = MODEL_OK;
 //if rates_newton
@@ -438,7 +438,7 @@ static int ha_follow_solutions(ha_model *m, double t, const double *x)
 }
 
 //end
-int MODEL_accept(MODEL *m, double t, const double *x)
+int MODEL_accept(MODEL *m, ha_wide t, const double *x)
 {
 //if delays
     static const int places[] = {DELAY_PLACES};
@@ -464,16 +464,16 @@ int MODEL_accept(MODEL *m, double t, const double *x)
 //end
 }
 
-double MODEL_next_jump(MODEL *m, double t)
+ha_wide MODEL_next_jump(MODEL *m, ha_wide t)
 {
-    double next = HUGE_VAL;
+    ha_wide next = HA_WIDE(HUGE_VAL);
     (void)m;
     (void)t;
 //if delays
     {
         int d;
         for (d = 0; d < DELAYS; ++d) {
-            const double at = ha_delay_next(m, d, t);
+            const ha_wide at = ha_delay_next(m, d, t);
             if (at > t && at < next) {
                 next = at;
             }
@@ -484,7 +484,7 @@ double MODEL_next_jump(MODEL *m, double t)
     {
         int s;
         for (s = 0; s < SAMPLES; ++s) {
-            const double at = ha_sample_next(m, s);
+            const ha_wide at = ha_sample_next(m, s);
             if (at > t && at < next) {
                 next = at;
             }
@@ -499,7 +499,7 @@ double MODEL_next_jump(MODEL *m, double t)
     return next;
 }
 
-int MODEL_cross(MODEL *m, double t, const double *x)
+int MODEL_cross(MODEL *m, ha_wide t, const double *x)
 {
     int status = MODEL_OK;
     m->crossed = t;
