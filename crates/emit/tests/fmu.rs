@@ -219,3 +219,31 @@ fn wrappers_compile_without_warnings() {
         common::cc("cc", &folder, |c| c.args(common::FLAGS).args(["-O1", "-c", "-I."]).args(&sources));
     }
 }
+
+/// Points that an integrator tries: one beyond a fold is discarded and leaves the instance as it was; one that is only far
+/// from the last completed step has its value.
+#[test]
+fn trial_points_are_discarded_only_without_a_value() {
+    let rectifier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/rectifier/model.bond");
+    for (path, far) in [(own("draining"), 0), (rectifier, 1)] {
+        let written = written(&export_program(read_program(&path), Method::Rk4, 1e-3, true), Version::V2);
+        let folder = common::folder(&format!("trials_{far}"));
+        for file in written.files.iter().filter(|f| f.path.starts_with("sources/")).chain(&fmu::headers(Version::V2)) {
+            std::fs::write(folder.join(file.path.trim_start_matches("sources/")), &file.bytes).expect("a file");
+        }
+        let token =
+            description(&written).split("guid=\"").nth(1).and_then(|rest| rest.split('"').next()).map(str::to_string);
+        let guid = format!("-DGUID=\"{}\"", token.expect("a token"));
+        std::fs::write(folder.join("trials.c"), include_str!("common/trials.c")).expect("a file");
+        let far = format!("-DFAR={far}");
+        common::cc("cc", &folder, |c| {
+            c.args(common::FLAGS)
+                .args(["-O1", "-I.", &guid, &far])
+                .arg("trials.c")
+                .args(&written.sources)
+                .args(["-o", "trials", "-lm"])
+        });
+        let out = std::process::Command::new(folder.join("trials")).output().expect("it runs");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stdout));
+    }
+}

@@ -59,7 +59,14 @@ pub struct Export {
 impl Default for Export {
     /// C with the minimal form, the classical Runge-Kutta method and steps of 1 ms.
     fn default() -> Export {
-        Export { target: Target::C, form: Form::Minimal, method: FixedMethod::Rk4, step: 1e-3, real: Real::Double, binary: true }
+        Export {
+            target: Target::C,
+            form: Form::Minimal,
+            method: FixedMethod::Rk4,
+            step: 1e-3,
+            real: Real::Double,
+            binary: true,
+        }
     }
 }
 

@@ -91,7 +91,10 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     let parameters = p.parameters.len();
     part(single && parameters > 0, format!("ha_wide p_exact[{parameters}]; /* parameters in double precision */"));
     part(s.exact > 0, format!("ha_wide c_exact[{}]; /* of what follows from them, what time needs */", s.exact));
-    part(single, format!("double rest[{0}], trial_rest[{0}]; /* of states, what is less than their last digit */", n(nx)));
+    part(
+        single,
+        format!("double rest[{0}], trial_rest[{0}]; /* of states, what is less than their last digit */", n(nx)),
+    );
     part(true, format!("double k[{}]; /* conserved constants */", n(p.conserved.len())));
     part(true, format!("double z[{}]; /* held signals */", n(p.held.len())));
     part(true, format!("unsigned char set[{}]; /* which parameters are set */", n(p.parameters.len())));

@@ -43,7 +43,10 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
             "no goto (15.1), no union (19.2), no stdarg (17.1); functions have several returns (against 15.5)".into(),
         ),
         ("stack", format!("at most {} bytes (gcc, 64 bits, -O2)", stack(plan))),
-        ("state", format!("at most {} bytes, all in one MODEL", state(header, &plan.name, plan.export.real == Real::Float))),
+        (
+            "state",
+            format!("at most {} bytes, all in one MODEL", state(header, &plan.name, plan.export.real == Real::Float)),
+        ),
         ("conversions", format!("no warning by gcc -std=c99 -Wall -Wextra -Wconversion -pedantic{flags}")),
     ];
     all.iter()
@@ -87,10 +90,12 @@ fn frame(function: &str) -> usize {
         }
     };
     let of_line = |line: &str| match line.trim_start().strip_prefix("const ").unwrap_or(line.trim_start()) {
-        declared if declared.starts_with("double ") || declared.starts_with("ha_wide ") => match declared.split_once(" = ") {
-            Some((name, value)) if !value.starts_with('{') => 8 * array(name),
-            _ => 8 * array(declared),
-        },
+        declared if declared.starts_with("double ") || declared.starts_with("ha_wide ") => {
+            match declared.split_once(" = ") {
+                Some((name, value)) if !value.starts_with('{') => 8 * array(name),
+                _ => 8 * array(declared),
+            }
+        }
         _ => 0,
     };
     FRAME + function.lines().map(of_line).sum::<usize>()

@@ -72,7 +72,8 @@ fn rewrite(text: &str, real: Real, wide: bool) -> String {
                     ("ha_narrow", Real::Float) => "(float)",
                     _ => "(double)",
                 };
-                let alone = cast.is_empty() && (out.ends_with("= ") || out.ends_with("return ")) && rest.starts_with(';');
+                let alone =
+                    cast.is_empty() && (out.ends_with("= ") || out.ends_with("return ")) && rest.starts_with(';');
                 let braces = !(alone || is_one(&inside));
                 out += cast;
                 out += &if braces { format!("({inside})") } else { inside };
@@ -184,6 +185,9 @@ mod tests {
             "#define A 1.0\nconst float a = 1e-9f * fabsf(b); /* 1.0 */\ndouble t = t0 + 2.5 * h;\n\
              x = (float)(t - 1.0) * 3; y = (double)m->p[2] + fabs(t) + (float)v12; s = \"1.0\\\"2.0\"; i[1];\n"
         );
-        assert_eq!(wide("double a = 1.0; ha_real b = ha_narrow(a);", Real::Float), "double a = 1.0; float b = (float)a;");
+        assert_eq!(
+            wide("double a = 1.0; ha_real b = ha_narrow(a);", Real::Float),
+            "double a = 1.0; float b = (float)a;"
+        );
     }
 }

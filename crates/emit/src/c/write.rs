@@ -428,7 +428,11 @@ impl<'a> Writer<'a> {
     /// Whether a step is computed in double precision, and whether its derivative is, if real numbers are less.
     fn precision(&self, f: &Body, step: &Step) -> (bool, bool) {
         let single = self.real == Real::Float;
-        let all = || step.args.iter().all(|&a| matches!(a, Arg::Local(i) if f.wide[i as usize]) || matches!(a, Arg::Fixed(r) if r <= self.layout.time));
+        let all = || {
+            step.args.iter().all(|&a| {
+                matches!(a, Arg::Local(i) if f.wide[i as usize]) || matches!(a, Arg::Fixed(r) if r <= self.layout.time)
+            })
+        };
         match step.act {
             Act::Side(_) | Act::Floor(_) => (single, single),
             Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => (single, false),

@@ -88,7 +88,8 @@ pub fn export_program(
         observed: vec![f64::NAN; model.observed()],
     };
     let recorded = model.recorded().to_vec();
-    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real: Real::Double };
+    let export =
+        Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real: Real::Double };
     let written = write(&export).expect("an explicit program");
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());

@@ -108,7 +108,12 @@ impl Plan<'_> {
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
         let more = linearly_implicit(self.export.method);
-        words.into_iter().chain(more).chain(tolerances(self.export.real)).map(|(word, text)| (word.to_string(), text)).collect()
+        words
+            .into_iter()
+            .chain(more)
+            .chain(tolerances(self.export.real))
+            .map(|(word, text)| (word.to_string(), text))
+            .collect()
     }
 
     /// Numbers of a table in double precision whatever real numbers are.

@@ -23,6 +23,11 @@ enum {
 /* Modes; a failure of the model leaves it in HA_FAILED. */
 enum { HA_INSTANTIATED, HA_INITIALISING, HA_EVENT, HA_CONTINUOUS, HA_STEPPING, HA_TERMINATED, HA_FAILED };
 
+/* Evaluations at most each time a Newton block is solved in model exchange. Integrators try points far from the last one that
+ * they have completed, and some tell of no step between two communication points: the solution is followed all that way, and
+ * no clock waits for it as for the steps of co-simulation. */
+enum { HA_TRIAL_EVALUATIONS = 1000000 };
+
 /* What may be done with a parameter: 0 nothing, 1 set before the start, 2 set at any time. */
 static const unsigned char ha_settable[] = {
 SETTABLE
@@ -140,7 +145,13 @@ static int ha_begin(ha_fmu *f)
     f->s.start_time = 0.0;
     memset(f->s.scales, 0, sizeof f->s.scales);
     ha_changed(f);
-    return MODEL_reset(&f->s.m) == MODEL_OK;
+    if (MODEL_reset(&f->s.m) != MODEL_OK) {
+        return 0;
+    }
+    if (f->exchange) {
+        f->s.m.most_evaluations = HA_TRIAL_EVALUATIONS;
+    }
+    return 1;
 }
 
 /* Finds the start, if that is due. */
