@@ -5,7 +5,7 @@ use halfarrow_compiler::bond_graph::{FileError, Files};
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::Form;
 use halfarrow_emit::c::{Export, Written, write};
-use halfarrow_emit::{Method, Real, Start};
+use halfarrow_emit::{EmitError, Method, Real, Start};
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Options, Sink, System, simulate};
@@ -69,12 +69,29 @@ pub fn export(path: &Path, method: Method, step: f64) -> Exported {
     export_program(program, method, step, false)
 }
 
+/// A model with real numbers of single precision.
+pub fn export_single(path: &Path, method: Method, step: f64) -> Exported {
+    let mut program = read_program(path);
+    program.name = format!("{}_{}_single", program.name, method.name());
+    export_as(program, method, step, (false, Real::Float)).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
+}
+
 pub fn export_program(
     program: halfarrow_compiler::program::Program,
     method: Method,
     step: f64,
     derivatives: bool,
 ) -> Exported {
+    export_as(program, method, step, (derivatives, Real::Double)).expect("an explicit program")
+}
+
+/// With derivatives or not, and real numbers of this size.
+pub fn export_as(
+    program: halfarrow_compiler::program::Program,
+    method: Method,
+    step: f64,
+    (derivatives, real): (bool, Real),
+) -> Result<Exported, EmitError> {
     let mut model = Model::new(program.clone()).expect("parameters have values");
     let mut x = model.initialise(0.0).expect("a start");
     let start = Start {
@@ -88,12 +105,11 @@ pub fn export_program(
         observed: vec![f64::NAN; model.observed()],
     };
     let recorded = model.recorded().to_vec();
-    let export =
-        Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real: Real::Double };
-    let written = write(&export).expect("an explicit program");
+    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real };
+    let written = write(&export)?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());
-    Exported { model, start: x, at_start: start, written, method, step, outputs }
+    Ok(Exported { model, start: x, at_start: start, written, method, step, outputs })
 }
 
 struct Collect(Rows);

@@ -361,7 +361,7 @@ impl<'a> Plan<'a> {
         text += math::C_SOURCE;
         text += "\n/* ---- small things ---- */\n\n";
         if size == Real::Float {
-            text += include_str!("../runtime/single.c");
+            text += math::C_SOURCE_SINGLE;
             text += &real::wide(&filled(include_str!("../runtime/small.c")), size);
         }
         text += &piece(include_str!("../runtime/small.c"));
