@@ -306,7 +306,11 @@ fn a_model_is_exported_as_c() {
     assert_eq!(status(&latex), 0, "{}", stderr(&latex));
     let text = fs::read_to_string(here.join("car.tex")).unwrap();
     assert!(text.starts_with("\\documentclass") && text.contains("\\dot{f}_{\\mathrm{wheel}}"), "{text}");
-    for wrong in [&["--step", "0"][..], &["--form", "lagrange"]] {
+    let single = json(&halfarrow(&here, &["export", "c", &car, "--out", "single", "--real", "float", "--json"]));
+    assert_eq!((&report["real"], &single["real"]), (&serde_json::json!("double"), &serde_json::json!("float")));
+    let header = fs::read_to_string(here.join("single/quarter_car.h")).unwrap();
+    assert!(header.contains("float x[4]; /* states */") && header.contains("double t; /* time, in s */"), "{header}");
+    for wrong in [&["--step", "0"][..], &["--form", "lagrange"], &["--real", "float", "--set", "mu=1e-50"]] {
         let arguments = [&["export", "c", &car, "--out", "car"], wrong].concat();
         assert_eq!(status(&halfarrow(&here, &arguments)), 2, "{wrong:?}");
     }
@@ -340,6 +344,12 @@ fn a_model_is_exported_as_fmu() {
     );
     assert!(!here.join("other.fmu").exists());
     assert_eq!(status(&halfarrow(&here, &["export", "fmu2", &car, "--out", "car.zip"])), 2);
+    let single = halfarrow(&here, &["export", "fmu2", &car, "--out", "car.fmu", "--real", "float"]);
+    assert!(
+        status(&single) == 2 && stderr(&single).contains("`--real float` is for `export c`"),
+        "{}",
+        stderr(&single)
+    );
 }
 
 /// Tables and equations are no wider than the page: 80 columns without a terminal, else as `COLUMNS` or `--width` say.

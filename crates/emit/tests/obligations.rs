@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Exported, FLAGS, export, own};
+use common::{Exported, FLAGS, export, export_single, own};
 use halfarrow_emit::Method;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Functions of the C library that code may call.
-const LIBRARY: [&str; 13] =
-    ["sqrt", "fabs", "floor", "ceil", "trunc", "rint", "round", "ldexp", "frexp", "fma", "memcpy", "memset", "memmove"];
+const LIBRARY: [&str; 17] = [
+    "sqrt", "fabs", "floor", "ceil", "trunc", "rint", "round", "ldexp", "frexp", "fma", "memcpy", "memset", "memmove",
+    "sqrtf", "fabsf", "floorf", "roundf",
+];
 
 fn models() -> Vec<Exported> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
@@ -28,6 +30,15 @@ fn models() -> Vec<Exported> {
         ("rlc_ladder", Method::Rosenbrock),
     ] {
         all.push(export(&of(name), method, 1e-3));
+    }
+    for (name, method) in [
+        ("contact", Method::ImplicitMidpoint),
+        ("bridge", Method::Rosenbrock),
+        ("delay", Method::Rk4),
+        ("tables", Method::Heun),
+        ("closure", Method::Euler),
+    ] {
+        all.push(export_single(&own(name), method, 1e-3));
     }
     all
 }
@@ -130,6 +141,14 @@ fn the_head_says_what_is_so() {
         assert!(!(indirect && source.contains("indirect calls:   none")), "{name}: indirect calls");
         symbols(name, &object);
         no_forbidden_words(name, source);
+        assert!(
+            source.contains(if name.ends_with("_single") {
+                "real numbers:     float;"
+            } else {
+                "real numbers:     double\n"
+            }),
+            "{name}"
+        );
         size(&one, claimed(source, "state"));
     }
 }

@@ -12,9 +12,9 @@ use std::process::Command;
 const STEPS: usize = 400;
 /// No number of double precision comes in by accident, and none is cut.
 const STRICT: [&str; 3] = ["-O1", "-Wdouble-promotion", "-Wfloat-conversion"];
-/// What is not compared: values that are nothing but rounding or counts of events within rounding of a step, runs that are
-/// too coarse for their model.
-const LEFT_OUT: [&str; 5] = ["quarter_car", "rectifier", "contact", "leakless", "electrostatic"];
+/// What is not compared: speeds that are rounding, at rest under great loads; models that fail or diverge with this step in
+/// double precision too.
+const LEFT_OUT: [&str; 3] = ["quarter_car", "leakless", "electrostatic"];
 
 /// A run: when it begins, how many steps it makes, of which each how many-th is printed, a parameter and its value.
 #[derive(Clone, Copy)]
@@ -73,14 +73,16 @@ fn floats_follow_the_interpreter() {
         let folder = path.parent().and_then(|p| p.file_name()).unwrap_or_default().to_string_lossy().to_string();
         let name =
             if path.ends_with("model.bond") { folder } else { path.file_stem().unwrap().to_string_lossy().to_string() };
+        // Its diodes turn over within a millisecond.
+        let step = if name == "rectifier" { 1e-5 } else { 1e-3 };
         if !LEFT_OUT.contains(&name.as_str()) {
-            all.push(export_single(path, Method::ALL[i % Method::ALL.len()], 1e-3));
+            all.push(export_single(path, Method::ALL[i % Method::ALL.len()], step));
         }
     }
     for name in ["bridge", "delay", "tables", "closure", "mesh"] {
         all.push(export_single(&own(name), Method::ImplicitMidpoint, 0.9e-3));
     }
-    assert!(all.len() >= 45, "{} models", all.len());
+    assert!(all.len() >= 50, "{} models", all.len());
     let text = build_with("single", &all, &driver(&all, &|_| PLAIN), &STRICT).run(&[]);
     let mut faults = Vec::new();
     for (one, (rows, said)) in all.iter().zip(outputs(&text)) {
