@@ -132,6 +132,8 @@ pub struct Start {
     pub conserved: Vec<f64>,
     /// Typical magnitudes of its states, 0 where unknown.
     pub scales: Vec<f64>,
+    /// Magnitudes to which its states grow in a run, 0 where unknown: told to importers of FMUs where `scales` knows none.
+    pub grown: Vec<f64>,
     /// Delays and periods of its held signals, in s.
     pub times: Vec<f64>,
     /// Values of its parameters.

@@ -220,6 +220,17 @@ fn wrappers_compile_without_warnings() {
     }
 }
 
+/// Of states at rest the importer is told how great they become.
+#[test]
+fn states_at_rest_have_the_magnitude_to_which_they_grow() {
+    let rectifier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/rectifier/model.bond");
+    let mut one = export_program(read_program(&rectifier), Method::Rk4, 1e-3, true);
+    let nominal = |one: &Exported| description(&written(one, Version::V2)).contains("nominal=\"1.25e-5\"");
+    assert!(!nominal(&one));
+    one.at_start.grown = vec![1.25e-5];
+    assert!(nominal(&one));
+}
+
 /// Points that an integrator tries: one beyond a fold is discarded and leaves the instance as it was; one that is only far
 /// from the last completed step has its value.
 #[test]

@@ -5,9 +5,10 @@ use halfarrow_compiler::program::Program;
 use halfarrow_emit::fmu::{self, Version};
 use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
-use halfarrow_sim::System;
 use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::{Options, Sink, System, simulate};
 use serde::Serialize;
+use std::ops::ControlFlow;
 
 use crate::error::{Error, Problem};
 use crate::library::library;
@@ -186,7 +187,8 @@ impl Model {
     }
 
     fn export_fmu(&self, export: &Export, version: Version) -> Result<Exported, Error> {
-        let code = Code::new(self, export)?;
+        let mut code = Code::new(self, export)?;
+        code.start.grown = grown(&mut code.system, &code.start, export);
         let written = fmu::write(&code.asked(true)?, version).map_err(refused)?;
         let binary = if export.binary { Some(library(&written, version)?) } else { None };
         let mut names: Vec<String> = written.files.iter().map(|f| f.path.clone()).collect();
@@ -200,6 +202,7 @@ impl Model {
 /// A program with its start, ready to be written.
 struct Code<'a> {
     export: &'a Export,
+    system: exec::Model,
     program: Program,
     start: emit::Start,
     recorded: Vec<usize>,
@@ -214,7 +217,7 @@ impl<'a> Code<'a> {
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
         let recorded = system.recorded().to_vec();
-        Ok(Code { export, program: system.program().clone(), start, recorded })
+        Ok(Code { export, program: system.program().clone(), system, start, recorded })
     }
 
     fn asked(&self, derivatives: bool) -> Result<emit::c::Export<'_>, Problem> {
@@ -275,12 +278,47 @@ fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarro
         states,
         conserved: system.conserved().to_vec(),
         scales: system.scales().to_vec(),
+        grown: Vec::new(),
         times: p.held.iter().map(|h| system.constant(h.time).unwrap_or(f64::NAN)).collect(),
         parameters: p.parameters.iter().map(|p| system.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
         derived: system.derived().to_vec(),
         inputs: p.inputs.iter().map(|i| system.constant(i.default).unwrap_or(0.0)).collect(),
         observed,
     })
+}
+
+/// Steps of the fixed method, and of the run that looks how states grow, after which that run ends.
+const LOOK_AHEAD: (f64, usize) = (1000.0, 2000);
+
+/// How great states become that are nothing at the start, as far as a short run with error control tells.
+fn grown(system: &mut exec::Model, start: &emit::Start, export: &Export) -> Vec<f64> {
+    let mut growth = Growth { magnitudes: Vec::new(), steps: 0 };
+    if start.scales.iter().all(|&scale| scale > 0.0) {
+        return growth.magnitudes;
+    }
+    let options = Options { to: LOOK_AHEAD.0 * export.step, ..Options::default() };
+    // Where it stops, by itself or since it takes too long, what was seen is told all the same.
+    let _ = simulate(system, &options, &mut start.states.clone(), &mut growth);
+    growth.magnitudes
+}
+
+/// Listens for the magnitudes of states.
+struct Growth {
+    magnitudes: Vec<f64>,
+    steps: usize,
+}
+
+impl Sink for Growth {
+    fn sample(&mut self, _: f64, _: &[f64]) {}
+
+    fn progress(&mut self, _: f64) -> ControlFlow<()> {
+        self.steps += 1;
+        if self.steps < LOOK_AHEAD.1 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+
+    fn tolerances(&mut self, magnitudes: &[f64], _: &[f64]) {
+        self.magnitudes = magnitudes.to_vec();
+    }
 }
 
 fn method(method: FixedMethod) -> emit::Method {

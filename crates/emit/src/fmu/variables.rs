@@ -105,11 +105,12 @@ impl Variables {
         self.all.iter().position(|v| v.reference == reference)
     }
 
-    /// Typical magnitudes of the states; 1 where they are not known. One that is much below that of another state of the
+    /// Typical magnitudes of the states, at the start or as they grow from rest; 1 where they are not known. One that is much below that of another state of the
     /// same unit is what rounding has left of it: that of the other one is taken.
     pub fn nominals(&self, export: &Export) -> Vec<f64> {
         let states = &export.program.states;
-        let scale = |i: usize| export.start.scales.get(i).copied().filter(|s| *s > 0.0 && s.is_finite()).unwrap_or(0.0);
+        let known = |scales: &[f64], i: usize| scales.get(i).copied().filter(|s| *s > 0.0 && s.is_finite());
+        let scale = |i: usize| known(&export.start.scales, i).or(known(&export.start.grown, i)).unwrap_or(0.0);
         let unit = |i: usize| states[i].unit.as_ref().map(|u| u.dimension);
         let nominal = |i: usize| {
             let like = (0..states.len()).filter(|&k| unit(k) == unit(i));

@@ -98,6 +98,7 @@ pub fn export_as(
         states: x.clone(),
         conserved: model.conserved().to_vec(),
         scales: model.scales().to_vec(),
+        grown: Vec::new(),
         times: program.held.iter().map(|h| model.constant(h.time).unwrap_or(f64::NAN)).collect(),
         parameters: program.parameters.iter().map(|p| model.parameter(&p.name).unwrap_or(f64::NAN)).collect(),
         derived: model.derived().to_vec(),

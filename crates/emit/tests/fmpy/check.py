@@ -27,8 +27,6 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[3]
 STEP, EVERY, POINTS = 1e-3, 0.01, 40
 FAULTS = []
-# Models at rest at the start: their magnitudes are not known, so CVODE takes its tolerance for an absolute one.
-AT_REST = {"bridge": 1e-11, "rectifier": 1e-11}
 # CMake stands beside this Python.
 os.environ["PATH"] = str(Path(sys.executable).parent) + os.pathsep + os.environ["PATH"]
 
@@ -226,12 +224,12 @@ def variable_steps(where, file):
     halves.close()
 
 
-def model_exchange(where, file, reference, tolerance):
+def model_exchange(where, file, reference, tolerance, relative=1e-9):
     fmu = Fmu(file, exchange=True)
     names = recorded(fmu, reference)
     fmu.close()
     result = fmpy.simulate_fmu(
-        str(file), fmi_type="ModelExchange", solver="CVode", relative_tolerance=AT_REST.get(file.stem[:-2], 1e-9), stop_time=POINTS / 100,
+        str(file), fmi_type="ModelExchange", solver="CVode", relative_tolerance=relative, stop_time=POINTS / 100,
         output_interval=EVERY, output=names, record_events=False)
     for name in names:
         wanted = reference[name]
@@ -401,6 +399,8 @@ def main():
             if name != "rectifier":  # its diodes turn over within one step
                 variable_steps(where, file)
             model_exchange(where + " model exchange", file, tight, tolerance)
+            if name == "rectifier":  # at rest at the start: its nominal tells what a loose tolerance is relative to
+                model_exchange(where + " model exchange, loosely", file, tight, 2e-2, 1e-4)
             if name != "rectifier":  # at time 0 its mains current is 0 but for rounding wherever the state is put
                 derivatives(where, file)
             if name in ("tuned", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
