@@ -9,7 +9,7 @@ OBLIGATION_LINES
 #include <string.h>
 
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "results need arithmetic in double precision: on 32-bit x86 compile with -msse2 -mfpmath=sse"
+#error "results need arithmetic without excess precision: on 32-bit x86 compile with -msse2 -mfpmath=sse"
 #endif
 #ifdef __FAST_MATH__
 #error "results need arithmetic by the standard: compile without -ffast-math"
