@@ -401,8 +401,7 @@ def main():
             model_exchange(where + " model exchange", file, tight, tolerance)
             if name == "rectifier":  # at rest at the start: its nominal tells what a loose tolerance is relative to
                 model_exchange(where + " model exchange, loosely", file, tight, 2e-2, 1e-4)
-            if name != "rectifier":  # at time 0 its mains current is 0 but for rounding wherever the state is put
-                derivatives(where, file)
+            derivatives(where, file)
             if name in ("tuned", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
                 initial_unknowns(where, file)
             if name in ("contact", "quarter_car"):

@@ -202,6 +202,38 @@ impl Frame {
         false
     }
 
+    /// What the rounding of residuals at the memory makes of each unknown, as the magnitude of which that is settled; whether
+    /// one of them is greater than its unknown.
+    pub(super) fn find_floors(&mut self, solve: &Solve) -> bool {
+        let newton = &mut self.solvers[solve.block.0 as usize].newton;
+        newton.x.copy_from_slice(&newton.memory);
+        if self.is_exhausted(solve) || !self.evaluate_root(solve) || !self.factor(solve) {
+            return false;
+        }
+        self.sum_terms(solve);
+        let Frame { solvers, terms, .. } = self;
+        let solver = &mut solvers[solve.block.0 as usize];
+        let newton = &mut solver.newton;
+        newton.floor.fill(0.0);
+        for (j, &right) in solve.right.iter().enumerate() {
+            newton.next.fill(0.0);
+            newton.next[j] = ROUNDING * terms[right as usize];
+            solver.lu.solve(&mut newton.next);
+            newton.floor.iter_mut().zip(&newton.next).for_each(|(floor, part)| *floor += part.abs());
+        }
+        let mut hidden = false;
+        for (floor, span) in newton.floor.iter_mut().zip(&mut newton.span) {
+            *floor /= SETTLED;
+            hidden |= *floor > *span;
+            *span = span.max(*floor);
+        }
+        let found = hidden && newton.floor.iter().all(|floor| floor.is_finite());
+        if !found {
+            newton.floor.fill(0.0);
+        }
+        found
+    }
+
     fn floating_of(&mut self, solve: &Solve) -> &mut Floating {
         &mut self.solvers[solve.block.0 as usize].newton.floating
     }

@@ -82,9 +82,11 @@ pub(crate) struct Newton {
     pub(super) evaluations: usize,
     step: Vec<f64>,
     trial: Vec<f64>,
-    next: Vec<f64>,
+    pub(super) next: Vec<f64>,
     /// Greatest magnitude of each unknown so far.
     size: Vec<f64>,
+    /// Magnitudes below which unknowns are rounding; 0 unless a solution is sought that is not found without them.
+    pub(super) floor: Vec<f64>,
     /// What is subtracted from the residuals on the way from a point where they do not vanish.
     pub(super) offset: Vec<f64>,
     first: Vec<f64>,
@@ -99,7 +101,7 @@ pub(crate) struct Newton {
     /// The Jacobian of the root at which the attempt began, if it began at one.
     base: Vec<f64>,
     /// Magnitudes of the unknowns at the memory and where the attempt from there led.
-    span: Vec<f64>,
+    pub(super) span: Vec<f64>,
     /// Whether the first step, taken whole, left little to do.
     near: bool,
     /// What nothing tells.
@@ -125,6 +127,7 @@ impl Newton {
             trial: line.clone(),
             next: line.clone(),
             size: line.clone(),
+            floor: line.clone(),
             offset: line.clone(),
             first: line.clone(),
             kept: line.clone(),
@@ -285,6 +288,7 @@ impl Frame {
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh) = (0, false);
         newton.floating.now.fill(false);
+        newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
         if let Err(missed) = self.follow(solve)
             && (self.newton_of(solve).following || !self.search(solve))
@@ -348,7 +352,26 @@ impl Frame {
             Ok(()) => self.elsewhere(solve),
             Err(miss) => Missed::All(miss),
         };
-        if self.approach(solve) { Ok(()) } else { Err(missed) }
+        if self.approach(solve) || self.follows_above_rounding(solve) { Ok(()) } else { Err(missed) }
+    }
+
+    /// The root that goes on from the memory, where an unknown that is 0 but for the rounding of others hides it: steps of
+    /// such an unknown are never small against it, but they are against what rounding leaves of it.
+    fn follows_above_rounding(&mut self, solve: &Solve) -> bool {
+        if !self.newton_of(solve).following || !self.find_floors(solve) {
+            return false;
+        }
+        let newton = self.newton_of(solve);
+        newton.floating.now.fill(false);
+        newton.offset.fill(0.0);
+        newton.kept.copy_from_slice(&newton.memory);
+        newton.base.copy_from_slice(&newton.jacobian_memory);
+        let at_once = self.attempt(solve, Trust::Damped).is_ok();
+        let found = at_once && (self.goes_on(solve) || self.is_the_only_one(solve)) || self.approach(solve);
+        if !found {
+            self.newton_of(solve).floor.fill(0.0);
+        }
+        found
     }
 
     /// Whether the memory still solves the equations to rounding: where an unknown is 0 but for the rounding of others,
@@ -610,7 +633,7 @@ impl Frame {
         newton.near = true;
         newton.lead.fill(0.0);
         newton.opening.fill(0.0);
-        (0..n).for_each(|i| newton.size[i] = newton.x[i].abs());
+        (0..n).for_each(|i| newton.size[i] = newton.x[i].abs().max(newton.floor[i]));
         if !self.evaluate(solve, false) {
             return Err(Miss { iterations: 0, residual: f64::NAN });
         }
@@ -810,7 +833,7 @@ impl Frame {
         residuals.fold(0.0, f64::max)
     }
 
-    fn factor(&mut self, solve: &Solve) -> bool {
+    pub(super) fn factor(&mut self, solve: &Solve) -> bool {
         let Frame { r, solvers, .. } = self;
         let lu = &mut solvers[solve.block.0 as usize].lu;
         put_entries(lu.matrix(), solve, r);

@@ -321,7 +321,7 @@ impl<'a> Plan<'a> {
         let newton: Vec<(usize, usize)> =
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (program.blocks[*b].size(), reads)).collect();
         let lu = |n: usize| elimination_room(n, self.export.real);
-        let work = |&(n, reads): &(usize, usize)| 16 * n + reads + 4 * n * n + lu(n);
+        let work = |&(n, reads): &(usize, usize)| 17 * n + reads + 4 * n * n + lu(n);
         self.sizes = Sizes {
             derived: writer.derived.len(),
             exact: writer.exact.borrow().len(),

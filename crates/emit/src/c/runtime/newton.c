@@ -52,6 +52,8 @@ typedef struct {
     double *order;
     double *rest;
     double *unseen;
+    /* Magnitudes below which unknowns are rounding; 0 unless a solution is sought that is not found without them. */
+    double *floor;
     ha_lu lu;
 } ha_newton;
 
@@ -101,6 +103,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.units = ha_take(&place, n);
     w.order = ha_take(&place, n);
     w.rest = ha_take(&place, n);
+    w.floor = ha_take(&place, n);
     w.loose = ha_take(&place, n * n);
     w.unseen = ha_take(&place, n * n);
     w.lu = ha_lu_at(place, m->order, n);
@@ -648,7 +651,7 @@ static int ha_attempt(ha_model *m, ha_newton *w, int trust)
     ha_fill(w->lead, 0.0, n);
     ha_fill(w->opening, 0.0, n);
     for (i = 0; i < n; ++i) {
-        w->size[i] = fabs(w->x[i]);
+        w->size[i] = ha_max(fabs(w->x[i]), w->floor[i]);
     }
     if (!ha_look_at(m, w, w->x)) {
         return 0;
@@ -913,6 +916,59 @@ static int ha_stays(ha_model *m, ha_newton *w)
     return ha_look_at(m, w, w->memory);
 }
 
+/* What the rounding of residuals at the memory makes of each unknown, as the magnitude of which that is settled; whether one
+ * of them is greater than its unknown. */
+static int ha_find_floors(ha_model *m, ha_newton *w)
+{
+    const int n = w->n;
+    int hidden = 0;
+    int i;
+    int j;
+    ha_copy(w->x, w->memory, n);
+    if (w->evaluations >= w->limit || !ha_look_at(m, w, w->x) || !ha_newton_factor(w)) {
+        return 0;
+    }
+    w->block->terms(m, w->present, w->x, w->terms);
+    ha_fill(w->floor, 0.0, n);
+    for (j = 0; j < n; ++j) {
+        ha_fill(w->next, 0.0, n);
+        w->next[j] = 8.0 * DBL_EPSILON * w->terms[j];
+        ha_lu_solve(&w->lu, w->next);
+        for (i = 0; i < n; ++i) {
+            w->floor[i] += fabs(w->next[i]);
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        w->floor[i] /= CLOSE_TO_ROUNDING;
+        if (w->floor[i] > w->span[i]) {
+            hidden = 1;
+        }
+        w->span[i] = ha_max(w->span[i], w->floor[i]);
+    }
+    if (!hidden || !ha_all_finite(w->floor, n)) {
+        ha_fill(w->floor, 0.0, n);
+        return 0;
+    }
+    return 1;
+}
+
+/* The root that goes on from the memory, where an unknown that is 0 but for the rounding of others hides it: steps of such an
+ * unknown are never small against it, but they are against what rounding leaves of it. */
+static int ha_follows_above_rounding(ha_model *m, ha_newton *w)
+{
+    if (!w->following || !ha_find_floors(m, w)) {
+        return 0;
+    }
+    ha_fill(w->offset, 0.0, w->n);
+    ha_copy(w->kept, w->memory, w->n);
+    ha_copy(w->base, w->jacobian_memory, w->n * w->n);
+    if ((ha_attempt(m, w, HA_DAMPED) && (ha_goes_on(w) || ha_is_the_only_one(m, w))) || ha_approach(m, w)) {
+        return 1;
+    }
+    ha_fill(w->floor, 0.0, w->n);
+    return 0;
+}
+
 /* The root that goes on from the memory: 0, or why there is none. */
 static int ha_follow(ha_model *m, ha_newton *w)
 {
@@ -933,7 +989,7 @@ static int ha_follow(ha_model *m, ha_newton *w)
     for (i = 0; i < w->n; ++i) {
         w->span[i] = ha_max(fabs(w->x[i]), fabs(w->memory[i]));
     }
-    if (ha_approach(m, w)) {
+    if (ha_approach(m, w) || ha_follows_above_rounding(m, w)) {
         return MODEL_OK;
     }
     return why == MODEL_NO_CONVERGENCE && w->evaluations >= w->limit ? MODEL_BOUND : why;
@@ -1055,6 +1111,7 @@ static int ha_find_root(ha_model *m, int number, const double *o, double *x)
     int status;
     ha_copy(w.outer, o, w.block->reads);
     ha_copy(w.present, o, w.block->reads);
+    ha_fill(w.floor, 0.0, w.n);
     status = ha_follow(m, &w);
     if (status != MODEL_OK && w.following) {
 //if newton_single
