@@ -160,6 +160,22 @@ fn long_runs_do_not_stand_still() {
     }
 }
 
+/// Where no source depends on time, and what parameters determine is computed, nothing but floats is left for a step.
+#[test]
+fn equations_without_time_have_no_double() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    for path in [root.join("quarter_car/model.bond"), root.join("slider_crank/model.bond"), own("closure")] {
+        let source = export_single(&path, Method::Heun, 1e-3).written.source;
+        let functions =
+            source.split("\n}\n").filter(|f| f.contains("int ha_rates_code") || f.contains("int ha_observe_code"));
+        assert_eq!(functions.clone().count(), 2);
+        for function in functions {
+            let body = function.split_once("\n{\n").expect("a body").1;
+            assert!(!body.contains("double"), "{body}");
+        }
+    }
+}
+
 /// What does not fit is refused, with its name and what would help.
 #[test]
 fn what_does_not_fit_is_refused() {
