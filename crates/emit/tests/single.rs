@@ -164,7 +164,7 @@ fn long_runs_do_not_stand_still() {
 #[test]
 fn equations_without_time_have_no_double() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-    for path in [root.join("quarter_car/model.bond"), root.join("slider_crank/model.bond"), own("draining")] {
+    for path in [root.join("quarter_car/model.bond"), root.join("double_pendulum/model.bond"), own("draining")] {
         let source = export_single(&path, Method::Heun, 1e-3).written.source;
         let functions =
             source.split("\n}\n").filter(|f| f.contains("int ha_rates_code") || f.contains("int ha_observe_code"));
