@@ -355,7 +355,7 @@ static int ha_is_at_rounding(ha_model *m, ha_newton *w)
 static int ha_is_near_rounding(ha_model *m, ha_newton *w)
 {
     ha_measure(m, w);
-    return ha_rest(w) <= 1e6;
+    return ha_rest(w) <= BORROWED_ROUNDING;
 }
 
 static void ha_swap(double *a, double *b)
