@@ -68,6 +68,17 @@ int main(void)
 {
     long i;
     ONE(sin) ONE(cos) ONE(tan) ONE(exp) ONE(log) ONE(log2) ONE(log10) ONE(sinh) ONE(cosh) ONE(tanh)
+    for (i = 0; i < POINTS; ++i) {
+        float both[2];
+        const float x = number(i, 500.0f);
+        const float sine = ha_sinf(x);
+        const float cosine = ha_cosf(x);
+        ha_turnf(x, both);
+        if (x == x && (memcmp(&both[0], &sine, sizeof sine) != 0 || memcmp(&both[1], &cosine, sizeof cosine) != 0)
+            && fabsf(x) <= 3.4e38f) {
+            printf("! sine and cosine of %a at once are others\n", (double)x);
+        }
+    }
     ONE(asin) ONE(acos) ONE(atan) TWO(pow) TWO(atan2)
     return 0;
 }

@@ -120,8 +120,27 @@ HA_FUNCTION float ha_cosf(float x)
 /* Sine and cosine. */
 HA_FUNCTION void ha_turnf(float x, float *both)
 {
-    both[0] = ha_sinf(x);
-    both[1] = ha_cosf(x);
+    ha_turned_single r;
+    ha_float c;
+    float z;
+    float sine;
+    float cosine;
+    if (!(fabsf(x) <= 200.0f) || x == 0.0f) {
+        both[0] = ha_sinf(x);
+        both[1] = ha_cosf(x);
+        return;
+    }
+    r = ha_near_single(x);
+    z = r.a * r.a;
+    sine = r.a + ha_sine_rest_single(r, z);
+    c = ha_cosine_parts_single(r, z);
+    cosine = c.hi + c.lo;
+    both[0] = (r.quarters & 1) != 0 ? cosine : sine;
+    both[1] = (r.quarters & 1) != 0 ? -sine : cosine;
+    if ((r.quarters & 2) != 0) {
+        both[0] = -both[0];
+        both[1] = -both[1];
+    }
 }
 
 HA_FUNCTION float ha_tanf(float x)
