@@ -1,5 +1,7 @@
 //! The model as code for elsewhere.
 
+use std::ops::ControlFlow;
+
 use halfarrow_compiler::equations::{Form, show};
 use halfarrow_compiler::program::Program;
 use halfarrow_emit::fmu::{self, Version};
@@ -8,7 +10,6 @@ use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Options, Sink, System, simulate};
 use serde::Serialize;
-use std::ops::ControlFlow;
 
 use crate::error::{Error, Problem};
 use crate::library::library;
