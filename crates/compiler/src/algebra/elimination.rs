@@ -69,6 +69,12 @@ impl NumericPoint {
         NumericPoint { symbols, known: FxHashMap::default() }
     }
 
+    /// Moves the point.
+    pub fn set(&mut self, values: impl IntoIterator<Item = (Symbol, f64)>) {
+        self.symbols.extend(values);
+        self.known.clear();
+    }
+
     /// The value of a symbol there.
     pub fn of(&self, symbol: Symbol) -> f64 {
         self.symbols.get(&symbol).copied().unwrap_or(1.0)

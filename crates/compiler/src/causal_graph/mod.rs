@@ -14,7 +14,7 @@ mod ports;
 mod rank;
 mod rules;
 pub mod signals;
-mod start_point;
+pub(crate) mod start_point;
 mod strokes;
 mod text;
 mod verify;

@@ -10,7 +10,7 @@ use crate::ids::Map;
 /// Values of all variables of a graph at the start: of positions those that are given, and for the others what closes
 /// the constraints. Efforts and flows without a start value are taken as 1: they are not known yet, and nothing that
 /// is chosen may rest on their being 0.
-pub(super) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
+pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
     let mut values: Map<Symbol, f64> = Map::new();
     for parameter in graph.parameters.values() {
         values.insert(parameter.symbol, x.given_value(parameter.value).unwrap_or(1.0));

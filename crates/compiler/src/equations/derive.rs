@@ -7,7 +7,7 @@ use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::freedom::{self, Sum};
-use super::minimal::{Assembled, Chosen, assemble};
+use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::stiff::parameters;
 use super::verify::verify;
@@ -181,8 +181,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();
     let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();
     let free_rates: BTreeSet<Symbol> = rates.intersection(&d.free).copied().collect();
-    let sum = |s: &Chosen| s.meaning.map(|value| Sum { state: s.symbol, value, speed: s.tracked });
-    let sums: Vec<Sum> = states.iter().filter_map(sum).collect();
+    let sums: Vec<Sum> = states.iter().filter(|s| s.meaning.is_some()).map(|s| Sum { speed: s.tracked }).collect();
     let meanings: Vec<_> = states.iter().filter_map(|s| s.meaning.map(|m| (s.symbol, m))).collect();
     let states: Vec<State> = states
         .into_iter()
@@ -202,7 +201,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let own_start = matches!(form, Form::Minimal | Form::Kane);
     let mut conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
     if own_start {
-        let free = freedom::conditions(&mut d, causal, &conserved, &sums, &conditions);
+        let free = freedom::conditions(&mut d, causal, &sums, &conditions);
         conditions.extend(free);
     }
     let guesses = if own_start { observed::guesses(&mut d) } else { Vec::new() };

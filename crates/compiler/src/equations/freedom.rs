@@ -1,97 +1,287 @@
 //! Freedom that the start values leave is zero in the storages, or what is guessed of them.
 //!
-//! A constant of the minimal form, and a sum of momenta that is its state, is no storage: if such a sum were zero, a storage
-//! beside one that starts with something would start with it too, and other forms would start elsewhere. So the storages
-//! behind them start from zero by a condition of their own, unless something that is given reaches them.
+//! Storage by storage in the order of the model: each starts empty if that is independent of what is given and of those
+//! before it. So what the start is does not depend on the form, nor on the variables that stay independent in it. Where
+//! zeros of the unknowns do the same, nothing is said.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::definitions::Definitions;
-use super::{Condition, Conserved};
-use crate::algebra::{Expr, Symbol, ZERO};
+use super::Condition;
+use super::definitions::{Definition, Definitions};
+use super::independent_rows::{IndependentRows, Row, equilibrate};
+use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
 use crate::bond_graph::Kind;
-use crate::causal_graph::{CausalGraph, PortState, Role};
+use crate::causal_graph::start_point::start_point;
+use crate::causal_graph::{CausalGraph, Role};
 
 /// A state that is a sum of stored quantities.
 pub(super) struct Sum {
-    /// The state.
-    pub state: Symbol,
-    /// The sum.
-    pub value: Expr,
     /// The co-energy variable of the storage that it is kept for, or a common variable without one.
     pub speed: Symbol,
 }
+
+/// A time at which no source is zero by chance.
+const SOME_TIME: f64 = 0.7361;
 
 /// The conditions that are missing: `storage = 0`, or its guess. `given` is what the start has to satisfy anyway.
 pub(super) fn conditions(
     d: &mut Definitions,
     causal: &CausalGraph,
-    conserved: &[Conserved],
     sums: &[Sum],
     given: &[Condition],
 ) -> Vec<Condition> {
-    let begun = !given.is_empty() || !d.graph.guesses.is_empty();
-    if sums.is_empty() && (conserved.is_empty() || !begun) {
-        return Vec::new();
-    }
-    let own = own_storages(d, causal, sums);
-    let mut leaves: BTreeSet<Symbol> = d.states.keys().copied().collect();
-    leaves.extend(conserved.iter().map(|c| c.replaced));
-    leaves.retain(|s| !own.contains_key(s));
-    leaves.extend(own.values().copied());
-    let mut reached = BTreeSet::new();
-    for condition in given {
-        reached.extend(read(d, condition.residual, &leaves));
-    }
-    let mut free = BTreeSet::new();
-    free.extend(own.values());
-    for conserved in conserved {
-        free.extend(read(d, conserved.value, &leaves));
-        free.extend(own.get(&conserved.replaced).or(Some(&conserved.replaced)));
-    }
-    free.retain(|s| !reached.contains(s) && !d.missing.contains_key(s));
-    let mut begins = |symbol: Symbol| {
+    let empty = storages(d, causal, sums);
+    let guessed: BTreeMap<Expr, Expr> = d.graph.guesses.iter().map(|g| (g.what, g.value)).collect();
+    let value = |x: &mut Exprs, s: Symbol| guessed.get(&x.sym(s)).copied().unwrap_or(ZERO);
+    let wanted: Vec<(Symbol, Expr)> = empty.into_iter().map(|s| (s, value(&mut d.x, s))).collect();
+    let mut weak = Vec::new();
+    for (symbol, value) in Freedom::new(d, &wanted, given).missing(d, &wanted, given) {
         let own = d.x.sym(symbol);
-        let value = d.graph.guesses.iter().find(|g| g.what == own).map_or(ZERO, |g| g.value);
-        Condition {
+        weak.push(Condition {
             residual: d.x.sub(own, value),
             name: d.x.name(symbol).trim_end_matches('*').to_string(),
             value,
             firm: false,
+            weak: true,
             span: Default::default(),
-        }
-    };
-    free.into_iter().map(&mut begins).collect()
+        });
+    }
+    weak
 }
 
-/// For each state that is a sum: what the storage, or the junction, that it is kept for holds itself.
-fn own_storages(d: &Definitions, causal: &CausalGraph, sums: &[Sum]) -> BTreeMap<Symbol, Symbol> {
+/// What the storages hold, in the order of the model; then speeds (or efforts) that are kept without one.
+fn storages(d: &Definitions, causal: &CausalGraph, sums: &[Sum]) -> Vec<Symbol> {
+    let stored = d.graph.elements.values().flat_map(|element| match &element.kind {
+        Kind::Inertance(storage) | Kind::Compliance(storage) => &storage.stored[..],
+        _ => &[],
+    });
     let ports = causal.ports.ports.iter().filter(|p| p.role == Role::Independent);
-    let stored = |port: &PortState| match &causal.graph.elements[port.port.element].kind {
-        Kind::Inertance(storage) | Kind::Compliance(storage) => storage.stored.get(port.port.port as usize).copied(),
-        _ => None,
-    };
-    let by_speed: BTreeMap<Symbol, Symbol> = ports.filter_map(|p| Some((p.input, stored(p)?))).collect();
-    let own = |sum: &Sum| match by_speed.get(&sum.speed) {
-        Some(&stored) => d.x.depends_on(sum.value, stored).then_some((sum.state, stored)),
-        None => d.of.contains_key(&sum.speed).then_some((sum.state, sum.speed)),
-    };
-    sums.iter().filter_map(own).collect()
+    let inputs: BTreeSet<Symbol> = ports.map(|p| p.input).collect();
+    let alone = sums.iter().map(|s| s.speed).filter(|s| !inputs.contains(s) && d.of.contains_key(s));
+    let has_value = |s: &Symbol| !d.missing.contains_key(s);
+    stored.copied().chain(alone).filter(has_value).collect()
 }
 
-/// The leaves that an expression reads through definitions.
-fn read(d: &Definitions, e: Expr, leaves: &BTreeSet<Symbol>) -> BTreeSet<Symbol> {
-    let mut found = BTreeSet::new();
-    let mut seen = BTreeSet::new();
-    let mut open: Vec<Symbol> = d.x.symbols_of(e).into_iter().collect();
-    while let Some(symbol) = open.pop() {
-        if leaves.contains(&symbol) {
-            found.insert(symbol);
-        } else if seen.insert(symbol)
-            && let Some(definition) = d.of.get(&symbol)
-        {
-            open.extend(d.x.symbols_of(definition.expr()));
+/// What the start conditions and storages read, and what of it is open once the conditions with one unknown are solved.
+struct Freedom {
+    /// What definitions read, of unknowns and of what is defined; those read come before those that read them.
+    reads: Vec<(Symbol, Vec<Symbol>)>,
+    /// What reads an unknown that is open.
+    open: BTreeSet<Symbol>,
+    /// Where slopes are taken: what is given has its value.
+    point: NumericPoint,
+}
+
+impl Freedom {
+    fn new(d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Freedom {
+        let roots = given.iter().flat_map(|g| d.x.symbols_of(g.residual)).chain(wanted.iter().map(|w| w.0));
+        let mut found = Freedom { reads: reached(d, roots), open: BTreeSet::new(), point: start_point(&d.x, d.graph) };
+        let closed = found.closed(d, given);
+        found.open =
+            found.reads.iter().filter(|(s, _)| is_unknown(d, *s) && !closed.contains(s)).map(|r| r.0).collect();
+        found.spread();
+        found
+    }
+
+    /// Whatever reads what is open is open.
+    fn spread(&mut self) {
+        loop {
+            let before = self.open.len();
+            for (symbol, reads) in &self.reads {
+                if reads.iter().any(|s| self.open.contains(s)) {
+                    self.open.insert(*symbol);
+                }
+            }
+            if self.open.len() == before {
+                return;
+            }
         }
     }
-    found
+
+    /// The unknowns that conditions with one unknown determine.
+    fn closed(&self, d: &Definitions, given: &[Condition]) -> BTreeSet<Symbol> {
+        let mut closed = BTreeSet::new();
+        let mut waiting: Vec<BTreeSet<Symbol>> = given.iter().map(|g| self.unknowns(d, g.residual)).collect();
+        loop {
+            let before = closed.len();
+            waiting.iter_mut().for_each(|reads| reads.retain(|s| !closed.contains(s)));
+            closed.extend(waiting.iter().filter(|reads| reads.len() == 1).flatten());
+            if closed.len() == before {
+                return closed;
+            }
+        }
+    }
+
+    /// The unknowns that an expression reads.
+    fn unknowns(&self, d: &Definitions, e: Expr) -> BTreeSet<Symbol> {
+        behind(d, e).into_iter().filter(|&s| is_unknown(d, s)).collect()
+    }
+
+    /// The storages that have to be told to be empty (or as guessed).
+    fn missing(mut self, d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Vec<(Symbol, Expr)> {
+        let holds = self.zero_definitions(d);
+        let parts = self.parts(d, given);
+        let of = |s: &Symbol| parts.get(s).copied();
+        let mut moved: BTreeSet<Symbol> = self.open.iter().filter(|s| !holds.contains(s)).filter_map(of).collect();
+        moved.extend(given.iter().flat_map(|g| d.x.symbols_of(g.residual)).filter_map(|s| of(&s)));
+        moved.extend(wanted.iter().filter(|w| w.1 != ZERO).filter_map(|w| of(&w.0)));
+        if moved.is_empty() {
+            return Vec::new();
+        }
+        self.open.retain(|s| moved.contains(&parts[s]));
+        let wanted: Vec<(Symbol, Expr)> = wanted.iter().filter(|w| self.open.contains(&w.0)).copied().collect();
+        let mut chosen = self.independent(d, &wanted, given);
+        self.leave_out_what_is_zero(d, &mut chosen, given, &holds);
+        chosen
+    }
+
+    /// Definitions that hold where all that is open is zero.
+    fn zero_definitions(&self, d: &Definitions) -> BTreeSet<Symbol> {
+        let mut zero = start_point(&d.x, d.graph);
+        zero.set([(d.graph.time, SOME_TIME)]);
+        zero.set(self.open.iter().map(|&s| (s, 0.0)));
+        let definition = |s: &Symbol| d.of.get(s).copied().filter(|_| !is_unknown(d, *s));
+        let mut holds = |s: &Symbol| definition(s).is_none_or(|of| zero.value(&d.x, of.expr()) == 0.0);
+        self.open.iter().copied().filter(|s| holds(s)).collect()
+    }
+
+    /// For everything that is open one of those that it hangs together with.
+    fn parts(&self, d: &Definitions, given: &[Condition]) -> BTreeMap<Symbol, Symbol> {
+        let mut leader: BTreeMap<Symbol, Symbol> = self.open.iter().map(|&s| (s, s)).collect();
+        let mut join = |together: &[Symbol]| {
+            for pair in together.windows(2) {
+                let (a, b) = (find(&mut leader, pair[0]), find(&mut leader, pair[1]));
+                leader.insert(a.max(b), a.min(b));
+            }
+        };
+        let open = |s: &Symbol| self.open.contains(s);
+        for (symbol, reads) in self.reads.iter().filter(|r| open(&r.0)) {
+            join(&reads.iter().copied().filter(open).chain([*symbol]).collect::<Vec<_>>());
+        }
+        for condition in given {
+            join(&d.x.symbols_of(condition.residual).iter().copied().filter(open).collect::<Vec<_>>());
+        }
+        self.open.iter().map(|&s| (s, find(&mut leader, s))).collect()
+    }
+
+    /// The storages whose being empty is independent of definitions, of what is given, and of the storages before them.
+    fn independent(&mut self, d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Vec<(Symbol, Expr)> {
+        let mut x = d.x.clone();
+        let mut rows = Vec::new();
+        let mut own = Vec::new();
+        for (symbol, _) in self.reads.iter().filter(|r| self.open.contains(&r.0)) {
+            let Some(definition) = d.of.get(symbol).filter(|_| !is_unknown(d, *symbol)) else { continue };
+            let mut row = slopes(&mut x, definition.expr(), &self.open, &mut self.point);
+            if let Definition::Explicit(_) = definition {
+                *row.entry(*symbol).or_default() -= 1.0;
+            }
+            rows.push(row);
+            own.push(Some(*symbol));
+        }
+        for condition in given {
+            rows.push(slopes(&mut x, condition.residual, &self.open, &mut self.point));
+            own.push(None);
+        }
+        rows.extend(wanted.iter().map(|&(s, _)| Row::from([(s, 1.0)])));
+        own.extend(wanted.iter().map(|_| None));
+        equilibrate(&mut rows);
+        let mut known = IndependentRows::default();
+        let added: Vec<bool> = rows.into_iter().zip(own).map(|(row, own)| known.add(row, own)).collect();
+        let first = added.len() - wanted.len();
+        wanted.iter().zip(&added[first..]).filter(|(_, added)| **added).map(|(w, _)| *w).collect()
+    }
+
+    /// Unknowns that nothing else is said of are zero, and the storages that only they move are empty then.
+    fn leave_out_what_is_zero(
+        &self,
+        d: &Definitions,
+        chosen: &mut Vec<(Symbol, Expr)>,
+        given: &[Condition],
+        holds: &BTreeSet<Symbol>,
+    ) {
+        let open = |s: &Symbol| self.open.contains(s) && is_unknown(d, *s);
+        let behind_all: Vec<BTreeSet<Symbol>> =
+            chosen.iter().map(|&(s, _)| behind_symbols(d, [s].into_iter())).collect();
+        let mut times: BTreeMap<Symbol, usize> = BTreeMap::new();
+        for reads in given.iter().map(|g| behind(d, g.residual)).chain(behind_all.iter().cloned()) {
+            reads.into_iter().filter(open).for_each(|s| *times.entry(s).or_default() += 1);
+        }
+        let is_zero = |((_, value), behind): (&(Symbol, Expr), &BTreeSet<Symbol>)| {
+            let unknowns: Vec<&Symbol> = behind.iter().filter(|s| open(s)).collect();
+            let alone = matches!(unknowns[..], [only] if times[only] == 1);
+            alone && *value == ZERO && behind.iter().filter(|s| self.open.contains(s)).all(|s| holds.contains(s))
+        };
+        let needed: Vec<bool> = chosen.iter().zip(&behind_all).map(|both| !is_zero(both)).collect();
+        let mut needed = needed.into_iter();
+        chosen.retain(|_| needed.next().unwrap_or(true));
+    }
+}
+
+/// A state or a constant.
+fn is_unknown(d: &Definitions, s: Symbol) -> bool {
+    d.constants.contains(&s) || (d.states.contains_key(&s) && !d.of.contains_key(&s))
+}
+
+/// What an expression reads, through definitions.
+fn behind(d: &Definitions, e: Expr) -> BTreeSet<Symbol> {
+    behind_symbols(d, d.x.symbols_of(e).iter().copied())
+}
+
+fn behind_symbols(d: &Definitions, symbols: impl Iterator<Item = Symbol>) -> BTreeSet<Symbol> {
+    reached(d, symbols).into_iter().map(|r| r.0).collect()
+}
+
+/// Unknowns and what is defined, of all that is read; each with what it reads, those read first as far as they can be.
+fn reached(d: &Definitions, roots: impl Iterator<Item = Symbol>) -> Vec<(Symbol, Vec<Symbol>)> {
+    let known = |s: &Symbol| is_unknown(d, *s) || d.of.contains_key(s);
+    let reads = |s: Symbol| -> Vec<Symbol> {
+        match d.of.get(&s) {
+            Some(of) if !is_unknown(d, s) => d.x.symbols_of(of.expr()).iter().copied().filter(known).collect(),
+            _ => Vec::new(),
+        }
+    };
+    let mut all = Vec::new();
+    let mut seen = BTreeSet::new();
+    for root in roots.filter(known) {
+        let mut stack: Vec<(Symbol, Vec<Symbol>, usize)> = Vec::new();
+        if seen.insert(root) {
+            stack.push((root, reads(root), 0));
+        }
+        while let Some((symbol, below, next)) = stack.last_mut() {
+            match below.get(*next).copied() {
+                Some(read) => {
+                    *next += 1;
+                    if seen.insert(read) {
+                        stack.push((read, reads(read), 0));
+                    }
+                }
+                None => {
+                    all.push((*symbol, std::mem::take(below)));
+                    stack.pop();
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The derivatives of an expression by what is open, as numbers.
+fn slopes(x: &mut Exprs, e: Expr, open: &BTreeSet<Symbol>, point: &mut NumericPoint) -> Row {
+    let read: Vec<Symbol> = x.symbols_of(e).iter().copied().filter(|s| open.contains(s)).collect();
+    let mut slope = |s: Symbol| {
+        let slope = x.derivative(e, s);
+        // Where a slope has no value it is some number: it is not known to be 0.
+        Some(point.value(x, slope)).filter(|v| v.is_finite()).unwrap_or(1.0)
+    };
+    read.into_iter().map(|s| (s, slope(s))).collect()
+}
+
+/// The least symbol of those that hang together with one, with the way to it shortened.
+fn find(leader: &mut BTreeMap<Symbol, Symbol>, mut s: Symbol) -> Symbol {
+    while leader[&s] != s {
+        let above = leader[&leader[&s]];
+        leader.insert(s, above);
+        s = above;
+    }
+    s
 }

@@ -10,6 +10,7 @@ mod display;
 mod domains;
 mod form;
 mod freedom;
+mod independent_rows;
 mod index;
 mod minimal;
 mod momenta;
@@ -299,6 +300,8 @@ pub struct Condition {
     pub value: Expr,
     /// It is a constraint: it holds whatever start values are given.
     pub firm: bool,
+    /// Nobody asked for it: freedom that remains is to be zero. It gives way to what is given.
+    pub weak: bool,
     /// Where it stands.
     pub span: Span,
 }

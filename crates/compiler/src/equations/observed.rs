@@ -143,7 +143,7 @@ pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
         let own = d.x.sym(symbol);
         let residual = d.x.sub(own, value);
         let name = d.x.name(symbol).to_string();
-        all.push(Condition { residual, name, value, firm: false, span });
+        all.push(Condition { residual, name, value, firm: false, weak: false, span });
     };
     for element in graph.elements.values() {
         if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
@@ -164,6 +164,7 @@ pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
             name: constraint.name.clone(),
             value: zero,
             firm: true,
+            weak: false,
             span: constraint.span,
         });
     }

@@ -220,6 +220,8 @@ pub struct StartCondition {
     pub asked: Value,
     /// It is a constraint: it holds whatever start values are given.
     pub firm: bool,
+    /// It is about freedom that remains, and gives way to what is given. Such conditions stand last.
+    pub weak: bool,
     /// States (by index) and, after them, conserved constants that the residual reads, ascending.
     pub reads: Vec<u32>,
     /// Where it stands.

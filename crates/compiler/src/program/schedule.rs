@@ -301,6 +301,7 @@ impl Schedule<'_> {
                     residual: lower.value(c.residual),
                     asked: lower.value(c.value),
                     firm: c.firm,
+                    weak: c.weak,
                     reads: Vec::new(),
                     span: c.span,
                 })

@@ -17,6 +17,8 @@ pub(super) struct Pass {
 pub(super) struct Group {
     pub conditions: Vec<usize>,
     pub unknowns: Vec<u32>,
+    /// How many of the conditions are given; those after them give way.
+    pub given: usize,
     /// Whether some of them may have to be solved together.
     pub together: bool,
 }
@@ -44,8 +46,12 @@ pub(super) fn plan(program: &Program) -> (Vec<Pass>, Vec<Group>) {
     }
     let group = |StartGroup { conditions, unknowns }: StartGroup| {
         let small = conditions.len().max(unknowns.len()) <= MOST_TOGETHER;
-        let together = small && conditions.iter().any(|c| !met.contains(c));
-        Group { conditions, unknowns, together }
+        // Freedom that was taken one by one may have to give way.
+        let weak = conditions.iter().filter(|&&c| program.start[c].weak).count();
+        let gives_way = weak > 0 && weak < conditions.len();
+        let together = small && (gives_way || conditions.iter().any(|c| !met.contains(c)));
+        let given = conditions.len() - weak;
+        Group { conditions, unknowns, given, together }
     };
     let groups = program.start_groups().into_iter().map(group).collect();
     (passes, groups)

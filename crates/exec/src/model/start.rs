@@ -26,6 +26,7 @@ const NOISE: f64 = 1e-14;
 const MOST_LINEARISED: usize = 200;
 
 /// The unknowns of the start: states, then conserved constants.
+#[derive(Clone)]
 struct Unknowns {
     /// Those that are not known are where their search begins.
     z: Vec<f64>,
@@ -212,9 +213,51 @@ impl Model {
             if known && self.is_met(t, &routine, &group, &unknowns.z) {
                 continue;
             }
-            self.solve_group(t, &routine, &group, unknowns)?;
+            self.solve_with_freedom(t, &routine, &group, unknowns)?;
         }
         Ok(())
+    }
+
+    /// A group with all that its freedom is to be; where that cannot be met, with as much of it as can, one after the
+    /// other.
+    fn solve_with_freedom(
+        &mut self,
+        t: f64,
+        routine: &Routine,
+        group: &StartGroup,
+        unknowns: &mut Unknowns,
+    ) -> Result<(), StartError> {
+        let weak = |c: &usize| self.program.start[*c].weak;
+        let (weak, given): (Vec<usize>, Vec<usize>) = group.conditions.iter().partition(|c| weak(c));
+        let all = self.solve_group(t, routine, group, unknowns);
+        if all.is_ok() || weak.is_empty() {
+            return all;
+        }
+        let mut kept = StartGroup { conditions: given, unknowns: group.unknowns.clone() };
+        // What was determined by freedom is open again.
+        let begin = self.begin_search(t, unknowns.z.len());
+        for u in group.unknowns.iter().map(|&u| u as usize) {
+            (unknowns.z[u], unknowns.known[u]) = (begin.z[u], false);
+        }
+        let before = unknowns.clone();
+        if !kept.conditions.is_empty() {
+            self.solve_part(t, &kept, unknowns)?;
+        }
+        for condition in weak {
+            let mut trial = kept.clone();
+            trial.conditions.push(condition);
+            let mut found = before.clone();
+            if self.solve_part(t, &trial, &mut found).is_ok() {
+                (kept, *unknowns) = (trial, found);
+            }
+        }
+        Ok(())
+    }
+
+    fn solve_part(&mut self, t: f64, group: &StartGroup, unknowns: &mut Unknowns) -> Result<(), StartError> {
+        let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.program.start[c].residual).collect();
+        let routine = self.routine_for(&wanted);
+        self.solve_group(t, &routine, group, unknowns)
     }
 
     fn is_met(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> bool {
@@ -235,7 +278,11 @@ impl Model {
         };
         // What rounding leaves of an unknown that should be 0, beside the greatest of the others: each weighed by what
         // it does to the conditions.
-        let rows: Vec<f64> = greatest_of(jacobian, residual.len(), n);
+        // Freedom that makes others grow without bounds is none, so its conditions are no rounding beside these.
+        let own = |i: usize| jacobian[i * n..][..n].iter().fold(0.0f64, |most, j| most.max(j.abs()));
+        let weak = |i: usize| self.program.start[group.conditions[i]].weak;
+        let rows = greatest_of(jacobian, residual.len(), n).into_iter().enumerate();
+        let rows: Vec<f64> = rows.map(|(i, size)| if weak(i) { own(i) } else { size }).collect();
         let share = |i: usize, j: usize| if rows[i] > 0.0 { jacobian[i * n + j].abs() / rows[i] } else { 0.0 };
         let weight = |j: usize| (0..rows.len()).fold(0.0f64, |most, i| most.max(share(i, j)));
         let weighed = group.unknowns.iter().enumerate().map(|(j, &u)| weight(j) * z[u as usize].abs());

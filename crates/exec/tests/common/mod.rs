@@ -112,7 +112,14 @@ impl Sketch {
     pub fn start(&mut self, name: &str, what: Expr, value: f64) {
         let value = self.number(value);
         let residual = self.x.sub(what, value);
-        self.conditions.push(Condition { residual, name: name.into(), value, firm: false, span: Span::default() });
+        self.conditions.push(Condition {
+            residual,
+            name: name.into(),
+            value,
+            firm: false,
+            weak: false,
+            span: Span::default(),
+        });
     }
     pub fn call(&mut self, f: Function, a: Expr) -> Expr {
         self.x.call(f, &[a])

@@ -215,13 +215,14 @@ impl Plan<'_> {
             text += &format!("static const int ha_group_{i}_conditions[] = {{{conditions}}};\n");
             let code = if group.together { format!("ha_start_group_{i}") } else { "NULL".into() };
             groups += &format!(
-                "    {{{}, {}, ha_group_{i}_conditions, ha_group_{i}_unknowns, {code}}},\n",
+                "    {{{}, {}, ha_group_{i}_conditions, ha_group_{i}_unknowns, {code}, {}}},\n",
                 group.conditions.len(),
-                group.unknowns.len()
+                group.unknowns.len(),
+                group.given
             );
         }
         if self.groups.is_empty() {
-            groups += "    {0, 0, NULL, NULL, NULL}\n";
+            groups += "    {0, 0, NULL, NULL, NULL, 0}\n";
         }
         text + &list + "};\n" + &groups + "};\n" + &self.guess_tables()
     }

@@ -15,6 +15,8 @@ typedef struct {
     const int *conditions;
     const int *unknowns;
     ha_start_code code;
+    /* Conditions that are given; those after them say what freedom that remains is to be, and give way. */
+    int given;
 } ha_group;
 
 //if guesses
@@ -122,8 +124,8 @@ static void ha_solve_each(ha_model *m, ha_wide t, const ha_pass *pass, double *z
 }
 
 //if start_groups
-/* Residuals of a group and their derivatives, row by row; whether all are finite. */
-static int ha_linearised(ha_model *m, ha_wide t, const ha_group *g, const double *z, double *residual, double *jacobian)
+/* Residuals of a group and their derivatives, row by row, 0 for conditions that are left out; whether all are finite. */
+static int ha_linearised(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const double *z, double *residual, double *jacobian)
 {
     double rates[HA_MOST_ROWS];
     int i;
@@ -137,30 +139,13 @@ static int ha_linearised(ha_model *m, ha_wide t, const ha_group *g, const double
             return 0;
         }
         for (i = 0; i < g->rows && g->columns > 0; ++i) {
-            jacobian[i * g->columns + j] = rates[i];
+            jacobian[i * g->columns + j] = left_out[i] ? 0.0 : rates[i];
         }
+    }
+    for (i = 0; i < g->rows; ++i) {
+        residual[i] = left_out[i] ? 0.0 : residual[i];
     }
     return ha_all_finite(residual, g->rows) && ha_all_finite(jacobian, g->rows * g->columns);
-}
-
-/* Whether all conditions of a group are met to rounding of the terms they are made of. */
-static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const double *residual, const double *jacobian)
-{
-    double asked[START_CONDITIONS];
-    int i;
-    int j;
-    ha_asked_code(m, asked);
-    for (i = 0; i < g->rows; ++i) {
-        double size = fabs(asked[g->conditions[i]]);
-        for (j = 0; j < g->columns; ++j) {
-            const double term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
-            size += fabs(term);
-        }
-        if (!(fabs(residual[i]) <= CLOSE_TO_ROUNDING * size)) {
-            return 0;
-        }
-    }
-    return 1;
 }
 
 /* The weights of rows, each by its greatest entry; entries that are rounding beside others in their column weigh as these. */
@@ -182,6 +167,46 @@ static void ha_weights(int rows, int columns, const double *jacobian, double *we
         }
         weights[i] = most > 0.0 ? 1.0 / most : 1.0;
     }
+}
+
+/* Whether all conditions of a group are met to rounding of the terms they are made of, and of what solving together leaves
+ * of an unknown that should be 0, beside the greatest of the others. */
+static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const double *residual, const double *jacobian)
+{
+    double asked[START_CONDITIONS];
+    double weights[HA_MOST_ROWS];
+    double greatest = 0.0;
+    int i;
+    int j;
+    ha_asked_code(m, asked);
+    ha_weights(g->rows, g->columns, jacobian, weights);
+    /* Freedom that makes others grow without bounds is none, so its conditions are no rounding beside these. */
+    for (i = g->given; i < g->rows; ++i) {
+        double most = 0.0;
+        for (j = 0; j < g->columns; ++j) {
+            most = ha_max(most, fabs(jacobian[i * g->columns + j]));
+        }
+        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
+    }
+    for (j = 0; j < g->columns; ++j) {
+        double share = 0.0;
+        for (i = 0; i < g->rows; ++i) {
+            share = ha_max(share, fabs(jacobian[i * g->columns + j]) * weights[i]);
+        }
+        greatest = ha_max(greatest, share * fabs(z[g->unknowns[j]]));
+    }
+    for (i = 0; i < g->rows; ++i) {
+        const double rounding = 64.0 * DBL_EPSILON * greatest / weights[i];
+        double size = fabs(asked[g->conditions[i]]);
+        for (j = 0; j < g->columns; ++j) {
+            const double term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
+            size += fabs(term);
+        }
+        if (!(fabs(residual[i]) <= CLOSE_TO_ROUNDING * size + rounding)) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 /* The shortest of the steps that reduce jacobian * step + residual most, rows weighed, and columns so that the greatest
@@ -298,7 +323,7 @@ static double ha_weighed(const double *residual, const double *weights, int n)
 }
 
 /* One damped step of Gauss-Newton of minimum norm, of the unknowns that are not fixed; whether it helped. */
-static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *fixed, double *z, double *residual, double *jacobian)
+static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const unsigned char *fixed, double *z, double *residual, double *jacobian)
 {
     double moving[HA_MOST_ROWS * HA_MOST_COLUMNS];
     double weights[HA_MOST_ROWS];
@@ -331,7 +356,7 @@ static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned c
             const double move = fraction * step[j];
             z[g->unknowns[j]] = before[j] + move;
         }
-        if (ha_linearised(m, t, g, z, next, next_jacobian) && ha_weighed(next, weights, g->rows) < norm) {
+        if (ha_linearised(m, t, g, left_out, z, next, next_jacobian) && ha_weighed(next, weights, g->rows) < norm) {
             ha_copy(residual, next, g->rows);
             ha_copy(jacobian, next_jacobian, g->rows * g->columns);
             return 1;
@@ -345,7 +370,7 @@ static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned c
 }
 
 /* From one beginning of the unknowns that are open: whether all conditions are met. */
-static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
+static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
 {
     double residual[HA_MOST_ROWS];
     double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
@@ -361,11 +386,11 @@ static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsign
             z[g->unknowns[i]] += beginning * (1.0 + offset * (double)i);
         }
     }
-    if (!ha_linearised(m, t, g, z, residual, jacobian)) {
+    if (!ha_linearised(m, t, g, left_out, z, residual, jacobian)) {
         return 0;
     }
     for (i = 0; i < 60; ++i) {
-        if (!ha_nearer(m, t, g, fixed, z, residual, jacobian)) {
+        if (!ha_nearer(m, t, g, left_out, fixed, z, residual, jacobian)) {
             break;
         }
     }
@@ -373,7 +398,7 @@ static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsign
 }
 
 /* What is determined already stays, if the rest can be met so; then everything may move. */
-static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, double *z, unsigned char *known)
+static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, double *z, unsigned char *known)
 {
     static const double beginnings[] = {0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3};
     double before[HA_START_UNKNOWNS + 1];
@@ -397,7 +422,7 @@ static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, double *z, 
     for (round = any ? 0 : 1; round < 2; ++round) {
         for (i = 0; i < (any ? 10 : 1); ++i) {
             ha_copy(z, before, HA_START_UNKNOWNS);
-            if (ha_solve_from(m, t, g, open, fixed, beginnings[i], i < 4 ? 0.0 : 1.0 / 16.0, z)) {
+            if (ha_solve_from(m, t, g, left_out, open, fixed, beginnings[i], i < 4 ? 0.0 : 1.0 / 16.0, z)) {
                 for (j = 0; j < g->columns; ++j) {
                     known[g->unknowns[j]] = 1;
                 }
@@ -407,6 +432,62 @@ static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, double *z, 
         memset(fixed, 0, sizeof fixed);
     }
     return 0;
+}
+
+static void ha_open(const ha_group *g, unsigned char *known)
+{
+    int i;
+    for (i = 0; i < g->columns; ++i) {
+        known[g->unknowns[i]] = 0;
+    }
+}
+
+/* A group with all that its freedom is to be; where that cannot be met, with as much of it as can, one after the other. */
+static int ha_solve_with_freedom(ha_model *m, ha_wide t, const ha_group *g, unsigned char *left_out, double *z, unsigned char *known)
+{
+    double before[HA_START_UNKNOWNS + 1];
+    double found[HA_START_UNKNOWNS + 1];
+    int i;
+    ha_copy(found, z, HA_START_UNKNOWNS);
+    if (ha_solve_group(m, t, g, left_out, z, known)) {
+        return 1;
+    }
+    if (g->given == g->rows) {
+        return 0;
+    }
+    for (i = g->given; i < g->rows; ++i) {
+        left_out[i] = 1;
+    }
+    /* What was determined by freedom is open again. */
+    ha_fill(before, 0.0, HA_START_UNKNOWNS);
+//if guesses
+    ha_begin_search(m, t, before);
+//end
+    for (i = 0; i < g->columns; ++i) {
+        found[g->unknowns[i]] = before[g->unknowns[i]];
+    }
+    ha_open(g, known);
+    ha_copy(before, found, HA_START_UNKNOWNS);
+    ha_copy(z, before, HA_START_UNKNOWNS);
+    if (g->given > 0 && !ha_solve_group(m, t, g, left_out, z, known)) {
+        return 0;
+    }
+    ha_copy(found, z, HA_START_UNKNOWNS);
+    for (i = g->given; i < g->rows; ++i) {
+        left_out[i] = 0;
+        ha_copy(z, before, HA_START_UNKNOWNS);
+        ha_open(g, known);
+        if (ha_solve_group(m, t, g, left_out, z, known)) {
+            ha_copy(found, z, HA_START_UNKNOWNS);
+        } else {
+            left_out[i] = 1;
+        }
+    }
+    ha_copy(z, found, HA_START_UNKNOWNS);
+    for (i = 0; i < g->columns; ++i) {
+        known[g->unknowns[i]] = 1;
+    }
+    return 1;
 }
 
 //end
@@ -439,14 +520,16 @@ static int ha_solve_start_once(ha_model *m, ha_wide t, double *z)
         if (g->code != NULL) {
             double residual[HA_MOST_ROWS];
             double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+            unsigned char left_out[HA_MOST_ROWS];
             int solved = 1;
+            memset(left_out, 0, sizeof left_out);
             for (j = 0; j < g->columns; ++j) {
                 solved = solved && known[g->unknowns[j]];
             }
-            if (solved && ha_linearised(m, t, g, z, residual, jacobian) && ha_is_met(m, g, z, residual, jacobian)) {
+            if (solved && ha_linearised(m, t, g, left_out, z, residual, jacobian) && ha_is_met(m, g, z, residual, jacobian)) {
                 continue;
             }
-            if (ha_solve_group(m, t, g, z, known)) {
+            if (ha_solve_with_freedom(m, t, g, left_out, z, known)) {
                 continue;
             }
         }
