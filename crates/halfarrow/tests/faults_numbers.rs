@@ -286,7 +286,7 @@ fn a_preference_that_cannot_be_met_is_told() {
         let all = found.diagnostics.0.iter().map(|d| format!("{} {}", d.code.name, d.title));
         all.filter(|told| told.starts_with("C009")).collect()
     };
-    assert_eq!(warned("prefer along.f\n"), ["C009 mx.f does not stay independent"]);
+    assert_eq!(warned("prefer along.f\n"), ["C009 along.f does not stay independent"]);
     assert_eq!(warned("prefer up.f\n"), Vec::<String>::new());
 }
 

@@ -14,11 +14,17 @@ impl<'a> Builder<'a, '_> {
     pub fn preferences(&mut self) -> Vec<Preference> {
         let flat = self.flat;
         let entries = flat.prefer.iter();
-        entries
-            .filter_map(|(scope, path)| {
-                self.preferred(*scope, path).map(|symbol| Preference { symbol, span: path.span })
-            })
-            .collect()
+        let written = |scope: ScopeId, path: &ast::Path| {
+            let parts: Vec<&str> = path.parts.iter().map(|p| p.name.text.as_str()).collect();
+            format!("{}{}", flat.names.scopes[scope].prefix, parts.join("."))
+        };
+        let mut found = Vec::new();
+        for (scope, path) in entries {
+            if let Some(symbol) = self.preferred(*scope, path) {
+                found.push(Preference { name: written(*scope, path), symbol, span: path.span });
+            }
+        }
+        found
     }
 
     /// A dotted name as a node and the names that follow it.

@@ -410,8 +410,10 @@ pub struct Named {
 }
 
 /// One entry of `prefer`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Preference {
+    /// As it is written, with the names of the components it stands in before it: `along.f`.
+    pub name: String,
     /// The variable that shall stay independent: an effort or flow of a bond (co-energy of a storage, or common
     /// variable of a junction).
     pub symbol: Symbol,

@@ -197,7 +197,7 @@ pub fn warnings(causal: &CausalGraph) -> Vec<Diagnostic> {
 /// `prefer` for what does not stay independent.
 fn preferred_in_vain(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {
     for preference in causal.ports.unmet.iter().map(|&i| &graph.preferences[i]) {
-        let name = causal.graph.exprs.name(preference.symbol).trim_end_matches('*');
+        let name = &preference.name;
         all.push(
             Diagnostic::warning(
                 codes::C009,
