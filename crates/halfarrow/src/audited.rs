@@ -387,6 +387,9 @@ impl System for Audited<'_, exec::Model> {
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.model.next_jump(t)
     }
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.model.is_corner(t)
+    }
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.model.cross_jump(t, x)?;
         self.model.observe(t, x, &mut self.book.values)?;
@@ -452,6 +455,9 @@ impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
     }
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.model.next_jump(t)
+    }
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.model.is_corner(t)
     }
     fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
         self.model.cross_jump(t, y, yp)?;

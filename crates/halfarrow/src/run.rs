@@ -122,6 +122,8 @@ pub struct RunReport {
     pub tangents: usize,
     /// Jumps of sources and inputs that were met.
     pub jumps: usize,
+    /// Corners of inputs that steps ended at: only slopes jump there.
+    pub corners: usize,
     /// Switching conditions that changed their side.
     pub switches: usize,
     /// Whether the stiff method took over.
@@ -391,6 +393,7 @@ impl Model {
             evaluations: summary.rates,
             tangents: summary.tangents,
             jumps: summary.jumps,
+            corners: summary.corners,
             switches: summary.switches,
             stiff: summary.stiff,
             audit,

@@ -168,3 +168,43 @@ fn what_would_never_end_is_refused_with_its_cost() {
     let done = run(&held("c.e"), Run { to: 1e12, ..base });
     assert_eq!(done.report.reached, 1e12);
 }
+
+/// A road of 2,001 points: its rows are corners, at which slopes change and nothing is evaluated anew; a step in it is a
+/// jump.
+#[test]
+fn rows_of_an_input_are_corners_and_no_jumps() {
+    let path = std::env::temp_dir().join(format!("halfarrow_road_{}.csv", std::process::id()));
+    let height = |t: f64| 0.02 * libm::sin(7.0 * t) + 0.01 * libm::sin(3.3 * t);
+    let mut road = String::from("t,road\n");
+    (0..=2000).map(|i| f64::from(i) * 0.005).for_each(|t| road += &format!("{t:?},{:?}\n", height(t)));
+    let model = Model::from_text(
+        "road.bond",
+        "model Road\ninput road = 0\nSe:F(1000*road) -> 1:v -> I:m(1)\nv -> C:s(k = 40)\nv -> R:d(0.8)",
+        &[],
+    )
+    .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let run = |road: &str, method: Method, step: Option<f64>| {
+        std::fs::write(&path, road).expect("a file");
+        let inputs = vec![("road".to_string(), path.clone())];
+        let run = Run { to: 10.0, every: Some(0.5), method, step, inputs, ..Run::default() };
+        model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+    };
+    let explicit = run(&road, Method::Explicit, None);
+    let report = &explicit.report;
+    assert_eq!((report.jumps, report.corners), (0, 2000));
+    assert!(report.steps < 2100 && report.evaluations < 6 * report.steps + 40, "{report:?}");
+    let radau = run(&road, Method::Radau, None);
+    assert!(radau.report.steps < 2100 && radau.report.evaluations < 6 * radau.report.steps, "{:?}", radau.report);
+    let fixed = run(&road, Method::Fixed(FixedMethod::Rk4), Some(1e-3));
+    assert_eq!((fixed.report.jumps, fixed.report.corners), (0, 2000));
+    for (a, b) in explicit.trace.columns.iter().zip(&radau.trace.columns) {
+        let size = a.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let off = a.values.iter().zip(&b.values).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+        assert!(off <= 1e-5 * size, "{}: {off} of {size}", a.name);
+    }
+    // A kerb: two rows at one time.
+    let kerb = road.replace("\n5.0,", "\n5.0,0.1\n5.0,");
+    let over = run(&kerb, Method::Explicit, None);
+    assert_eq!((over.report.jumps, over.report.corners), (1, 1999));
+    std::fs::remove_file(&path).expect("it is there");
+}

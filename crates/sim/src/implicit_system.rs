@@ -96,6 +96,13 @@ pub trait ImplicitSystem {
     /// integrator stops exactly there, to the last bit.
     fn next_jump(&mut self, t: f64) -> Option<f64>;
 
+    /// Whether the jump announced at `t` is a mere corner, as between rows of an input table: no value jumps there. Asked
+    /// before it is crossed.
+    fn is_corner(&mut self, t: f64) -> bool {
+        let _ = t;
+        false
+    }
+
     /// The integration stands at `t`: at its start, exactly at an announced jump, or just past a located crossing. Moves
     /// the current interval, takes the sides, and leaves `y` and `yp` consistent with the new mode: `F = 0`, and the
     /// hidden constraints of a higher index hold as well. `yp` of an algebraic unknown may be anything finite.

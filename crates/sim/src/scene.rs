@@ -18,6 +18,8 @@ pub(crate) trait Scene {
     /// As in [`System`].
     fn next_jump(&mut self, t: f64) -> Option<f64>;
     /// As in [`System`].
+    fn is_corner(&mut self, t: f64) -> bool;
+    /// As in [`System`].
     fn cross_jump(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure>;
     /// As in [`System`].
     fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure>;
@@ -45,6 +47,9 @@ impl Scene for crate::shared::Counted<'_> {
     }
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         System::next_jump(self, t)
+    }
+    fn is_corner(&mut self, t: f64) -> bool {
+        System::is_corner(self, t)
     }
     fn cross_jump(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
         System::cross_jump(self, t, point)
@@ -86,6 +91,9 @@ impl Scene for Implicit<'_> {
     }
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.0.next_jump(t)
+    }
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.0.is_corner(t)
     }
     fn cross_jump(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
         let (y, yp) = halves_mut(point);

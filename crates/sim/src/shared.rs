@@ -112,6 +112,9 @@ impl System for Counted<'_> {
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.system.next_jump(t)
     }
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.system.is_corner(t)
+    }
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.system.cross_jump(t, x)
     }

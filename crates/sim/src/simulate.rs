@@ -67,10 +67,20 @@ pub struct Summary {
     pub iterations: usize,
     /// Jumps crossed that were known in advance, the start not counted.
     pub jumps: usize,
+    /// Corners of inputs that steps ended at, where nothing jumps but slopes.
+    pub corners: usize,
     /// Crossings of switching functions.
     pub switches: usize,
     /// Whether `auto` changed to the stiff method.
     pub stiff: bool,
+}
+
+impl Summary {
+    /// Counts a corner, or a jump.
+    pub(crate) fn meet(&mut self, corner: bool) {
+        self.corners += usize::from(corner);
+        self.jumps += usize::from(!corner);
+    }
 }
 
 /// A run that stopped before its end. All samples up to `time` were handed to the sink.
@@ -197,6 +207,13 @@ impl<'a> Run<'a> {
         self.settle(x)
     }
 
+    /// Counts what was announced for `t`; whether it is a mere corner.
+    pub(crate) fn meet(&mut self, t: f64) -> bool {
+        let corner = self.scene.borrow_mut().is_corner(t);
+        self.counts.meet(corner);
+        corner
+    }
+
     fn cross(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         let scene = &mut *self.scene.borrow_mut();
         scene.cross_jump(t, x)?;
@@ -237,7 +254,9 @@ impl<'a> Run<'a> {
             self.counts.steps += 1;
             let switched = self.sides.crossed(&mut *self.scene.borrow_mut(), target, x)?.is_some();
             self.counts.switches += usize::from(switched);
-            self.counts.jumps += usize::from(jump == Some(target));
+            if jump == Some(target) {
+                self.meet(target);
+            }
             self.reach(target, x)?;
             if switched || jump == Some(target) {
                 self.settle_at_jump(x)?;

@@ -91,6 +91,13 @@ pub trait System {
     /// exactly there, to the last bit.
     fn next_jump(&mut self, t: f64) -> Option<f64>;
 
+    /// Whether the jump announced at `t` is a mere corner, as between rows of an input table: neither values nor rates jump
+    /// there, only slopes. Asked before it is crossed.
+    fn is_corner(&mut self, t: f64) -> bool {
+        let _ = t;
+        false
+    }
+
     /// The integration stands at `t`: at its start, exactly at an announced jump, or just past a located crossing. Up
     /// to here the old mode was used. Moves the current interval if `t` has reached the jump, takes the sides of all
     /// switching functions from their values at `(t, x)`, and may change `x`.

@@ -284,7 +284,9 @@ impl Lane {
         let switched = self.sides.crossed(&mut Counted::new(system), self.target, x)?.is_some();
         let at_jump = self.jump == Some(self.target);
         self.counts.switches += usize::from(switched);
-        self.counts.jumps += usize::from(at_jump);
+        if at_jump {
+            self.counts.meet(system.is_corner(self.target));
+        }
         self.time = self.target;
         system.accept(self.time, x)?;
         if switched || at_jump {

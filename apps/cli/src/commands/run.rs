@@ -223,6 +223,9 @@ fn summary(report: &RunReport) -> String {
     if report.jumps + report.switches > 0 {
         text += &format!(", {} jumps and {} switches met", report.jumps, report.switches);
     }
+    if report.corners > 0 {
+        text += &format!(", {} corners of inputs", report.corners);
+    }
     text + &format!("\naudit: {}\n", misses(&report.audit))
 }
 

@@ -684,6 +684,10 @@ impl ImplicitSystem for ImplicitModel {
         self.form.next_jump(t)
     }
 
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.form.is_corner(t)
+    }
+
     fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
         let implicit = self.form.program.implicit.is_some();
         if !self.begun || !implicit {

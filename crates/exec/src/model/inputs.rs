@@ -92,6 +92,12 @@ impl Signal {
         (after..self.times.len()).find(|&k| self.is_corner(k)).map(|k| self.times[k])
     }
 
+    /// Whether it jumps at `t`: two points stand there.
+    pub fn jumps_at(&self, t: f64) -> bool {
+        let after = self.times.partition_point(|&p| p <= t);
+        after >= 2 && self.times[after - 1] == t && self.times[after - 2] == t
+    }
+
     fn line(&self, k: usize, t: f64) -> (f64, f64) {
         let slope = self.slope(k);
         // From the nearer end, so that points are met exactly.
@@ -138,6 +144,9 @@ mod tests {
     fn points_on_a_line_are_no_corners() {
         let signal = Signal::table(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 0.0]).unwrap();
         assert_eq!(signal.next_corner(0.0), Some(2.0));
+        assert!((0..5).all(|t| !signal.jumps_at(f64::from(t))));
+        let stair = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
+        assert_eq!([0.0, 1.0, 1.5, 2.0].map(|t| stair.jumps_at(t)), [false, true, false, false]);
     }
 
     #[test]

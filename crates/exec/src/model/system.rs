@@ -313,6 +313,14 @@ impl System for Model {
         inputs.chain(held).chain(self.clock.next).filter(|&next| next > t).reduce(f64::min)
     }
 
+    fn is_corner(&mut self, t: f64) -> bool {
+        let held = self.held.iter().any(|held| match held {
+            Held::Delay(delay) => delay.next_jump(self.crossed) == Some(t),
+            Held::Sample(sample) => sample.is_due(t),
+        });
+        !held && self.clock.next != Some(t) && !self.inputs.iter().any(|signal| signal.jumps_at(t))
+    }
+
     fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         if t < self.crossed {
             self.restart();

@@ -57,7 +57,9 @@ impl Drive<'_, '_, '_, '_> {
     fn piece(&mut self, stop: f64, jump: bool, point: &mut [f64]) -> Result<(), Failure> {
         if is_at(self.run.time, stop, self.run.time) {
             self.run.reach(stop, point)?;
-            self.run.counts.jumps += usize::from(jump);
+            if jump {
+                self.run.meet(stop);
+            }
             return if jump { self.run.settle_at_jump(point) } else { self.run.settle(point) };
         }
         self.set_off(stop, point)?;
@@ -77,7 +79,7 @@ impl Drive<'_, '_, '_, '_> {
             self.run.reach(end, point)?;
             self.samples_before(end)?;
             if jump && end == stop {
-                self.run.counts.jumps += 1;
+                self.run.meet(stop);
                 self.run.settle_at_jump(point)?;
                 self.resume = self.is_corner(point).then(|| longest.max(self.radau.next_step()));
             } else {

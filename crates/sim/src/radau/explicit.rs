@@ -91,6 +91,9 @@ impl ImplicitSystem for Explicit<'_> {
     fn next_jump(&mut self, t: f64) -> Option<f64> {
         self.shared.system().next_jump(t)
     }
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.shared.system().is_corner(t)
+    }
     fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
         let mut system = self.shared.system();
         system.cross_jump(t, y)?;

@@ -140,7 +140,9 @@ impl Ticker {
             system.accept(target, x)?;
             if switched || jump.is_some() {
                 self.counts.switches += usize::from(switched);
-                self.counts.jumps += usize::from(jump.is_some());
+                if jump.is_some() {
+                    self.counts.meet(system.is_corner(target));
+                }
                 self.cross(system, target, x)?;
             }
         }

@@ -36,6 +36,13 @@ trait Integrator {
     /// change otherwise than before: with a first step of at most `h`.
     fn resume(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
 
+    /// The same at `(t, x)` where it is known that the rates do not jump.
+    fn go_on(&mut self, t: f64, x: &[f64], h: f64) -> Result<(), Failure> {
+        let mut rates = vec![0.0; x.len()];
+        self.end_rates(&mut rates)?;
+        self.resume(t, x, &rates, h)
+    }
+
     /// Takes one step that meets the tolerances and ends at `stop` at the latest.
     fn step(&mut self, stop: f64) -> Result<(), Failure>;
 
@@ -156,6 +163,15 @@ fn next_stop(run: &Run<'_>, shared: &Shared<'_>) -> f64 {
     jump.map_or(run.options.to, |jump| jump.min(run.options.to))
 }
 
+/// How to go on at an announced jump.
+#[derive(Clone, Copy)]
+struct Resume {
+    /// The step, in s.
+    step: f64,
+    /// It is known that the rates do not jump there.
+    bends: bool,
+}
+
 /// One integrator at work on a run.
 struct Drive<'r, 'a, 'i, 's> {
     run: &'r mut Run<'a>,
@@ -168,7 +184,7 @@ struct Drive<'r, 'a, 'i, 's> {
     /// Rates just before the last announced jump.
     end_rates: Vec<f64>,
     /// Step to go on with, where the run stands at an announced jump that left the state alone.
-    resume: Option<f64>,
+    resume: Option<Resume>,
     /// Whether the last announced jump was a mere corner, over which the method went on.
     corner: bool,
     /// Longest step.
@@ -238,7 +254,9 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
     fn piece(&mut self, stop: f64, jump: bool, x: &mut [f64]) -> Result<Option<End>, Failure> {
         if is_at(self.run.time, stop, self.run.time) {
             self.run.reach(stop, x)?;
-            self.run.counts.jumps += usize::from(jump);
+            if jump {
+                self.run.meet(stop);
+            }
             return if jump { self.run.settle_at_jump(x) } else { self.run.settle(x) }.map(|()| None);
         }
         let interval = stop - self.run.time;
@@ -265,11 +283,14 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
             self.run.reach(end, x)?;
             self.samples_before(end)?;
             if jump && end == stop {
-                self.run.counts.jumps += 1;
-                self.method.end_rates(&mut self.end_rates)?;
+                let bends = self.run.meet(stop);
+                if !bends {
+                    self.method.end_rates(&mut self.end_rates)?;
+                }
                 self.run.settle_at_jump(x)?;
                 let same = x == self.method.state();
-                self.resume = same.then(|| longest.max(self.method.next_step()));
+                let step = longest.max(self.method.next_step());
+                self.resume = same.then_some(Resume { step, bends });
             } else {
                 self.run.settle(x)?;
             }
@@ -321,7 +342,11 @@ impl<'r, 'a, 'i, 's> Drive<'r, 'a, 'i, 's> {
         let (time, mut rates) = (self.run.time, vec![0.0; x.len()]);
         let longest = (stop - time).min(self.longest.unwrap_or(f64::INFINITY));
         let resume = self.resume.take();
-        if let Some(step) = resume {
+        if let Some(Resume { step, bends: true }) = resume {
+            self.corner = true;
+            return self.method.go_on(time, x, step.min(longest));
+        }
+        if let Some(Resume { step, .. }) = resume {
             self.shared.system().rates(time, x, &mut rates)?;
             self.corner = self.is_corner(&rates, x);
             if self.corner {
