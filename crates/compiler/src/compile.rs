@@ -1,7 +1,7 @@
 //! The chain of stages.
 
 use crate::ast::parse;
-use crate::bond_graph::{BondGraph, Files, Override, elaborate};
+use crate::bond_graph::{self, BondGraph, Files, Override, elaborate};
 use crate::causal_graph::{self, CausalGraph, assign_causality};
 use crate::diagnostic::{Diagnostics, Sources, render};
 use crate::equations::{Equations, Form, derive_equations};
@@ -64,9 +64,12 @@ pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
     let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
     diagnostics.0.extend(elaborated.diagnostics.0);
-    let found = Found { diagnostics, sources: elaborated.sources };
+    let mut found = Found { diagnostics, sources: elaborated.sources };
     match elaborated.graph {
-        Some(ir) if !found.diagnostics.has_errors() => Ok(Reached { ir, found }),
+        Some(ir) if !found.diagnostics.has_errors() => {
+            found.diagnostics.0.extend(bond_graph::warnings(&ir));
+            Ok(Reached { ir, found })
+        }
         _ => Err(found),
     }
 }

@@ -31,6 +31,7 @@ mod report;
 mod run;
 mod stage;
 mod sweep;
+mod table_file;
 mod verdict;
 
 pub use audited::{AuditReport, Miss};
@@ -48,9 +49,7 @@ pub use halfarrow_emit::{File, Real};
 pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
-pub use halfarrow_trace::{
-    Column, PlotOptions, Trace, WriteError, csv_text, read_trace, write_csv, write_parquet, write_whole,
-};
+pub use halfarrow_trace::{Column, PlotOptions, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
 pub use linearize::{
     Linearize, LinearizeReport, Mode, Point, ReachReport, Response, Stability, StateAt, SymbolicReport, Terminal,
     TransferFunction,
@@ -62,4 +61,5 @@ pub use report::{Page, Report};
 pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance, Stopped, Timings};
 pub use stage::Stage;
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
+pub use table_file::read_trace;
 pub use verdict::Verdict;

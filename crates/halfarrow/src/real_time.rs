@@ -7,13 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
+use crate::table_file::ReadTable;
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, WallClock, run_real_time};
 use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
-use halfarrow_trace::read_inputs;
 use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
@@ -286,7 +286,7 @@ fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Run, Problem> {
             Source::File(name, path) => inputs.push((name.clone(), path.clone())),
             Source::Table(path) => {
                 let bad = |faults| Problem::BadInput { path: path.clone(), faults };
-                let columns = read_inputs(path).map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
+                let columns = ReadTable::open(path)?.columns;
                 let known = |name: &String| system.program().inputs.iter().any(|i| i.name == *name);
                 let found: Vec<String> = columns.into_keys().filter(known).collect();
                 if found.is_empty() {

@@ -14,7 +14,7 @@ use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
 use halfarrow_sim::{AbsoluteTolerance, Crawl, Failure, ImplicitSystem as _, Method, Options, Sink, Summary, System};
-use halfarrow_trace::{Trace, read_inputs};
+use halfarrow_trace::Trace;
 use serde::Serialize;
 
 use crate::advice::advice;
@@ -22,6 +22,7 @@ use crate::audited::{AuditReport, Audited};
 use crate::cost;
 use crate::error::{Error, Problem};
 use crate::model::Model;
+use crate::table_file::ReadTable;
 use crate::verdict::Made;
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
@@ -706,16 +707,15 @@ pub(crate) fn connect(
             return Err(Problem::UnknownInput { name: name.clone(), known });
         }
         let bad = |faults| Problem::BadInput { path: path.clone(), faults };
-        let mut signals = read_inputs(path).map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
-        let columns: Vec<String> = signals.keys().cloned().collect();
-        let only =
-            if columns.len() == 1 { signals.pop_first().map(|(_, signal)| signal) } else { signals.remove(name) };
+        let mut table = ReadTable::open(path)?;
+        let columns: Vec<String> = table.columns.keys().cloned().collect();
+        let found = if columns.len() == 1 { &columns[0] } else { name };
         let missing = || bad(vec![format!("no column is called `{name}`: there are {}", columns.join(", "))]);
-        let signal = only.ok_or_else(missing)?;
-        let unit = inputs.iter().find(|i| i.name == *name).and_then(|i| i.unit.clone());
-        let si = |&value: &f64| unit.as_ref().map_or(value, |unit| unit.to_si_f64(value));
-        let values: Vec<f64> = signal.values().iter().map(si).collect();
-        put(name, signal.times(), &values).map_err(|e| bad(vec![e.to_string()]))?;
+        let column = table.columns.remove(found).ok_or_else(missing)?;
+        let declared = inputs.iter().find(|i| i.name == *name);
+        let unit = declared.and_then(|i| i.unit.as_ref().or(i.deduced.as_ref()));
+        let values = column.in_si(found, unit).map_err(|fault| bad(vec![fault]))?;
+        put(name, &table.times, &values).map_err(|e| bad(vec![e.to_string()]))?;
     }
     Ok(())
 }

@@ -6,10 +6,8 @@ use std::path::Path;
 
 use halfarrow_sim::{Signal, SignalError};
 
-use crate::{Column, Trace};
-
 /// Faults reported of one file; more say nothing new.
-const MOST_ERRORS: usize = 20;
+const MOST_ERRORS: usize = 10;
 
 /// What is wrong with an input file. `line` counts from 1, the header included.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +61,11 @@ pub enum InputError {
         /// The time of the sample before, in s.
         before: f64,
     },
+    /// There are more faults of single fields and lines.
+    More {
+        /// How many.
+        count: usize,
+    },
     /// More than two samples stand at the same time.
     Crowded {
         /// Where the third one stands.
@@ -72,42 +75,47 @@ pub enum InputError {
     },
 }
 
-/// Reads what an earlier run has written to a CSV file. The columns are in the order of their names and have no units.
-///
-/// # Errors
-/// All faults found, in the order of their lines.
-pub fn read_trace(path: &Path) -> Result<Trace, Vec<InputError>> {
-    let signals = read_inputs(path)?;
-    let times = signals.values().next().map(|s| s.times().to_vec()).unwrap_or_default();
-    let column = |(name, signal): (&String, &Signal)| Column {
-        name: name.clone(),
-        unit: String::new(),
-        values: signal.values().to_vec(),
-    };
-    Ok(Trace { times, columns: signals.iter().map(column).collect() })
+/// The signals of a CSV file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputTable {
+    /// The unit of the times, if the file says one; else they are in s. The times of the signals are as they stand there.
+    pub time_unit: Option<String>,
+    /// The columns beside the time, by name.
+    pub columns: BTreeMap<String, InputColumn>,
 }
 
-/// Reads the signals of a CSV file, by name. See [`parse_inputs`].
+/// A signal of a CSV file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputColumn {
+    /// Its points.
+    pub signal: Signal,
+    /// Its unit, if the file says one.
+    pub unit: Option<String>,
+}
+
+/// Reads the signals of a CSV file. See [`parse_inputs`].
 ///
 /// # Errors
 /// All faults found, in the order of their lines.
-pub fn read_inputs(path: &Path) -> Result<BTreeMap<String, Signal>, Vec<InputError>> {
+pub fn read_inputs(path: &Path) -> Result<InputTable, Vec<InputError>> {
     let text = std::fs::read_to_string(path);
     parse_inputs(&text.map_err(|error| vec![InputError::Unreadable { reason: error.to_string() }])?)
 }
 
-/// The signals of a CSV text, by name: a header of `t` and the names, then a line for each sample, times in s and
-/// ascending. Signals are straight between samples; two samples at the same time make a jump. Empty lines and lines that
-/// start with `#` are skipped.
+/// The signals of a CSV text, by name: a header of `t` and the names, if wanted a line of units, then a line for each
+/// sample, times ascending, in s unless there is a unit. Signals are straight between samples; two samples at the same time
+/// make a jump. Empty lines and lines that start with `#` are skipped.
 ///
 /// ```
-/// let signals = halfarrow_trace::parse_inputs("t,road\n0,0\n1,0.2\n1,0\n").unwrap();
-/// assert_eq!(signals["road"].next_corner(0.0), Some(1.0));
+/// let table = halfarrow_trace::parse_inputs("t,road\ns,mm\n0,0\n1,0.2\n1,0\n").unwrap();
+/// let road = &table.columns["road"];
+/// assert_eq!(road.signal.next_corner(0.0), Some(1.0));
+/// assert_eq!(road.unit.as_deref(), Some("mm"));
 /// ```
 ///
 /// # Errors
-/// All faults found, in the order of their lines.
-pub fn parse_inputs(text: &str) -> Result<BTreeMap<String, Signal>, Vec<InputError>> {
+/// The first faults found, in the order of their lines, and how many more there are.
+pub fn parse_inputs(text: &str) -> Result<InputTable, Vec<InputError>> {
     let text = text.trim_start_matches('\u{feff}');
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -115,19 +123,29 @@ pub fn parse_inputs(text: &str) -> Result<BTreeMap<String, Signal>, Vec<InputErr
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let mut records = reader.records().map_while(Result::ok);
+    let mut records = reader.records().map_while(Result::ok).peekable();
     let header: Vec<String> = records.next().iter().flatten().map(str::to_owned).collect();
     check_header(&header).map_err(|error| vec![error])?;
+    let units = records.next_if(|record| are_units(&header, record));
     let mut table = Table { lines: vec![], columns: vec![vec![]; header.len()] };
     let mut errors = Vec::new();
+    let mut more = 0;
     for record in records {
         errors.extend(table.add(&header, &record));
+        more += errors.len().saturating_sub(MOST_ERRORS);
+        errors.truncate(MOST_ERRORS);
     }
     if errors.is_empty() {
-        return table.signals(&header);
+        return table.signals(&header, units.as_ref());
     }
-    errors.truncate(MOST_ERRORS);
+    errors.extend((more > 0).then_some(InputError::More { count: more }));
     Err(errors)
+}
+
+/// Whether the line below the header has a unit for the time, and no number.
+fn are_units(header: &[String], record: &csv::StringRecord) -> bool {
+    let no_number = |field: &str| field.parse::<f64>().is_err();
+    record.len() == header.len() && record.get(0).is_some_and(|time| !time.is_empty()) && record.iter().all(no_number)
 }
 
 fn check_header(header: &[String]) -> Result<(), InputError> {
@@ -176,13 +194,16 @@ impl Table {
         errors
     }
 
-    fn signals(self, header: &[String]) -> Result<BTreeMap<String, Signal>, Vec<InputError>> {
+    fn signals(self, header: &[String], units: Option<&csv::StringRecord>) -> Result<InputTable, Vec<InputError>> {
         let (times, columns) = self.columns.split_first().ok_or(vec![InputError::Empty])?;
-        let signal = |(name, values): (&String, &Vec<f64>)| {
+        let unit = |i: usize| units.and_then(|u| u.get(i)).filter(|unit| !unit.is_empty()).map(str::to_owned);
+        let mut table = InputTable { time_unit: unit(0), columns: BTreeMap::new() };
+        for (i, (name, values)) in header[1..].iter().zip(columns).enumerate() {
             let signal = Signal::new(times.clone(), values.clone());
-            signal.map(|signal| (name.clone(), signal)).map_err(|error| vec![located(error, &self.lines, times)])
-        };
-        header[1..].iter().zip(columns).map(signal).collect()
+            let signal = signal.map_err(|error| vec![located(error, &self.lines, times)])?;
+            table.columns.insert(name.clone(), InputColumn { signal, unit: unit(i + 1) });
+        }
+        Ok(table)
     }
 }
 
@@ -206,7 +227,7 @@ impl InputError {
             | InputError::Backwards { line, .. }
             | InputError::Crowded { line, .. } => Some(*line),
             InputError::NoTime { .. } | InputError::Separator { .. } | InputError::Double { .. } => Some(1),
-            InputError::Unreadable { .. } | InputError::Empty => None,
+            InputError::Unreadable { .. } | InputError::Empty | InputError::More { .. } => None,
         }
     }
 }
@@ -243,6 +264,7 @@ impl fmt::Display for InputError {
             InputError::Backwards { time, before, .. } => {
                 write!(f, "the time goes back from {before} s to {time} s: sort the lines by time")
             }
+            InputError::More { count } => write!(f, "and {count} more faults of this kind"),
             InputError::Crowded { time, .. } => {
                 write!(f, "a third sample at {time} s: a jump takes two, the value before and the value after")
             }
@@ -262,9 +284,10 @@ mod tests {
 
     #[test]
     fn reads_signals_by_name() {
-        let signals = parse_inputs("\u{feff}t, road ,\"a,b\"\r\n# measured\r\n0,0,1\r\n\r\n0.5,2e-1,3\r\n").unwrap();
+        let signals =
+            parse_inputs("\u{feff}t, road ,\"a,b\"\r\n# measured\r\n0,0,1\r\n\r\n0.5,2e-1,3\r\n").unwrap().columns;
         assert_eq!(signals.keys().collect::<Vec<_>>(), ["a,b", "road"]);
-        let road = &signals["road"];
+        let road = &signals["road"].signal;
         assert_eq!(road.value(road.piece(0.0), 0.25), 0.1);
     }
 
@@ -295,7 +318,8 @@ mod tests {
         let nothing =
             "there is no signal: the header has to name t and at least one signal, and a sample has to follow";
         ["", "t\n0\n", "t,u\n"].iter().for_each(|text| assert_eq!(messages(text), [nothing]));
-        assert!(messages(&format!("t,u\n{}", "x,y\n".repeat(100))).len() == 20);
+        assert!(messages(&format!("t,u\n0,0\n{}", "x,y\n".repeat(100))).len() == 11);
+        assert_eq!(messages(&format!("t,u\n0,0\n{}", "x,y\n".repeat(100)))[10], "and 190 more faults of this kind");
         assert!(read_inputs(Path::new("/no/such/file.csv")).is_err());
     }
 
@@ -305,6 +329,10 @@ mod tests {
         let mut trace = crate::Trace::new([("u", "V")]);
         [(0.0, 0.1), (1.0, 0.3), (1.0, -2.0), (4.0, 1e-9)].iter().for_each(|&(t, u)| trace.sample(t, &[u]));
         let signal = Signal::new(trace.times.clone(), trace.columns[0].values.clone()).unwrap();
-        assert_eq!(parse_inputs(&crate::csv_text(&trace, false)).unwrap()["u"], signal);
+        let plain = parse_inputs(&crate::csv_text(&trace, false)).unwrap();
+        assert_eq!((&plain.columns["u"].signal, &plain.columns["u"].unit, plain.time_unit), (&signal, &None, None));
+        let table = parse_inputs(&crate::csv_text(&trace, true)).unwrap();
+        assert_eq!((&table.columns["u"].signal, table.columns["u"].unit.as_deref()), (&signal, Some("V")));
+        assert_eq!(table.time_unit.as_deref(), Some("s"));
     }
 }

@@ -16,7 +16,7 @@ mod whole;
 
 pub use chart::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
 pub use csv::{CsvTable, csv_text, write_csv};
-pub use input::{InputError, parse_inputs, read_inputs, read_trace};
+pub use input::{InputColumn, InputError, InputTable, parse_inputs, read_inputs};
 #[cfg(feature = "parquet")]
 pub use parquet::{ParquetTable, write_parquet};
 pub use plot::{PlotOptions, plot, plot_runs};

@@ -1,6 +1,6 @@
 //! What `simulate --plot` plots: chosen variables and axes, further runs over the same axes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use halfarrow::{Error, Model, Override, PlotOptions, Problem, Record, Run, Simulated, Trace, read_trace};
 
@@ -39,7 +39,8 @@ pub fn write_plots(arguments: &Simulate, model: &Model, run: &Run, done: &Simula
     let picture = if options.is_plain() && arguments.overlay.is_empty() {
         model.plot(&done.trace)
     } else {
-        let others = arguments.overlay.iter().map(|what| Ok((what.as_str(), other(arguments, run, what)?)));
+        let others =
+            arguments.overlay.iter().map(|what| Ok((what.as_str(), other(arguments, run, &done.trace, what)?)));
         let others = others.collect::<Result<Vec<(&str, Trace)>, Error>>()?;
         let own = if others.is_empty() { "" } else { "as given" };
         let further = others.iter().map(|(name, trace)| (*name, trace));
@@ -50,14 +51,9 @@ pub fn write_plots(arguments: &Simulate, model: &Model, run: &Run, done: &Simula
 }
 
 /// A run to lie over the one that was asked for: of a file, or with other parameters.
-fn other(arguments: &Simulate, run: &Run, what: &str) -> Result<Trace, Error> {
+fn other(arguments: &Simulate, run: &Run, own: &Trace, what: &str) -> Result<Trace, Error> {
     if Path::new(what).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-        let path = PathBuf::from(what);
-        let bad = |faults: Vec<_>| Problem::BadInput {
-            path: path.clone(),
-            faults: faults.iter().map(ToString::to_string).collect(),
-        };
-        return read_trace(&path).map_err(|faults| bad(faults).into());
+        return Ok(read_trace(Path::new(what), own)?);
     }
     let pair = |text: &str| {
         let parts = text.split_once('=').map(|(name, value)| (name.trim().to_string(), value.trim().to_string()));

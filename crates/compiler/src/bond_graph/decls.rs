@@ -12,7 +12,7 @@ use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::span::Span;
-use crate::unit::Dimension as Dim;
+use crate::unit::{Dimension as Dim, Unit};
 
 /// How far a declaration has got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +20,15 @@ enum Stage {
     Waiting,
     Open,
     Done,
+}
+
+/// The dimension of a number that is written with its unit.
+fn dimension_of_number(e: &ast::Expr) -> Option<Dim> {
+    match &e.kind {
+        ExprKind::Number(number) => Unit::parse(&number.unit.as_ref()?.text).ok().map(|unit| unit.dimension),
+        ExprKind::Unary(unary) => dimension_of_number(&unary.operand),
+        _ => None,
+    }
 }
 
 impl<'a> Builder<'a, '_> {
@@ -40,8 +49,10 @@ impl<'a> Builder<'a, '_> {
     fn symbol_of_signal(&mut self, decl: DeclId) {
         let d = &self.flat.names.decls[decl];
         let (meaning, quantity) = match d.kind {
-            DeclKind::Input(_) => {
-                let quantity = d.unit.and_then(|u| self.unit(u)).map_or(Quantity::Any, |u| Quantity::of(u.dim));
+            DeclKind::Input(default) => {
+                let declared = d.unit.and_then(|u| self.unit(u)).map(|u| u.dim);
+                let dimension = declared.or_else(|| default.and_then(dimension_of_number));
+                let quantity = dimension.map_or(Quantity::Any, Quantity::of);
                 (Meaning::Input(super::InputId::new(self.inputs.len())), quantity)
             }
             DeclKind::State(_) => {

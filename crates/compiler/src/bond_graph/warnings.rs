@@ -49,6 +49,7 @@ fn isolated_parts(graph: &BondGraph) -> Vec<Diagnostic> {
     for (id, held) in graph.held.iter() {
         reads.by(elements + graph.signals.len() + id.index(), held.source);
     }
+    graph.outputs.iter().for_each(|output| reads.beside_each_other(output.value));
     let mut sets = reads.sets;
     let mut seen: BTreeMap<usize, &Element> = BTreeMap::new();
     for (id, element) in graph.elements.iter() {
@@ -83,16 +84,28 @@ impl Reads<'_> {
     }
 
     fn symbol(&mut self, reader: usize, symbol: Symbol) {
+        if let Some(place) = self.place(symbol) {
+            self.sets.join(reader, place);
+        }
+    }
+
+    /// Whoever compares parts in one expression has put them beside each other.
+    fn beside_each_other(&mut self, expr: Expr) {
+        let read = self.graph.exprs.symbols_of(expr);
+        let places: Vec<usize> = read.iter().filter_map(|&s| self.place(s)).collect();
+        places.windows(2).for_each(|pair| self.sets.join(pair[0], pair[1]));
+    }
+
+    /// Where a variable belongs.
+    fn place(&self, symbol: Symbol) -> Option<usize> {
         let elements = self.graph.elements.len();
-        match self.graph.variables.get(&symbol).map(|v| v.meaning) {
-            Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => {
-                self.sets.join(reader, self.graph.bonds[bond].from.element.index());
-            }
-            Some(Meaning::Stored(port)) => self.sets.join(reader, port.element.index()),
-            Some(Meaning::Signal(id)) => self.sets.join(reader, elements + id.index()),
-            Some(Meaning::Held(id)) => self.sets.join(reader, elements + self.graph.signals.len() + id.index()),
-            Some(Meaning::Rate(of)) if of != symbol => self.symbol(reader, of),
-            _ => {}
+        match self.graph.variables.get(&symbol)?.meaning {
+            Meaning::Effort(bond) | Meaning::Flow(bond) => Some(self.graph.bonds[bond].from.element.index()),
+            Meaning::Stored(port) => Some(port.element.index()),
+            Meaning::Signal(id) => Some(elements + id.index()),
+            Meaning::Held(id) => Some(elements + self.graph.signals.len() + id.index()),
+            Meaning::Rate(of) if of != symbol => self.place(of),
+            _ => None,
         }
     }
 }

@@ -128,8 +128,10 @@ pub struct Input {
     pub name: String,
     /// Its value where nothing is connected, in parameters.
     pub default: Value,
-    /// SI unit, where known.
+    /// The unit that it is declared in.
     pub unit: Option<Unit>,
+    /// The SI unit that follows from its value and from where it is read, where known.
+    pub deduced: Option<Unit>,
 }
 
 /// A delayed or sampled signal.

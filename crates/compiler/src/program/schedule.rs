@@ -273,7 +273,12 @@ impl Schedule<'_> {
             kept: Vec::new(),
             conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
             inputs: inputs
-                .map(|i| Input { name: i.name.clone(), default: lower.value(i.default), unit: i.unit.clone() })
+                .map(|i| Input {
+                    name: i.name.clone(),
+                    default: lower.value(i.default),
+                    unit: i.unit.clone(),
+                    deduced: graph.variables.get(&i.symbol).and_then(|v| v.unit.clone()),
+                })
                 .collect(),
             held: held
                 .map(|h| Held {

@@ -93,6 +93,9 @@ pub struct Samples {
     pub rows: Vec<Vec<f64>>,
 }
 
+/// Faults reported of one file; more say nothing new.
+const MOST_FAULTS: usize = 10;
+
 impl Samples {
     /// Reads a CSV file whose header names parameters; a row is a set.
     ///
@@ -114,7 +117,9 @@ impl Samples {
             }
             rows.push(fields.into_iter().map(|field| field.unwrap_or(f64::NAN)).collect());
         }
-        faults.truncate(20);
+        let more = faults.len().saturating_sub(MOST_FAULTS);
+        faults.truncate(MOST_FAULTS);
+        faults.extend((more > 0).then(|| format!("and {more} more lines")));
         match (faults.is_empty(), rows.is_empty()) {
             (true, false) => Ok(Samples { names, rows }),
             (true, true) => Err(bad(vec!["there are no rows".into()])),
