@@ -425,9 +425,9 @@ fn freedom_behind_dependent_start_values_is_zero_in_the_order_of_the_model() {
             let start = given.iter().find(|g| g.0 == i).map_or(String::new(), |g| format!(", f0 = {:?}", g.1));
             text += &format!("1:v{i} -> I:m{i}({}{start})\nv{i} -> R:r{i}(1)\n", 1 + i);
         }
-        for j in n..n + tied {
+        for (j, ratios) in rows.iter().enumerate().skip(n) {
             text += &format!("0:n{j}\n");
-            (0..n).for_each(|i| text += &format!("v{i} -> TF:t{i}_{j}(f_out = {:?}) -> n{j}\n", rows[j][i]));
+            (0..n).for_each(|i| text += &format!("v{i} -> TF:t{i}_{j}(f_out = {:?}) -> n{j}\n", ratios[i]));
             text += &format!("n{j} -> v{j}\n");
         }
         if round % 3 == 1 {
