@@ -270,7 +270,7 @@ proptest! {
             let element = &graph.elements[junctions[at % junctions.len()]];
             let bond = &graph.bonds[element.ports[0].bond];
             let symbol = if matches!(element.kind, Kind::Zero) { bond.effort } else { bond.flow };
-            graph.preferences.push(Preference { symbol, span: element.span });
+            graph.preferences.push(Preference { name: element.name.clone(), symbol, span: element.span });
         }
         let Ok(causal) = assign_causality(&graph) else { return Ok(()) };
         prop_assert_eq!(verify(&causal), Ok(()), "{}", bonds);
