@@ -193,7 +193,8 @@ impl fmt::Display for Failure {
             ),
             Failure::Bound { time, what, most } => write!(
                 f,
-                "{} the equations of {what} are not solved after {most} evaluations, which is the bound",
+                "{} the equations of {what} are not solved after {most} evaluations, which is the bound; shorten the step, or allow more \
+                 where steps have a deadline (--bound)",
                 When(*time)
             ),
             Failure::StepTooSmall { time, step } => write!(
