@@ -37,6 +37,32 @@ fn rounding_is_no_magnitude() {
 }
 
 /// What runs down a chain comes to its end as a ripple of some decades below, and rounding with it.
+/// Where a machine would rest tells how great its states are only if it is near. The reference is the same machine by classical
+/// Runge-Kutta with steps of 1e-4 s.
+#[test]
+fn a_rest_that_is_far_away_is_no_magnitude() {
+    let model = fault("no_rest");
+    let asked = |form, method, step| Run {
+        to: 0.4,
+        every: Some(0.1),
+        rtol: 1e-9,
+        form,
+        method,
+        step,
+        record: Record::Names(vec!["y".into(), "m.p".into()]),
+        ..Run::default()
+    };
+    let values = |asked: Run| -> Vec<f64> {
+        run(&model, asked).trace.columns.iter().filter(|c| c.name != "t").flat_map(|c| c.values.clone()).collect()
+    };
+    let wanted = values(asked(Form::Minimal, Method::Fixed(FixedMethod::Rk4), Some(1e-4)));
+    for form in [Form::Minimal, Form::Kane, Form::Break, Form::Lagrange] {
+        for (value, wanted) in values(asked(form, Method::Auto, None)).into_iter().zip(&wanted) {
+            assert!((value - wanted).abs() < 1e-8, "{form:?}: {value}, not {wanted}");
+        }
+    }
+}
+
 #[test]
 fn a_chain_takes_the_steps_that_its_motion_asks_for() {
     let steps = [1e-8, 1e-9, 1e-10, 1e-11].map(|rtol| {

@@ -22,6 +22,8 @@ const COLUMNS: usize = 9;
 const HOPELESS: (usize, f64) = (4, 1e-3);
 /// Pieces that are a smaller part of a move are too many.
 const SHORTEST: f64 = 1e-4;
+/// Sums below this part of their terms are rounding.
+const CANCELLED: f64 = 1e-13;
 /// Magnitudes of states below this part of the greatest are what rounding left.
 const NOISE: f64 = 1e-14;
 
@@ -66,8 +68,11 @@ impl Ways {
     /// Derivatives along the ways, from those by the states: row by row.
     pub fn along(&self, jacobian: &[f64], states: usize) -> Vec<f64> {
         let Ways::Few { columns, basis, size } = self else { return jacobian.to_vec() };
+        // What cancels but for rounding is nothing: a row may hold no more.
         let entry = |row: &[f64], k: usize| -> f64 {
-            (0..states).filter(|&j| row[j] != 0.0).map(|j| row[j] * size[j] * basis[j * columns + k]).sum()
+            let terms = (0..states).filter(|&j| row[j] != 0.0).map(|j| row[j] * size[j] * basis[j * columns + k]);
+            let (sum, most) = terms.fold((0.0, 0.0), |(sum, most): (f64, f64), term| (sum + term, most + term.abs()));
+            if sum.abs() > CANCELLED * most { sum } else { 0.0 }
         };
         jacobian.chunks(states.max(1)).flat_map(|row| (0..*columns).map(move |k| entry(row, k))).collect()
     }
@@ -158,7 +163,9 @@ impl Model {
         let svd = kept.svd().ok()?;
         let (values, v) = (svd.S().column_vector(), svd.V());
         let rank = rank_of(&values.iter().copied().collect::<Vec<_>>());
-        let basis = (0..n).flat_map(|j| (rank..n).map(move |k| (j, k))).map(|(j, k)| v[(j, k)]).collect();
+        // A state that no way moves but by rounding stays.
+        let entry = |(j, k): (usize, usize)| if v[(j, k)].abs() > CANCELLED { v[(j, k)] } else { 0.0 };
+        let basis = (0..n).flat_map(|j| (rank..n).map(move |k| (j, k))).map(entry).collect();
         Some(Ways::Few { columns: n - rank, basis, size: leaf.size.clone() })
     }
 

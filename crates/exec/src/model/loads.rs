@@ -44,6 +44,10 @@ impl Model {
             ways if ways.count(n) == 0 => return None,
             ways => leading_rows(&ways.along(&jacobian, n), ways.count(n)),
         };
+        if rows.is_empty() {
+            // Nothing changes any rate.
+            return None;
+        }
         let curve = Curve { leaf, t, load, rows, size };
         let mut place = Place { x: start.to_vec(), part: 0.0 };
         // The direction: states in parts of their size, then the part of the loads.

@@ -22,6 +22,8 @@ const BEGINNINGS: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1
 const BESIDE: f64 = 1e-3;
 /// Part of the greatest derivative by an unknown that is what rounding left of one.
 const NOISE: f64 = 1e-14;
+/// The linearised motion is believed up to this many times what is there: farther away lies what hardly anything holds.
+const FAR: f64 = 1e3;
 /// More states than this are not linearised to find typical magnitudes.
 const MOST_LINEARISED: usize = 200;
 
@@ -134,7 +136,8 @@ impl Model {
         for (i, size) in sizes.iter_mut().enumerate() {
             let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum();
             let soon = if fastest > 0.0 { pull.max(rates[i].abs()) / fastest } else { 0.0 };
-            *size = size.max(step[i].abs()).max(soon);
+            let near = size.max(soon);
+            *size = near.max(step[i].abs().min(FAR * near));
         }
         sizes
     }
