@@ -21,6 +21,9 @@ const NOISE: f64 = 1e-12;
 /// rounding makes, amplified even more, is no part of it.
 const FLOOR: f64 = 1e-9;
 
+/// From law to law, what stands beside a quantity is passed on so often.
+const NEIGHBOURS: usize = 3;
+
 /// No scale is below this: numbers near the end of the range of `f64` have fewer digits.
 const LEAST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
@@ -214,10 +217,12 @@ impl Scales {
             let most = beside.entry(quantity).or_default();
             *most = most.max(*weight);
         }
-        let near = beside.clone();
-        for (&(quantity, from), weight) in of_variables {
-            let most = beside.entry(quantity).or_default();
-            *most = most.max(weight * near.get(&from).copied().unwrap_or(0.0));
+        for _ in 0..NEIGHBOURS {
+            let near = beside.clone();
+            for ((quantity, from), weight) in of_variables.iter().copied() {
+                let most = beside.entry(*quantity).or_default();
+                *most = most.max(*weight * near.get(from).copied().unwrap_or(0.0));
+            }
         }
         self.raise_energies(graph, &mut beside);
         let size = |(&quantity, &beside): (&Quantity, &f64)| {
