@@ -132,6 +132,17 @@ fn factors_from_out_to_in_may_vanish() {
     }
 }
 
+/// At the start rounding may put an argument on the side that the law does not take; when it leaves 0 the side changes.
+#[test]
+fn a_side_taken_at_rest_is_left() {
+    let model = fault("root_at_rest");
+    let done =
+        model.simulate(&run(Form::Minimal, 0.4, &["r8.e", "r8.f"]), &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
+    let [e, f] = last(&done)[..] else { panic!("two values") };
+    assert!((f - 0.552 * e.signum() * e.abs().sqrt()).abs() < 1e-12, "{e} and {f}");
+    assert!(f > 0.03, "it has moved: {f}");
+}
+
 /// The slope before a kink tells nothing of the way behind it. The reference is the same circuit with the diode solved for its
 /// effort.
 #[test]

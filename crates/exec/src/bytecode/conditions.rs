@@ -93,6 +93,14 @@ impl Conditions {
         }
     }
 
+    /// Where sides have just been taken, an operand that rounding puts on the other one is on the side taken.
+    pub fn confirm(&self, condition: ConditionId, beyond: &mut [f64; 2]) {
+        if self.kinds[condition.0 as usize] == ConditionKind::Sign {
+            let held = self.held[condition.0 as usize] != 0.0;
+            beyond[0] = if held { beyond[0].abs().max(f64::MIN_POSITIVE) } else { -beyond[0].abs() };
+        }
+    }
+
     /// The lower and upper border of the held value.
     pub fn borders(&self, condition: ConditionId, tables: &[Table1d]) -> [f64; 2] {
         let held = self.held[condition.0 as usize];

@@ -69,6 +69,8 @@ pub struct Model {
     scales: Vec<f64>,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
     scaled: bool,
+    /// When the sides of switching functions were taken last.
+    sides_taken: Option<f64>,
     /// Values of the conserved constants.
     conserved: Vec<f64>,
     /// States that jump with a source, if there are any.
@@ -142,6 +144,7 @@ impl Model {
             held: Vec::new(),
             scales: vec![0.0; n],
             scaled: true,
+            sides_taken: None,
             conserved: vec![0.0; program.conserved.len()],
             kept,
             dx: vec![0.0; n],

@@ -161,6 +161,7 @@ impl Model {
             frame.conditions.value(condition, frame.r[register as usize], &frame.tables);
         }
         frame.conditions.state = Hold::Keep;
+        self.sides_taken = Some(t);
         run.map_err(|trouble| self.failure(t, trouble))
     }
 
@@ -382,7 +383,10 @@ impl System for Model {
         let frame = &self.frame;
         let mut next = 0;
         for (&condition, &register) in self.switches.iter().zip(&self.switching.outputs) {
-            let beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
+            let mut beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
+            if self.sides_taken == Some(t) {
+                frame.conditions.confirm(condition, &mut beyond);
+            }
             let count = self.program.conditions[condition].kind.switches();
             g[next..next + count].copy_from_slice(&beyond[..count]);
             next += count;
