@@ -83,6 +83,8 @@ pub(crate) struct Scales {
     links: BTreeMap<(Quantity, Quantity), f64>,
     /// Integrals of the magnitudes of efforts and flows.
     turnovers: BTreeMap<Quantity, f64>,
+    /// Start values that the model gives.
+    given: BTreeMap<Quantity, f64>,
     /// Magnitudes below which the method of the run neglected what happens.
     neglected: BTreeMap<Quantity, f64>,
     begun: Option<f64>,
@@ -98,6 +100,7 @@ impl Scales {
             seen: BTreeMap::new(),
             links: BTreeMap::new(),
             turnovers: BTreeMap::new(),
+            given: BTreeMap::new(),
             neglected: BTreeMap::new(),
             begun: None,
             span: 0.0,
@@ -125,9 +128,26 @@ impl Scales {
                 self.note(quantity, greatest(column));
             }
         }
+        self.absorb_given(graph, values);
         for port in graph.outer_ports() {
             let power = values.power(port).unwrap_or_default();
             self.note(self.power(graph, port), greatest(&power));
+        }
+    }
+
+    /// Takes note of the start values that the model gives: they tell what is great where a run begins at rest.
+    fn absorb_given(&mut self, graph: &BondGraph, values: &Values) {
+        let starts = graph.elements.values().filter_map(|element| match &element.kind {
+            Kind::Inertance(storage) | Kind::Compliance(storage) => Some(&storage.initial),
+            _ => None,
+        });
+        for initial in starts.flatten() {
+            let value = graph.exprs.eval(initial.value, &mut |s| values.parameter(s).unwrap_or(f64::NAN)).abs();
+            if value.is_finite() {
+                let quantity = self.of(graph, initial.symbol);
+                let given = self.given.entry(quantity).or_default();
+                *given = given.max(value);
+            }
         }
     }
 
@@ -202,6 +222,7 @@ impl Scales {
             let most = beside.entry(quantity).or_default();
             *most = most.max(least);
         };
+        self.given.iter().for_each(|(&quantity, &given)| raise(quantity, given));
         for bond in graph.bonds.ids() {
             for flow in [false, true] {
                 raise(self.of_bond(bond, flow), sorts[&sort_of_bond(graph, bond, flow)]);

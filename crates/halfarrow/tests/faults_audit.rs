@@ -7,7 +7,7 @@ use std::path::Path;
 
 use halfarrow::{
     AuditReport, Compare, Error, Failure, FixedMethod, Form, Method, Model, Override, RealTimeRun, Record, Reduce, Run,
-    Simulated, Stopped, Sweep, Vary, Verdict,
+    Simulated, Start, Stopped, Sweep, Vary, Verdict,
 };
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{self, BondGraph, NoFiles};
@@ -160,6 +160,25 @@ fn a_long_rest_before_a_motion_raises_no_alarm() {
     for wanted in [step, Run { to: 10.0, ..Run::default() }] {
         let done = run(&model, &wanted).unwrap_or_else(|stopped| panic!("{stopped}"));
         assert_eq!(done.report.audit.verdict, Verdict::Holds, "{:?}", done.report.audit);
+    }
+}
+
+/// Where everything is 0, a root law too, that is the solution, and rounding of it is no miss.
+#[test]
+fn where_all_is_zero_all_is_well() {
+    let dead = text(
+        "model Dead\n0:z\n0:y\n1:o\ny -> TF:t(1.203) -> z\nz -> R:a(f = 2*sign(e)*sqrt(abs(e)))\n\
+         y -> R:b(e = 0.389*tanh(1.490*f) + 0.2*f)\no -> I:m(1, p0 = 0.5)\n",
+    );
+    let resting = text(
+        "model Rest\n0:z\n1:o\n1:p\nstate phi' = p.f from 1.239\nz -> GY:g(0.5 + 0.2*cos(phi)) -> o\n\
+         I:f[x, y](m = [[3, 2], [2, 4]])\np -> f.x\no -> f.y\nz -> C:c(e = 2.193*sinh(q))\nz -> I:m(1.758)\n\
+         o -> I:n(1, p0 = 0.5)\n",
+    );
+    for (model, start) in [(&dead, Start::Given), (&resting, Start::Equilibrium)] {
+        let asked = Run { to: 0.4, every: Some(0.05), rtol: 1e-9, start, record: Record::All, ..Run::default() };
+        let done = run(model, &asked).unwrap_or_else(|stopped| panic!("{}", stopped.failure));
+        assert_eq!(done.report.audit.verdict, Verdict::Holds, "{:?}", done.report.audit.warnings);
     }
 }
 

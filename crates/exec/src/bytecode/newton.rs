@@ -381,7 +381,11 @@ impl Frame {
         let newton = self.newton_of(solve);
         newton.trial.copy_from_slice(&newton.memory);
         if !self.evaluate(solve, true) {
-            return false;
+            // Where a slope is infinite, as that of a root at 0, no step tells: the residuals do if they vanish.
+            let vanishes = solve.right.iter().all(|&right| self.r[right as usize] == 0.0);
+            let newton = self.newton_of(solve);
+            newton.x.copy_from_slice(&newton.memory);
+            return vanishes;
         }
         for i in 0..n {
             let Frame { r, solvers, .. } = &mut *self;

@@ -882,7 +882,13 @@ static int ha_stays(ha_model *m, ha_newton *w)
     int i;
     int j;
     if (!ha_look_at(m, w, w->memory)) {
-        return 0;
+        /* Where a slope is infinite, as that of a root at 0, no step tells: the residuals do if they vanish. */
+        int vanishes = 1;
+        for (i = 0; i < w->n; ++i) {
+            vanishes = vanishes && w->right[i] == 0.0;
+        }
+        ha_copy(w->x, w->memory, w->n);
+        return vanishes;
     }
     for (i = 0; i < w->n; ++i) {
         double terms = 0.0;
