@@ -204,3 +204,26 @@ fn compare(one: &Exported, text: &str, (wanted, failure): &(Rows, Option<String>
         (said, failure) => Err(format!("{} rows, but {}: {said:?}, but {failure:?}", rows.len(), wanted.len())),
     }
 }
+
+/// Parameters for which the equations are others have a status of their own: no run starts or goes on with them.
+#[test]
+fn c_refuses_parameters_for_which_the_equations_are_others() {
+    let all = [export(&common::difference(), Method::Heun, 1e-3)];
+    let name = &all[0].written.name;
+    let upper = name.to_uppercase();
+    let mut text = String::from("#include <stdio.h>\n\n");
+    let _ = write!(
+        text,
+        "int main(void)\n{{\n    static {name} m;\n    int said[8];\n    int i;\n    \
+         said[0] = {name}_reset(&m);\n    said[1] = {name}_set_parameter(&m, {upper}_P_b, 2.0);\n    \
+         puts({name}_message(&m));\n    said[2] = {name}_start(&m, 0.0);\n    \
+         said[3] = {name}_set_parameter(&m, {upper}_P_a, 2.0);\n    said[4] = {name}_start(&m, 0.0);\n    \
+         said[5] = {name}_step(&m);\n    (void){name}_set_parameter(&m, {upper}_P_b, 1.0);\n    said[6] = {name}_step(&m);\n    \
+         (void){name}_set_parameter(&m, {upper}_P_a, 1.0);\n    said[7] = {name}_step(&m);\n    \
+         for (i = 0; i < 8; ++i) {{\n        printf(\"%d \", said[i] == {upper}_STRUCTURE ? 1 : said[i] == {upper}_OK ? 0 : 9);\n    }}\n    \
+         return 0;\n}}\n"
+    );
+    let output = build("structure", &all, &text).run(&[]);
+    assert!(output.contains("derived where a - b is zero"), "{output}");
+    assert!(output.trim_end().ends_with("0 1 1 0 0 0 1 0"), "{output}");
+}

@@ -231,6 +231,39 @@ fn states_at_rest_have_the_magnitude_to_which_they_grow() {
     assert!(nominal(&one));
 }
 
+/// Parameters that are set one after the other may fit only together; where they do not, the end of the initialization or
+/// the next step is refused with the reason.
+#[test]
+fn parameters_for_which_the_equations_are_others_are_refused() {
+    let written = written(&export_program(read_program(&common::difference()), Method::Rk4, 1e-3, true), Version::V2);
+    let folder = common::folder("structure_fmu");
+    for file in written.files.iter().filter(|f| f.path.starts_with("sources/")).chain(&fmu::headers(Version::V2)) {
+        std::fs::write(folder.join(file.path.trim_start_matches("sources/")), &file.bytes).expect("a file");
+    }
+    let all = elements(&description(&written));
+    let of = |name: &str, key: &str| {
+        let found = all
+            .iter()
+            .find(|(_, a)| a.get("name").is_some_and(|n| n == name) || a.contains_key(key) && name.is_empty());
+        found.and_then(|(_, a)| a.get(key).cloned()).unwrap_or_else(|| panic!("{name} {key}"))
+    };
+    let defined = [
+        format!("-DGUID=\"{}\"", of("", "guid")),
+        format!("-DA={}", of("a", "valueReference")),
+        format!("-DB={}", of("b", "valueReference")),
+    ];
+    std::fs::write(folder.join("structure.c"), include_str!("common/structure.c")).expect("a file");
+    common::cc("cc", &folder, |c| {
+        c.args(common::FLAGS).args(["-O1", "-I."]).args(&defined).arg("structure.c").args(&written.sources).args([
+            "-o",
+            "structure",
+            "-lm",
+        ])
+    });
+    let out = std::process::Command::new(folder.join("structure")).output().expect("it runs");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stdout));
+}
+
 /// Points that an integrator tries: one beyond a fold is discarded and leaves the instance as it was; one that is only far
 /// from the last completed step has its value.
 #[test]

@@ -1,6 +1,7 @@
 //! A model that can be asked.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{BondGraph, Files, Override};
@@ -17,6 +18,15 @@ use crate::error::{Error, Problem};
 pub struct Model {
     pub(crate) graph: BondGraph,
     pub(crate) found: Found,
+    origin: Arc<Origin>,
+}
+
+/// What a model was made of.
+#[derive(Debug)]
+struct Origin {
+    name: String,
+    text: String,
+    overrides: Vec<Override>,
 }
 
 impl Model {
@@ -39,7 +49,19 @@ impl Model {
 
     fn read(name: &str, text: &str, files: &dyn Files, overrides: &[Override]) -> Result<Model, Error> {
         let Reached { ir: graph, found } = to_bond_graph(Text { name, text, files, overrides })?;
-        Ok(Model { graph, found })
+        let origin = Origin { name: name.to_string(), text: text.to_string(), overrides: overrides.to_vec() };
+        Ok(Model { graph, found, origin: Arc::new(origin) })
+    }
+
+    /// The same model with other values of parameters in the place of those that it has.
+    ///
+    /// # Errors
+    /// The model has errors with these values.
+    pub fn with(&self, set: &[Override]) -> Result<Model, Error> {
+        let Origin { name, text, overrides } = &*self.origin;
+        let kept = overrides.iter().filter(|o| !set.iter().any(|s| s.name == o.name));
+        let all: Vec<Override> = kept.chain(set).cloned().collect();
+        Model::read(name, text, &Disk, &all)
     }
 
     /// Its name, as the text says.

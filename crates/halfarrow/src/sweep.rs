@@ -4,11 +4,13 @@ mod audit;
 mod journal;
 mod plan;
 mod reduce;
+mod structures;
 
 pub use audit::{SetMiss, SweepAudit};
 pub use plan::{Samples, Vary};
 pub use reduce::{Reduce, Reduction};
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -28,6 +30,7 @@ use crate::run::{Record, Run, choose, connect, options, units};
 use journal::{Entry, Journal};
 use plan::Plan;
 use reduce::Reducers;
+use structures::{Structures, set_all};
 
 /// Sets of a chunk: what is computed in one go, written at once, and lost when the program is killed.
 const CHUNK: usize = 4 * LANES;
@@ -111,11 +114,12 @@ impl Model {
         let unwritable = |why: io::Error| Error::from(Problem::Unwritable { path: out.into(), why: why.to_string() });
         let mut journal = Journal::open(out, &identity, columns.len(), sweep.restart)?;
         let resumed = journal.sets();
-        let work = Work { plan: &plan, reducers: &reducers, options: &options, system: &system };
-        if !self.compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)? {
+        let structures = Structures::of(self, &system, sweep, &plan);
+        let work = Work { plan: &plan, reducers: &reducers, options: &options, structures: &structures };
+        if !compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)? {
             return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
         }
-        let audit = self.audit_sample(&work, &sweep.run);
+        let audit = audit::sample_of(&work, &sweep.run);
         let failures = kind.write(out, &columns, sweep.units, &mut journal).map_err(unwritable)?;
         journal.remove();
         Ok(SweepReport {
@@ -129,47 +133,46 @@ impl Model {
         })
     }
 
-    /// Computes what is not done yet; false if it was stopped.
-    fn compute(
-        &self,
-        work: &Work<'_>,
-        start: crate::run::Start,
-        journal: &mut Journal,
-        progress: &mut dyn FnMut(usize, usize) -> bool,
-    ) -> io::Result<bool> {
-        let chunks = work.plan.sets().div_ceil(CHUNK);
-        let open: Vec<usize> = (0..chunks).filter(|chunk| !journal.has(*chunk)).collect();
-        let mut done = journal.sets();
-        if open.is_empty() || !progress(done, work.plan.sets()) {
-            return Ok(open.is_empty());
-        }
-        // Few results wait to be written: memory stays bounded however many sets there are.
-        let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
-        std::thread::scope(|scope| {
-            scope.spawn(move || {
-                // An end of the other side stops the work.
-                let _ = open.into_par_iter().try_for_each_init(
-                    || Worker::new(work),
-                    |worker, chunk| sender.send(worker.chunk(self, chunk, start)).map_err(drop),
-                );
-            });
-            for entry in receiver {
-                done += entry.rows;
-                journal.add(&entry)?;
-                if !progress(done, work.plan.sets()) {
-                    return Ok(false);
-                }
-            }
-            Ok(true)
-        })
-    }
-
     /// What tells one sweep from another.
     fn identity(&self, sweep: &Sweep, plan: &Plan, columns: &[(String, String)]) -> String {
         // Everything that the rows depend on, as text.
         let graph = format!("{:?}", self.graph);
         format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()), sweep.run)
     }
+}
+
+/// Computes what is not done yet; false if it was stopped.
+fn compute(
+    work: &Work<'_>,
+    start: crate::run::Start,
+    journal: &mut Journal,
+    progress: &mut dyn FnMut(usize, usize) -> bool,
+) -> io::Result<bool> {
+    let chunks = work.plan.sets().div_ceil(CHUNK);
+    let open: Vec<usize> = (0..chunks).filter(|chunk| !journal.has(*chunk)).collect();
+    let mut done = journal.sets();
+    if open.is_empty() || !progress(done, work.plan.sets()) {
+        return Ok(open.is_empty());
+    }
+    // Few results wait to be written: memory stays bounded however many sets there are.
+    let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            // An end of the other side stops the work.
+            let _ = open.into_par_iter().try_for_each_init(
+                || Worker::new(work),
+                |worker, chunk| sender.send(worker.chunk(chunk, start)).map_err(drop),
+            );
+        });
+        for entry in receiver {
+            done += entry.rows;
+            journal.add(&entry)?;
+            if !progress(done, work.plan.sets()) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    })
 }
 
 /// A number that tells contents apart (FNV-1a).
@@ -182,42 +185,54 @@ struct Work<'a> {
     plan: &'a Plan,
     reducers: &'a [Reducers],
     options: &'a Options,
-    system: &'a exec::Model,
+    structures: &'a Structures,
 }
 
-/// A core's own copies of the model.
+/// A core's own copies of the model, by the numbers of their equations.
 struct Worker<'a> {
     work: &'a Work<'a>,
+    copies: Vec<Option<Copies<'a>>>,
+}
+
+/// A model as a core runs it.
+struct Copies<'a> {
+    model: &'a Model,
     wide: Option<exec::WideModel>,
     system: exec::Model,
 }
 
+/// What became of a set: what is kept of its run, or why there is none.
+type Outcome = Result<Vec<f64>, String>;
+
 impl<'a> Worker<'a> {
     fn new(work: &'a Work<'a>) -> Worker<'a> {
-        let wide = is_wide(work.options.method).then(|| exec::WideModel::new(work.system));
-        Worker { work, wide, system: work.system.clone() }
+        Worker { work, copies: (0..work.structures.len()).map(|_| None).collect() }
     }
 
-    fn chunk(&mut self, model: &Model, chunk: usize, start: crate::run::Start) -> Entry {
+    fn chunk(&mut self, chunk: usize, start: crate::run::Start) -> Entry {
         let sets: Vec<usize> = (chunk * CHUNK..self.work.plan.sets().min((chunk + 1) * CHUNK)).collect();
         let mut entry = Entry { chunk, rows: sets.len(), values: Vec::new(), failures: Vec::new() };
-        for group in sets.chunks(LANES) {
-            let outcomes = match self.wide.take() {
-                Some(mut wide) => {
-                    let outcomes = self.together(&mut wide, model, group, start);
-                    self.wide = Some(wide);
-                    outcomes
-                }
-                None => group.iter().map(|&set| self.alone(model, set, start)).collect(),
-            };
-            for (&set, outcome) in group.iter().zip(outcomes) {
-                self.row(set, outcome, &mut entry);
+        let mut outcomes: BTreeMap<usize, Outcome> = BTreeMap::new();
+        let mut alike: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for &set in &sets {
+            match self.work.structures.number(set) {
+                Ok(number) => alike.entry(number).or_default().push(set),
+                Err(reason) => _ = outcomes.insert(set, Err(reason)),
             }
+        }
+        for (number, sets) in alike {
+            let copies = self.copies[number].get_or_insert_with(|| Copies::of(self.work, number));
+            for group in sets.chunks(LANES) {
+                outcomes.extend(group.iter().copied().zip(copies.group(self.work, group, start)));
+            }
+        }
+        for (set, outcome) in outcomes {
+            self.row(set, outcome, &mut entry);
         }
         entry
     }
 
-    fn row(&self, set: usize, outcome: Result<Vec<f64>, String>, entry: &mut Entry) {
+    fn row(&self, set: usize, outcome: Outcome, entry: &mut Entry) {
         entry.values.push((set + 1) as f64);
         entry.values.extend(self.work.plan.values(set));
         let failed = outcome.is_err();
@@ -231,35 +246,55 @@ impl<'a> Worker<'a> {
         }
         entry.values.push(f64::from(failed));
     }
+}
+
+impl<'a> Copies<'a> {
+    fn of(work: &Work<'a>, number: usize) -> Copies<'a> {
+        let structure = work.structures.get(number);
+        let wide = is_wide(work.options.method).then(|| exec::WideModel::new(&structure.system));
+        Copies { model: &structure.model, wide, system: structure.system.clone() }
+    }
+
+    /// Sets with the same equations, together where the method allows that.
+    fn group(&mut self, work: &Work<'_>, sets: &[usize], start: crate::run::Start) -> Vec<Outcome> {
+        match self.wide.take() {
+            Some(mut wide) => {
+                let outcomes = self.together(work, &mut wide, sets, start);
+                self.wide = Some(wide);
+                outcomes
+            }
+            None => sets.iter().map(|&set| self.alone(work, set, start)).collect(),
+        }
+    }
 
     /// One set by itself, with any method.
-    fn alone(&mut self, model: &Model, set: usize, start: crate::run::Start) -> Result<Vec<f64>, String> {
-        let mut x = prepare(&mut self.system, model, self.work.plan, set, start)?;
-        let mut sink = Reducers::begin(self.work.reducers);
-        simulate(&mut self.system, self.work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
+    fn alone(&mut self, work: &Work<'_>, set: usize, start: crate::run::Start) -> Outcome {
+        let mut x = prepare(&mut self.system, self.model, work.plan, set, start)?;
+        let mut sink = Reducers::begin(work.reducers);
+        simulate(&mut self.system, work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
         Ok(sink.finish())
     }
 
     /// Several sets on vectors.
     fn together(
-        &mut self,
+        &self,
+        work: &Work<'_>,
         wide: &mut exec::WideModel,
-        model: &Model,
         sets: &[usize],
         start: crate::run::Start,
-    ) -> Vec<Result<Vec<f64>, String>> {
+    ) -> Vec<Outcome> {
         let states = self.system.program().states.len();
         let mut x = vec![[0.0; LANES]; states];
         let mut prepared: Vec<Result<(), String>> = Vec::with_capacity(sets.len());
         let mut wanted = [false; LANES];
         for (lane, &set) in sets.iter().enumerate() {
-            let found = prepare(wide.model(lane), model, self.work.plan, set, start);
+            let found = prepare(wide.model(lane), self.model, work.plan, set, start);
             wanted[lane] = found.is_ok();
             prepared.push(found.map(|state| x.iter_mut().zip(state).for_each(|(x, state)| x[lane] = state)));
         }
         wide.begin();
-        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(self.work.reducers));
-        let ends = simulate_wide(wide, self.work.options, &mut x, &mut sinks, wanted);
+        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers));
+        let ends = simulate_wide(wide, work.options, &mut x, &mut sinks, wanted);
         let outcome = |((prepared, end), sink): ((Result<(), String>, Result<_, halfarrow_sim::Stopped>), _)| {
             prepared?;
             end.map_err(|stopped| stopped.to_string())?;
@@ -277,9 +312,7 @@ fn prepare(
     set: usize,
     start: crate::run::Start,
 ) -> Result<Vec<f64>, String> {
-    for (name, value) in plan.names().iter().zip(plan.values(set)) {
-        system.set_parameter(name, value).map_err(|why| format!("{name} = {value}: {why}"))?;
-    }
+    set_all(system, plan, set)?;
     model.start(system, start).map_err(|error| error.to_string())
 }
 

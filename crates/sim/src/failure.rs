@@ -67,6 +67,11 @@ pub enum Failure {
         /// Why it has none there, such as `the current -2 A is below -is`.
         reason: String,
     },
+    /// Parameters have been set to values for which the equations are others than those that were derived.
+    Structure {
+        /// What held when they were derived and holds no longer, such as `a - b is zero`.
+        assumed: String,
+    },
     /// No step is short enough: the solution grows without bound or is not smooth here.
     StepTooSmall {
         /// When, in s.
@@ -139,7 +144,7 @@ impl Failure {
             | Failure::Bound { time, .. }
             | Failure::Untrue { time, .. }
             | Failure::Interrupted { time } => Some(*time).filter(|time| !time.is_nan()),
-            Failure::BadOption { .. } | Failure::BadMethod { .. } => None,
+            Failure::Structure { .. } | Failure::BadOption { .. } | Failure::BadMethod { .. } => None,
         }
     }
 }
@@ -182,6 +187,11 @@ impl fmt::Display for Failure {
             Failure::OutOfDomain { time, what, reason } => {
                 write!(f, "{} {what} is asked for a value where it has none: {reason}", When(*time))
             }
+            Failure::Structure { assumed } => write!(
+                f,
+                "with these parameters the equations are others: they were derived where {assumed}; load the model with \
+                 these values, as by `--set`, so that they are derived anew"
+            ),
             Failure::Branch { time, what, leap } => write!(
                 f,
                 "{} the equations of {what} have two solutions: {} would leap from {} to {}; the solution that the run has \

@@ -242,13 +242,18 @@ impl Exprs {
             merged.push(if *n == ONE { *base } else { self.pow(*base, *n) });
             return;
         }
-        if self.positive(base) {
+        let whole = |n: &Expr| self.is_number(*n).is_some_and(Rational::is_integer);
+        let roots = !powers.iter().all(|p| whole(&p.1));
+        if roots && self.positive(base) {
             let exponents: Vec<Expr> = powers.iter().map(|p| p.1).collect();
             let n = self.add(&exponents);
             merged.push(self.pow(base, n));
             return;
         }
-        let (nonzero, nonnegative) = (self.nonzero(base), self.nonnegative(base));
+        let below = |p: &&(Expr, Expr)| self.is_number(p.1).is_some_and(|n| n.signum() < 0);
+        let mixed = (1..powers.len()).contains(&powers.iter().filter(below).count());
+        let nonzero = (roots || mixed) && self.nonzero(base);
+        let nonnegative = roots && self.nonnegative(base);
         // Exponents that may be added: by sign unless the base is nonzero, whole ones apart from roots unless it is
         // not negative.
         let mut groups: [Vec<Rational>; 4] = Default::default();
@@ -389,10 +394,10 @@ impl Exprs {
             return self.intern(Node::Pow(base, exponent));
         };
         let both = &m_number * n;
-        let zero_stays_out = self.nonzero(inner) || m_number.signum() > 0 || n.signum() > 0;
-        let sign_stays = self.nonnegative(inner)
-            || (m_number.is_integer() && n.is_integer())
-            || (!m_number.is_integer() && !both.is_integer());
+        let zero_stays_out = m_number.signum() > 0 || n.signum() > 0 || self.nonzero(inner);
+        let sign_stays = (m_number.is_integer() && n.is_integer())
+            || (!m_number.is_integer() && !both.is_integer())
+            || self.nonnegative(inner);
         if sign_stays && zero_stays_out {
             return self.pow_number(inner, &both);
         }

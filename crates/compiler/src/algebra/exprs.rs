@@ -1,5 +1,6 @@
 //! The pool of shared expressions.
 
+use super::assumptions::Notes;
 use super::fingerprint::{Fingerprint, mix};
 use super::node::{Comparison, Expr, Facts, Function, Node, Symbol};
 use super::properties::Properties;
@@ -58,6 +59,8 @@ pub(super) struct Entry {
     /// The product without its number; itself if it has none.
     pub monomial: Expr,
     pub fingerprint: Fingerprint,
+    /// What was said of it that the values of parameters decide.
+    pub notes: Notes,
 }
 
 #[derive(Clone)]
@@ -271,6 +274,7 @@ impl Exprs {
             symbols: self.symbols_of_node(&node),
             monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),
             fingerprint: self.fingerprint_of(&node),
+            notes: Notes::default(),
             node,
         };
         let id = u32::try_from(self.entries.len()).expect("fewer than 2^32 expressions");

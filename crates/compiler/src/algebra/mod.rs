@@ -3,6 +3,7 @@
 //! Every stage keeps its formulas in one pool, [`Exprs`], in which equal expressions are one entry. Numbers are exact;
 //! floats occur in values of tables and in [`Evaluator`] only.
 
+mod assumptions;
 mod calculus;
 mod construct;
 mod cost;
@@ -31,6 +32,7 @@ mod text;
 mod together;
 mod zero;
 
+pub use assumptions::{Assumption, Holds};
 pub use cost::Cost;
 pub use elimination::{
     BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,

@@ -1,5 +1,6 @@
 //! What is known of an expression without a value for its symbols: sign, and whether it is defined everywhere.
 
+use super::assumptions::Notes;
 use super::exprs::Exprs;
 use super::node::{Expr, Function, Node};
 use super::rational::Rational;
@@ -17,11 +18,11 @@ impl Signs {
     pub const NOT_ZERO: Signs = Signs(5);
     pub const ANY: Signs = Signs(7);
 
-    fn within(self, other: Signs) -> bool {
+    pub fn within(self, other: Signs) -> bool {
         self.0 & !other.0 == 0
     }
 
-    fn and(self, other: Signs) -> Signs {
+    pub fn and(self, other: Signs) -> Signs {
         Signs(self.0 & other.0)
     }
 
@@ -71,17 +72,27 @@ pub(super) struct Properties {
 impl Exprs {
     /// Whether the expression is known never to be zero.
     pub fn nonzero(&self, e: Expr) -> bool {
-        self.signs(e).within(Signs::NOT_ZERO)
+        self.claims(e, Signs::NOT_ZERO, Notes::NOT_ZERO)
     }
 
     /// Whether the expression is known to be above zero.
     pub fn positive(&self, e: Expr) -> bool {
-        self.signs(e).within(Signs::PLUS)
+        self.claims(e, Signs::PLUS, Notes::POSITIVE)
     }
 
     /// Whether the expression is known not to be below zero.
     pub fn nonnegative(&self, e: Expr) -> bool {
-        self.signs(e).within(Signs::NOT_MINUS)
+        self.claims(e, Signs::NOT_MINUS, Notes::NOT_NEGATIVE)
+    }
+
+    /// Whether the signs of an expression are among these; if so that is noted.
+    fn claims(&self, e: Expr, signs: Signs, note: u8) -> bool {
+        let entry = self.entry(e);
+        let known = entry.properties.signs.within(signs);
+        if known {
+            entry.notes.add(note);
+        }
+        known
     }
 
     /// Whether the expression is known to have a finite value for all values of its symbols.
@@ -97,8 +108,11 @@ impl Exprs {
         let monomial = self.entry(e).monomial;
         let (_, primitive) = self.primitive(monomial);
         for e in [e, monomial, primitive] {
-            let signs = &mut self.entries[e.0 as usize].properties.signs;
-            *signs = signs.and(Signs::NOT_ZERO);
+            let entry = &mut self.entries[e.0 as usize];
+            if !entry.properties.signs.within(Signs::NOT_ZERO) {
+                entry.notes.add(Notes::WATCHED);
+            }
+            entry.properties.signs = entry.properties.signs.and(Signs::NOT_ZERO);
         }
         let mut parts = Vec::new();
         match self.node(monomial) {
@@ -139,7 +153,7 @@ impl Exprs {
             radical |= p.radical;
             opaque = [opaque[0] | p.opaque[0], opaque[1] | p.opaque[1]];
         });
-        Properties { signs: self.signs_of(node), total, piecewise, radical, opaque }
+        Properties { signs: self.signs_of(node, &|e| self.signs(e)), total, piecewise, radical, opaque }
     }
 
     fn is_radical(&self, node: &Node) -> bool {
@@ -151,7 +165,8 @@ impl Exprs {
         match node {
             Node::Pow(base, n) => match self.is_number(*n) {
                 Some(n) if n.is_integer() => n.signum() >= 0 || self.nonzero(*base),
-                Some(n) => self.positive(*base) || n.signum() > 0 && self.nonnegative(*base),
+                Some(n) if n.signum() > 0 => self.nonnegative(*base),
+                Some(_) => self.positive(*base),
                 None => self.positive(*base),
             },
             Node::Call(Function::Tan | Function::Asin | Function::Acos, _) => false,
@@ -162,7 +177,8 @@ impl Exprs {
         }
     }
 
-    fn signs_of(&self, node: &Node) -> Signs {
+    /// The signs of a node by those of its parts.
+    pub(super) fn signs_of(&self, node: &Node, of: &dyn Fn(Expr) -> Signs) -> Signs {
         match node {
             Node::Number(value) => Signs::of(value),
             Node::Pi => Signs::PLUS,
@@ -171,18 +187,17 @@ impl Exprs {
                 f if f.nonzero => Signs::NOT_ZERO,
                 _ => Signs::ANY,
             },
-            Node::Add(terms) => terms.iter().map(|&t| self.signs(t)).reduce(Signs::plus).unwrap_or(Signs::ZERO),
-            Node::Mul(factors) => factors.iter().map(|&f| self.signs(f)).fold(Signs::PLUS, Signs::times),
-            Node::Pow(base, n) => self.signs_of_power(*base, *n),
-            Node::Call(f, x) => self.signs_of_call(*f, x),
+            Node::Add(terms) => terms.iter().map(|&t| of(t)).reduce(Signs::plus).unwrap_or(Signs::ZERO),
+            Node::Mul(factors) => factors.iter().map(|&f| of(f)).fold(Signs::PLUS, Signs::times),
+            Node::Pow(base, n) => self.signs_of_power(of(*base), *n),
+            Node::Call(f, x) => self.signs_of_call(*f, x, of),
             Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => Signs::NOT_MINUS,
-            Node::Select(_, a, b) => Signs(self.signs(*a).0 | self.signs(*b).0),
+            Node::Select(_, a, b) => Signs(of(*a).0 | of(*b).0),
             Node::Table(..) | Node::TableSlope(..) => Signs::ANY,
         }
     }
 
-    fn signs_of_power(&self, base: Expr, n: Expr) -> Signs {
-        let base = self.signs(base);
+    fn signs_of_power(&self, base: Signs, n: Expr) -> Signs {
         let Some(n) = self.is_number(n) else {
             return if base.within(Signs::PLUS) { Signs::PLUS } else { Signs::ANY };
         };
@@ -195,17 +210,17 @@ impl Exprs {
         }
     }
 
-    fn signs_of_call(&self, f: Function, x: &[Expr]) -> Signs {
+    fn signs_of_call(&self, f: Function, x: &[Expr], of: &dyn Fn(Expr) -> Signs) -> Signs {
         use Function::*;
-        let arg = self.signs(x[0]);
+        let arg = of(x[0]);
         match f {
             Exp | Cosh => Signs::PLUS,
             Sqrt => arg.and(Signs::NOT_MINUS),
             Abs => Signs(arg.0 & 2 | if arg.within(Signs::ZERO) { 0 } else { 4 }),
             Sign | Asin | Atan | Sinh | Tanh => arg,
             Acos => Signs::NOT_MINUS,
-            Min => self.signs_of_extreme(arg, self.signs(x[1]), i32::min),
-            Max => self.signs_of_extreme(arg, self.signs(x[1]), i32::max),
+            Min => self.signs_of_extreme(arg, of(x[1]), i32::min),
+            Max => self.signs_of_extreme(arg, of(x[1]), i32::max),
             Sin | Cos | Tan | Atan2 | Log | Log10 | Floor | Mod => Signs::ANY,
         }
     }

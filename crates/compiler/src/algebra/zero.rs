@@ -1,9 +1,10 @@
 //! Whether an expression is zero whatever its symbols are.
 
+use super::assumptions::Notes;
 use super::exprs::Exprs;
 use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
-use super::node::Expr;
+use super::node::{Expr, Node};
 use super::precise::{Point, Verdict};
 use astro_float::{BigFloat, Consts};
 
@@ -25,7 +26,11 @@ impl Exprs {
 
     /// Whether the expression is zero at the given parameters, for all values of what is not given.
     pub fn is_zero_given(&self, e: Expr) -> bool {
-        self.is_zero_in(e, true)
+        let zero = self.is_zero_in(e, true);
+        if zero && !self.is_zero(e) {
+            self.note_zero(e);
+        }
+        zero
     }
 
     /// Whether a square matrix is known to have a determinant that is not zero at the given parameters: by its values at
@@ -42,13 +47,22 @@ impl Exprs {
 
     fn is_zero_in(&self, e: Expr, given: bool) -> bool {
         let lanes = &self.fingerprint(e)[if given { GIVEN } else { GENERIC }];
-        let known = lanes.iter().filter(|&&v| v != POISON);
-        let poisoned = known.clone().count() == 0;
-        let zero = !poisoned && known.clone().all(|&v| v == 0);
+        let zero = lanes_vanish(lanes);
         let properties = &self.entry(e).properties;
         if zero && !properties.radical {
             return true;
         }
+        let vanishes = self.vanishes_by_values(e, given);
+        if vanishes {
+            self.note_positive_symbols(e);
+        }
+        vanishes
+    }
+
+    fn vanishes_by_values(&self, e: Expr, given: bool) -> bool {
+        let lanes = &self.fingerprint(e)[if given { GIVEN } else { GENERIC }];
+        let (zero, poisoned) = (lanes_vanish(lanes), lanes.iter().all(|&v| v == POISON));
+        let properties = &self.entry(e).properties;
         if !zero && !poisoned && !properties.opaque[usize::from(given)] {
             return false;
         }
@@ -56,6 +70,15 @@ impl Exprs {
             return false;
         }
         self.is_zero_by_values(e, given)
+    }
+
+    /// Roots and magnitudes vanish in sums by the signs of what stands in them.
+    fn note_positive_symbols(&self, e: Expr) {
+        for part in self.below(&[e], &|e| !self.is_constant(e)) {
+            if matches!(self.node(part), Node::Symbol(s) if self.facts(*s).positive) {
+                self.entry(part).notes.add(Notes::POSITIVE);
+            }
+        }
     }
 
     fn is_zero_by_values(&self, e: Expr, given: bool) -> bool {
@@ -77,6 +100,12 @@ impl Exprs {
         }
         false
     }
+}
+
+/// Whether what is known of the lanes is zero, and something is known.
+fn lanes_vanish(lanes: &[u64]) -> bool {
+    let mut known = lanes.iter().filter(|&&v| v != POISON).peekable();
+    known.peek().is_some() && known.all(|&v| v == 0)
 }
 
 /// Whether a square matrix over the prime field is regular; `false` if an entry is undefined.

@@ -73,6 +73,7 @@ impl<'a> Builder<'a, '_> {
             self.fault(Diagnostic::error(codes::L010, title, e.span, format!("this is {number}")));
             return None;
         }
+        let _ = self.exprs.positive(value.expr); // as was just seen
         Some(value.expr)
     }
 
@@ -120,19 +121,28 @@ impl<'a> Builder<'a, '_> {
         let mut terms = vec![self.exprs.mul(&[kp.expr, u.expr])];
         let mut quantity = kp.quantity.times(&u.quantity);
         let second = Quantity::of(Dim::SECOND);
-        if self.value_of(ki.expr) != Some(0.0) {
+        if !self.is_left_out(ki.expr) {
             let (id, symbol) = self.block_signal(cx, "integral", u.quantity.times(&second), span);
             self.signals[id].rate = u.expr;
             let integral = self.exprs.sym(symbol);
             terms.push(self.exprs.mul(&[ki.expr, integral]));
             quantity = self.same(&quantity, &ki.quantity.times(&u.quantity).times(&second), span);
         }
-        if self.value_of(kd.expr) != Some(0.0) {
+        if !self.is_left_out(kd.expr) {
             let rate = self.pid_rate(cx, call, &u, &kp, &kd, span)?;
             terms.push(self.exprs.mul(&[kd.expr, rate]));
             quantity = self.same(&quantity, &kd.quantity.times(&u.quantity).over(&second), span);
         }
         Some(Value::number(self.exprs.add(&terms), quantity))
+    }
+
+    /// Whether a gain is zero, so that its term is left out.
+    fn is_left_out(&self, gain: Expr) -> bool {
+        let zero = self.value_of(gain) == Some(0.0);
+        if zero {
+            self.exprs.note_zero(gain);
+        }
+        zero
     }
 
     fn same(&mut self, a: &Quantity, b: &Quantity, span: Span) -> Quantity {
@@ -156,6 +166,7 @@ impl<'a> Builder<'a, '_> {
         let time = match filter {
             Some(arg) => self.positive(cx, &arg.value, "the time constant of a filter")?,
             None if self.value_of(kp.expr).is_some_and(|v| v != 0.0) => {
+                let _ = self.exprs.nonzero(kp.expr); // divided by
                 let ten = self.exprs.int(FILTER_RATIO);
                 let scaled = self.exprs.mul(&[ten, kp.expr]);
                 self.exprs.div(kd.expr, scaled)

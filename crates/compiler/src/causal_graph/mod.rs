@@ -203,7 +203,7 @@ impl Combination {
                 *e = x.simplify(*e);
             }
         }
-        sum.retain(|_, e| !x.is_zero_given(*e));
+        sum.retain(|_, e| !x.is_zero(*e));
         Combination(sum.into_iter().collect())
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::along::{Closure, Treatment, assemble_all};
+use super::assumptions::assumptions;
 use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
@@ -219,6 +220,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let dof = ports.iter().filter(|p| p.role == Role::Independent).count() + truth.ports.virtual_speeds.len();
     let index::Indices { index, indices, counts } =
         index::indices(&mut d, &states, &algebraic, &ordered.steps, &residuals);
+    let assumptions = assumptions(&mut d.x, graph);
     Ok(Equations {
         form,
         graph: graph.with_exprs(d.x),
@@ -246,6 +248,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         certificate: None,
         dof,
         implicit,
+        assumptions,
     })
 }
 

@@ -1,6 +1,7 @@
 //! The equations of a bond graph in one of its forms, in the order in which they are evaluated.
 
 mod along;
+mod assumptions;
 mod blocks;
 mod breaks;
 mod conserved;
@@ -24,7 +25,7 @@ mod verify;
 
 use std::collections::BTreeSet;
 
-use crate::algebra::{Expr, Symbol};
+use crate::algebra::{Assumption, Expr, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortRef};
 pub use crate::causal_paths::{Certificate, Count};
 use crate::ids::Map;
@@ -108,6 +109,8 @@ pub struct Equations {
     pub dof: usize,
     /// What stays implicit: unknowns of the Newton blocks.
     pub implicit: Vec<Symbol>,
+    /// What must hold of parameters that may change: where it does not, the equations are others.
+    pub assumptions: Vec<Assumption>,
 }
 
 impl Equations {

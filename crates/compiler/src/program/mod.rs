@@ -34,6 +34,7 @@ pub use values::{Op, Reads, Values};
 
 use std::collections::BTreeMap;
 
+pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::HeldKind;
 pub use crate::equations::{DomainKind, Unavailable};
@@ -104,6 +105,8 @@ pub struct Program {
     pub watches: Vec<Watch>,
     /// What must hold for laws to have values, for messages.
     pub domains: Vec<Domain>,
+    /// What must hold of parameters: where it does not, the equations are others than these.
+    pub assumptions: Vec<Assumption>,
     /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
     pub dependence: Vec<Vec<u32>>,
 }
@@ -258,6 +261,34 @@ pub struct Watch {
     pub elements: String,
     /// The divisor as text, or what it reads if that would be long.
     pub divisor: String,
+}
+
+/// Something that was taken for granted of parameters when the equations were derived.
+#[derive(Debug, Clone)]
+pub struct Assumption {
+    /// A value of parameters alone.
+    pub value: Value,
+    /// Magnitude of the terms that it is the sum of: below rounding of it the value counts as zero.
+    pub scale: Value,
+    /// What holds of it.
+    pub holds: Holds,
+    /// The same in words, such as `a - b is zero`.
+    pub text: String,
+}
+
+impl Assumption {
+    /// A value below this fraction of its scale is rounding of the operations that lead to it.
+    pub const ROUNDING: f64 = 1e-13;
+
+    /// Whether it holds of a value with this scale.
+    pub fn holds_of(&self, value: f64, scale: f64) -> bool {
+        match self.holds {
+            Holds::Zero => value.abs() <= Assumption::ROUNDING * scale,
+            Holds::NotZero => value.abs() > Assumption::ROUNDING * scale.abs(),
+            Holds::Positive => value > 0.0,
+            Holds::NotNegative => value >= 0.0,
+        }
+    }
 }
 
 /// A list of names for a message: its first ones, and how many more there are.

@@ -5,10 +5,10 @@ use super::lower::Lowering;
 use super::sharing::share;
 use super::values::{Op, Reads};
 use super::{
-    Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Implicit, Input, Moved, Observed,
-    Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
+    Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
+    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
 };
-use crate::algebra::{Expr, Exprs, Function, Interpolation, Node, PlainNames, Symbol, ascii};
+use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
 use crate::equations::{Equations, Momentum, Step};
 use crate::ids::{Id, Table};
@@ -324,6 +324,11 @@ impl Schedule<'_> {
                 })
                 .collect(),
             domains: equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect(),
+            assumptions: equations
+                .assumptions
+                .iter()
+                .filter_map(|a| assumption(lower, graph, &self.watches, a))
+                .collect(),
             relations: relations(lower, graph, &equations.relations),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
             parameters,
@@ -411,6 +416,61 @@ fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Do
         asked: domain.asked.and_then(|s| Some((name(s), lower.defined(s)?))),
         limit: domain.limit.map(|limit| lower.value(limit)),
     })
+}
+
+/// An assumption with the value that tells whether it holds; none if it is a divisor that is watched as it is.
+fn assumption(
+    lower: &mut Lowering,
+    graph: &BondGraph,
+    watches: &[Watch],
+    of: &crate::algebra::Assumption,
+) -> Option<Assumption> {
+    let exprs = &graph.exprs;
+    let says = match of.holds {
+        Holds::Zero => "is zero",
+        Holds::NotZero => "is not zero",
+        Holds::Positive => "is above zero",
+        Holds::NotNegative => "is not below zero",
+    };
+    let text = ascii(exprs, of.expr, &PlainNames(exprs));
+    let what = if text.len() <= SHORT {
+        text
+    } else {
+        let read: Vec<&str> = exprs.symbols_of(of.expr).into_iter().map(|s| exprs.name(s)).collect();
+        format!("an expression in {}", first_of(&read.join(", ")))
+    };
+    let value = lower.value(of.expr);
+    if of.holds == Holds::NotZero && watches.iter().any(|w| w.pivot == value) {
+        return None;
+    }
+    let sum = matches!(of.holds, Holds::Zero | Holds::NotZero) && !matches!(exprs.node(of.expr), Node::Symbol(_));
+    let scale = if sum { magnitude(lower, exprs, of.expr) } else { value };
+    Some(Assumption { value, scale, holds: of.holds, text: format!("{what} {says}") })
+}
+
+/// What a sum of products comes to if nothing in it cancels.
+fn magnitude(lower: &mut Lowering, exprs: &Exprs, e: Expr) -> Value {
+    match exprs.node(e) {
+        Node::Add(terms) => {
+            let mut sum = lower.constant(0.0);
+            for &term in terms {
+                let size = magnitude(lower, exprs, term);
+                sum = lower.add(sum, size);
+            }
+            sum
+        }
+        Node::Mul(factors) => {
+            let sized = factors.iter().filter(|&&factor| factor != MINUS_ONE);
+            let sizes = sized.map(|&factor| magnitude(lower, exprs, factor)).collect::<Vec<_>>();
+            let product = sizes.into_iter().reduce(|product, size| lower.op(Op::Mul(product, size)));
+            product.expect("a product has factors")
+        }
+        Node::Number(n) => lower.constant(n.to_f64().abs()),
+        _ => {
+            let value = lower.value(e);
+            lower.op(Op::Call(Function::Abs, value))
+        }
+    }
 }
 
 /// The rows of which all is evaluated.

@@ -99,6 +99,7 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
     part(true, format!("double z[{}]; /* held signals */", n(p.held.len())));
     part(true, format!("unsigned char set[{}]; /* which parameters are set */", n(p.parameters.len())));
     part(true, "int changed; /* whether any is set */".into());
+    part(!p.assumptions.is_empty(), "int broken; /* which assumption parameters break, from 1 */".into());
     part(true, "int begun; /* whether the run has begun */".into());
     part(true, "int cross_due; /* whether a parameter or an input has jumped */".into());
     part(true, "ha_wide crossed; /* when the last jump was crossed */".into());

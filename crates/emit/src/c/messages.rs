@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Domain, DomainKind, Watch, first_of};
+use halfarrow_compiler::program::{Assumption, Domain, DomainKind, Watch, first_of};
 
 use super::plan::Plan;
 use crate::Real;
@@ -70,6 +70,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ),
         ("OUT_OF_RANGE", out_of_range(plan)),
         ("NOT_STARTED", vec!["the model has not been started".into()]),
+        ("STRUCTURE", p.assumptions.iter().map(structure).collect()),
     ]
 }
 
@@ -89,6 +90,13 @@ fn vanished(watch: &Watch) -> String {
         "the equations of {} have no unique solution: they divide by {}, which vanishes there; the machine is in a singular position, unless another variable may stay independent: name it with `prefer`",
         first_of(&watch.elements),
         watch.divisor
+    )
+}
+
+fn structure(a: &Assumption) -> String {
+    format!(
+        "with these parameters the equations are others: they were derived where {}; export the model anew with these values, as by `--set`",
+        a.text
     )
 }
 
@@ -128,6 +136,7 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "NO_START" => "no start was found for these parameters",
         "OUT_OF_RANGE" => "a parameter, or what follows from it, does not fit float",
         "BAD_PARAMETER" => "no such parameter, a constant, or a value that is not finite",
+        "STRUCTURE" => "parameters for which the equations are others",
         _ => "a step before the start",
     };
     let there = |code: &str| code != "OUT_OF_RANGE" || plan.export.real == Real::Float;

@@ -55,6 +55,11 @@ pub fn own(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(format!("{name}.bond"))
 }
 
+/// A model whose structure is another where two of its parameters differ.
+pub fn difference() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/difference.bond")
+}
+
 /// The program of a model.
 pub fn read_program(path: &Path) -> halfarrow_compiler::program::Program {
     let text = fs::read_to_string(path).expect("a model");

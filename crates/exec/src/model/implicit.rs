@@ -263,6 +263,9 @@ impl ImplicitModel {
     /// As [`Model::rates`](System::rates).
     pub fn start_at(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         self.form.restart();
+        if let Some(failure) = self.form.broken() {
+            return Err(failure);
+        }
         self.begun = false;
         self.x.copy_from_slice(x);
         let n = self.unknowns();

@@ -30,7 +30,7 @@ use crate::bytecode::{Abreast, Frame, Hold, Trouble};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::{
-    BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value, first_of,
+    Assumption, BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value, first_of,
 };
 use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
@@ -84,6 +84,10 @@ pub struct Model {
     begun: bool,
     /// When the last jump was crossed, in s.
     crossed: f64,
+    /// Computes what is assumed of parameters, each value with its scale.
+    assumed: Routine,
+    /// The number of the first assumption that the parameters break.
+    broken: Option<usize>,
     /// The time of the rates that stand in the registers, those of the states that stand there, if nothing has been done
     /// since.
     rated: Option<f64>,
@@ -129,11 +133,13 @@ impl Model {
         let switching = program.routine(&layout, &operands);
         let clock = Clock::new(&program, &layout);
         let mut frame = Frame::new(&program, &layout, layout.size);
+        let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
+        let assumed = program.routine(&layout, &assumed);
         let sparsity = sparsity_of(&program);
         let slopes = entries.map(|entries| Slopes::new(&program, &layout, &sparsity, &entries));
         let kept = Kept::of(&program, &layout);
         let more = slopes.as_ref().map(|s| &s.routine).into_iter().chain(kept.as_ref().map(Kept::routine));
-        for routine in [&rates, &preamble, &sources, &switching, clock.routine()].into_iter().chain(more) {
+        for routine in [&rates, &preamble, &assumed, &sources, &switching, clock.routine()].into_iter().chain(more) {
             frame.reserve(routine);
         }
         let n = program.states.len();
@@ -153,6 +159,8 @@ impl Model {
             begun: false,
             crossed: f64::NEG_INFINITY,
             rated: None,
+            assumed,
+            broken: None,
             observe: Routine::default(),
             recorded: Vec::new(),
             layout,
@@ -182,9 +190,31 @@ impl Model {
 
     /// Sets a parameter, in SI units; parameters given by it follow. The run starts anew.
     ///
+    /// Where the value breaks what the equations rest on ([`broken`](Model::broken)), no run starts until other
+    /// parameters mend it.
+    ///
     /// # Errors
     /// There is no such parameter, it is a constant, the value is not finite, or nothing can be solved with it.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        self.place_parameter(name, value)?;
+        self.parameters_changed().map_err(ParameterError::Unsolvable)
+    }
+
+    /// Sets several parameters at once: what the values on the way would break counts for nothing.
+    ///
+    /// # Errors
+    /// As [`set_parameter`](Model::set_parameter).
+    pub fn set_parameters<'a>(
+        &mut self,
+        values: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Result<(), ParameterError> {
+        for (name, value) in values {
+            self.place_parameter(name, value)?;
+        }
+        self.parameters_changed().map_err(ParameterError::Unsolvable)
+    }
+
+    fn place_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
         let found = self.program.parameters.iter().position(|p| p.name == name);
         let index = found.ok_or_else(|| ParameterError::Unknown(name.to_string()))?;
         if self.program.parameters[index].constant {
@@ -194,7 +224,13 @@ impl Model {
             return Err(ParameterError::NotFinite(name.to_string()));
         }
         self.frame.set[index] = Some(value);
-        self.parameters_changed().map_err(ParameterError::Unsolvable)
+        Ok(())
+    }
+
+    /// What the equations rest on and the parameters break, if they do: then these equations are not those of the model.
+    pub fn broken(&self) -> Option<Failure> {
+        let assumption = &self.program.assumptions[self.broken?];
+        Some(Failure::Structure { assumed: assumption.text.clone() })
     }
 
     /// The present value of a parameter or constant, in SI units.
@@ -318,6 +354,7 @@ impl Model {
         self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
         let run = self.frame.run(&self.preamble);
         run.map_err(|trouble| self.failure(f64::NAN, trouble))?;
+        self.broken = self.first_broken().map_err(|trouble| self.failure(f64::NAN, trouble))?;
         if let Some(failure) = self.violated_always() {
             return Err(failure);
         }
@@ -328,6 +365,17 @@ impl Model {
         }
         self.restart();
         Ok(())
+    }
+
+    /// The number of the first assumption that does not hold.
+    fn first_broken(&mut self) -> Result<Option<usize>, Trouble> {
+        if self.program.assumptions.is_empty() {
+            return Ok(None);
+        }
+        self.frame.run(&self.assumed)?;
+        let of = |i: usize| self.frame.r[self.assumed.outputs[i] as usize];
+        let broken = |(i, a): &(usize, &Assumption)| !a.holds_of(of(2 * i), of(2 * i + 1));
+        Ok(self.program.assumptions.iter().enumerate().find(broken).map(|(i, _)| i))
     }
 
     fn abreast_of(&self, routine: &Routine) -> Option<Arc<Abreast>> {

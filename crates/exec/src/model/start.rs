@@ -60,6 +60,9 @@ impl Model {
     /// Start values that contradict each other, with fitting ones.
     pub fn initialise(&mut self, t: f64) -> Result<Vec<f64>, StartError> {
         self.restart();
+        if let Some(failure) = self.broken() {
+            return Err(StartError::Failure(failure));
+        }
         self.check_asked()?;
         let states = self.program.states.len();
         let n = states + self.conserved.len();

@@ -326,6 +326,9 @@ impl System for Model {
         if t < self.crossed {
             self.restart();
         }
+        if let Some(failure) = self.broken().filter(|_| !self.begun) {
+            return Err(failure);
+        }
         let sums = if self.begun { self.sums(t, x)? } else { Vec::new() };
         self.crossed = t;
         self.rated = None;

@@ -175,6 +175,7 @@ impl Sketch {
             indices: Vec::new(),
             counts: Count { differential: 0, algebraic: 0 },
             breaks: BreakBound::default(),
+            assumptions: Vec::new(),
             implicit: Vec::new(),
         }
     }

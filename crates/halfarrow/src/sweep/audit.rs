@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::plan::Plan;
 use super::{Work, prepare};
 use crate::audited::{AuditReport, Audited, Miss};
-use crate::model::Model;
 use crate::run::Run;
 use crate::verdict::{Made, Verdict};
 
@@ -47,38 +46,37 @@ impl Sink for Nobody {
     fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
-impl Model {
-    /// Audits some of the sets, on all cores. Sets that fail are told by their rows.
-    pub(super) fn audit_sample(&self, work: &Work<'_>, run: &Run) -> SweepAudit {
-        let of = |set: usize| Some((set, self.audit_set(work, run, set)?));
-        let found: Vec<(usize, AuditReport)> = sample(work.plan).into_par_iter().filter_map(of).collect();
-        let count = |wanted: Verdict| found.iter().filter(|(_, audit)| audit.verdict == wanted).count();
-        let mut audit = SweepAudit {
-            sets: found.len(),
-            doubtful: count(Verdict::Doubtful),
-            refused: count(Verdict::Refused),
-            ..SweepAudit::default()
-        };
-        for (set, found) in found {
-            if found.verdict != Verdict::Holds {
-                let (verdict, warnings) = (found.verdict, found.warnings.clone());
-                audit.misses.push(SetMiss { set: set + 1, verdict, warnings });
-            }
-            audit.greatest.merge(found);
+/// Audits some of the sets, on all cores. Sets that fail are told by their rows.
+pub(super) fn sample_of(work: &Work<'_>, run: &Run) -> SweepAudit {
+    let of = |set: usize| Some((set, audit_set(work, run, set)?));
+    let found: Vec<(usize, AuditReport)> = sample(work.plan).into_par_iter().filter_map(of).collect();
+    let count = |wanted: Verdict| found.iter().filter(|(_, audit)| audit.verdict == wanted).count();
+    let mut audit = SweepAudit {
+        sets: found.len(),
+        doubtful: count(Verdict::Doubtful),
+        refused: count(Verdict::Refused),
+        ..SweepAudit::default()
+    };
+    for (set, found) in found {
+        if found.verdict != Verdict::Holds {
+            let (verdict, warnings) = (found.verdict, found.warnings.clone());
+            audit.misses.push(SetMiss { set: set + 1, verdict, warnings });
         }
-        audit
+        audit.greatest.merge(found);
     }
+    audit
+}
 
-    fn audit_set(&self, work: &Work<'_>, run: &Run, set: usize) -> Option<AuditReport> {
-        let mut system = work.system.clone();
-        let mut x = prepare(&mut system, self, work.plan, set, run.start).ok()?;
-        system.record(&[]).ok()?;
-        let mut audited = Audited::new(&mut system, &self.graph);
-        audited.simulate(work.options, &mut x, &mut Nobody).ok()?;
-        let mut report = audited.finish();
-        report.judge(&Made::by(run));
-        Some(report)
-    }
+fn audit_set(work: &Work<'_>, run: &Run, set: usize) -> Option<AuditReport> {
+    let structure = work.structures.get(work.structures.number(set).ok()?);
+    let mut system = structure.system.clone();
+    let mut x = prepare(&mut system, &structure.model, work.plan, set, run.start).ok()?;
+    system.record(&[]).ok()?;
+    let mut audited = Audited::new(&mut system, &structure.model.graph);
+    audited.simulate(work.options, &mut x, &mut Nobody).ok()?;
+    let mut report = audited.finish();
+    report.judge(&Made::by(run));
+    Some(report)
 }
 
 /// The first set, the last, and some evenly between them.

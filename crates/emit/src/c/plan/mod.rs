@@ -7,7 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::{
-    Block, BlockId, Cause, ConditionId, ConditionKind, DomainKind, Layout, Program, Reads, Routine, Value,
+    Assumption, Block, BlockId, Cause, ConditionId, ConditionKind, DomainKind, Holds, Layout, Program, Reads, Routine,
+    Value,
 };
 
 use super::cost::{Cost, Work};
@@ -16,6 +17,9 @@ use super::start::{self, Group, Pass};
 use super::write::{Moving, Shape, Writer, elimination_room, number};
 use super::{Export, messages, real, template};
 use crate::{EmitError, Method, Real};
+
+/// A sum of floats below this fraction of its terms is rounding of the operations that lead to it.
+const ROUNDING_OF_FLOATS: f64 = 1e-5;
 
 /// Points that all delays together may keep.
 const MOST_POINTS: f64 = 1e6;
@@ -171,6 +175,7 @@ impl<'a> Plan<'a> {
         let switching_code = code;
         text += &plain(&mut writer, &mut inner, "ha_domains_code", &domains).0;
         text += &self.domain_checks(&writer, &domains);
+        text += &self.assumption_checks(&writer);
 
         let along = |writer: &mut Writer, name: &str, code: &Code, moving: Moving| {
             let shape = Shape { along: Some(moving), ..ALONG };
@@ -314,6 +319,30 @@ impl<'a> Plan<'a> {
         text + "    return MODEL_OK;\n}\n\n"
     }
 
+    /// The number from 1 of the first assumption that parameters break, 0 if there is none.
+    fn assumption_checks(&self, writer: &Writer) -> String {
+        if self.program.assumptions.is_empty() {
+            return String::new();
+        }
+        let fixed = |value: Value| writer.fixed(self.layout.registers[&value]);
+        let rounding = number(match self.export.real {
+            Real::Double => Assumption::ROUNDING,
+            Real::Float => ROUNDING_OF_FLOATS,
+        });
+        let mut text = String::from("static int ha_broken(const ha_model *m)\n{\n");
+        for (i, a) in self.program.assumptions.iter().enumerate() {
+            let (v, s) = (fixed(a.value), fixed(a.scale));
+            let holds = match a.holds {
+                Holds::Zero => format!("{v} <= {rounding} * {s} && -{v} <= {rounding} * {s}"),
+                Holds::NotZero => format!("{v} > {rounding} * {s} || -{v} > {rounding} * {s}"),
+                Holds::Positive => format!("{v} > 0.0"),
+                Holds::NotNegative => format!("{v} >= 0.0"),
+            };
+            text += &format!("    if (!({holds})) {{\n        return {};\n    }}\n", i + 1);
+        }
+        text + "    return 0;\n}\n\n"
+    }
+
     fn find_sizes(&mut self, writer: &Writer) {
         let program = self.program;
         let linear = program.blocks.values().filter(|b| matches!(b, Block::Linear { .. })).map(Block::size);
@@ -413,7 +442,7 @@ impl<'a> Plan<'a> {
         let held = !self.program.held.is_empty();
         let conditions = &self.program.conditions;
         let drift = self.export.method.is_linearly_implicit();
-        let all: [(&str, bool); 35] = [
+        let all: [(&str, bool); 36] = [
             ("single", self.export.real == Real::Float),
             ("tables", !self.program.tables.is_empty()),
             ("conditions", !conditions.is_empty()),
@@ -440,6 +469,7 @@ impl<'a> Plan<'a> {
                 "domains_always",
                 self.program.domains.iter().any(|d| self.program.values.reads(d.argument) == Reads::PARAMETERS),
             ),
+            ("assumptions", !self.program.assumptions.is_empty()),
             ("outputs", !self.export.recorded.is_empty()),
             ("tangent", self.has_tangent()),
             ("derivatives", self.export.derivatives),

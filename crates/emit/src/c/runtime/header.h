@@ -116,7 +116,9 @@ PRIVATE_PARTS
 /* Everything as the model says, parameters at their defaults. */
 int MODEL_reset(MODEL *m);
 
-/* Sets a parameter. Before a start the start values follow it; during a run it is a jump at the present time. */
+/* Sets a parameter. Before a start the start values follow it; during a run it is a jump at the present time.
+ * MODEL_STRUCTURE says that the equations are others with this value: it is taken, but no run starts or goes on until other
+ * parameters fit it. */
 int MODEL_set_parameter(MODEL *m, int parameter, ha_wide value);
 
 /* Begins a run at a time with the start values of the model; outputs are then those at the start. They were found by the

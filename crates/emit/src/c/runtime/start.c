@@ -51,6 +51,12 @@ static int ha_parameters(ha_model *m)
 //else
     (void)i;
 //end
+//if assumptions
+    m->broken = ha_broken(m);
+    if (m->broken) {
+        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+    }
+//end
     return MODEL_OK;
 }
 
@@ -198,6 +204,11 @@ int MODEL_start(MODEL *m, ha_wide t)
     int status;
     m->failure.code = MODEL_OK;
     ha_restart(m);
+//if assumptions
+    if (m->broken) {
+        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+    }
+//end
     status = ha_start_values(m, t);
     return status == MODEL_OK ? MODEL_start_from(m, t, m->x) : status;
 }

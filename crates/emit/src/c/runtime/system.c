@@ -35,6 +35,11 @@ typedef int (*ha_code)(ha_model *m, ha_wide t, const double *x, double *out);
 static int ha_run(ha_model *m, ha_code code, ha_wide t, const double *x, double *out, int n)
 {
     int status;
+//if assumptions
+    if (m->broken) {
+        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+    }
+//end
 //if held
     ha_place(m, t);
 //end
@@ -502,6 +507,11 @@ ha_wide MODEL_next_jump(MODEL *m, ha_wide t)
 int MODEL_cross(MODEL *m, ha_wide t, const double *x)
 {
     int status = MODEL_OK;
+//if assumptions
+    if (m->broken) {
+        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+    }
+//end
     m->crossed = t;
     ha_copy(m->u_crossed, m->u, HA_NU);
 //if switches

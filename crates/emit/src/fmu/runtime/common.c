@@ -279,10 +279,15 @@ static int ha_set(ha_fmu *f, unsigned reference, double value)
         f->s.m.u[r - HA_FIRST_INPUT] = value;
     } else if (r >= HA_FIRST_PARAMETER && r < HA_FIRST_OUTPUT) {
         const int parameter = r - HA_FIRST_PARAMETER;
+        int status;
         if (ha_settable[parameter] < (before ? 1 : 2)) {
             return ha_refuse(f, before ? "this variable cannot be set" : "this parameter is fixed once the run has begun");
         }
-        if (MODEL_set_parameter(&f->s.m, parameter, value) != MODEL_OK) {
+        status = MODEL_set_parameter(&f->s.m, parameter, value);
+        if (status == MODEL_STRUCTURE) {
+            /* Other parameters may be set with it: the start or the next step says whether they all fit. */
+            f->s.m.failure.code = MODEL_OK;
+        } else if (status != MODEL_OK) {
             return ha_failed(f);
         }
     } else {

@@ -1,0 +1,288 @@
+//! What was decided by the values that parameters have, so that it can be checked when they change.
+//!
+//! Every answer of the pool that parameters' values made, be it that an expression is above zero or that it vanishes, is
+//! noted with the expression it was about. In the end the notes are brought down to what must hold of parameters alone.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use rustc_hash::FxHashMap;
+
+use super::exprs::Exprs;
+use super::fingerprint::mix;
+use super::node::{Expr, Node, Symbol};
+use super::properties::Signs;
+use super::rational::Rational;
+
+/// Something that must hold of parameters for what was derived from an expression.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Assumption {
+    /// An expression of parameters.
+    pub expr: Expr,
+    /// What holds of it.
+    pub holds: Holds,
+}
+
+/// What is assumed of a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Holds {
+    /// It vanishes.
+    Zero,
+    /// It does not vanish.
+    NotZero,
+    /// It is above zero.
+    Positive,
+    /// It is not below zero.
+    NotNegative,
+}
+
+/// What has been said of an expression: a set of the notes below.
+#[derive(Debug, Default)]
+pub(super) struct Notes(AtomicU8);
+
+impl Clone for Notes {
+    fn clone(&self) -> Notes {
+        Notes(AtomicU8::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+impl Notes {
+    pub const NOT_ZERO: u8 = 1;
+    pub const POSITIVE: u8 = 2;
+    pub const NOT_NEGATIVE: u8 = 4;
+    /// It vanishes at the given parameters, and not in general.
+    pub const ZERO: u8 = 8;
+    /// It counts as nonzero without a proof: it is watched while the program runs.
+    pub const WATCHED: u8 = 16;
+
+    pub fn add(&self, note: u8) {
+        if !self.has(note) {
+            self.0.fetch_or(note, Ordering::Relaxed);
+        }
+    }
+
+    pub fn has(&self, note: u8) -> bool {
+        self.0.load(Ordering::Relaxed) & note != 0
+    }
+
+    /// The signs that were read out of what is known.
+    fn claims(&self) -> impl Iterator<Item = Signs> + '_ {
+        let all =
+            [(Self::NOT_ZERO, Signs::NOT_ZERO), (Self::POSITIVE, Signs::PLUS), (Self::NOT_NEGATIVE, Signs::NOT_MINUS)];
+        all.into_iter().filter(|(note, _)| self.has(*note)).map(|(_, signs)| signs)
+    }
+}
+
+/// Parameters of an expression up to which the weakest signs that it needs are searched for; above, all keep theirs.
+const SEARCHED: usize = 6;
+
+/// Divisors with more parts are left to the watch of the run.
+const LONGEST_DIVISOR: u32 = 100;
+
+/// The signs that parameters need to have.
+type Needed = BTreeMap<Symbol, Signs>;
+
+impl Exprs {
+    /// Notes that an expression was taken as zero since it is so at the given parameters.
+    pub fn note_zero(&self, e: Expr) {
+        if !self.is_constant(e) {
+            self.entry(e).notes.add(Notes::ZERO);
+        }
+    }
+
+    /// All that has been decided in this pool by the values of parameters that may change, as assumptions on these
+    /// parameters alone: signs first, in the order of the parameters, then what vanishes, then what was divided by. What an expression of other
+    /// symbols was decided for is asked at an arbitrary point of them.
+    pub fn assumptions(&mut self, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Assumption> {
+        let zeros = self.zeros(may_change);
+        let divisors = self.watched_divisors(may_change);
+        let needed = self.needed_signs(may_change);
+        let mut all = Vec::with_capacity(needed.len() + zeros.len());
+        for (symbol, signs) in needed {
+            let holds = match signs {
+                Signs::PLUS => Holds::Positive,
+                Signs::NOT_MINUS => Holds::NotNegative,
+                Signs::NOT_ZERO => Holds::NotZero,
+                _ => continue,
+            };
+            all.push(Assumption { expr: self.sym(symbol), holds });
+        }
+        all.extend(zeros.into_iter().map(|expr| Assumption { expr, holds: Holds::Zero }));
+        all.extend(divisors.into_iter().map(|expr| Assumption { expr, holds: Holds::NotZero }));
+        all
+    }
+
+    fn changing(&self, e: Expr, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Symbol> {
+        self.symbols_of(e).into_iter().filter(|&s| self.facts(s).given.is_some() && may_change(s)).collect()
+    }
+
+    /// What vanishes by the values of parameters, without numbers before it, each once.
+    fn zeros(&mut self, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
+        let noted: Vec<Expr> =
+            (0..self.len() as u32).map(Expr).filter(|&e| self.entry(e).notes.has(Notes::ZERO)).collect();
+        let mut zeros = Vec::new();
+        for e in noted {
+            for e in self.vanishing_factor(e, may_change) {
+                let (_, primitive) = self.primitive(e);
+                if !zeros.contains(&primitive) && !self.is_constant(primitive) {
+                    zeros.push(primitive);
+                }
+            }
+        }
+        zeros
+    }
+
+    /// What was divided by without a proof that it does not vanish, of parameters alone: what reads states is watched while
+    /// the program runs.
+    fn watched_divisors(&mut self, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
+        let of_parameters = |x: &Exprs, e: Expr| x.symbols_of(e).into_iter().all(|s| x.facts(s).given.is_some());
+        let part = |x: &Exprs, e: Expr| {
+            x.entry(e).notes.has(Notes::WATCHED)
+                && x.entry(e).size <= LONGEST_DIVISOR
+                && !matches!(x.node(e), Node::Mul(_) | Node::Pow(..))
+                && of_parameters(x, e)
+                && !x.changing(e, may_change).is_empty()
+        };
+        let noted: Vec<Expr> = (0..self.len() as u32).map(Expr).filter(|&e| part(self, e)).collect();
+        let mut divisors = Vec::new();
+        for e in noted {
+            let (_, primitive) = self.primitive(e);
+            let sound = self.given_value(primitive).is_some_and(|v| v.is_finite() && v != 0.0);
+            if sound && !divisors.contains(&primitive) {
+                divisors.push(primitive);
+            }
+        }
+        divisors
+    }
+
+    /// The expression in parameters alone, the other symbols at an arbitrary point.
+    fn at_arbitrary_point(&mut self, e: Expr) -> Expr {
+        let others = self.symbols_of(e).into_iter().filter(|&s| self.facts(s).given.is_none());
+        let point: Vec<(Symbol, Rational)> = others.map(|s| (s, arbitrary(self.name(s)))).collect();
+        let point = point.into_iter().map(|(s, value)| (s, self.number(value))).collect();
+        self.substitute(e, &point)
+    }
+
+    /// The factor for which an expression vanishes, in parameters alone; nothing if none of these may change. Where it
+    /// cannot be told, each parameter is to keep its value.
+    fn vanishing_factor(&mut self, e: Expr, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
+        let factor = match self.node(e) {
+            Node::Mul(factors) => factors.iter().copied().find(|&f| self.is_zero_given(f)).unwrap_or(e),
+            _ => e,
+        };
+        let factor = match *self.node(factor) {
+            Node::Pow(base, _) if self.is_zero_given(base) => base,
+            _ => factor,
+        };
+        let parameters = self.changing(factor, may_change);
+        if parameters.is_empty() {
+            return Vec::new();
+        }
+        let at_point = self.at_arbitrary_point(factor);
+        if self.given_value(at_point).is_some_and(f64::is_finite) {
+            return vec![at_point];
+        }
+        parameters.into_iter().filter_map(|s| self.kept(s)).collect()
+    }
+
+    /// What vanishes as long as a parameter keeps its value.
+    fn kept(&mut self, parameter: Symbol) -> Option<Expr> {
+        let symbol = self.sym(parameter);
+        let value = self.given_value(symbol).filter(|v| v.is_finite())?;
+        let value = self.float(value);
+        Some(self.sub(symbol, value))
+    }
+
+    /// The signs of parameters that all claims rest on, as weak as they may be.
+    fn needed_signs(&self, may_change: &dyn Fn(Symbol) -> bool) -> Needed {
+        let mut needed = Needed::new();
+        let mut compound = Vec::new();
+        for e in (0..self.len() as u32).map(Expr) {
+            let notes = &self.entry(e).notes;
+            match self.node(e) {
+                _ if notes.claims().next().is_none() => {}
+                Node::Symbol(s) if may_change(*s) && self.facts(*s).given.is_some() => {
+                    notes.claims().for_each(|claim| need(&mut needed, *s, claim));
+                }
+                Node::Symbol(_) => {}
+                _ => compound.push(e),
+            }
+        }
+        // With what single parameters need most claims hold: these are told in one go.
+        let mut signs = self.signs_by(&(0..self.len() as u32).map(Expr).collect::<Vec<_>>(), &needed, may_change);
+        for e in compound {
+            for claim in self.entry(e).notes.claims() {
+                if signs[&e].within(claim) {
+                    continue;
+                }
+                let below = self.below(&[e], &|_| true);
+                signs.extend(self.signs_by(&below, &needed, may_change));
+                if !signs[&e].within(claim) {
+                    self.raise(e, &below, claim, &mut needed, may_change);
+                    signs.extend(self.signs_by(&below, &needed, may_change));
+                }
+            }
+        }
+        needed
+    }
+
+    /// Asks as little as possible more of the parameters of an expression, so that a claim on its sign holds.
+    fn raise(&self, e: Expr, below: &[Expr], claim: Signs, needed: &mut Needed, may_change: &dyn Fn(Symbol) -> bool) {
+        let parameters = self.changing(e, may_change);
+        let mut tried = needed.clone();
+        parameters.iter().for_each(|&s| need(&mut tried, s, self.facts_of(s)));
+        if !self.signs_by(below, &tried, may_change)[&e].within(claim) {
+            return; // what is watched makes it true, or what is known of other symbols
+        }
+        for &s in parameters.iter().filter(|_| parameters.len() <= SEARCHED) {
+            let full = tried[&s];
+            for weaker in [Signs::ANY, Signs::NOT_MINUS, Signs::NOT_ZERO] {
+                let least = needed.get(&s).copied().unwrap_or(Signs::ANY);
+                tried.insert(s, least.and(weaker));
+                if self.signs_by(below, &tried, may_change)[&e].within(claim) {
+                    break;
+                }
+                tried.insert(s, full);
+            }
+        }
+        *needed = tried;
+    }
+
+    fn facts_of(&self, s: Symbol) -> Signs {
+        match self.facts(s) {
+            f if f.positive => Signs::PLUS,
+            f if f.nonzero => Signs::NOT_ZERO,
+            _ => Signs::ANY,
+        }
+    }
+
+    /// The signs of expressions in the order of their ids, if of parameters that may change no more is known than this.
+    fn signs_by(&self, order: &[Expr], needed: &Needed, may_change: &dyn Fn(Symbol) -> bool) -> FxHashMap<Expr, Signs> {
+        let mut known: FxHashMap<Expr, Signs> = FxHashMap::default();
+        for &e in order {
+            let entry = self.entry(e);
+            let mut signs = match &entry.node {
+                Node::Symbol(s) if self.facts(*s).given.is_some() && may_change(*s) => {
+                    needed.get(s).copied().unwrap_or(Signs::ANY)
+                }
+                node => self.signs_of(node, &|c| known[&c]),
+            };
+            if entry.notes.has(Notes::WATCHED) {
+                signs = signs.and(Signs::NOT_ZERO);
+            }
+            known.insert(e, signs);
+        }
+        known
+    }
+}
+
+fn need(needed: &mut Needed, s: Symbol, signs: Signs) {
+    let known = needed.entry(s).or_insert(Signs::ANY);
+    *known = known.and(signs);
+}
+
+/// A number between 0.3 and 1.7, the same for the same name.
+fn arbitrary(name: &str) -> Rational {
+    let seed = name.bytes().fold(0x9a7, |h, b| mix(h, u64::from(b)));
+    Rational::new(300_000 + ((seed >> 20) % 1_400_000) as i64, 1_000_003)
+}
