@@ -151,7 +151,7 @@ impl Ports {
             let open = |s: &Symbol| self.definitions.contains_key(s) && !known.contains_key(s);
             stack.extend(definition.0.iter().map(|t| t.0).filter(open));
             if stack.len() == before {
-                let flat = definition.substitute(x, known);
+                let flat = definition.substitute(x, known, &self.undetermined);
                 known.insert(top, flat);
                 stack.pop();
             }
@@ -179,7 +179,7 @@ impl Combination {
     }
 
     /// The combination with known ones put in for their symbols.
-    fn substitute(&self, x: &mut Exprs, known: &Map<Symbol, Combination>) -> Combination {
+    fn substitute(&self, x: &mut Exprs, known: &Map<Symbol, Combination>, undetermined: &[Symbol]) -> Combination {
         if self.0.iter().all(|t| !known.contains_key(&t.0)) {
             return self.clone();
         }
@@ -203,7 +203,8 @@ impl Combination {
                 *e = x.simplify(*e);
             }
         }
-        sum.retain(|_, e| !x.is_zero(*e));
+        // What vanishes at the given parameters alone stays in, but for the share of what nothing determines.
+        sum.retain(|s, e| if undetermined.contains(s) { !x.is_zero_given(*e) } else { !x.is_zero(*e) });
         Combination(sum.into_iter().collect())
     }
 }
