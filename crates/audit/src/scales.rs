@@ -261,6 +261,9 @@ impl Scales {
     /// would be there if the storage held the energy of the greatest: it may have been wrong about a magnitude. Storages
     /// that depend on others go with them: what holds less energy than was neglected of any state is neglected.
     fn least_stored(&self, graph: &BondGraph) -> Vec<(Quantity, f64)> {
+        if self.neglected.is_empty() {
+            return Vec::new();
+        }
         let energy = |port: PortRef, stored: Symbol| {
             let acts = graph.storage_symbols(port).map_or(0.0, |(z, _)| self.seen(self.of(graph, z)));
             acts * self.seen(Quantity::Of(stored))
@@ -268,8 +271,9 @@ impl Scales {
         let held: Vec<(Quantity, f64)> =
             storages(graph).map(|(port, stored)| (Quantity::Of(stored), energy(port, stored))).collect();
         let most = held.iter().fold(0.0, |most: f64, (_, energy)| most.max(*energy));
+        let told = self.neglected_through_laws();
         let neglected = |(quantity, held): &(Quantity, f64)| {
-            let share = self.neglected_of(*quantity)? / self.seen(*quantity);
+            let share = told.get(quantity)? / self.seen(*quantity);
             (*held > 0.0).then(|| (held * share * share).min(most))
         };
         let shared = held.iter().filter_map(neglected).fold(0.0, f64::max);
@@ -280,11 +284,16 @@ impl Scales {
         held.iter().map(least).collect()
     }
 
-    /// The magnitude below which the method neglected a quantity, told of itself or of what a law joins it with.
-    fn neglected_of(&self, quantity: Quantity) -> Option<f64> {
-        let through = self.links.iter().filter(|((of, _), _)| *of == quantity);
-        let through = through.filter_map(|((_, from), weight)| Some(weight * self.neglected.get(from)?));
-        self.neglected.get(&quantity).copied().into_iter().chain(through).reduce(f64::max)
+    /// The magnitudes below which the method neglected quantities, told of themselves or of what a law joins them with.
+    fn neglected_through_laws(&self) -> BTreeMap<Quantity, f64> {
+        let mut all = self.neglected.clone();
+        for ((of, from), weight) in &self.links {
+            if let Some(magnitude) = self.neglected.get(from) {
+                let least = all.entry(*of).or_default();
+                *least = least.max(weight * magnitude);
+            }
+        }
+        all
     }
 
     /// The greatest quantity of each sort.

@@ -314,7 +314,8 @@ impl Sink for Told<'_> {
         self.sink.progress(t)
     }
     fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
-        self.neglected = absolute.iter().map(|error| error / self.rtol).collect();
+        self.neglected.clear();
+        self.neglected.extend(absolute.iter().map(|error| error / self.rtol));
         self.sink.tolerances(magnitudes, absolute);
     }
     fn crawls(&mut self, crawl: &Crawl) {

@@ -628,7 +628,10 @@ impl Sink for Recorder<'_> {
         if go_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
     fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
-        self.kept = (magnitudes.to_vec(), absolute.to_vec());
+        for (kept, values) in [(&mut self.kept.0, magnitudes), (&mut self.kept.1, absolute)] {
+            kept.clear();
+            kept.extend_from_slice(values);
+        }
     }
     fn crawls(&mut self, crawl: &Crawl) {
         let Crawl { time, steps, step, state } = crawl;

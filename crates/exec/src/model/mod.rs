@@ -328,6 +328,7 @@ impl Model {
     pub fn restart(&mut self) {
         self.begun = false;
         self.crossed = f64::NEG_INFINITY;
+        self.sides_taken = None;
         self.follow();
         self.inputs.iter_mut().for_each(Signal::release);
         self.place_constant_inputs();

@@ -85,8 +85,9 @@ impl Drive<'_, '_, '_, '_> {
             } else {
                 self.run.settle(point)?;
             }
-            self.tolerances.watch(self.radau.state());
-            self.take_tolerances();
+            if self.tolerances.watch(self.radau.state()) {
+                self.take_tolerances();
+            }
         }
         Ok(())
     }

@@ -64,16 +64,19 @@ impl Tolerances {
         &self.magnitudes
     }
 
-    /// Takes notice of values reached.
-    pub(super) fn watch(&mut self, y: &[f64]) {
+    /// Takes notice of values reached. `true` if a tolerance is another one now.
+    pub(super) fn watch(&mut self, y: &[f64]) -> bool {
         if self.given.is_some() {
-            return;
+            return false;
         }
+        let mut changed = false;
         let share = (SHARE * self.relative).max(ROUNDING).min(self.relative);
         for ((magnitude, absolute), y) in self.magnitudes.iter_mut().zip(&mut self.absolute).zip(y) {
             *magnitude = magnitude.max(y.abs());
-            *absolute = (share * *magnitude).max(f64::MIN_POSITIVE);
+            let before = std::mem::replace(absolute, (share * *magnitude).max(f64::MIN_POSITIVE));
+            changed |= before != *absolute;
         }
+        changed
     }
 
     /// Root of the mean square of `v`, each component relative to what is allowed at `y`.
