@@ -26,6 +26,8 @@ pub struct Pivot {
     pub row: SparseRow,
     /// What it was divided by.
     pub divisor: Expr,
+    /// Which of the rows it was, before other pivots were taken off it.
+    pub source: usize,
 }
 
 /// What elimination leaves.
@@ -293,7 +295,7 @@ impl Eliminator {
                 self.subtract(x, other as usize, &pivot, column);
             }
         }
-        self.done.pivots.push(Pivot { column, row: SparseRow(pivot), divisor });
+        self.done.pivots.push(Pivot { column, row: SparseRow(pivot), divisor, source: row });
         touched
     }
 

@@ -673,6 +673,7 @@ fn erase(graph: &BondGraph, strokes: &mut Table<BondId, Stroke>, undetermined: &
 fn merge(ports: &mut Ports, solved: Solved) {
     ports.ports.extend(solved.ports);
     ports.definitions.extend(solved.definitions);
+    ports.definitions.extend(solved.short.into_iter().flatten());
     ports.watched.extend(solved.watched);
     ports.degenerate.extend(solved.degenerate);
     ports.undetermined.extend(solved.undetermined);

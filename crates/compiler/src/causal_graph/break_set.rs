@@ -48,6 +48,40 @@ pub fn break_set(successors: &[Vec<u32>], rank: &[u8]) -> BreakSet {
     whole
 }
 
+/// Edges through a vertex that are drawn from end to end, at most: a vertex with more of them stays.
+const DRAWN_THROUGH: usize = 64;
+
+/// The graph with vertices for which `passed` holds passed over: what leads to one leads to what follows it. Cycles stay
+/// cycles. Vertices that are cycles by themselves then, and those with very many neighbours, stay as they are.
+pub fn passed_over(successors: &[Vec<u32>], passed: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
+    let n = successors.len();
+    let mut next: Vec<BTreeSet<usize>> = successors.iter().map(|s| s.iter().map(|&w| w as usize).collect()).collect();
+    let mut before: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); n];
+    next.iter().enumerate().for_each(|(v, s)| s.iter().for_each(|&w| _ = before[w].insert(v)));
+    let edges = |next: &[BTreeSet<usize>], before: &[BTreeSet<usize>], v: usize| next[v].len() * before[v].len();
+    let mut queue: BTreeSet<(usize, usize)> =
+        (0..n).filter(|&v| passed(v)).map(|v| (edges(&next, &before, v), v)).collect();
+    while let Some((_, v)) = queue.pop_first() {
+        if next[v].contains(&v) || edges(&next, &before, v) > DRAWN_THROUGH {
+            continue;
+        }
+        let (to, from) = (std::mem::take(&mut next[v]), std::mem::take(&mut before[v]));
+        let around: BTreeSet<usize> = to.union(&from).copied().collect();
+        around.iter().for_each(|&w| _ = queue.remove(&(edges(&next, &before, w), w)));
+        to.iter().for_each(|&w| _ = before[w].remove(&v));
+        for &u in &from {
+            next[u].remove(&v);
+            for &w in &to {
+                next[u].insert(w);
+                before[w].insert(u);
+            }
+        }
+        let open = around.into_iter().filter(|&w| passed(w) && !(next[w].is_empty() && before[w].is_empty()));
+        queue.extend(open.map(|w| (edges(&next, &before, w), w)));
+    }
+    next.into_iter().map(|s| s.into_iter().map(|w| w as u32).collect()).collect()
+}
+
 /// The size of a smallest set of vertices that meets every cycle (of a good one, for kernels above [`EXACT_KERNEL`]).
 pub fn count(successors: &[Vec<u32>]) -> usize {
     let components = cyclic_components(successors);

@@ -10,6 +10,7 @@ mod contradiction;
 mod digits;
 mod drawn;
 mod local;
+mod matched;
 mod ports;
 mod rank;
 mod rules;
@@ -176,6 +177,17 @@ impl Combination {
     /// The coefficient of a symbol, if it occurs.
     pub fn coefficient(&self, symbol: Symbol) -> Option<Expr> {
         self.0.binary_search_by_key(&symbol, |t| t.0).ok().map(|i| self.0[i].1)
+    }
+
+    /// The combination with symbols that are others' names replaced; what then stands twice is added up.
+    pub(crate) fn renamed(&self, x: &mut Exprs, other: &impl Fn(Symbol) -> Symbol) -> Combination {
+        let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
+        for &(s, c) in &self.0 {
+            let s = other(s);
+            let value = sum.get(&s).map_or(c, |&old| x.add(&[old, c]));
+            sum.insert(s, value);
+        }
+        Combination(sum.into_iter().collect())
     }
 
     /// The combination with known ones put in for their symbols.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::matched::matched_rows;
 use super::{Combination, PortState, Role};
 use crate::algebra::{Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
@@ -45,6 +46,8 @@ pub struct Solved {
     pub virtual_speeds: Vec<Virtual>,
     /// Triangular definitions.
     pub definitions: Vec<(Symbol, Combination)>,
+    /// The same as short as the elements write them, where that can be.
+    pub short: Option<Vec<(Symbol, Combination)>>,
     /// Relations among source variables alone that the structure demands: each `Σ = 0`, its support minimal.
     pub demands: Vec<Combination>,
     /// Divisors to be watched.
@@ -358,16 +361,14 @@ impl Net {
             }
         }
         let mut defined = vec![false; self.symbols.len()];
+        done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
+        let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
         let regular = regular_rows(x, &done);
-        for (i, pivot) in done.pivots.iter().enumerate() {
-            defined[pivot.column] = true;
-            let others = pivot.row.0.iter().filter(|e| e.0 != pivot.column);
-            let row = match &regular {
-                Some(regular) => regular.rows[i].0.clone(),
-                None => others.map(|&(c, e)| (c, settled(x, e))).collect(),
-            };
-            solved.definitions.push((self.symbols[pivot.column], self.combination(&row)));
+        let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
+        if all && regular.is_none() {
+            solved.short = matched_rows(x, &self.rows, &done).map(|rows| rows.into_iter().map(named).collect());
         }
+        solved.definitions.extend(reduced_rows(x, &done, regular.as_ref()).into_iter().map(named));
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
         for (&p, &role) in outputs {
@@ -411,6 +412,20 @@ fn law_causality(x: &Exprs, work: &mut Eliminator, port: &NetPort, wishes: &Wish
         },
         (None, None) => wish,
     }
+}
+
+/// Pivot columns by what their rows hold.
+fn reduced_rows(x: &mut Exprs, done: &Elimination, regular: Option<&RegularRows>) -> Vec<(usize, Vec<(usize, Expr)>)> {
+    let mut rows = Vec::with_capacity(done.pivots.len());
+    for (i, pivot) in done.pivots.iter().enumerate() {
+        let others = pivot.row.0.iter().filter(|e| e.0 != pivot.column);
+        let row = match regular {
+            Some(regular) => regular.rows[i].0.clone(),
+            None => others.map(|&(c, e)| (c, settled(x, e))).collect(),
+        };
+        rows.push((pivot.column, row));
+    }
+    rows
 }
 
 /// Pivot columns by the columns that are none.
@@ -459,7 +474,7 @@ fn continuous(x: &mut Exprs, e: Expr) -> Option<Expr> {
 }
 
 /// An entry with its sign turned, in its simple form.
-fn settled(x: &mut Exprs, e: Expr) -> Expr {
+pub(super) fn settled(x: &mut Exprs, e: Expr) -> Expr {
     let minus = x.neg(e);
     if x.is_number(minus).is_some() { minus } else { x.simplify(minus) }
 }

@@ -2,7 +2,7 @@
 //! which unknowns are left. Source: `method.md`, sections 3 and 4.
 
 use super::definitions::{Definition, Definitions};
-use super::minimal::{Assembled, Cell, Chosen, Later};
+use super::minimal::{Assembled, Cell, Chosen, Later, variables_of_laws};
 use super::{Cause, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{Kind, PortRef};
@@ -40,6 +40,7 @@ pub fn assemble_all<'a>(
     for &symbol in &causal.ports.undetermined {
         d.missing.insert(symbol, Unavailable::Undetermined);
     }
+    d.of_laws = variables_of_laws(causal);
     for (&symbol, row) in &causal.ports.definitions {
         let value = row.expr(&mut d.x);
         d.set(symbol, value);

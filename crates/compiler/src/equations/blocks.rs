@@ -8,12 +8,18 @@ use rustc_hash::FxHashMap;
 
 use super::Step;
 use super::definitions::{Definition, Definitions};
-use crate::algebra::{Expr, Exprs, SparseRow, Symbol};
+use super::forms::LinearForms;
+use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
-use crate::causal_graph::{break_set::break_set, rank_given};
+use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
 
 /// Terms that may be formed in the search for short forms of the entries of a matrix.
 const WORK: u64 = 1_000_000;
+/// Entries that are written longer than this stay products of sums, as they come about.
+const LONGEST: u64 = 600;
+
+/// Loops with more variables than this are not written out to see whether terms that are no linear forms cancel.
+const WRITTEN_OUT: usize = 64;
 
 /// A loop that has no unique solution, whatever the values are.
 #[derive(Debug, Clone)]
@@ -33,6 +39,8 @@ pub struct Ordered {
     pub steps: Vec<Step>,
     /// The rows of all linear blocks.
     pub rows: Vec<LinearRow>,
+    /// Names for parts of these rows, with their values; steps define them.
+    pub named: Vec<(Symbol, Expr)>,
 }
 
 /// One linear equation.
@@ -112,14 +120,14 @@ fn block(
             Definition::Implicit(e) => e,
         });
     }
-    let flat = substituted(&mut d.x, &body, &residuals);
-    let linear: Option<Vec<(Vec<Expr>, Expr)>> = flat.iter().map(|&r| d.x.linear_in(r, &torn)).collect();
-    let Some(rows) = linear else {
+    let Some((named, rows)) = linear(&mut d.x, &torn, &body, &residuals) else {
         let inner = body.clone();
         ordered.steps.push(Step::Newton { unknowns: torn, body: inner, residuals, elements });
         ordered.assign(body);
         return Ok(());
     };
+    ordered.named.extend(&named);
+    ordered.assign(named);
     let x = &mut d.x;
     let matrix = shortened(x, rows.iter().map(|r| &r.0[..]));
     let right: Vec<Expr> = rows.iter().map(|r| x.neg(r.1)).collect();
@@ -146,12 +154,44 @@ fn block(
     Ok(())
 }
 
+/// The residuals of a loop as linear forms in its unknowns, coefficients and rest, with names for parts of them; `None` if
+/// they are none, be it that terms which are no linear forms cancel.
+fn linear(
+    x: &mut Exprs,
+    torn: &[Symbol],
+    body: &[(Symbol, Expr)],
+    residuals: &[Expr],
+) -> Option<(Vec<(Symbol, Expr)>, Vec<(Vec<Expr>, Expr)>)> {
+    let Some(forms) = LinearForms::new(x, torn, body) else {
+        if body.len() > WRITTEN_OUT {
+            return None;
+        }
+        let flat = substituted(x, body, residuals);
+        let rows: Option<Vec<_>> = flat.iter().map(|&r| x.linear_in(r, torn)).collect();
+        return Some((Vec::new(), rows?));
+    };
+    let mut rows = Vec::with_capacity(residuals.len());
+    for &residual in residuals {
+        let form = forms.of_expr(x, residual)?;
+        let coefficients = (0..torn.len()).map(|k| form.coefficients.get(&k).copied().unwrap_or(ZERO)).collect();
+        rows.push((coefficients, form.rest));
+    }
+    Some((forms.named, rows))
+}
+
 /// A matrix with its entries in their short forms, as far as the work for each entry goes.
 fn shortened<'a>(x: &mut Exprs, rows: impl ExactSizeIterator<Item = &'a [Expr]>) -> Vec<Vec<Expr>> {
     let size = rows.len() as u64;
     let short = |x: &mut Exprs, e: Expr| {
         x.bound_search(WORK / (size * size));
-        x.simplify(e)
+        let own = x.simplify(e);
+        if x.written_length(own) > LONGEST {
+            return own;
+        }
+        let flat = x.expand(e);
+        let flat = x.simplify(flat);
+        let cost = |e| (!x.nonzero(e), x.written_length(e));
+        if cost(flat) < cost(own) { flat } else { own }
     };
     let matrix = rows.map(|row| row.iter().map(|&e| short(x, e)).collect()).collect();
     x.bound_search(u64::MAX);
@@ -185,13 +225,15 @@ fn tear(d: &Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Vec<Sy
     torn.into_iter().collect()
 }
 
-/// A minimum set of variables that meets every loop of a component.
+/// A minimum set of variables that meets every loop of a component: of those of laws, as far as the variables of junctions
+/// between them are few.
 fn break_variables(d: &Definitions, component: &[Symbol]) -> Vec<Symbol> {
     let index: BTreeMap<Symbol, usize> = component.iter().enumerate().map(|(i, &s)| (s, i)).collect();
     let successors: Vec<Vec<u32>> = component
         .iter()
         .map(|s| d.x.symbols_of(d.of[s].expr()).iter().filter_map(|r| index.get(r).map(|&i| i as u32)).collect())
         .collect();
+    let successors = passed_over(&successors, |i| !d.of_laws.contains(&component[i]));
     let rank = vec![0; component.len()];
     break_set(&successors, &rank).vertices.into_iter().map(|i| component[i]).collect()
 }

@@ -43,6 +43,8 @@ pub struct Definitions<'a> {
     pub constants: BTreeSet<Symbol>,
     /// Unknowns that nothing defines: algebraic ones and free rates of states.
     pub free: BTreeSet<Symbol>,
+    /// What algebraic laws give and take: loops are torn there rather than at variables of junctions.
+    pub of_laws: BTreeSet<Symbol>,
     /// Symbols that have no value, with the reason.
     pub missing: BTreeMap<Symbol, Unavailable>,
     rates: Map<Symbol, Symbol>,
@@ -60,6 +62,7 @@ impl<'a> Definitions<'a> {
             stored: Map::new(),
             constants: BTreeSet::new(),
             free: BTreeSet::new(),
+            of_laws: BTreeSet::new(),
             missing: BTreeMap::new(),
             rates: Map::new(),
         }

@@ -166,6 +166,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     }
     let given: BTreeSet<Symbol> = causal.ports.ports.iter().filter(|p| is_law(p.role)).map(|p| p.input).collect();
     let mut ordered = sort(&mut d, &roots, &rates, &given).map_err(|insoluble| no_solution(&d, &insoluble))?;
+    ordered.named.iter().for_each(|&(symbol, value)| d.set(symbol, value));
     if let Some(lost) = lost_in_itself(&d) {
         return Err(through_itself(graph, &d.x, lost));
     }
@@ -342,6 +343,7 @@ fn sort(
         match order(d, &rest, rates) {
             Ok(more) => {
                 ordered.steps.extend(more.steps);
+                ordered.named.extend(more.named);
                 return Ok(ordered);
             }
             Err(insoluble) if insoluble.members.iter().any(|s| given.contains(s)) => return Err(insoluble),

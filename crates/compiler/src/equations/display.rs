@@ -76,12 +76,16 @@ pub fn show(mut equations: Equations) -> Shown {
     let mut d = Definitions::new(std::mem::take(&mut equations.graph.exprs), &equations.graph);
     d.of = std::mem::take(&mut equations.definitions);
     d.free.extend(equations.free_rates.iter().chain(equations.algebraic.iter().map(|a| &a.symbol)));
-    let ordered = Ordered { steps: std::mem::take(&mut equations.steps), rows: std::mem::take(&mut equations.rows) };
+    let ordered = Ordered {
+        steps: std::mem::take(&mut equations.steps),
+        rows: std::mem::take(&mut equations.rows),
+        named: Vec::new(),
+    };
     let Page { display, dependent, sources, aliases, definitions } = page(&mut d, &equations, &ordered);
     let Definitions { x, of, .. } = d;
     equations.graph.exprs = x;
     equations.definitions = of;
-    Ordered { steps: equations.steps, rows: equations.rows } = ordered;
+    Ordered { steps: equations.steps, rows: equations.rows, .. } = ordered;
     Shown { equations, display, dependent, sources, aliases, definitions }
 }
 

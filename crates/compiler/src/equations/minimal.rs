@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use petgraph::unionfind::UnionFind;
 
 use super::definitions::{Definition, Definitions};
+use super::rows::Rows;
 use super::{StateKind, Unavailable};
-use crate::algebra::{Expr, Exprs, Node, ONE, Symbol};
+use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
-use crate::ids::Map;
 
 /// A state of the minimal form before it is ordered.
 #[derive(Debug, Clone)]
@@ -30,8 +30,8 @@ pub struct Assembled<'a> {
     pub d: Definitions<'a>,
     /// The states, storages in the order of the model, then signals.
     pub states: Vec<Chosen>,
-    /// Rows of the junction structure, by variable, over inputs of the structure.
-    pub rows: Map<Symbol, Combination>,
+    /// Rows of the junction structure.
+    pub rows: Rows<'a>,
     /// What changes the stored quantities behind the states.
     pub balances: Vec<Balance>,
     pub(super) later: Vec<Later>,
@@ -85,18 +85,12 @@ pub(super) struct Cell<'a> {
 pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<'a>, (Symbol, Unavailable)> {
     let graph = &causal.graph;
     let mut d = Definitions::new(graph.exprs.clone(), graph);
-    let mut rows = structure(&mut d.x, causal);
-    for v in &causal.ports.virtual_speeds {
-        causal.ports.resolve_into(&mut d.x, v.reaction, &mut rows);
-    }
-    for &symbol in causal.ports.definitions.keys() {
-        causal.ports.resolve_into(&mut d.x, symbol, &mut rows);
-    }
     for &symbol in &causal.ports.undetermined {
         d.missing.insert(symbol, Unavailable::Undetermined);
     }
-    drop_vanishing_sources(&mut d, causal, &mut rows);
-    for (&symbol, row) in rows.iter().filter(|(s, row)| row.coefficient(**s).is_none()) {
+    d.of_laws = variables_of_laws(causal);
+    let mut rows = rows_of(&mut d, causal);
+    for (symbol, row) in rows.definitions(&mut d.x) {
         let value = row.expr(&mut d.x);
         d.set(symbol, value);
     }
@@ -109,21 +103,8 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
     Ok(assembled)
 }
 
-/// What the junction structure makes of its inputs, by output.
-pub(super) fn structure(x: &mut Exprs, causal: &CausalGraph) -> Map<Symbol, Combination> {
-    let mut rows = Map::new();
-    for state in &causal.ports.ports {
-        causal.ports.resolve_into(x, state.output, &mut rows);
-        if !rows.contains_key(&state.output) {
-            // Where two elements share a bond, what one gives is what the other takes.
-            rows.insert(state.output, Combination(vec![(state.output, ONE)]));
-        }
-    }
-    rows
-}
-
-/// Sources whose value is zero leave the rows: a constraint at rest imposes nothing on a dependent storage.
-pub(super) fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, rows: &mut Map<Symbol, Combination>) {
+/// The rows of a graph, without sources whose value is zero.
+pub(super) fn rows_of<'a>(d: &mut Definitions, causal: &'a CausalGraph) -> Rows<'a> {
     let mut zero = BTreeSet::new();
     for state in causal.ports.ports.iter().filter(|p| matches!(p.role, Role::Source | Role::Redundant)) {
         let value = imposed(&mut d.x, causal, state);
@@ -131,9 +112,13 @@ pub(super) fn drop_vanishing_sources(d: &mut Definitions, causal: &CausalGraph, 
             zero.insert(state.input);
         }
     }
-    for row in rows.values_mut() {
-        row.0.retain(|t| !zero.contains(&t.0));
-    }
+    Rows::new(causal, zero)
+}
+
+/// What algebraic laws give and take.
+pub(super) fn variables_of_laws(causal: &CausalGraph) -> BTreeSet<Symbol> {
+    let laws = causal.ports.ports.iter().filter(|p| matches!(p.role, Role::Algebraic(_)));
+    laws.flat_map(|p| [p.input, p.output]).collect()
 }
 
 /// The value that a port imposes.
@@ -155,7 +140,7 @@ pub(super) fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) ->
 impl<'a> Assembled<'a> {
     /// Definitions without states yet.
     pub(super) fn empty(d: Definitions<'a>) -> Self {
-        Assembled { d, states: Vec::new(), rows: Map::new(), balances: Vec::new(), later: Vec::new() }
+        Assembled { d, states: Vec::new(), rows: Rows::none(), balances: Vec::new(), later: Vec::new() }
     }
 
     /// Sources, constraints and algebraic laws give their variable.
@@ -252,11 +237,11 @@ impl<'a> Assembled<'a> {
             self.d.stored.insert(cell.stored, cell.rate);
         }
         let speeds = &causal.ports.virtual_speeds;
-        for (members, group_speeds) in groups(&cells, speeds, &self.rows) {
+        for (members, group_speeds) in groups(&mut self.d.x, &cells, speeds, &mut self.rows) {
             let group: Vec<&Cell> = members.iter().map(|&m| &cells[m]).collect();
             if group.iter().all(|c| c.state.role == Role::Independent) && group_speeds.is_empty() {
                 group.iter().for_each(|cell| self.independent(cell));
-            } else if !momenta || self.in_velocity_form(causal, &group) {
+            } else if !momenta || self.in_velocity_form(&group) {
                 self.velocity_form(&group, &group_speeds);
             } else {
                 self.momentum_form(&group, &group_speeds);
@@ -383,7 +368,7 @@ impl<'a> Assembled<'a> {
         if followers.iter().any(|f| !self.d.is_constant(f.factor)) {
             return;
         }
-        let Some(mut row) = self.rows.get(&rate).cloned() else { return };
+        let Some(mut row) = self.rows.of(&mut self.d.x, rate).cloned() else { return };
         let mut terms = vec![quantity];
         for f in followers {
             row.0.retain(|t| t.0 != f.rate);
@@ -395,11 +380,11 @@ impl<'a> Assembled<'a> {
     }
 
     /// The dependent storages of a group that read `z`.
-    fn followers(&self, z: Symbol, group: &[&Cell]) -> Vec<Follower> {
+    fn followers(&mut self, z: Symbol, group: &[&Cell]) -> Vec<Follower> {
         let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
         dependent
             .filter_map(|c| {
-                let factor = self.rows[&c.z].coefficient(z)?;
+                let factor = self.rows.of(&mut self.d.x, c.z)?.coefficient(z)?;
                 Some(Follower { factor, stored: c.stored, rate: c.rate })
             })
             .collect()
@@ -407,18 +392,20 @@ impl<'a> Assembled<'a> {
 
     /// Whether a group can be written with speeds (or stored quantities) of the independent storages as states: no
     /// varying source enters, and every law gives `X` from `z`.
-    fn in_velocity_form(&mut self, causal: &CausalGraph, group: &[&Cell]) -> bool {
+    fn in_velocity_form(&mut self, group: &[&Cell]) -> bool {
         let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
-        let constant_sources = dependent.clone().all(|cell| {
-            self.rows[&cell.z].0.iter().all(|t| match causal.ports.ports.iter().find(|p| p.input == t.0) {
-                Some(p) if matches!(p.role, Role::Source | Role::Redundant) => {
-                    let value = self.d.of[&p.input].expr();
-                    self.d.is_constant(value)
-                }
-                _ => true,
-            })
-        });
+        let constant_sources = dependent.clone().all(|cell| !self.is_moved(cell.z));
         constant_sources && group.iter().all(|cell| self.stored_of(cell).is_some())
+    }
+
+    /// Whether a source that is no constant stands in the row of a variable.
+    fn is_moved(&mut self, z: Symbol) -> bool {
+        let row = self.rows.of(&mut self.d.x, z).cloned().unwrap_or_default();
+        row.0.iter().any(|t| {
+            let giver = self.rows.giver(t.0);
+            giver.is_some_and(|p| matches!(p.role, Role::Source | Role::Redundant))
+                && !self.d.is_constant(self.d.of[&t.0].expr())
+        })
     }
 
     /// States are speeds of linear inertances and stored quantities of other storages; rates of dependent ones follow by
@@ -553,7 +540,7 @@ impl<'a> Assembled<'a> {
         let own = stored.map_or(d.x.int(0), |s| d.x.sym(s));
         let meaning = d.x.add(&[own, sum]);
         // pi' = what the bond of the independent storage carries without the rates of dependent ones, and S'^T X_d.
-        let mut structure = self.rows[&rate].clone();
+        let mut structure = self.rows.of(&mut d.x, rate).cloned().unwrap_or_default();
         structure.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
         if followers.iter().any(|f| !d.is_constant(f.factor)) {
             self.balances.pop();
@@ -660,9 +647,10 @@ impl Cell<'_> {
 
 /// Storages that depend on each other, or are ports of one field, with the virtual speeds among them.
 pub(super) fn groups(
+    x: &mut Exprs,
     cells: &[Cell],
     speeds: &[Virtual],
-    rows: &Map<Symbol, Combination>,
+    rows: &mut Rows,
 ) -> Vec<(Vec<usize>, Vec<Virtual>)> {
     let mut index: BTreeMap<Symbol, usize> = cells.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
     index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, cells.len() + k)));
@@ -673,7 +661,7 @@ pub(super) fn groups(
             set.union(previous, i);
         }
         if cell.state.role == Role::Dependent {
-            for term in &rows[&cell.z].0 {
+            for term in rows.of(x, cell.z).iter().flat_map(|row| &row.0) {
                 if let Some(&other) = index.get(&term.0) {
                     set.union(i, other);
                 }

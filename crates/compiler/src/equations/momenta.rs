@@ -2,10 +2,10 @@
 //! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
 use super::definitions::Definitions;
-use super::minimal::{Assembled, Cell, drop_vanishing_sources, groups, imposed, structure};
+use super::minimal::{Assembled, Cell, groups, imposed, rows_of};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::Meaning;
-use crate::causal_graph::{CausalGraph, Role};
+use crate::causal_graph::{CausalGraph, Combination, PortState, Role};
 
 /// A sum of stored quantities that no jump of a source changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,23 +22,25 @@ impl Assembled<'_> {
     /// The sums of all storages that depend on each other. `truth` is the graph with its exact ports, of whose pool that
     /// of these definitions is a continuation.
     pub(super) fn momenta(&mut self, truth: &CausalGraph) -> Vec<Momentum> {
-        let mut rows = structure(&mut self.d.x, truth);
-        drop_vanishing_sources(&mut self.d, truth, &mut rows);
+        let mut rows = rows_of(&mut self.d, truth);
         let cells: Vec<Cell> = truth.ports.ports.iter().filter_map(|state| self.cell(truth, state)).collect();
         let mut all = Vec::new();
-        for (members, speeds) in groups(&cells, &truth.ports.virtual_speeds, &rows) {
+        for (members, speeds) in groups(&mut self.d.x, &cells, &truth.ports.virtual_speeds, &mut rows) {
             let dependent: Vec<&Cell> =
                 members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Dependent).collect();
             if dependent.is_empty() {
                 continue;
             }
-            let moved = dependent.iter().any(|c| rows[&c.z].0.iter().any(|t| is_moving(&mut self.d, truth, t.0)));
+            let of_dependent: Vec<Combination> =
+                dependent.iter().map(|c| rows.of(&mut self.d.x, c.z).cloned().unwrap_or_default()).collect();
+            let mut inputs = of_dependent.iter().flat_map(|row| &row.0).filter_map(|t| rows.giver(t.0));
+            let moved = inputs.any(|giver| is_moving(&mut self.d, truth, giver));
             let independent = members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Independent);
             let own = independent.map(|c| (c.z, Some(c.stored)));
             for (speed, stored) in own.chain(speeds.iter().map(|v| (v.speed, None))) {
                 let mut sum: Vec<Expr> = stored.map(|s| self.d.x.sym(s)).into_iter().collect();
-                for cell in &dependent {
-                    if let Some(factor) = rows[&cell.z].coefficient(speed) {
+                for (cell, row) in dependent.iter().zip(&of_dependent) {
+                    if let Some(factor) = row.coefficient(speed) {
                         let stored = self.d.x.sym(cell.stored);
                         sum.push(self.d.x.mul(&[factor, stored]));
                     }
@@ -51,14 +53,12 @@ impl Assembled<'_> {
     }
 }
 
-/// Whether an input of the junction structure is a source whose value may change.
-fn is_moving(d: &mut Definitions, truth: &CausalGraph, input: Symbol) -> bool {
-    let port = truth.ports.ports.iter().find(|p| p.input == input);
-    let source = port.filter(|p| matches!(p.role, Role::Source | Role::Redundant));
-    source.is_some_and(|port| {
+/// Whether a port is a source whose value may change.
+fn is_moving(d: &mut Definitions, truth: &CausalGraph, port: &PortState) -> bool {
+    matches!(port.role, Role::Source | Role::Redundant) && {
         let value = imposed(&mut d.x, truth, port);
         !d.is_constant(value)
-    })
+    }
 }
 
 /// Those that can be computed from what is defined.

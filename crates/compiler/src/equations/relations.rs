@@ -141,7 +141,7 @@ fn row(assembled: &mut Assembled, ports: &Ports, state: &Chosen) -> Option<Row> 
     let port = ports.independent.get(&state.symbol).or_else(|| ports.independent.get(&state.tracked)).copied();
     let virtual_speed = causal.ports.virtual_speeds.iter().find(|v| v.speed == state.tracked);
     let rate = port.map(|p| p.output).or(virtual_speed.map(|v| v.reaction))?;
-    let combination = assembled.rows.get(&rate)?.clone();
+    let combination = assembled.rows.of(&mut assembled.d.x, rate)?.clone();
     let mut sum = Sum { assembled, ports, row: Row { quantity: Vec::new(), by: BTreeMap::new() } };
     sum.row.quantity.extend(port.and_then(|p| stored(causal, p)).map(|stored| (ONE, stored)));
     sum.add(&combination, ONE);
@@ -213,10 +213,11 @@ impl Sum<'_, '_> {
                 .x
                 .depends_on_any(coefficient, &|s| matches!(d.meaning(s), Some(Meaning::Effort(_) | Meaning::Flow(_))));
             let known = self.ports.free.contains(&variable) || self.ports.dependent.contains_key(&variable);
-            let row = match self.assembled.rows.get(&variable) {
+            let assembled = &mut *self.assembled;
+            let row = match assembled.rows.of(&mut assembled.d.x, variable) {
                 Some(row) => row.clone(),
                 None if known => Combination(vec![(variable, ONE)]),
-                None if d.of.get(&variable).is_some_and(|of| !varies(d, of.expr())) => continue,
+                None if assembled.d.of.get(&variable).is_some_and(|of| !varies(&assembled.d, of.expr())) => continue,
                 None => return None,
             };
             if reads_bonds {

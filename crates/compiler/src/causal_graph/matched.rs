@@ -1,0 +1,153 @@
+//! Definitions as short as the elements write them.
+//!
+//! Elimination finds which variables follow from which, but the rows that it leaves last hold everything taken off them:
+//! the force at the root of a chain as a sum over all its links. Once it is known what follows, each row of the junction
+//! structure is given to a variable that it holds, and defines it as it stands. Where such definitions read each other in
+//! a circle, a loop of junctions, elimination works on the rows of that circle alone. The blocks are those of
+//! the block triangular form (Duff and Reid, ACM Transactions on Mathematical Software 4, 1978).
+
+use std::collections::BTreeMap;
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::DiGraph;
+
+use super::ports::settled;
+use crate::algebra::{Elimination, Expr, Exprs, ONE, SparseRow, eliminate};
+
+/// What each pivot column of an elimination is in terms of other columns, from the rows that went into it. `None` if
+/// something would have to be divided by that is not known to be nonzero and was not divided by before.
+pub(super) fn matched_rows(
+    x: &mut Exprs,
+    rows: &[SparseRow],
+    done: &Elimination,
+) -> Option<Vec<(usize, Vec<(usize, Expr)>)>> {
+    let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
+    let row_of = matching(x, &rows, done)?;
+    let mut graph = DiGraph::<usize, ()>::new();
+    let nodes: BTreeMap<usize, _> = row_of.keys().map(|&column| (column, graph.add_node(column))).collect();
+    for (column, &row) in &row_of {
+        let read = rows[row].0.iter().filter(|e| e.0 != *column).filter_map(|e| nodes.get(&e.0));
+        read.for_each(|&read| _ = graph.add_edge(nodes[column], read, ()));
+    }
+    let mut definitions = Vec::with_capacity(row_of.len());
+    for circle in tarjan_scc(&graph) {
+        let columns: Vec<usize> = circle.into_iter().map(|node| graph[node]).collect();
+        match columns[..] {
+            [column] => definitions.push((column, solved_for(x, rows[row_of[&column]], column))),
+            _ => {
+                let own = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
+                definitions.extend(circle_solved(x, own, columns, done)?);
+            }
+        }
+    }
+    Some(definitions)
+}
+
+/// The columns of a circle, each by later ones and by columns outside.
+fn circle_solved(
+    x: &mut Exprs,
+    rows: Vec<SparseRow>,
+    mut columns: Vec<usize>,
+    done: &Elimination,
+) -> Option<Vec<(usize, Vec<(usize, Expr)>)>> {
+    columns.sort_unstable();
+    let own = eliminate(x, rows, &[columns.clone()]);
+    let as_before = own.watched.iter().all(|e| done.watched.contains(e));
+    if own.pivots.len() < columns.len() || !as_before || own.degenerate.iter().any(|e| !done.degenerate.contains(e)) {
+        return None;
+    }
+    Some(own.pivots.iter().map(|pivot| (pivot.column, solved_for(x, &pivot.row, pivot.column))).collect())
+}
+
+/// A column in terms of the others in its row.
+fn solved_for(x: &mut Exprs, row: &SparseRow, column: usize) -> Vec<(usize, Expr)> {
+    let divisor = row.0.iter().find(|e| e.0 == column).map_or(ONE, |e| e.1);
+    let mut terms = Vec::with_capacity(row.0.len() - 1);
+    for &(other, e) in row.0.iter().filter(|e| e.0 != column) {
+        let quotient = if divisor == ONE { e } else { x.div(e, divisor) };
+        terms.push((other, settled(x, quotient)));
+    }
+    terms
+}
+
+/// An entry of a row, its column by the number of its pivot.
+struct Edge {
+    row: usize,
+    column: usize,
+    coefficient: Expr,
+}
+
+/// A row for each pivot column, in which its coefficient is a number, or else what elimination divided by there, or else
+/// a parameter that is not zero. `None` if there are no such rows for all of them.
+fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination) -> Option<BTreeMap<usize, usize>> {
+    let place: BTreeMap<usize, usize> = done.pivots.iter().enumerate().map(|(i, p)| (p.column, i)).collect();
+    let constant = |e: Expr| !x.depends_on_any(e, &|s| x.facts(s).given.is_none());
+    let levels: [&dyn Fn(&Edge) -> bool; 3] = [
+        &|edge| x.is_number(edge.coefficient).is_some(),
+        &|edge| edge.row == edge.column && edge.coefficient == done.pivots[edge.row].divisor,
+        &|edge| constant(edge.coefficient) && x.nonzero(edge.coefficient),
+    ];
+    let mut allowed: Vec<Vec<usize>> = vec![Vec::new(); rows.len()];
+    let mut found = Matching { row_of: vec![None; rows.len()], column_of: vec![None; rows.len()] };
+    for level in levels {
+        for (row, entries) in rows.iter().enumerate() {
+            for &(column, coefficient) in &entries.0 {
+                let Some(&column) = place.get(&column) else { continue };
+                if !allowed[row].contains(&column) && level(&Edge { row, column, coefficient }) {
+                    allowed[row].push(column);
+                }
+            }
+            if found.column_of[row].is_none() && found.row_of[row].is_none() && allowed[row].contains(&row) {
+                found.join(row, row);
+            }
+        }
+        (0..rows.len()).for_each(|row| found.augment(row, &allowed));
+    }
+    let all: Option<Vec<usize>> = found.row_of.into_iter().collect();
+    Some(done.pivots.iter().map(|p| p.column).zip(all?).collect())
+}
+
+/// Rows and columns, joined in pairs.
+struct Matching {
+    row_of: Vec<Option<usize>>,
+    column_of: Vec<Option<usize>>,
+}
+
+impl Matching {
+    fn join(&mut self, row: usize, column: usize) {
+        (self.row_of[column], self.column_of[row]) = (Some(row), Some(column));
+    }
+
+    /// Finds a column for a row that has none, if rows that have one can move over: the shortest such exchange.
+    fn augment(&mut self, row: usize, edges: &[Vec<usize>]) {
+        if self.column_of[row].is_some() {
+            return;
+        }
+        let mut reached_by: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut queue = std::collections::VecDeque::from([row]);
+        while let Some(from) = queue.pop_front() {
+            for &column in &edges[from] {
+                if reached_by.contains_key(&column) {
+                    continue;
+                }
+                reached_by.insert(column, from);
+                match self.row_of[column] {
+                    Some(holder) => queue.push_back(holder),
+                    None => return self.exchange(column, &reached_by),
+                }
+            }
+        }
+    }
+
+    fn exchange(&mut self, mut column: usize, reached_by: &BTreeMap<usize, usize>) {
+        loop {
+            let row = reached_by[&column];
+            let before = self.column_of[row];
+            self.join(row, column);
+            match before {
+                Some(next) => column = next,
+                None => return,
+            }
+        }
+    }
+}
