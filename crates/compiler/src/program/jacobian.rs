@@ -1,7 +1,8 @@
 //! Exact derivatives of values by givens, as values of a program: sparse, with solve blocks by the implicit function
 //! theorem.
 
-use super::values::{Op, Reads, Values};
+use super::op::Op;
+use super::values::{Reads, Values};
 use super::{Block, BlockId, Program, Value};
 use crate::ids::{Id, Table};
 use rustc_hash::FxHashMap;

@@ -4,6 +4,8 @@
 //! wherever C computes in double precision without contraction.
 
 mod cost;
+pub(crate) mod flags;
+mod givens;
 mod header;
 mod messages;
 mod obligations;
@@ -12,9 +14,9 @@ mod project;
 mod range;
 mod real;
 mod slopes;
-mod ssa;
 mod start;
 pub(crate) mod template;
+mod terms;
 mod variables;
 mod write;
 

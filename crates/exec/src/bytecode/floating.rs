@@ -5,8 +5,9 @@
 //! rest the shortest change is taken: it stays where it was.
 
 use super::frame::Frame;
+use super::instruction::{Instruction, Solve};
 use super::newton::SETTLED;
-use halfarrow_compiler::program::{Instruction, Solve};
+use halfarrow_compiler::program::Op;
 
 /// A residual below this part of its terms is rounding.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -275,7 +276,7 @@ impl Frame {
         for instruction in &solve.code {
             let terms = self.terms_of(instruction);
             self.plain::<false>(std::slice::from_ref(instruction));
-            if let Some(out) = super::operands::written(instruction) {
+            if let Some(out) = instruction.written() {
                 self.terms[out as usize] = terms.unwrap_or(self.r[out as usize].abs());
             }
         }
@@ -284,11 +285,12 @@ impl Frame {
     /// What an operation adds up, in magnitude, before it is done; `None` where that is its value.
     fn terms_of(&self, instruction: &Instruction) -> Option<f64> {
         let t = |r: u32| self.terms[r as usize];
-        match *instruction {
-            Instruction::Add { a, b, .. } | Instruction::Sub { a, b, .. } => Some(t(a) + t(b)),
-            Instruction::Neg { a, .. } => Some(t(a)),
-            Instruction::Mul { a, b, .. } => Some(t(a) * t(b)),
-            Instruction::Div { a, b, .. } => Some(t(a) / self.r[b as usize].abs()),
+        let Instruction::Op { op, .. } = *instruction else { return None };
+        match op {
+            Op::Add(a, b) | Op::Sub(a, b) => Some(t(a) + t(b)),
+            Op::Neg(a) => Some(t(a)),
+            Op::Mul(a, b) => Some(t(a) * t(b)),
+            Op::Div(a, b) => Some(t(a) / self.r[b as usize].abs()),
             _ => None,
         }
     }

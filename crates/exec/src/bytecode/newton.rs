@@ -11,7 +11,7 @@
 
 use super::floating::Floating;
 use super::frame::{Frame, Trouble, put_entries};
-use halfarrow_compiler::program::{Instruction, Solve};
+use super::instruction::{Instruction, Solve};
 
 /// Iterations of one attempt.
 const ITERATIONS: usize = 100;
@@ -982,10 +982,7 @@ impl Frame {
 
 /// Whether inner code reads conditions, which may be held or not.
 pub(super) fn has_conditions(solve: &Solve) -> bool {
-    use Instruction::*;
-    let condition = |i: &Instruction| {
-        matches!(i, Side { .. } | Floor { .. } | Table { .. } | TableSlope { .. } | TableCurvature { .. })
-    };
+    let condition = |i: &Instruction| matches!(i, Instruction::Op { op, .. } if op.is_held());
     solve.code.iter().any(condition)
 }
 

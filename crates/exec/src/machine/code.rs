@@ -4,9 +4,9 @@ use super::chunk::{Item, Setting};
 use super::live::Live;
 use super::memory::{Arrays, Gathered, Memory, Reach, Start};
 use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_WATCH, WRITTEN_OUT};
-use crate::bytecode::{Frame, Hold, InnerCode, Trouble};
+use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Register, Routine, Solve, Trouble};
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{Instruction, Layout, Program, Register, Routine, Solve};
+use halfarrow_compiler::program::{Op, Program};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -187,7 +187,10 @@ fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> Item<'a> {
 /// Whether functions are written out: not where there are many, as that takes long to compile.
 fn inlines(code: &[Instruction]) -> bool {
     let wanted = |i: &&Instruction| {
-        matches!(i, Instruction::Call { f: Function::Sin | Function::Cos | Function::Exp | Function::Log, .. })
+        matches!(
+            i,
+            Instruction::Op { op: Op::Call(Function::Sin | Function::Cos | Function::Exp | Function::Log, _), .. }
+        )
     };
     code.iter().filter(wanted).count() <= INLINE
 }

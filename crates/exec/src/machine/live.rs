@@ -1,7 +1,6 @@
 //! What is read after a place in a routine.
 
-use crate::bytecode::{reads, written};
-use halfarrow_compiler::program::{Instruction, Register, Solve};
+use crate::bytecode::{Instruction, Register, Solve};
 use std::collections::BTreeSet;
 
 /// Registers that are read before they are written.
@@ -15,10 +14,10 @@ impl Live {
 
     /// Goes back over an instruction.
     pub fn before(&mut self, instruction: &Instruction) {
-        if let Some(out) = written(instruction) {
+        if let Some(out) = instruction.written() {
             self.0.remove(&out);
         }
-        reads(instruction, |register| {
+        instruction.for_each_read(|register| {
             self.0.insert(register);
         });
     }

@@ -1,7 +1,8 @@
 //! What one evaluation takes, counted in the code that is run.
 
 use super::Model;
-use halfarrow_compiler::program::{Instruction, Routine, Solve};
+use crate::bytecode::{Instruction, Routine, Solve};
+use halfarrow_compiler::program::{Cost, Op};
 
 /// Operations of one evaluation of rates or residuals.
 ///
@@ -35,29 +36,16 @@ impl Operations {
         counted
     }
 
+    /// What is handed through, watched, or counted with its block is not counted here.
     fn count(&mut self, instruction: &Instruction) {
-        match instruction {
-            Instruction::Neg { .. }
-            | Instruction::Add { .. }
-            | Instruction::Sub { .. }
-            | Instruction::Positive { .. }
-            | Instruction::Side { .. }
-            | Instruction::And { .. }
-            | Instruction::Or { .. }
-            | Instruction::Not { .. }
-            | Instruction::Select { .. } => self.additions += 1,
-            Instruction::Mul { .. } => self.multiplications += 1,
-            Instruction::Div { .. } => self.divisions += 1,
-            Instruction::Powi { n, .. } => self.multiplications += (n.ilog2() + n.count_ones() - 1) as usize,
-            Instruction::Pow { .. }
-            | Instruction::Call { .. }
-            | Instruction::Call2 { .. }
-            | Instruction::Floor { .. }
-            | Instruction::Table { .. }
-            | Instruction::TableSlope { .. }
-            | Instruction::TableCurvature { .. } => self.calls += 1,
-            // Handed through, watched, or counted with its block.
-            Instruction::Parameter { .. } | Instruction::Watch { .. } | Instruction::Solve { .. } => {}
+        let Instruction::Op { op, .. } = instruction else { return };
+        match (op.cost(), op) {
+            (Cost::Given, _) => {}
+            (Cost::Addition, _) => self.additions += 1,
+            (Cost::Multiplication, _) => self.multiplications += 1,
+            (Cost::Division, _) => self.divisions += 1,
+            (Cost::Power, Op::Powi(n, _)) => self.multiplications += (n.ilog2() + n.count_ones() - 1) as usize,
+            (Cost::Power | Cost::Call | Cost::Table, _) => self.calls += 1,
         }
     }
 
