@@ -3,7 +3,7 @@
 
 use super::op::Op;
 use super::values::{Reads, Values};
-use super::{Block, BlockId, Program, Value};
+use super::{Block, BlockId, Program, Value, verify};
 use crate::ids::{Id, Table};
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
@@ -73,7 +73,9 @@ impl Program {
             let slopes = work.slopes.get(value).into_iter().flat_map(|s| s.iter());
             entries.extend(slopes.map(|&(column, value)| Entry { row: row as u32, column, value }));
         }
-        Differentiated { program: Program { values: work.values, blocks: work.blocks, ..self.clone() }, entries }
+        let program = Program { values: work.values, blocks: work.blocks, ..self.clone() };
+        debug_assert_eq!(verify(&program), Ok(()), "{}", self.name);
+        Differentiated { program, entries }
     }
 }
 

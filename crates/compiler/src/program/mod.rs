@@ -28,6 +28,7 @@ mod schedule;
 mod sharing;
 mod start;
 mod values;
+mod verify;
 
 pub use jacobian::{Differentiated, Entry};
 pub use op::{Bits, Cost, Op};
@@ -35,6 +36,7 @@ pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;
 pub use start::StartGroup;
 pub use values::{Reads, Values};
+pub use verify::verify;
 
 use std::collections::BTreeMap;
 
@@ -61,8 +63,8 @@ id!(
 
 /// What is evaluated.
 ///
-/// Invariant: every value reads values before it; a value that reads a guess of a Newton block is read by that block
-/// and by such values only.
+/// Invariants (see [`verify`]): every value reads values before it; a value that reads a guess of a Newton block is read
+/// by that block and by such values only; all numbers in it are those of something.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// Name of the model.

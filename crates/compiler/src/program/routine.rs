@@ -93,7 +93,8 @@ pub enum Method {
 
 /// Steps in order, and what is wanted of them.
 ///
-/// Invariant: each local is defined by one step, in the order of the numbers, before any step reads it.
+/// Invariant (see [`verify`](Code::verify)): each local is defined by one step, in the order of the numbers, before any
+/// step reads it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Code {
     /// The steps.
@@ -217,7 +218,13 @@ impl Program {
     }
 
     fn live_anywhere(&self, more: &[Value]) -> Vec<bool> {
-        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).chain(more.iter().copied()).collect();
+        let wanted: Vec<Value> = self.wanted_anywhere().into_iter().chain(more.iter().copied()).collect();
+        self.live(&wanted, true)
+    }
+
+    /// All values that are read from outside.
+    pub(super) fn wanted_anywhere(&self) -> Vec<Value> {
+        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
         wanted.extend(self.observed.iter().filter_map(|o| o.value.clone().ok()));
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
         wanted.extend(self.guesses.iter().flat_map(|g| [g.residual, g.asked]));
@@ -230,7 +237,7 @@ impl Program {
         wanted.extend(self.assumptions.iter().flat_map(|a| [a.value, a.scale]));
         let asked = |d: &super::Domain| d.asked.as_ref().map(|a| a.1);
         wanted.extend(self.domains.iter().flat_map(|d| [Some(d.argument), asked(d), d.limit]).flatten());
-        self.live(&wanted, true)
+        wanted
     }
 }
 
@@ -276,6 +283,7 @@ impl<'a> Builder<'a> {
         let live = self.program.live(&roots, self.preamble);
         self.order(&live, watches).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
+        debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);
         Routine { wanted: wanted.to_vec(), code: self.code }
     }
 

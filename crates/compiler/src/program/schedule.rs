@@ -7,7 +7,7 @@ use super::sharing::share;
 use super::values::Reads;
 use super::{
     Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
-    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
+    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
@@ -343,6 +343,7 @@ impl Schedule<'_> {
         program.place_guesses();
         find_causes(&mut program, &self.kinks);
         program.kept = kept(&program, equations);
+        debug_assert_eq!(verify(&program), Ok(()), "{}", program.name);
         program
     }
 }

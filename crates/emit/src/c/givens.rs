@@ -42,14 +42,6 @@ impl<'a> Givens<'a> {
         matches!(self.program.values.op(value), Op::Parameter(_)) || self.exact.borrow().contains_key(&value)
     }
 
-    /// The order in which values of parameters are put where they belong: parameters, then what follows from them.
-    pub fn rank(&self, value: Value) -> (bool, usize) {
-        match self.program.values.op(value) {
-            Op::Parameter(i) => (false, i as usize),
-            _ => (true, self.derived[&value]),
-        }
-    }
-
     /// Whether it follows from time and parameters alone.
     pub fn is_timely(&self, value: Value) -> bool {
         self.is_time(value) || self.program.values.reads(value) == Reads::PARAMETERS

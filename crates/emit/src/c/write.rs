@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{
-    Arg, Block, BlockId, Cause, Code, ConditionId, ConditionKind, Method, Op, Program, Reads, Solve, Step, Value,
+    Arg, Block, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Reads, Solve, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -161,7 +161,7 @@ impl<'a> Writer<'a> {
         &mut self,
         name: &str,
         shape: Shape,
-        (code, kept): (&Code, &[(Value, Arg)]),
+        (code, kept): (&Code, &[(u32, Value)]),
         (values, rates): (&[String], &[String]),
     ) -> String {
         let moves = self.moves(code, shape, !rates.is_empty());
@@ -177,6 +177,7 @@ impl<'a> Writer<'a> {
             chunk: 0,
             turns: FxHashMap::default(),
             names: self.variables.of_locals(code),
+            kept: kept.iter().copied().collect(),
             text: String::new(),
         };
         for (c, steps) in chunks.iter().enumerate() {
@@ -199,7 +200,6 @@ impl<'a> Writer<'a> {
             f.text.clear();
             steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
             self.outputs(&mut f, code, (values, rates), chunks.len());
-            self.keep(&mut f, kept, chunks.len());
             let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
             let _ = writeln!(text, "static {kind} {called}({})\n{{", shape.parameters);
             if !shape.void && f.text.contains("status") {
@@ -306,15 +306,14 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Puts what is computed of what other routines read where these find it.
-    fn keep(&self, f: &mut Body, kept: &[(Value, Arg)], chunks: usize) {
-        let here: Vec<(Value, Arg)> = kept.iter().copied().filter(|(_, a)| f.is_here(*a, chunks)).collect();
-        for (given, a) in here {
-            let (place, value) = (self.givens.text(given), self.arg(f, a, false));
-            let _ = writeln!(f.text, "    {place} = {value};");
-            if self.real == Real::Float {
-                self.keep_exact(f, given, a);
-            }
+    /// Puts what other routines and Newton blocks read where these find it, as soon as it is computed.
+    fn keep(&self, f: &mut Body, out: u32) {
+        let Some(&given) = f.kept.get(&out) else { return };
+        let a = Arg::Local(Local(out));
+        let (place, value) = (self.givens.text(given), self.arg(f, a, false));
+        let _ = writeln!(f.text, "    {place} = {value};");
+        if self.real == Real::Float {
+            self.keep_exact(f, given, a);
         }
     }
 
@@ -624,6 +623,7 @@ impl<'a> Writer<'a> {
             let array = if f.wide[out as usize] { "wide" } else { "w" };
             let _ = writeln!(f.text, "    m->{array}[{}] = v{out};", f.place[out as usize]);
         }
+        self.keep(f, out);
         if let Some(rate) = rate {
             self.put_rate(f, out, rate);
         }
@@ -658,6 +658,8 @@ struct Body {
     turns: FxHashMap<Arg, Option<usize>>,
     /// What the locals are in the model, where they have a name there.
     names: Vec<Option<String>>,
+    /// What other routines read of what is computed.
+    kept: FxHashMap<u32, Value>,
     text: String,
 }
 
@@ -679,7 +681,7 @@ struct Reading {
 }
 
 /// Whether each local is read by a step or wanted.
-fn read_of(code: &Code, kept: &[(Value, Arg)]) -> Vec<bool> {
+fn read_of(code: &Code, kept: &[(u32, Value)]) -> Vec<bool> {
     let mut read = vec![false; code.values.len()];
     let mut mark = |a: Arg| {
         if let Arg::Local(i) = a {
@@ -687,7 +689,7 @@ fn read_of(code: &Code, kept: &[(Value, Arg)]) -> Vec<bool> {
         }
     };
     code.steps.iter().for_each(|step| step.for_each_read(&mut mark));
-    code.outputs.iter().copied().chain(kept.iter().map(|k| k.1)).for_each(mark);
+    code.outputs.iter().copied().chain(kept.iter().map(|k| Arg::Local(Local(k.0)))).for_each(mark);
     read
 }
 

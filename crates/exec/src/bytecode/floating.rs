@@ -5,7 +5,7 @@
 //! rest the shortest change is taken: it stays where it was.
 
 use super::frame::Frame;
-use super::instruction::{Instruction, Solve};
+use super::instruction::{Operation, Solve};
 use super::newton::SETTLED;
 use halfarrow_compiler::program::Op;
 
@@ -273,20 +273,18 @@ impl Frame {
         solve.guess.iter().zip(point).for_each(|(&g, &x)| {
             (self.r[g as usize], self.terms[g as usize]) = (x, x.abs());
         });
-        for instruction in &solve.code {
-            let terms = self.terms_of(instruction);
-            self.plain::<false>(std::slice::from_ref(instruction));
-            if let Some(out) = instruction.written() {
-                self.terms[out as usize] = terms.unwrap_or(self.r[out as usize].abs());
-            }
+        for operation in &solve.code {
+            let terms = self.terms_of(operation);
+            self.plain::<false>(std::slice::from_ref(operation));
+            let out = operation.out as usize;
+            self.terms[out] = terms.unwrap_or(self.r[out].abs());
         }
     }
 
     /// What an operation adds up, in magnitude, before it is done; `None` where that is its value.
-    fn terms_of(&self, instruction: &Instruction) -> Option<f64> {
+    fn terms_of(&self, operation: &Operation) -> Option<f64> {
         let t = |r: u32| self.terms[r as usize];
-        let Instruction::Op { op, .. } = *instruction else { return None };
-        match op {
+        match operation.op {
             Op::Add(a, b) | Op::Sub(a, b) => Some(t(a) + t(b)),
             Op::Neg(a) => Some(t(a)),
             Op::Mul(a, b) => Some(t(a) * t(b)),

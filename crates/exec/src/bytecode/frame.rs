@@ -2,7 +2,7 @@
 
 use super::abreast::{Abreast, Space};
 use super::conditions::{Conditions, table_on};
-use super::instruction::{Instruction, Register, Routine, Solve};
+use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
@@ -156,15 +156,19 @@ impl Frame {
     /// Runs a part of the code of a routine.
     pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), Trouble> {
         for instruction in code {
-            match *instruction {
-                Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
+            match instruction {
+                Instruction::Op(operation) => self.operation::<ALONG>(operation),
+                Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[*solve as usize])?,
                 Instruction::Watch { pivot, scale, watch } => {
-                    let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
+                    let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     if !Frame::stands(pivot, scale) {
-                        return Err(Trouble::Vanished { watch });
+                        return Err(Trouble::Vanished { watch: *watch });
                     }
                 }
-                ref plain => self.step::<ALONG>(plain),
+                Instruction::Parameter { out, index, default } => {
+                    let value = self.set[*index as usize].unwrap_or(self.r[*default as usize]);
+                    self.put::<ALONG>(*out, value, 0.0);
+                }
             }
         }
         Ok(())
@@ -187,8 +191,8 @@ impl Frame {
         }
     }
 
-    pub(crate) fn plain<const ALONG: bool>(&mut self, code: &[Instruction]) {
-        code.iter().for_each(|instruction| self.step::<ALONG>(instruction));
+    pub(crate) fn plain<const ALONG: bool>(&mut self, code: &[Operation]) {
+        code.iter().for_each(|operation| self.operation::<ALONG>(operation));
     }
 
     pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
@@ -288,25 +292,11 @@ impl Frame {
         }
     }
 
-    /// One instruction that is neither a solve block nor a watch.
-    #[inline]
-    fn step<const ALONG: bool>(&mut self, instruction: &Instruction) {
-        match *instruction {
-            Instruction::Op { out, op } => self.operation::<ALONG>(out, op),
-            Instruction::Parameter { out, index, default } => {
-                let value = self.set[index as usize].unwrap_or(self.r[default as usize]);
-                self.put::<ALONG>(out, value, 0.0);
-            }
-            Instruction::Solve { .. } | Instruction::Watch { .. } => {
-                unreachable!("solve blocks and watches stand at the top level")
-            }
-        }
-    }
-
     /// One operation: its value, and by the rules of the table its rate.
     #[inline]
     #[allow(unused_variables, reason = "each rule reads what it needs")]
-    fn operation<const ALONG: bool>(&mut self, out: Register, op: Op<Register>) {
+    fn operation<const ALONG: bool>(&mut self, operation: &Operation) {
+        let out = operation.out;
         macro_rules! compute {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
@@ -314,7 +304,7 @@ impl Frame {
                 cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
              })* }
              held $held:tt) => {
-                match op {
+                match operation.op {
                     $(Op::$plain($($part,)* $($a),*) => {
                         $(let $da = if ALONG { Some(self.d[$a as usize]) } else { None };)*
                         $(let $a = self.r[$a as usize];)*

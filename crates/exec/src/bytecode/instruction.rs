@@ -5,37 +5,24 @@ use halfarrow_compiler::program::{self, BlockId, Op};
 /// A place for one number.
 pub(crate) type Register = u32;
 
+/// An operation on registers; `out` may be one of its operands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Operation {
+    pub out: Register,
+    pub op: Op<Register>,
+}
+
 /// What the interpreter does in one go.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Instruction {
-    /// An operation; `out` may be one of its operands.
-    Op { out: Register, op: Op<Register> },
+    /// An operation.
+    Op(Operation),
     /// The parameter's set value, or `default` where none is set.
     Parameter { out: Register, index: u32, default: Register },
     /// Stops if the pivot vanishes against its scale.
     Watch { pivot: Register, scale: Register, watch: u32 },
     /// A solve block: index into [`Routine::solves`].
     Solve { solve: u32 },
-}
-
-impl Instruction {
-    /// Calls `visit` with each register that it reads; solve blocks are not visited.
-    pub fn for_each_read(&self, visit: impl FnMut(Register)) {
-        match *self {
-            Instruction::Op { op, .. } => op.for_each_operand(visit),
-            Instruction::Parameter { default, .. } => [default].into_iter().for_each(visit),
-            Instruction::Watch { pivot, scale, .. } => [pivot, scale].into_iter().for_each(visit),
-            Instruction::Solve { .. } => {}
-        }
-    }
-
-    /// The register that it writes.
-    pub fn written(&self) -> Option<Register> {
-        match *self {
-            Instruction::Op { out, .. } | Instruction::Parameter { out, .. } => Some(out),
-            Instruction::Watch { .. } | Instruction::Solve { .. } => None,
-        }
-    }
 }
 
 /// A solve block in a routine.
@@ -51,8 +38,8 @@ pub(crate) struct Solve {
     pub guess: Vec<Register>,
     /// Newton: what varies outside and is read by `code`, in the order of the values; the same in every routine.
     pub outer: Vec<Register>,
-    /// Newton: computes right side and matrix at the guess; it holds no solve blocks.
-    pub code: Vec<Instruction>,
+    /// Newton: computes right side and matrix at the guess.
+    pub code: Vec<Operation>,
     /// Matrix of a linear block, Jacobian of a Newton block, row by row.
     pub matrix: Vec<Register>,
     /// The places of the matrix that are not 0 whatever happens.

@@ -16,7 +16,7 @@ pub(crate) use conditions::{Hold, piece_of, table_on};
 pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble};
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
-pub(crate) use instruction::{Instruction, Routine, Solve};
+pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
 pub(crate) use lu::Lu;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;

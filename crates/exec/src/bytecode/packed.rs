@@ -3,7 +3,7 @@
 //! To find out what an instruction does takes longer than to do it. Every value keeps the operation it comes from, hence
 //! its bits; only the order of what does not read each other changes.
 
-use super::instruction::{Instruction, Register, Routine, Solve};
+use super::instruction::{Operation, Register, Routine, Solve};
 use super::registers::Layout;
 use halfarrow_compiler::program::{Arg, Code, Method, Op, Step};
 use std::collections::BTreeMap;
@@ -23,8 +23,10 @@ pub(crate) enum Kind {
 pub(crate) enum Run {
     /// Operations of one kind: result and operands, in their slots.
     Many(Kind, Vec<[u32; 3]>),
-    /// Any other instruction, on slots.
-    One(Instruction),
+    /// Any other operation, on slots.
+    One(Operation),
+    /// A divisor that must not vanish against its scale.
+    Watch { pivot: u32, scale: u32 },
     /// A solve block.
     Solve(Block),
 }
@@ -194,10 +196,10 @@ impl Slots {
                     (None, Step::Op { op, .. }) => {
                         let mut reads = reads.into_iter();
                         let op = op.map_operands(|_| reads.next().expect("as many slots as operands"));
-                        runs.push(Run::One(Instruction::Op { out: writes[0], op }));
+                        runs.push(Run::One(Operation { out: writes[0], op }));
                     }
-                    (None, &Step::Watch { watch, .. }) => {
-                        runs.push(Run::One(Instruction::Watch { pivot: reads[0], scale: reads[1], watch }));
+                    (None, Step::Watch { .. }) => {
+                        runs.push(Run::Watch { pivot: reads[0], scale: reads[1] });
                     }
                     (None, Step::Solve(solve)) => {
                         let alone = !matches!(solve.method, Method::Linear { shared: Some(_), .. });

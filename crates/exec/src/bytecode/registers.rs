@@ -1,7 +1,7 @@
 //! Registers for the values of a routine: fixed ones for what stands before any routine runs, others given away again as
 //! soon as nothing reads them any more.
 
-use super::instruction::{Instruction, Register, Routine, Solve};
+use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::program::{self, Arg, Code, Method, Op, Program, Step, Value};
 use rustc_hash::FxHashMap;
@@ -143,35 +143,23 @@ impl<'a> Allocator<'a> {
     fn routine(mut self, source: Code) -> Routine {
         let mut places = Places::of(&source);
         self.fixed.iter().for_each(|(&local, &register)| places.register[local as usize] = register);
-        let code = self.code(&source, &mut places);
+        let code = source.steps.iter().zip(0..).map(|(step, at)| self.step(step, at, &mut places)).collect();
         let outputs = source.outputs.iter().map(|&a| self.register(&places, a)).collect();
         Routine { code, outputs, solves: self.solves, registers: self.next, source }
     }
 
-    fn code(&mut self, code: &Code, places: &mut Places) -> Vec<Instruction> {
-        code.steps.iter().zip(0..).map(|(step, at)| self.step(step, at, places)).collect()
-    }
-
     fn step(&mut self, step: &Step, at: u32, places: &mut Places) -> Instruction {
         match step {
-            Step::Op { out, op } => {
-                let op = op.map_operands(|a| self.register(places, a));
-                step.for_each_read(|a| self.release(places, a, at));
-                Instruction::Op { out: self.define(places, out.index()), op }
+            Step::Op { out, op } => Instruction::Op(self.operation(out.index(), *op, at, places)),
+            Step::Parameter { out, index, default: value } => {
+                let default = self.register(places, *value);
+                self.release(places, *value, at);
+                Instruction::Parameter { out: self.define(places, out.index()), index: *index, default }
             }
-            Step::Parameter { out, index, default } => {
-                let default_register = self.register(places, *default);
-                self.release(places, *default, at);
-                Instruction::Parameter {
-                    out: self.define(places, out.index()),
-                    index: *index,
-                    default: default_register,
-                }
-            }
-            Step::Watch { watch, pivot, scale } => {
-                let [p, s] = [*pivot, *scale].map(|a| self.register(places, a));
-                step.for_each_read(|a| self.release(places, a, at));
-                Instruction::Watch { pivot: p, scale: s, watch: *watch }
+            Step::Watch { watch, pivot: divisor, scale: size } => {
+                let [pivot, scale] = [*divisor, *size].map(|a| self.register(places, a));
+                [*divisor, *size].into_iter().for_each(|a| self.release(places, a, at));
+                Instruction::Watch { pivot, scale, watch: *watch }
             }
             Step::Solve(solve) => {
                 let solve = self.solve(solve, at, places);
@@ -181,12 +169,27 @@ impl<'a> Allocator<'a> {
         }
     }
 
+    fn operation(&mut self, out: usize, op: Op<Arg>, at: u32, places: &mut Places) -> Operation {
+        let on_registers = op.map_operands(|a| self.register(places, a));
+        op.for_each_operand(|a| self.release(places, a, at));
+        Operation { out: self.define(places, out), op: on_registers }
+    }
+
+    /// The code of a Newton block.
+    fn inside(&mut self, code: &Code, places: &mut Places) -> Vec<Operation> {
+        let operations = code.steps.iter().zip(0..).map(|(step, at)| match step {
+            Step::Op { out, op } => self.operation(out.index(), *op, at, places),
+            _ => unreachable!("Newton blocks hold operations alone"),
+        });
+        operations.collect()
+    }
+
     fn solve(&mut self, solve: &program::Solve, at: u32, places: &mut Places) -> Solve {
         let mut inside = Places::default();
         let of = |this: &Self, args: &[Arg], places: &Places| -> Vec<Register> {
             args.iter().map(|&a| this.register(places, a)).collect()
         };
-        let (mut shared, mut instructions) = (None, Vec::new());
+        let (mut shared, mut operations) = (None, Vec::new());
         let (right, matrix) = match &solve.method {
             Method::Linear { shared: with, matrix, right } => {
                 shared = *with;
@@ -196,7 +199,7 @@ impl<'a> Allocator<'a> {
                 inside = Places::of(code);
                 inside.guess = (0..solve.unknowns.len()).map(|_| self.take()).collect();
                 inside.outer = of(self, outer, places);
-                instructions = self.code(code, &mut inside);
+                operations = self.inside(code, &mut inside);
                 let mut right = of(self, &code.outputs, &inside);
                 let matrix = right.split_off(solve.unknowns.len());
                 (right, matrix)
@@ -218,7 +221,7 @@ impl<'a> Allocator<'a> {
             unknowns,
             guess: inside.guess,
             outer: inside.outer,
-            code: instructions,
+            code: operations,
             matrix,
             entries: solve.entries.clone(),
             right,

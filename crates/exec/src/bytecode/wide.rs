@@ -4,7 +4,7 @@
 //! through the frame of each lane.
 
 use super::frame::Frame;
-use super::instruction::{Instruction, Register, Routine, Solve};
+use super::instruction::{Operation, Routine, Solve};
 use super::packed::{Block, Kind, Packed, Run};
 use crate::math;
 use halfarrow_compiler::for_each_op;
@@ -93,12 +93,11 @@ impl<const N: usize> WideFrame<N> {
                 Run::Many(Kind::Div, all) => self.many(all, |a, b| a / b),
                 Run::Many(Kind::Neg, all) => self.many(all, |a, _| -a),
                 Run::Solve(block) => self.solve(solves, block, frames, good),
-                Run::One(Instruction::Watch { pivot, scale, .. }) => {
+                Run::Watch { pivot, scale } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     (0..N).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
                 }
-                Run::One(Instruction::Op { out, op }) => self.step(*out, *op, frames),
-                Run::One(_) => unreachable!("parameters are set lane by lane, blocks stand by themselves"),
+                Run::One(operation) => self.step(operation, frames),
             }
         }
     }
@@ -132,7 +131,8 @@ impl<const N: usize> WideFrame<N> {
     /// One operation: what has a way of its own for lanes, else lane by lane as the table says.
     #[inline(always)]
     #[allow(unreachable_patterns, unused_variables, reason = "the table has what has a way of its own as well")]
-    fn step<L: Lane>(&mut self, out: Register, op: Op<Register>, frames: &mut [L]) {
+    fn step<L: Lane>(&mut self, operation: &Operation, frames: &mut [L]) {
+        let out = operation.out;
         macro_rules! compute {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
@@ -140,7 +140,7 @@ impl<const N: usize> WideFrame<N> {
                 cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
              })* }
              held $held:tt) => {
-                match op {
+                match operation.op {
                     Op::Powi(n, a) => self.r[out as usize] = Line(powers(self.r[a as usize].0, n)),
                     Op::Pow(a, b) => {
                         self.r[out as usize] = Line(math::pow_lanes(&self.r[a as usize].0, &self.r[b as usize].0));

@@ -2,7 +2,7 @@
 
 use super::arithmetic::Writer;
 use super::{RARE, STATUS_OF_WATCH, kernels};
-use crate::bytecode::{Instruction, PIVOT_BELOW, Register, Solve};
+use crate::bytecode::{Operation, PIVOT_BELOW, Register, Solve};
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, Value, types};
 use halfarrow_compiler::algebra::Function;
@@ -31,7 +31,13 @@ pub(super) struct Direct {
 /// What a chunk consists of.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Item<'a> {
-    Plain(&'a Instruction),
+    Op(&'a Operation),
+    /// Stops if the pivot vanishes against its scale.
+    Watch {
+        pivot: Register,
+        scale: Register,
+        watch: u32,
+    },
     /// A small linear block, written out.
     Solve(&'a Solve),
 }
@@ -95,7 +101,8 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     pub fn item(&mut self, item: Item) {
         match item {
-            Item::Plain(instruction) => self.instruction(instruction),
+            Item::Op(&Operation { out, op }) => self.operation(out, op),
+            Item::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
             Item::Solve(solve) => self.solve(solve),
         }
     }
@@ -223,23 +230,15 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.w.is(FloatCC::NotEqual, value, zero)
     }
 
-    fn instruction(&mut self, instruction: &Instruction) {
-        match *instruction {
-            Instruction::Op { out, op } => self.operation(out, op),
-            Instruction::Watch { pivot, scale, watch } => {
-                let (pivot, scale) = (self.value(pivot), self.value(scale));
-                let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
-                let least = self.w.mul(factor, scale);
-                let size = self.w.abs(pivot);
-                let above = self.w.is(FloatCC::GreaterThan, size, least);
-                let some = self.w.is(FloatCC::NotEqual, pivot, zero);
-                let stands = self.w.both(above, some);
-                self.require(stands, STATUS_OF_WATCH + u64::from(watch));
-            }
-            Instruction::Parameter { .. } | Instruction::Solve { .. } => {
-                unreachable!("neither parameters nor large blocks stand in a chunk")
-            }
-        }
+    fn watch(&mut self, pivot: Register, scale: Register, watch: u32) {
+        let (pivot, scale) = (self.value(pivot), self.value(scale));
+        let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
+        let least = self.w.mul(factor, scale);
+        let size = self.w.abs(pivot);
+        let above = self.w.is(FloatCC::GreaterThan, size, least);
+        let some = self.w.is(FloatCC::NotEqual, pivot, zero);
+        let stands = self.w.both(above, some);
+        self.require(stands, STATUS_OF_WATCH + u64::from(watch));
     }
 
     /// One operation: its value, and by the rules of the table its slope.

@@ -1,7 +1,7 @@
 //! What one evaluation takes, counted in the code that is run.
 
 use super::Model;
-use crate::bytecode::{Instruction, Routine, Solve};
+use crate::bytecode::{Instruction, Operation, Routine, Solve};
 use halfarrow_compiler::program::{Cost, Op};
 
 /// Operations of one evaluation of rates or residuals.
@@ -31,14 +31,14 @@ impl Operations {
 
     fn of(routine: &Routine) -> Operations {
         let mut counted = Operations::default();
-        routine.code.iter().for_each(|instruction| counted.count(instruction));
+        // What is handed through or watched is not counted, blocks are below.
+        let operations = routine.code.iter().filter_map(|i| if let Instruction::Op(o) = i { Some(o) } else { None });
+        operations.for_each(|operation| counted.count(operation));
         routine.solves.iter().for_each(|solve| counted.solve(solve));
         counted
     }
 
-    /// What is handed through, watched, or counted with its block is not counted here.
-    fn count(&mut self, instruction: &Instruction) {
-        let Instruction::Op { op, .. } = instruction else { return };
+    fn count(&mut self, &Operation { op, .. }: &Operation) {
         match (op.cost(), op) {
             (Cost::Given, _) => {}
             (Cost::Addition, _) => self.additions += 1,
@@ -59,7 +59,7 @@ impl Operations {
         if !solve.guess.is_empty() {
             self.iterated += 1;
             self.additions += n;
-            solve.code.iter().for_each(|instruction| self.count(instruction));
+            solve.code.iter().for_each(|operation| self.count(operation));
         }
     }
 }

@@ -156,13 +156,12 @@ impl Routines {
         blocks
     }
 
-    /// What the preamble computes of what other routines read, in the order of its places.
-    fn kept(&self, writer: &Writer) -> Vec<(Value, Arg)> {
+    /// What the preamble computes of what other routines read.
+    fn kept(&self) -> Vec<(u32, Value)> {
         let Routine { wanted, code } = &self.preamble;
-        let all = wanted.iter().copied().zip(code.outputs.iter().copied());
-        let mut kept: Vec<(Value, Arg)> = all.filter(|(_, a)| matches!(a, Arg::Local(_))).collect();
-        kept.sort_by_key(|&(value, _)| writer.givens.rank(value));
-        kept
+        let local =
+            |(&value, &a): (&Value, &Arg)| if let Arg::Local(local) = a { Some((local.0, value)) } else { None };
+        wanted.iter().zip(&code.outputs).filter_map(local).collect()
     }
 }
 
@@ -271,17 +270,16 @@ impl<'a> Plan<'a> {
             text += &along(&mut writer, name, ALONG, routine, begin);
         }
 
-        // Last, once it is known what is read in double precision.
-        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
-        let kept = routines.kept(&writer);
-        let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
-        text = writer.function("ha_preamble_code", shape, (&preamble, &kept), (&[], &[])) + &text;
-
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
         let mut block_text = String::new();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
             block_text += &self.block(&mut writer, i, program.blocks[*block].size(), code);
         }
+
+        // Last, once it is known what is read in double precision.
+        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
+        let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
+        let preamble = writer.function("ha_preamble_code", shape, (&preamble, &routines.kept()), (&[], &[]));
         let work = |routine: &Routine| Work::of(program, &routine.code);
         self.works = Works {
             rates: work(&routines.rates),
@@ -293,7 +291,7 @@ impl<'a> Plan<'a> {
         };
         self.newton = used.clone();
         self.find_sizes(&writer);
-        self.functions = block_text + &text;
+        self.functions = block_text + &preamble + &text;
     }
 
     /// The functions of a Newton block.
