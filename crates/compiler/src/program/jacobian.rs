@@ -23,7 +23,7 @@ pub struct Entry {
 #[derive(Debug, Clone)]
 pub struct Differentiated {
     /// The program with more values, and more blocks that share the factors of the others; ids of the first one keep their
-    /// meaning. Its registers are those of [`layout_with`](Program::layout_with) the values of the entries.
+    /// meaning. What of them reads parameters alone is [`determined`](Program::determined) together with the values of the entries.
     pub program: Program,
     /// The derivatives that may be nonzero, by row, in a row by column.
     pub entries: Vec<Entry>,

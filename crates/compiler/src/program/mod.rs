@@ -19,6 +19,7 @@ mod angles;
 pub mod calculus;
 mod dependence;
 mod derive;
+pub mod elimination;
 mod jacobian;
 mod lower;
 mod operations;

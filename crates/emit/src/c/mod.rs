@@ -3,6 +3,7 @@
 //! The operations are those of the interpreter, one by one and in its order, so that results are equal to the last bit
 //! wherever C computes in double precision without contraction.
 
+mod blocks;
 mod cost;
 pub(crate) mod flags;
 mod givens;

@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Write};
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::program::calculus::{Calculus, Moving};
+use halfarrow_compiler::program::elimination::Elimination;
 use halfarrow_compiler::program::{ConditionId, Op};
 
 use super::write::number;
@@ -96,6 +97,11 @@ pub(super) struct Expressions<'t> {
     /// How temporaries are called, and whether they are in double precision whatever real numbers are.
     name: String,
     wide: bool,
+    /// How far lines are indented, and how many temporaries there are.
+    pub indent: &'static str,
+    kept: usize,
+    /// What has to hold for the rest to count.
+    pub asked: Vec<String>,
 }
 
 /// An expression: its place among the others.
@@ -103,7 +109,7 @@ pub(super) type Expression = usize;
 
 impl<'t> Expressions<'t> {
     pub fn new(lines: &'t mut String, name: String, wide: bool) -> Self {
-        Expressions { all: Vec::new(), lines, name, wide }
+        Expressions { all: Vec::new(), lines, name, wide, indent: "    ", kept: 0, asked: Vec::new() }
     }
 
     /// A name, or what else needs no brackets.
@@ -113,6 +119,11 @@ impl<'t> Expressions<'t> {
 
     pub fn text(&self, expression: Expression) -> String {
         self.all[expression].0.clone()
+    }
+
+    /// Writes a line.
+    pub fn line(&mut self, text: &str) {
+        let _ = writeln!(self.lines, "{}{text}", self.indent);
     }
 
     fn push(&mut self, text: String, binds: Binds) -> Expression {
@@ -181,5 +192,22 @@ impl Calculus for Expressions<'_> {
     }
     fn table(&mut self, _: (u32, Option<ConditionId>), _: u32, _: Expression) -> Expression {
         unreachable!("tables are looked up with their derivative")
+    }
+}
+
+impl Elimination for Expressions<'_> {
+    fn sign_of(&mut self, a: Expression) -> Expression {
+        let text = format!("copysign(1.0, {})", self.all[a].0);
+        self.push(text, Binds::Whole)
+    }
+    fn require(&mut self, pivot: Expression, least: Expression) {
+        let [p, least] = [pivot, least].map(|e| self.part(e, Binds::Product));
+        self.asked.push(format!("{p} > 0.0 && {p} > {least} && ha_finite({p})"));
+    }
+    fn keep(&mut self, a: Expression) -> Expression {
+        let (name, text) = (format!("{}_{}", self.name, self.kept), self.text(a));
+        self.kept += 1;
+        self.line(&format!("const double {name} = {text};"));
+        self.whole(&name)
     }
 }

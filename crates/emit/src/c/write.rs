@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{
-    Arg, Block, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Reads, Solve, Step, Value,
+    Arg, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::blocks::Factored;
 use super::givens::Givens;
 use super::header::comment;
 use super::slopes::{Expressions, expression, power};
@@ -16,9 +17,6 @@ use crate::Real;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
 const CHUNK: usize = 250;
-
-/// Symmetric linear equations of up to this many unknowns are written out.
-const WRITTEN_OUT: usize = 6;
 
 /// How a function is called.
 #[derive(Debug, Clone, Copy)]
@@ -50,23 +48,6 @@ pub(super) struct Moving {
     pub outer: bool,
 }
 
-/// Numbers that `lu.c` takes for a matrix: twice the matrix, scales of rows, work, what is left, and in single precision the
-/// magnitudes of columns.
-pub(super) fn elimination_room(n: usize, real: Real) -> usize {
-    2 * n * n + if real == Real::Double { 3 * n } else { 4 * n }
-}
-
-/// Where linear blocks with a constant matrix keep their factors.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Factored {
-    /// Number, first place and first place of the order of each such block.
-    pub places: FxHashMap<u32, (usize, usize, usize)>,
-    /// Numbers taken in all.
-    pub size: usize,
-    /// Places of orders taken in all.
-    pub orders: usize,
-}
-
 /// Writes functions.
 pub(super) struct Writer<'a> {
     pub program: &'a Program,
@@ -80,7 +61,7 @@ pub(super) struct Writer<'a> {
     /// Places of the array for what crosses in double precision, if real numbers are less.
     pub wide_crossing: usize,
     /// The Newton blocks in use, by which they are numbered.
-    newton: &'a [BlockId],
+    pub newton: &'a [BlockId],
 }
 
 /// A number as C reads it back to the bit.
@@ -108,17 +89,7 @@ pub(super) fn numbers(values: &[f64]) -> String {
 
 impl<'a> Writer<'a> {
     pub fn new(program: &'a Program, newton: &'a [BlockId], real: Real) -> Writer<'a> {
-        let mut factored = Factored::default();
-        for (id, block) in program.blocks.iter() {
-            let Block::Linear { matrix, .. } = block else { continue };
-            let n = block.size();
-            if n > 1 && matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
-                let number = factored.places.len();
-                factored.places.insert(id.0, (number, factored.size, factored.orders));
-                factored.size += elimination_room(n, real);
-                factored.orders += n;
-            }
-        }
+        let factored = Factored::of(program, real);
         let givens = Givens::new(program, real);
         let variables = Variables::of(program, &givens);
         Writer { program, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton }
@@ -524,96 +495,7 @@ impl<'a> Writer<'a> {
         self.put(f, out, &format!("q{number}[{order}]"), rate.as_deref());
     }
 
-    fn linear(&self, f: &mut Body, solve: &Solve, reads: &Reading, number: usize) {
-        let (a, d, block) = (&reads.values[..], &reads.rates[..], solve.block.0);
-        let n = solve.unknowns.len();
-        let fail = format!("        return ha_fail(m, MODEL_SINGULAR, {block}, {});\n    }}", f.shape.time);
-        let moves = solve.unknowns.iter().any(|out| f.moves[out.0 as usize]);
-        if n == 1 {
-            let _ = writeln!(f.text, "    if (!ha_is_pivot({})) {{\n{fail}", a[0]);
-            let out = solve.unknowns[0].0;
-            if !f.read[out as usize] {
-                return;
-            }
-            let rate = moves.then(|| {
-                let right = d[1].clone().unwrap_or_else(|| "0.0".into());
-                match &d[0] {
-                    Some(da) => format!("({right} - {da} * v{out}) / {}", a[0]),
-                    None => format!("{right} / {}", a[0]),
-                }
-            });
-            return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
-        }
-        let (matrix, right) = a.split_at(n * n);
-        let symmetric = self.program.blocks[solve.block].is_symmetric();
-        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
-            f.text += &definite(matrix, right, (number, self.real.epsilon()), &fail);
-            return self.solved(f, solve, number);
-        }
-        let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
-        let _ = writeln!(f.text, "    const double b{number}[] = {{{}}};", right.join(", "));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let lu = match self.factored.places.get(&block) {
-            Some((which, place, order)) => {
-                let call =
-                    format!("ha_linear_constant(m, {which}, {place}, {order}, {n}, a{number}, b{number}, s{number})");
-                let _ = writeln!(f.text, "    if (!{call}) {{\n{fail}");
-                format!("ha_lu_at(m->factors + {place}, m->factors_order + {order}, {n})")
-            }
-            None => {
-                let _ = writeln!(f.text, "    if (!ha_linear(m, {n}, a{number}, b{number}, s{number})) {{\n{fail}");
-                format!("ha_lu_at(m->work, m->order, {n})")
-            }
-        };
-        if moves {
-            let zero = |d: &Option<String>| d.clone().unwrap_or_else(|| "0.0".into());
-            let (matrix, right) = d.split_at(n * n);
-            let (matrix, right): (Vec<_>, Vec<_>) =
-                (matrix.iter().map(zero).collect(), right.iter().map(zero).collect());
-            let _ = writeln!(f.text, "    const double da{number}[] = {{{}}};", matrix.join(", "));
-            let _ = writeln!(f.text, "    const double db{number}[] = {{{}}};", right.join(", "));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(f.text, "    ha_linear_rate({lu}, da{number}, db{number}, s{number}, ds{number});");
-        }
-        self.solved(f, solve, number);
-    }
-
-    fn newton(&self, f: &mut Body, solve: &Solve, reads: &Reading, number: usize) {
-        let (a, d, block) = (&reads.values[..], &reads.rates[..], solve.block.0);
-        let n = solve.unknowns.len();
-        let list = |values: Vec<String>| if values.is_empty() { "0.0".to_string() } else { values.join(", ") };
-        let _ = writeln!(f.text, "    const double o{number}[] = {{{}}};", list(a.to_vec()));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let which = self.newton.binary_search(&solve.block).expect("all blocks in use are known");
-        if solve.unknowns.iter().any(|out| f.moves[out.0 as usize]) {
-            let rates = d.iter().map(|d| d.clone().unwrap_or_else(|| "0.0".into())).collect();
-            let _ = writeln!(f.text, "    const double e{number}[] = {{{}}};", list(rates));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(
-                f.text,
-                "    status = ha_root_along(m, {which}, o{number}, e{number}, s{number}, ds{number});"
-            );
-        } else {
-            let _ = writeln!(f.text, "    status = ha_find_root(m, {which}, o{number}, s{number});");
-        }
-        let _ = writeln!(
-            f.text,
-            "    if (status != MODEL_OK) {{\n        return ha_fail(m, status, {block}, {});\n    }}",
-            f.shape.time
-        );
-        self.solved(f, solve, number);
-    }
-
-    fn solved(&self, f: &mut Body, solve: &Solve, number: usize) {
-        for (i, out) in solve.unknowns.iter().enumerate() {
-            if f.read[out.0 as usize] {
-                let rate = f.moves[out.0 as usize].then(|| format!("ds{number}[{i}]"));
-                self.put(f, out.0, &format!("s{number}[{i}]"), rate.as_deref());
-            }
-        }
-    }
-
-    fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
+    pub fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
         let name = f.names[out as usize].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
         let _ = match f.wide[out as usize] {
             true => writeln!(f.text, "    const ha_wide v{out} = HA_WIDE({value});{name}"),
@@ -642,12 +524,14 @@ impl<'a> Writer<'a> {
 }
 
 /// A function while it is written.
-struct Body {
-    shape: Shape,
-    moves: Vec<bool>,
+pub(super) struct Body {
+    pub shape: Shape,
+    /// Which locals have derivatives that somebody asks for.
+    pub moves: Vec<bool>,
     /// Which locals are in double precision whatever real numbers are.
     wide: Vec<bool>,
-    read: Vec<bool>,
+    /// Which are read.
+    pub read: Vec<bool>,
     /// The chunk that computes each local.
     home: Vec<usize>,
     /// Where a local is kept that crosses from one chunk to another, and where its derivative is.
@@ -660,7 +544,7 @@ struct Body {
     names: Vec<Option<String>>,
     /// What other routines read of what is computed.
     kept: FxHashMap<u32, Value>,
-    text: String,
+    pub text: String,
 }
 
 impl Body {
@@ -675,9 +559,9 @@ impl Body {
 
 /// What a step reads, in C: values and derivatives.
 #[derive(Default)]
-struct Reading {
-    values: Vec<String>,
-    rates: Vec<Option<String>>,
+pub(super) struct Reading {
+    pub values: Vec<String>,
+    pub rates: Vec<Option<String>>,
 }
 
 /// Whether each local is read by a step or wanted.
@@ -704,51 +588,6 @@ fn turns(steps: &[Step]) -> FxHashMap<Arg, Option<usize>> {
     };
     let cosines = of(Function::Cos);
     of(Function::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()
-}
-
-/// Symmetric linear equations, solved as `lu.c` does where the matrix is definite; else by it. Solution in `s<number>`.
-fn definite(matrix: &[String], right: &[String], (number, epsilon): (usize, f64), fail: &str) -> String {
-    let n = right.len();
-    let mut text = format!("    double s{number}[{n}];\n    {{\n");
-    let mut line = |words: String| {
-        let _ = writeln!(text, "        {words}");
-    };
-    line(format!("const double sign = copysign(1.0, {});", matrix[0]));
-    let mut u: Vec<String> = matrix.to_vec();
-    let mut good = Vec::new();
-    for k in 0..n {
-        line(format!("const double p{k} = sign * {};", u[k * n + k]));
-        let rounding = self::number(epsilon * n as f64);
-        good.push(format!("p{k} > 0.0 && p{k} > {rounding} * (sign * {}) && ha_finite(p{k})", matrix[k * n + k]));
-        line(format!("const double i{k} = 1.0 / {};", u[k * n + k]));
-        for j in k + 1..n {
-            line(format!("const double f{k}_{j} = {} * i{k};", u[k * n + j]));
-        }
-        for j in k + 1..n {
-            for i in j..n {
-                line(format!("const double u{k}_{j}_{i} = {} - f{k}_{j} * {};", u[j * n + i], u[k * n + i]));
-                u[j * n + i] = format!("u{k}_{j}_{i}");
-            }
-        }
-    }
-    line(format!("if ({}) {{", good.join(" && ")));
-    right.iter().enumerate().for_each(|(i, b)| line(format!("    double x{i} = {b} + 0.0;")));
-    for k in 0..n {
-        (k + 1..n).for_each(|j| line(format!("    x{j} -= f{k}_{j} * x{k};")));
-    }
-    (0..n).for_each(|k| line(format!("    x{k} = x{k} * i{k} + 0.0;")));
-    for k in (0..n).rev() {
-        (0..k).for_each(|i| line(format!("    x{i} -= f{i}_{k} * x{k};")));
-    }
-    (0..n).for_each(|i| line(format!("    s{number}[{i}] = x{i};")));
-    line("} else {".into());
-    line(format!("    const double a[] = {{{}}};", matrix.join(", ")));
-    line(format!("    const double b[] = {{{}}};", right.join(", ")));
-    line(format!("    if (!ha_linear(m, {n}, a, b, s{number})) {{"));
-    fail.lines().for_each(|l| line(l.to_string()));
-    line("}".into());
-    text += "    }\n";
-    text
 }
 
 /// The lines of straight code without values that no later line reads.

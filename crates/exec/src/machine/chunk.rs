@@ -9,6 +9,7 @@ use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::ids::Table;
 use halfarrow_compiler::program::calculus::{Calculus, Moving};
+use halfarrow_compiler::program::elimination::{Definite, Elimination};
 use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Op};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -238,7 +239,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let above = self.w.is(FloatCC::GreaterThan, size, least);
         let some = self.w.is(FloatCC::NotEqual, pivot, zero);
         let stands = self.w.both(above, some);
-        self.require(stands, STATUS_OF_WATCH + u64::from(watch));
+        self.stop_unless(stands, STATUS_OF_WATCH + u64::from(watch));
     }
 
     /// One operation: its value, and by the rules of the table its slope.
@@ -372,7 +373,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         });
     }
 
-    fn require(&mut self, stands: Value, status: u64) {
+    fn stop_unless(&mut self, stands: Value, status: u64) {
         let (fine, wrong) = (self.w.integer(0), self.w.integer(status));
         let mine = self.w.choose(stands, fine, wrong);
         self.status = Some(match self.status {
@@ -501,7 +502,8 @@ impl Chunk<'_, '_> {
             right[0] = self.w.div(right[0], pivot);
         } else {
             let matrix: Vec<Value> = solve.matrix.iter().map(|&r| self.value(r)).collect();
-            self.definite(n, &matrix, &mut right);
+            let factors = Definite::factor(self, &matrix, n, f64::EPSILON * n as f64);
+            factors.solve(self, &mut right);
         }
         for (&out, value) in solve.unknowns.iter().zip(right) {
             self.put(out, value, |_| unreachable!("blocks are written out for values only"));
@@ -519,51 +521,17 @@ impl Chunk<'_, '_> {
         let good = self.w.both(some, finite);
         self.usual(good);
     }
+}
 
-    /// `Uᵀ D U x = b`.
-    fn definite(&mut self, n: usize, matrix: &[Value], b: &mut [Value]) {
-        let mut u = matrix.to_vec();
-        let mut inverses = Vec::with_capacity(n);
-        let (zero, one) = (self.w.number(0.0), self.w.number(1.0));
-        let (high, rounding) = (self.w.number(f64::INFINITY), self.w.number(f64::EPSILON * n as f64));
-        let sign = self.w.sign_of(matrix[0]);
-        for k in 0..n {
-            let pivot = u[k * n + k];
-            let (size, entry) = (self.w.mul(sign, pivot), self.w.mul(sign, matrix[k * n + k]));
-            let least = self.w.mul(rounding, entry);
-            for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)]
-            {
-                let good = self.w.is(how, size, bound);
-                self.usual(good);
-            }
-            let inverse = self.w.div(one, pivot);
-            let row: Vec<Value> = (k + 1..n).map(|j| u[k * n + j]).collect();
-            for j in k + 1..n {
-                let factor = self.w.mul(row[j - k - 1], inverse);
-                for i in j..n {
-                    let product = self.w.mul(factor, row[i - k - 1]);
-                    u[j * n + i] = self.w.sub(u[j * n + i], product);
-                }
-                u[k * n + j] = factor;
-            }
-            inverses.push(inverse);
-        }
-        b.iter_mut().for_each(|b| *b = self.w.add(*b, zero));
-        for k in 0..n {
-            for j in k + 1..n {
-                let product = self.w.mul(u[k * n + j], b[k]);
-                b[j] = self.w.sub(b[j], product);
-            }
-        }
-        for (b, inverse) in b.iter_mut().zip(inverses) {
-            let scaled = self.w.mul(*b, inverse);
-            *b = self.w.add(scaled, zero);
-        }
-        for k in (0..n).rev() {
-            for i in 0..k {
-                let product = self.w.mul(u[i * n + k], b[k]);
-                b[i] = self.w.sub(b[i], product);
-            }
+impl Elimination for Chunk<'_, '_> {
+    fn sign_of(&mut self, a: Value) -> Value {
+        self.w.sign_of(a)
+    }
+    fn require(&mut self, pivot: Value, least: Value) {
+        let (zero, high) = (self.zero(), self.w.number(f64::INFINITY));
+        for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)] {
+            let good = self.w.is(how, pivot, bound);
+            self.usual(good);
         }
     }
 }

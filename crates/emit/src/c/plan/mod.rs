@@ -1,24 +1,25 @@
 //! All functions of a model, and the source that they make.
 
+mod routines;
 mod words;
-
-use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program;
 use halfarrow_compiler::program::{
-    Arg, Assumption, Block, BlockId, Cause, Code, ConditionId, ConditionKind, DomainKind, Holds, Program, Reads,
-    Routine, Solve, Value,
+    Assumption, Block, BlockId, Cause, Code, ConditionId, ConditionKind, DomainKind, Holds, Program, Reads, Routine,
+    Value,
 };
 
+use super::blocks::elimination_room;
 use super::cost::{Cost, Work};
 use super::flags::Flags;
 use super::start::{self, Group, Pass};
 use super::terms;
-use super::write::{Moving, Shape, Writer, elimination_room, number};
+use super::write::{Moving, Shape, Writer, number};
 use super::{Export, messages, real, template};
 use crate::{EmitError, Method, Real};
+use routines::{Routines, newton_of};
 
 /// A sum of floats below this fraction of its terms is rounding of the operations that lead to it.
 const ROUNDING_OF_FLOATS: f64 = 1e-5;
@@ -98,76 +99,6 @@ struct Works {
     sources: Work,
     tangent: Work,
     clock: Work,
-}
-
-/// What the functions compute.
-struct Routines {
-    preamble: Routine,
-    rates: Routine,
-    observe: Routine,
-    switching: Routine,
-    clock: Routine,
-    sources: Routine,
-    domains: Routine,
-    /// What the start of a run asks for, each with the name of its function.
-    starts: Vec<(String, Routine)>,
-}
-
-impl Routines {
-    fn of(plan: &Plan) -> Routines {
-        let p = plan.program;
-        let rates: Vec<Value> = p.states.iter().map(|s| s.rate).collect();
-        let shown = plan.export.recorded.iter().filter_map(|&i| p.observed[i].value.clone().ok());
-        let operands = |ids: &[ConditionId]| ids.iter().map(|&c| p.conditions[c].operand).collect::<Vec<_>>();
-        let residuals = |conditions: &[usize]| conditions.iter().map(|&c| p.start[c].residual).collect::<Vec<_>>();
-        let passes = plan.passes.iter().enumerate().map(|(i, p)| ("pass", i, residuals(&p.conditions)));
-        let groups = plan.groups.iter().enumerate().filter(|(_, g)| g.together);
-        let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
-        let guesses = p.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
-        let start = |(kind, number, wanted): (&str, usize, Vec<Value>)| {
-            (format!("ha_start_{kind}_{number}"), p.routine(&wanted))
-        };
-        Routines {
-            preamble: p.preamble(&p.determined(&[])),
-            rates: p.watched_routine(&rates),
-            observe: p.watched_routine(&shown.collect::<Vec<_>>()),
-            switching: p.routine(&operands(&plan.switches)),
-            clock: p.routine(&operands(&plan.clocks)),
-            sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
-            domains: p.routine(&p.domains.iter().map(|d| d.argument).collect::<Vec<_>>()),
-            starts: passes.chain(groups).chain(guesses).map(start).collect(),
-        }
-    }
-
-    fn all(&self) -> impl Iterator<Item = &Routine> {
-        let Routines { preamble, rates, observe, switching, clock, sources, domains, starts } = self;
-        let all = [preamble, rates, observe, switching, clock, sources, domains];
-        all.into_iter().chain(starts.iter().map(|s| &s.1))
-    }
-
-    /// All Newton blocks, each with what it reads from outside and its code.
-    fn newton(&self) -> BTreeMap<BlockId, (&[Arg], &Code)> {
-        let mut blocks = BTreeMap::new();
-        for solve in self.all().flat_map(|r| newton_of(&r.code)) {
-            if let program::Method::Newton { outer, code } = &solve.method {
-                blocks.entry(solve.block).or_insert((&outer[..], code));
-            }
-        }
-        blocks
-    }
-
-    /// What the preamble computes of what other routines read.
-    fn kept(&self) -> Vec<(u32, Value)> {
-        let Routine { wanted, code } = &self.preamble;
-        let local =
-            |(&value, &a): (&Value, &Arg)| if let Arg::Local(local) = a { Some((local.0, value)) } else { None };
-        wanted.iter().zip(&code.outputs).filter_map(local).collect()
-    }
-}
-
-/// The Newton blocks of some code.
-fn newton_of(code: &Code) -> impl Iterator<Item = &Solve> {
-    code.solves().filter(|solve| matches!(solve.method, program::Method::Newton { .. }))
 }
 
 /// Values of parameters alone, from where the preamble leaves them.
