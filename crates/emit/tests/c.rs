@@ -44,6 +44,7 @@ fn c_follows_parameters_and_inputs() {
         (own("sampled"), "period", 5e-3),
         (own("bridge"), "c", 2e-6),
         (own("closure"), "coupler0", 1.0),
+        (own("working_point"), "k", 0.4),
         (own("freedom"), "v", -1.5),
     ];
     let all: Vec<Exported> = cases.iter().map(|(path, ..)| export(path, Method::Heun, 1e-3)).collect();

@@ -234,9 +234,8 @@ fn reactions_are_left_out_of_the_rates() {
     s.rate("x", rate);
     s.hidden("r", re);
     let program = schedule(&s.equations());
-    let layout = program.layout();
-    let rate = program.routine(&layout, &[program.states[0].rate]);
-    assert_eq!(rate.code.len(), 1);
+    let rate = program.routine(&[program.states[0].rate]);
+    assert_eq!(rate.code.steps.len(), 1);
     let mut model = Model::new(program).unwrap();
     model.record(&["r"]).unwrap();
     let mut out = [0.0];

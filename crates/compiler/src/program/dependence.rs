@@ -1,6 +1,7 @@
 //! Which states a value reads.
 
-use super::values::{Op, Reads};
+use super::op::Op;
+use super::values::Reads;
 use super::{Program, Value};
 use crate::ids::Id;
 use std::rc::Rc;

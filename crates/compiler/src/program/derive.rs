@@ -1,7 +1,9 @@
 //! Derivatives of values, as values.
 
-use super::Value;
-use super::values::{Op, Reads, Values};
+use super::calculus::{Calculus, Moving, sum};
+use super::op::Op;
+use super::values::{Reads, Values};
+use super::{ConditionId, Value};
 use crate::algebra::Function;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -67,78 +69,45 @@ impl Values {
 
     /// Derivative of a value from those of its operands; `None` if it is zero.
     pub(super) fn slope(&mut self, value: Value, d: &dyn Fn(Value) -> Option<Value>) -> Option<Value> {
-        match self.op(value) {
-            Op::Neg(a) => Some(self.neg(d(a)?)),
-            Op::Add(a, b) => self.plus_some(d(a), d(b)),
-            Op::Sub(a, b) => {
-                let minus = d(b).map(|b| self.neg(b));
-                self.plus_some(d(a), minus)
-            }
-            Op::Mul(a, b) => {
-                let left = d(a).map(|da| self.times(da, b));
-                let right = d(b).map(|db| self.times(a, db));
-                self.plus_some(left, right)
-            }
-            Op::Div(a, b) => {
-                let minus = d(b).map(|db| self.times(value, db)).map(|product| self.neg(product));
-                let numerator = self.plus_some(d(a), minus)?;
-                Some(self.over(numerator, b))
-            }
-            Op::Powi(a, n) => {
-                let (da, factor) = (d(a)?, self.number(f64::from(n)));
-                let power = self.powi(a, n - 1);
-                let slope = self.times(factor, power);
-                Some(self.times(slope, da))
-            }
-            Op::Pow(a, b) => self.slope_of_power(value, a, b, d(a), d(b)),
-            Op::Call(f, a) => {
-                let da = d(a)?;
-                let slope = self.slope_of_call(f, value, a)?;
-                Some(self.times(slope, da))
-            }
-            Op::Call2(Function::Atan2, y, x) => {
-                let (xx, yy) = (self.times(x, x), self.times(y, y));
-                let square = self.plus(xx, yy);
-                let left = d(y).map(|dy| self.times(x, dy));
-                let right = d(x).map(|dx| self.times(y, dx)).map(|product| self.neg(product));
-                let numerator = self.plus_some(left, right)?;
-                Some(self.over(numerator, square))
-            }
-            Op::Select(c, a, b) => {
-                let zero = self.number(0.0);
-                if d(a).is_none() && d(b).is_none() {
-                    return None;
-                }
-                Some(self.select(c, d(a).unwrap_or(zero), d(b).unwrap_or(zero)))
-            }
-            Op::Table(table, piece, a) => {
-                let (da, slope) = (d(a)?, self.op_of(Op::TableSlope(table, piece, a)));
-                Some(self.times(slope, da))
-            }
-            Op::TableSlope(table, piece, a) => {
-                let (da, slope) = (d(a)?, self.op_of(Op::TableCurvature(table, piece, a)));
-                Some(self.times(slope, da))
-            }
-            Op::TableCurvature(..) => panic!("no third derivative of a table is ever taken"),
-            _ => None,
-        }
+        self.op(value).slope(self, value, |_, operand| (operand, d(operand)))
     }
+}
 
-    pub(super) fn plus_some(&mut self, a: Option<Value>, b: Option<Value>) -> Option<Value> {
-        match (a, b) {
-            (Some(a), Some(b)) => Some(self.plus(a, b)),
-            (one, other) => one.or(other),
-        }
+/// Values as numbers: what is trivial is left out.
+impl Calculus for Values {
+    type Number = Value;
+    fn number(&mut self, value: f64) -> Value {
+        Values::number(self, value)
     }
-
-    fn slope_of_power(
-        &mut self,
-        value: Value,
-        a: Value,
-        b: Value,
-        da: Option<Value>,
-        db: Option<Value>,
-    ) -> Option<Value> {
+    fn neg(&mut self, a: Value) -> Value {
+        Values::neg(self, a)
+    }
+    fn add(&mut self, a: Value, b: Value) -> Value {
+        self.plus(a, b)
+    }
+    fn sub(&mut self, a: Value, b: Value) -> Value {
+        self.minus(a, b)
+    }
+    fn mul(&mut self, a: Value, b: Value) -> Value {
+        self.times(a, b)
+    }
+    fn div(&mut self, a: Value, b: Value) -> Value {
+        self.over(a, b)
+    }
+    fn powi(&mut self, a: Value, n: u32) -> Value {
+        Values::powi(self, a, n)
+    }
+    fn call(&mut self, f: Function, a: Value) -> Value {
+        self.op_of(Op::Call(f, a))
+    }
+    fn select(&mut self, c: Value, a: Value, b: Value) -> Value {
+        Values::select(self, c, a, b)
+    }
+    fn along(&mut self, slope: impl FnOnce(&mut Self) -> Value, rate: Value) -> Value {
+        let slope = slope(self);
+        self.times(slope, rate)
+    }
+    fn along_power(&mut self, value: Value, (a, da): Moving<Self>, (b, db): Moving<Self>) -> Option<Value> {
         let left = da.map(|da| {
             let one = self.number(1.0);
             let less = self.minus(b, one);
@@ -151,55 +120,13 @@ impl Values {
             let slope = self.times(value, log);
             self.times(slope, db)
         });
-        self.plus_some(left, right)
+        sum(self, left, right)
     }
-
-    /// Derivative of `value = f(a)` by `a`; `None` if it is zero.
-    fn slope_of_call(&mut self, f: Function, value: Value, a: Value) -> Option<Value> {
-        use Function::*;
-        let one = self.number(1.0);
-        let over = |this: &mut Self, n: Value, d: Value| this.over(n, d);
-        Some(match f {
-            Sin => self.op_of(Op::Call(Cos, a)),
-            Cos => {
-                let sin = self.op_of(Op::Call(Sin, a));
-                self.neg(sin)
-            }
-            Tan => {
-                let square = self.times(value, value);
-                self.plus(one, square)
-            }
-            Asin | Acos => {
-                let square = self.times(a, a);
-                let rest = self.minus(one, square);
-                let root = self.op_of(Op::Call(Sqrt, rest));
-                let slope = over(self, one, root);
-                if f == Asin { slope } else { self.neg(slope) }
-            }
-            Atan => {
-                let square = self.times(a, a);
-                let sum = self.plus(one, square);
-                over(self, one, sum)
-            }
-            Exp => value,
-            Log => over(self, one, a),
-            Log10 => {
-                let ten = self.number(std::f64::consts::LN_10);
-                let product = self.times(a, ten);
-                over(self, one, product)
-            }
-            Sqrt => {
-                let twice = self.plus(value, value);
-                over(self, one, twice)
-            }
-            Abs => self.op_of(Op::Call(Sign, a)),
-            Sinh => self.op_of(Op::Call(Cosh, a)),
-            Cosh => self.op_of(Op::Call(Sinh, a)),
-            Tanh => {
-                let square = self.times(value, value);
-                self.minus(one, square)
-            }
-            Sign | Floor | Atan2 | Min | Max | Mod => return None,
-        })
+    fn table(&mut self, (table, piece): (u32, Option<ConditionId>), order: u32, a: Value) -> Value {
+        match order {
+            1 => self.op_of(Op::TableSlope(table, piece, a)),
+            2 => self.op_of(Op::TableCurvature(table, piece, a)),
+            _ => panic!("no third derivative of a table is ever taken"),
+        }
     }
 }

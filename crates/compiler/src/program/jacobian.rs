@@ -1,8 +1,9 @@
 //! Exact derivatives of values by givens, as values of a program: sparse, with solve blocks by the implicit function
 //! theorem.
 
-use super::values::{Op, Reads, Values};
-use super::{Block, BlockId, Program, Value};
+use super::op::Op;
+use super::values::{Reads, Values};
+use super::{Block, BlockId, Program, Value, verify};
 use crate::ids::{Id, Table};
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
@@ -22,7 +23,7 @@ pub struct Entry {
 #[derive(Debug, Clone)]
 pub struct Differentiated {
     /// The program with more values, and more blocks that share the factors of the others; ids of the first one keep their
-    /// meaning. Its registers are those of [`layout_with`](Program::layout_with) the values of the entries.
+    /// meaning. What of them reads parameters alone is [`determined`](Program::determined) together with the values of the entries.
     pub program: Program,
     /// The derivatives that may be nonzero, by row, in a row by column.
     pub entries: Vec<Entry>,
@@ -72,7 +73,9 @@ impl Program {
             let slopes = work.slopes.get(value).into_iter().flat_map(|s| s.iter());
             entries.extend(slopes.map(|&(column, value)| Entry { row: row as u32, column, value }));
         }
-        Differentiated { program: Program { values: work.values, blocks: work.blocks, ..self.clone() }, entries }
+        let program = Program { values: work.values, blocks: work.blocks, ..self.clone() };
+        debug_assert_eq!(verify(&program), Ok(()), "{}", self.name);
+        Differentiated { program, entries }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Expressions to values.
 
+use super::op::Op;
 use super::sharing::{Sharing, Unit, UnitId};
-use super::values::{Op, Reads, Values};
+use super::values::{Reads, Values};
 use super::{BlockId, Cause, Condition, ConditionId, ConditionKind, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
 use crate::ids::Table;
@@ -375,7 +376,7 @@ impl<'a> Lowering<'a> {
                 let side = self.side(difference);
                 self.select(side, a, b)
             }
-            (f, Some(b)) => self.op(Op::Call2(f, a, b)),
+            (_, Some(b)) => self.op(Op::Atan2(a, b)),
             (f, None) => {
                 self.note_piecewise(f, a);
                 self.op(Op::Call(f, a))

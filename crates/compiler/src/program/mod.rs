@@ -1,9 +1,8 @@
 //! The program: what is evaluated to integrate a model and to record its variables.
 //!
 //! [`schedule`] turns the steps of [`Equations`](crate::equations::Equations) into one list of [values](Program::values), each an operation on
-//! values before it, equal ones shared. From it [`Program::routine`] makes the code that computes a chosen few of
-//! them, with everything else left out and registers reused: one routine for the rates, one for what is recorded, one
-//! for switching functions. Values that read parameters alone are computed once for each set of parameters, by the
+//! values before it, equal ones shared. From it [`Program::routine`] takes what computes a chosen few of
+//! them, everything else left out: one routine for the rates, one for what is recorded, one for switching functions. Values that read parameters alone are computed once for each set of parameters, by the
 //! [preamble](Program::preamble).
 //!
 //! # Conditions
@@ -13,9 +12,14 @@
 //! branches of an `if` are evaluated: there are no side effects, and a branch without a value does no harm as long as
 //! it is not chosen. Inside a Newton block conditions that read its unknowns are not held.
 
+#[macro_use]
+mod op;
+
 mod angles;
+pub mod calculus;
 mod dependence;
 mod derive;
+pub mod elimination;
 mod jacobian;
 mod lower;
 mod operations;
@@ -25,12 +29,15 @@ mod schedule;
 mod sharing;
 mod start;
 mod values;
+mod verify;
 
 pub use jacobian::{Differentiated, Entry};
-pub use routine::{Instruction, Layout, Register, Routine, Solve};
+pub use op::{Bits, Cost, Op};
+pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;
 pub use start::StartGroup;
-pub use values::{Op, Reads, Values};
+pub use values::{Reads, Values};
+pub use verify::verify;
 
 use std::collections::BTreeMap;
 
@@ -57,8 +64,8 @@ id!(
 
 /// What is evaluated.
 ///
-/// Invariant: every value reads values before it; a value that reads a guess of a Newton block is read by that block
-/// and by such values only.
+/// Invariants (see [`verify`]): every value reads values before it; a value that reads a guess of a Newton block is read
+/// by that block and by such values only; all numbers in it are those of something.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// Name of the model.

@@ -1,7 +1,8 @@
 //! Operations on values, with what is trivial left out.
 
 use super::Value;
-use super::values::{Op, Reads, Values};
+use super::op::{Bits, Op};
+use super::values::{Reads, Values};
 
 impl Values {
     /// The value of an operation on others.
@@ -11,7 +12,7 @@ impl Values {
 
     /// A constant.
     pub(super) fn number(&mut self, value: f64) -> Value {
-        self.op_of(Op::Constant(value.to_bits()))
+        self.op_of(Op::Constant(Bits::of(value)))
     }
 
     fn is(&self, a: Value, number: f64) -> bool {
@@ -22,7 +23,7 @@ impl Values {
         match self.op(a) {
             Op::Neg(b) => b,
             Op::Sub(b, c) => self.op_of(Op::Sub(c, b)),
-            Op::Constant(bits) => self.number(-f64::from_bits(bits)),
+            Op::Constant(bits) => self.number(-bits.number()),
             _ => self.op_of(Op::Neg(a)),
         }
     }
@@ -77,7 +78,7 @@ impl Values {
                 let square = self.op_of(Op::Mul(a, a));
                 self.op_of(Op::Mul(square, square))
             }
-            _ => self.op_of(Op::Powi(a, n)),
+            _ => self.op_of(Op::Powi(n, a)),
         }
     }
 

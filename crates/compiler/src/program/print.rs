@@ -1,69 +1,114 @@
-//! A program as text.
+//! A program as text: `%1` is a value of a routine, `$1` one of parameters alone, `.1` one within a Newton block, `?1` the
+//! guess of an unknown there.
 
-use super::{Block, Cause, Instruction, Layout, Program, Register, Routine, Value};
+use super::{Arg, Block, Cause, Code, Method, Op, Program, Routine, Solve, Step, Value};
 use crate::ids::Id;
-use std::collections::BTreeMap;
+use rustc_hash::FxHashMap;
 use std::fmt;
 
 impl fmt::Display for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let layout = self.layout();
-        let names = self.register_names(&layout);
+        let determined = self.determined(&[]);
+        let names = Names::of(self, &determined);
         writeln!(f, "program {}", self.name)?;
-        let preamble = self.preamble(&layout);
-        if !preamble.code.is_empty() {
+        let preamble = self.preamble(&determined);
+        if !preamble.code.steps.is_empty() {
             writeln!(f, "\nonce for a set of parameters")?;
-            self.print_code(f, &preamble, &names)?;
+            let names = Names { preamble: true, ..names.clone() };
+            self.print_code(f, &preamble.code, &names.within(&preamble.code))?;
         }
         let rates: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
-        let routine = self.watched_routine(&layout, &rates);
         let what = if self.implicit.is_some() { "rates and residuals" } else { "rates" };
-        writeln!(f, "\n{what}, {} instructions, {} registers", routine.code.len(), routine.registers)?;
-        self.print_code(f, &routine, &names)?;
         let explicit = |i: usize| self.implicit.as_ref().is_none_or(|all| all.explicit[i]);
-        for (i, (state, &out)) in self.states.iter().zip(&routine.outputs).enumerate() {
-            match explicit(i) {
-                true => writeln!(f, "    {}' = {}", state.name, name(&names, out))?,
-                false => writeln!(f, "    0 = {}", name(&names, out))?,
-            }
-        }
+        let told = |(i, state): (usize, &super::State)| match explicit(i) {
+            true => format!("{}'", state.name),
+            false => "0".to_string(),
+        };
+        let told: Vec<String> = self.states.iter().enumerate().map(told).collect();
+        self.print_routine(f, what, &self.watched_routine(&rates), &names, &told)?;
         self.print_conditions(f)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
-        let routine = self.watched_routine(&layout, &values);
-        writeln!(f, "\nrecorded, {} instructions, {} registers", routine.code.len(), routine.registers)?;
-        self.print_code(f, &routine, &names)?;
-        for ((observed, _), &out) in shown.iter().zip(&routine.outputs) {
-            writeln!(f, "    {} = {}", observed.name, name(&names, out))?;
-        }
-        Ok(())
+        let told: Vec<String> = shown.iter().map(|(o, _)| o.name.clone()).collect();
+        self.print_routine(f, "recorded", &self.watched_routine(&values), &names, &told)
     }
 }
 
-type Names = BTreeMap<Register, String>;
+/// How values are called that stand before a routine runs.
+#[derive(Clone)]
+struct Names {
+    given: FxHashMap<Value, String>,
+    /// In the preamble what parameters determine is called so as well.
+    preamble: bool,
+}
 
-fn name(names: &Names, register: Register) -> String {
-    names.get(&register).cloned().unwrap_or_else(|| format!("r{register}"))
+/// How all that some code reads and defines is called.
+struct Within<'a> {
+    names: &'a Names,
+    code: &'a Code,
+    /// Of a Newton block what it reads from outside.
+    outer: Option<Vec<String>>,
+}
+
+impl Names {
+    fn of(program: &Program, determined: &[Value]) -> Names {
+        let mut given = FxHashMap::default();
+        let computed = determined.iter().filter(|v| !program.values.op(**v).is_given());
+        given.extend(computed.zip(1..).map(|(&v, number)| (v, format!("${number}"))));
+        for (value, op) in program.values.iter().filter(|(_, op)| op.is_given()) {
+            let name = match op {
+                Op::Constant(bits) => format!("{}", bits.number()),
+                Op::Parameter(i) => program.parameters[i as usize].name.clone(),
+                Op::Time => "t".to_string(),
+                Op::Input(i) => program.inputs[i as usize].name.clone(),
+                Op::Held(i) => program.held[i as usize].name.clone(),
+                Op::Conserved(i) => program.conserved[i as usize].clone(),
+                Op::State(i) => program.states[i as usize].name.clone(),
+                Op::Rate(i) => format!("{}'", program.states[i as usize].name),
+                _ => unreachable!("not given"),
+            };
+            given.insert(value, name);
+        }
+        Names { given, preamble: false }
+    }
+
+    fn within<'a>(&'a self, code: &'a Code) -> Within<'a> {
+        Within { names: self, code, outer: None }
+    }
+}
+
+impl Within<'_> {
+    fn name(&self, a: Arg) -> String {
+        match a {
+            Arg::Given(v) => self.names.given[&v].clone(),
+            Arg::Outer(i) => self.outer.as_ref().expect("a Newton block has an outside")[i as usize].clone(),
+            Arg::Guess(i) => format!("?{i}"),
+            Arg::Local(i) if self.outer.is_some() => format!(".{}", i.0),
+            Arg::Local(i) => {
+                let value = self.code.values[i.index()].filter(|_| self.names.preamble);
+                value.and_then(|v| self.names.given.get(&v).cloned()).unwrap_or_else(|| format!("%{}", i.0))
+            }
+        }
+    }
+
+    fn list(&self, args: impl IntoIterator<Item = Arg>) -> String {
+        args.into_iter().map(|a| self.name(a)).collect::<Vec<_>>().join(", ")
+    }
 }
 
 impl Program {
-    fn register_names(&self, layout: &Layout) -> Names {
-        let mut names: Names = layout.constants.iter().map(|&(r, value)| (r, format!("{value}"))).collect();
-        names.insert(layout.time, "t".to_string());
-        let mut group = |first: Register, members: Vec<&String>| {
-            let numbered = members.into_iter().enumerate();
-            names.extend(numbered.map(|(i, name)| (first + i as u32, name.clone())));
-        };
-        group(layout.parameters, self.parameters.iter().map(|p| &p.name).collect());
-        group(layout.inputs, self.inputs.iter().map(|i| &i.name).collect());
-        group(layout.held, self.held.iter().map(|h| &h.name).collect());
-        group(layout.conserved, self.conserved.iter().collect());
-        group(layout.states, self.states.iter().map(|s| &s.name).collect());
-        if self.implicit.is_some() {
-            let rates: Vec<String> = self.states.iter().map(|s| format!("{}'", s.name)).collect();
-            group(layout.rates, rates.iter().collect());
-        }
-        names
+    fn print_routine(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        what: &str,
+        routine: &Routine,
+        names: &Names,
+        told: &[String],
+    ) -> fmt::Result {
+        writeln!(f, "\n{what}, {} instructions", routine.code.steps.len())?;
+        let within = names.within(&routine.code);
+        self.print_code(f, &routine.code, &within)?;
+        told.iter().zip(&routine.code.outputs).try_for_each(|(told, &a)| writeln!(f, "    {told} = {}", within.name(a)))
     }
 
     fn print_conditions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -83,59 +128,49 @@ impl Program {
         Ok(())
     }
 
-    fn print_code(&self, f: &mut fmt::Formatter<'_>, routine: &Routine, names: &Names) -> fmt::Result {
-        for instruction in &routine.code {
-            let Instruction::Solve { solve } = *instruction else {
-                writeln!(f, "    {}", text(instruction, names))?;
-                continue;
-            };
-            let solve = &routine.solves[solve as usize];
-            let unknowns: Vec<String> = solve.unknowns.iter().map(|&r| name(names, r)).collect();
-            let kind = match self.blocks[solve.block] {
-                Block::Linear { .. } => "linear",
-                Block::Newton { .. } => "newton",
-            };
-            writeln!(f, "    {} = {kind} block of {}", unknowns.join(", "), self.blocks[solve.block].elements())?;
-            if !solve.guess.is_empty() {
-                let guess: Vec<String> = solve.guess.iter().map(|&r| name(names, r)).collect();
-                writeln!(f, "        guess {}", guess.join(", "))?;
+    fn print_code(&self, f: &mut fmt::Formatter<'_>, code: &Code, names: &Within) -> fmt::Result {
+        let indent = if names.outer.is_some() { "        " } else { "    " };
+        code.steps.iter().try_for_each(|step| {
+            let out = names.list(step.defines().iter().map(|&out| Arg::Local(out)));
+            match step {
+                Step::Op { op, .. } => writeln!(f, "{indent}{out} = {}", op.map_operands(|a| Named(names, a)).text()),
+                Step::Parameter { default, .. } => writeln!(f, "{indent}{out} = {} unless set", names.name(*default)),
+                Step::Watch { pivot, .. } => writeln!(f, "{indent}stop if {} vanishes", names.name(*pivot)),
+                Step::Solve(solve) => self.print_solve(f, solve, &out, names),
             }
-            solve.code.iter().try_for_each(|i| writeln!(f, "        {}", text(i, names)))?;
-            for (row, right) in solve.matrix.chunks(solve.right.len().max(1)).zip(&solve.right) {
-                let row: Vec<String> = row.iter().map(|&r| name(names, r)).collect();
-                writeln!(f, "        [{}] | {}", row.join(", "), name(names, *right))?;
+        })
+    }
+
+    fn print_solve(&self, f: &mut fmt::Formatter<'_>, solve: &Solve, out: &str, names: &Within) -> fmt::Result {
+        let kind = match self.blocks[solve.block] {
+            Block::Linear { .. } => "linear",
+            Block::Newton { .. } => "newton",
+        };
+        writeln!(f, "    {out} = {kind} block of {}", self.blocks[solve.block].elements())?;
+        let (inside, right, matrix) = match &solve.method {
+            Method::Linear { matrix, right, .. } => (None, &right[..], &matrix[..]),
+            Method::Newton { outer, code } => {
+                let outer = Some(outer.iter().map(|&a| names.name(a)).collect());
+                let inside = Within { names: names.names, code, outer };
+                self.print_code(f, code, &inside)?;
+                let (right, matrix) = code.outputs.split_at(solve.unknowns.len());
+                (Some(inside), right, matrix)
             }
+        };
+        let inside = inside.as_ref().unwrap_or(names);
+        for (row, &right) in matrix.chunks(right.len().max(1)).zip(right) {
+            writeln!(f, "        [{}] | {}", inside.list(row.iter().copied()), inside.name(right))?;
         }
         Ok(())
     }
 }
 
-fn text(instruction: &Instruction, names: &Names) -> String {
-    use Instruction::*;
-    let n = |r: Register| name(names, r);
-    let binary = |out, a, sign: &str, b| format!("{} = {} {sign} {}", n(out), n(a), n(b));
-    match *instruction {
-        Parameter { out, default, .. } => format!("{} = {} unless set", n(out), n(default)),
-        Neg { out, a } => format!("{} = -{}", n(out), n(a)),
-        Add { out, a, b } => binary(out, a, "+", b),
-        Sub { out, a, b } => binary(out, a, "-", b),
-        Mul { out, a, b } => binary(out, a, "*", b),
-        Div { out, a, b } => binary(out, a, "/", b),
-        Powi { out, a, n: power } => format!("{} = {}^{power}", n(out), n(a)),
-        Pow { out, a, b } => binary(out, a, "^", b),
-        Call { f, out, a } => format!("{} = {}({})", n(out), f.name(), n(a)),
-        Call2 { f, out, a, b } => format!("{} = {}({}, {})", n(out), f.name(), n(a), n(b)),
-        Positive { out, a } => format!("{} = {} > 0", n(out), n(a)),
-        Side { out, a, condition } => format!("{} = c{}: {} > 0", n(out), condition.0, n(a)),
-        Floor { out, a, condition } => format!("{} = c{}: floor({})", n(out), condition.0, n(a)),
-        And { out, a, b } => binary(out, a, "and", b),
-        Or { out, a, b } => binary(out, a, "or", b),
-        Not { out, a } => format!("{} = not {}", n(out), n(a)),
-        Select { out, c, a, b } => format!("{} = if {} then {} else {}", n(out), n(c), n(a), n(b)),
-        Table { out, a, table, .. } => format!("{} = table {table} at {}", n(out), n(a)),
-        TableSlope { out, a, table, .. } => format!("{} = slope of table {table} at {}", n(out), n(a)),
-        TableCurvature { out, a, table, .. } => format!("{} = curvature of table {table} at {}", n(out), n(a)),
-        Watch { pivot, .. } => format!("stop if {} vanishes", n(pivot)),
-        Solve { solve } => format!("solve {solve}"),
+/// What a step reads, under its name.
+#[derive(Clone, Copy)]
+struct Named<'a>(&'a Within<'a>, Arg);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.name(self.1))
     }
 }

@@ -1,131 +1,60 @@
-//! Values to code: what is not needed left out, registers reused.
+//! Values to routines: what computes some of them, each value once, what is not needed left out.
 
-use super::values::{Op, Reads};
-use super::{Block, BlockId, ConditionId, Program, Value};
-use crate::algebra::Function;
-use crate::ids::Id;
-use rustc_hash::FxHashMap;
+use super::op::Op;
+use super::values::Reads;
+use super::{Block, BlockId, Program, Value};
+use crate::ids::{Id, id};
+use rustc_hash::{FxHashMap, FxHashSet};
 
-/// A place for one number.
-pub type Register = u32;
+id!(
+    /// A value within a routine, numbered in the order in which they are defined.
+    Local
+);
 
-/// One step of a routine. `out` is written, the others are read; `out` may be one of them.
-#[allow(missing_docs)]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Instruction {
-    /// The parameter's set value, or `default` where none is set.
+/// What a step of a routine reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Arg {
+    /// A value that stands before any routine runs: given ([`Op::is_given`]), or of parameters alone. In the preamble the
+    /// latter stand as soon as they are computed.
+    Given(Value),
+    /// The result of an earlier step.
+    Local(Local),
+    /// In the code of a Newton block: what it reads from outside, an index into [`Method::Newton::outer`].
+    Outer(u32),
+    /// In the code of a Newton block: the guess of an unknown.
+    Guess(u32),
+}
+
+/// A step of a routine.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// An operation on what earlier steps have found.
+    Op {
+        /// What it defines.
+        out: Local,
+        /// What it does; no given.
+        op: Op<Arg>,
+    },
+    /// A parameter: its set value, or its default where none is set.
     Parameter {
-        out: Register,
+        /// What it defines.
+        out: Local,
+        /// Which parameter.
         index: u32,
-        default: Register,
+        /// Its default.
+        default: Arg,
     },
-    Neg {
-        out: Register,
-        a: Register,
-    },
-    Add {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Sub {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Mul {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Div {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Powi {
-        out: Register,
-        a: Register,
-        n: u32,
-    },
-    Pow {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Call {
-        f: Function,
-        out: Register,
-        a: Register,
-    },
-    Call2 {
-        f: Function,
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Positive {
-        out: Register,
-        a: Register,
-    },
-    Side {
-        out: Register,
-        a: Register,
-        condition: ConditionId,
-    },
-    Floor {
-        out: Register,
-        a: Register,
-        condition: ConditionId,
-    },
-    And {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Or {
-        out: Register,
-        a: Register,
-        b: Register,
-    },
-    Not {
-        out: Register,
-        a: Register,
-    },
-    Select {
-        out: Register,
-        c: Register,
-        a: Register,
-        b: Register,
-    },
-    Table {
-        out: Register,
-        a: Register,
-        table: u32,
-        piece: Option<ConditionId>,
-    },
-    TableSlope {
-        out: Register,
-        a: Register,
-        table: u32,
-        piece: Option<ConditionId>,
-    },
-    TableCurvature {
-        out: Register,
-        a: Register,
-        table: u32,
-        piece: Option<ConditionId>,
-    },
-    /// Stops if the pivot vanishes against its scale.
+    /// Stops if a divisor vanishes against its scale.
     Watch {
-        pivot: Register,
-        scale: Register,
+        /// Which divisor: index into [`Program::watches`].
         watch: u32,
+        /// The divisor.
+        pivot: Arg,
+        /// Its scale.
+        scale: Arg,
     },
-    /// A solve block: index into [`Routine::solves`].
-    Solve {
-        solve: u32,
-    },
+    /// A solve block.
+    Solve(Solve),
 }
 
 /// A solve block in a routine.
@@ -133,123 +62,135 @@ pub enum Instruction {
 pub struct Solve {
     /// The block.
     pub block: BlockId,
-    /// The block that has factored the same matrix, if there is one.
-    pub shared: Option<BlockId>,
-    /// Where the unknowns are written.
-    pub unknowns: Vec<Register>,
-    /// Newton: where the guess is put before `code` runs; empty for a linear block.
-    pub guess: Vec<Register>,
-    /// Newton: what varies outside and is read by `code`, in the order of the values; the same in every routine.
-    pub outer: Vec<Register>,
-    /// Newton: computes right side and matrix at the guess; it holds no solve blocks.
-    pub code: Vec<Instruction>,
-    /// Matrix of a linear block, Jacobian of a Newton block, row by row.
-    pub matrix: Vec<Register>,
-    /// The places of the matrix that are not 0 whatever happens.
+    /// Its unknowns, which it defines.
+    pub unknowns: Vec<Local>,
+    /// The places of the matrix, row by row, that are not 0 whatever happens.
     pub entries: Vec<u32>,
-    /// Right-hand side of a linear block, residuals of a Newton block.
-    pub right: Vec<Register>,
+    /// How it is solved.
+    pub method: Method,
 }
 
-/// Code that computes some values.
+/// How a solve block is solved, and what it reads.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Method {
+    /// By elimination.
+    Linear {
+        /// The block that has factored the same matrix, if there is one.
+        shared: Option<BlockId>,
+        /// Row by row.
+        matrix: Vec<Arg>,
+        /// The right-hand side.
+        right: Vec<Arg>,
+    },
+    /// By Newton.
+    Newton {
+        /// What varies outside and is read by `code`, in the order of the values; the same in every routine.
+        outer: Vec<Arg>,
+        /// Computes the residuals, then the Jacobian row by row, at the guess; it holds no solve blocks.
+        code: Code,
+    },
+}
+
+/// Steps in order, and what is wanted of them.
+///
+/// Invariant (see [`verify`](Code::verify)): each local is defined by one step, in the order of the numbers, before any
+/// step reads it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Code {
+    /// The steps.
+    pub steps: Vec<Step>,
+    /// What is wanted.
+    pub outputs: Vec<Arg>,
+    /// For each local the value of the program that it is; none for an unknown that nothing reads.
+    pub values: Vec<Option<Value>>,
+}
+
+/// What computes some values of a program.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Routine {
-    /// The code.
-    pub code: Vec<Instruction>,
-    /// Its solve blocks.
-    pub solves: Vec<Solve>,
-    /// Where the wanted values stand when it has run.
-    pub outputs: Vec<Register>,
-    /// Number of registers it needs, fixed ones included.
-    pub registers: u32,
+    /// The values.
+    pub wanted: Vec<Value>,
+    /// What computes them; its outputs are they.
+    pub code: Code,
 }
 
-/// Registers that keep their contents between routines: parameters, constants and what is computed from them; time,
-/// inputs, held signals, conserved constants, states, each group in order.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Layout {
-    /// The register of each value that has a fixed one.
-    pub registers: FxHashMap<Value, Register>,
-    /// Constants and their registers.
-    pub constants: Vec<(Register, f64)>,
-    /// First register of the parameters.
-    pub parameters: Register,
-    /// Register of time.
-    pub time: Register,
-    /// First register of the inputs.
-    pub inputs: Register,
-    /// First register of the held signals.
-    pub held: Register,
-    /// First register of the conserved constants.
-    pub conserved: Register,
-    /// First register of the states.
-    pub states: Register,
-    /// First register of their rates; there are some only in implicit form.
-    pub rates: Register,
-    /// Number of fixed registers.
-    pub size: u32,
+impl Solve {
+    /// What it reads from outside.
+    pub fn reads(&self) -> impl Iterator<Item = Arg> + '_ {
+        let (first, second): (&[Arg], &[Arg]) = match &self.method {
+            Method::Linear { matrix, right, .. } => (matrix, right),
+            Method::Newton { outer, .. } => (outer, &[]),
+        };
+        first.iter().chain(second).copied()
+    }
+}
+
+impl Step {
+    /// Calls `visit` with all that it reads; of a Newton block what it reads from outside.
+    pub fn for_each_read(&self, mut visit: impl FnMut(Arg)) {
+        match self {
+            Step::Op { op, .. } => op.for_each_operand(visit),
+            Step::Parameter { default, .. } => visit(*default),
+            Step::Watch { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(visit),
+            Step::Solve(solve) => solve.reads().for_each(visit),
+        }
+    }
+
+    /// What it defines.
+    pub fn defines(&self) -> &[Local] {
+        match self {
+            Step::Op { out, .. } | Step::Parameter { out, .. } => std::slice::from_ref(out),
+            Step::Watch { .. } => &[],
+            Step::Solve(solve) => &solve.unknowns,
+        }
+    }
+}
+
+impl Code {
+    /// Takes the next local, which is this value of the program.
+    pub fn define(&mut self, value: Option<Value>) -> Local {
+        self.values.push(value);
+        Local::new(self.values.len() - 1)
+    }
+
+    /// Appends an operation.
+    pub fn push(&mut self, op: Op<Arg>, value: Option<Value>) -> Arg {
+        let out = self.define(value);
+        self.steps.push(Step::Op { out, op });
+        Arg::Local(out)
+    }
+
+    /// Its solve blocks.
+    pub fn solves(&self) -> impl Iterator<Item = &Solve> {
+        self.steps.iter().filter_map(|step| if let Step::Solve(solve) = step { Some(solve) } else { None })
+    }
 }
 
 impl Program {
-    /// The fixed registers.
-    pub fn layout(&self) -> Layout {
-        self.layout_with(&[])
-    }
-
-    /// The fixed registers where these values are wanted too.
-    pub fn layout_with(&self, more: &[Value]) -> Layout {
-        let mut layout = Layout { parameters: 0, ..Layout::default() };
-        let mut next = self.parameters.len() as u32;
+    /// The values of parameters alone that anything reads, or that are wanted besides; constants and parameters among
+    /// them, in order.
+    pub fn determined(&self, more: &[Value]) -> Vec<Value> {
         let live = self.live_anywhere(more);
-        for (value, op) in self.values.iter().filter(|(v, _)| live[v.index()]) {
-            let computed = self.values.reads(value) == Reads::PARAMETERS && !matches!(op, Op::Parameter(_));
-            if computed {
-                layout.registers.insert(value, next);
-                if let Op::Constant(bits) = op {
-                    layout.constants.push((next, f64::from_bits(bits)));
-                }
-                next += 1;
-            }
-        }
-        layout.time = next;
-        layout.inputs = next + 1;
-        layout.held = layout.inputs + self.inputs.len() as u32;
-        layout.conserved = layout.held + self.held.len() as u32;
-        layout.states = layout.conserved + self.conserved.len() as u32;
-        layout.rates = layout.states + self.states.len() as u32;
-        layout.size = layout.rates + if self.implicit.is_some() { self.states.len() as u32 } else { 0 };
-        for (value, op) in self.values.iter() {
-            let register = match op {
-                Op::Parameter(i) => layout.parameters + i,
-                Op::Time => layout.time,
-                Op::Input(i) => layout.inputs + i,
-                Op::Held(i) => layout.held + i,
-                Op::Conserved(i) => layout.conserved + i,
-                Op::State(i) => layout.states + i,
-                Op::Rate(i) => layout.rates + i,
-                _ => continue,
-            };
-            layout.registers.insert(value, register);
-        }
-        layout
+        let is = |v: Value, op: Op| {
+            matches!(op, Op::Parameter(_)) || live[v.index()] && self.values.reads(v) == Reads::PARAMETERS
+        };
+        self.values.iter().filter(|&(v, op)| is(v, op)).map(|(v, _)| v).collect()
     }
 
-    /// The code that computes all that reads parameters alone, into its fixed registers; divisors among it are watched.
-    pub fn preamble(&self, layout: &Layout) -> Routine {
-        let mut wanted: Vec<Value> = layout.registers.keys().copied().collect();
-        wanted.retain(|&v| self.values.reads(v) == Reads::PARAMETERS);
-        wanted.sort_unstable();
-        Builder::new(self, layout, true).build(&wanted, &self.watches_of(true))
+    /// The routine that computes all that reads parameters alone; divisors among it are watched. `determined` is what
+    /// [`determined`](Program::determined) gives.
+    pub fn preamble(&self, determined: &[Value]) -> Routine {
+        Builder::new(self, true).build(determined, &self.watches_of(true))
     }
 
-    /// The code that computes the wanted values from the fixed registers, in the order of [`Program::values`].
-    pub fn routine(&self, layout: &Layout, wanted: &[Value]) -> Routine {
-        Builder::new(self, layout, false).build(wanted, &[])
+    /// The routine that computes the wanted values, in the order of [`Program::values`].
+    pub fn routine(&self, wanted: &[Value]) -> Routine {
+        Builder::new(self, false).build(wanted, &[])
     }
 
     /// The same, with all divisors watched that vary.
-    pub fn watched_routine(&self, layout: &Layout, wanted: &[Value]) -> Routine {
-        Builder::new(self, layout, false).build(wanted, &self.watches_of(false))
+    pub fn watched_routine(&self, wanted: &[Value]) -> Routine {
+        Builder::new(self, false).build(wanted, &self.watches_of(false))
     }
 
     /// The watches of divisors that read parameters alone, or of the others.
@@ -277,7 +218,13 @@ impl Program {
     }
 
     fn live_anywhere(&self, more: &[Value]) -> Vec<bool> {
-        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).chain(more.iter().copied()).collect();
+        let wanted: Vec<Value> = self.wanted_anywhere().into_iter().chain(more.iter().copied()).collect();
+        self.live(&wanted, true)
+    }
+
+    /// All values that are read from outside.
+    pub(super) fn wanted_anywhere(&self) -> Vec<Value> {
+        let mut wanted: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
         wanted.extend(self.observed.iter().filter_map(|o| o.value.clone().ok()));
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
         wanted.extend(self.guesses.iter().flat_map(|g| [g.residual, g.asked]));
@@ -290,23 +237,27 @@ impl Program {
         wanted.extend(self.assumptions.iter().flat_map(|a| [a.value, a.scale]));
         let asked = |d: &super::Domain| d.asked.as_ref().map(|a| a.1);
         wanted.extend(self.domains.iter().flat_map(|d| [Some(d.argument), asked(d), d.limit]).flatten());
-        self.live(&wanted, true)
+        wanted
     }
 }
 
-const NONE: u32 = u32::MAX;
-
-/// Values in the order in which they are computed, then given registers.
+/// Puts together a routine.
 struct Builder<'a> {
     program: &'a Program,
-    layout: &'a Layout,
     preamble: bool,
-    register: Vec<u32>,
-    /// Position after which a value is read no more.
-    last_use: Vec<u32>,
-    free: Vec<u32>,
-    next: u32,
-    routine: Routine,
+    local: FxHashMap<Value, Local>,
+    code: Code,
+    /// The Newton block that is open.
+    inner: Inner,
+}
+
+/// The code of a Newton block while it is put together.
+#[derive(Default)]
+struct Inner {
+    /// What varies outside and is read inside.
+    outer: Vec<Value>,
+    local: FxHashMap<Value, Local>,
+    code: Code,
 }
 
 /// What is computed at a position.
@@ -320,20 +271,9 @@ enum Item {
 }
 
 impl<'a> Builder<'a> {
-    fn new(program: &'a Program, layout: &'a Layout, preamble: bool) -> Self {
-        let n = program.values.len();
-        let mut register = vec![NONE; n];
-        layout.registers.iter().for_each(|(v, &r)| register[v.index()] = r);
-        Builder {
-            program,
-            layout,
-            preamble,
-            register,
-            last_use: vec![0; n],
-            free: Vec::new(),
-            next: layout.size,
-            routine: Routine::default(),
-        }
+    fn new(program: &'a Program, preamble: bool) -> Self {
+        let (local, code, inner) = (FxHashMap::default(), Code::default(), Inner::default());
+        Builder { program, preamble, local, code, inner }
     }
 
     fn build(mut self, wanted: &[Value], watches: &[u32]) -> Routine {
@@ -341,13 +281,10 @@ impl<'a> Builder<'a> {
         let watched = |w: &u32| &self.program.watches[*w as usize];
         roots.extend(watches.iter().map(watched).flat_map(|w| [w.pivot, w.scale]));
         let live = self.program.live(&roots, self.preamble);
-        let items = self.order(&live, watches);
-        self.find_last_uses(&items);
-        wanted.iter().for_each(|v| self.last_use[v.index()] = u32::MAX);
-        items.iter().enumerate().for_each(|(at, &item)| self.emit(at as u32, item, &live));
-        self.routine.outputs = wanted.iter().map(|v| self.register[v.index()]).collect();
-        self.routine.registers = self.next;
-        self.routine
+        self.order(&live, watches).into_iter().for_each(|item| self.emit(item));
+        self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
+        debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);
+        Routine { wanted: wanted.to_vec(), code: self.code }
     }
 
     /// Whether the value is there before the routine runs.
@@ -439,142 +376,98 @@ impl<'a> Builder<'a> {
         items
     }
 
-    fn find_last_uses(&mut self, items: &[Item]) {
-        let program = self.program;
-        let mut close_at = vec![0; program.blocks.len()];
-        let mut open = None;
-        for (at, item) in items.iter().enumerate() {
-            match item {
-                Item::Open(block) => open = Some(*block),
-                Item::Close(block) => {
-                    close_at[block.index()] = at as u32;
-                    open = None;
-                    program.blocks[*block].reads().for_each(|v| self.last_use[v.index()] = at as u32);
-                }
-                _ => {}
-            }
-            debug_assert!(open.is_none() || matches!(item, Item::Open(_) | Item::Inner(_)));
-        }
-        let mut block = None;
-        for (at, item) in items.iter().enumerate() {
-            let mut used = |v: Value, at: u32| self.last_use[v.index()] = self.last_use[v.index()].max(at);
-            match *item {
-                Item::Open(b) => block = Some(b),
-                Item::Close(_) => block = None,
-                Item::Value(v) => program.values.op(v).for_each_operand(|v| used(v, at as u32)),
-                Item::Inner(v) => {
-                    let close = block.map_or(at as u32, |b| close_at[b.index()]);
-                    // What stands outside the block is read in every iteration.
-                    program.values.op(v).for_each_operand(|v| {
-                        let inside = program.values.reads(v).includes(Reads::GUESS);
-                        used(v, if inside { at as u32 } else { close });
-                    });
-                }
-                Item::Watch(w) => {
-                    let w = &program.watches[w as usize];
-                    used(w.pivot, at as u32);
-                    used(w.scale, at as u32);
-                }
-            }
-        }
-    }
-
-    fn emit(&mut self, at: u32, item: Item, live: &[bool]) {
+    fn emit(&mut self, item: Item) {
         match item {
-            Item::Value(v) => {
-                let op = self.program.values.op(v);
-                let instruction = self.instruction(v, op, at);
-                self.routine.code.push(instruction);
-            }
+            Item::Value(v) => self.value(v),
             Item::Inner(v) => {
-                let op = self.program.values.op(v);
-                let instruction = self.instruction(v, op, at);
-                let solve = self.routine.solves.last_mut().expect("inner code stands in an open block");
-                solve.code.push(instruction);
+                let op = self.program.values.op(v).map_operands(|o| self.inner_arg(o));
+                let out = self.inner.code.define(Some(v));
+                self.inner.code.steps.push(Step::Op { out, op });
+                self.inner.local.insert(v, out);
             }
-            Item::Open(block) => self.open(block),
-            Item::Close(block) => self.close(block, at, live),
+            Item::Open(block) => {
+                let varies = |v: &Value| self.program.values.reads(*v) != Reads::PARAMETERS;
+                let mut outer: Vec<Value> = self.outer_reads(block).into_iter().filter(varies).collect();
+                outer.sort_unstable();
+                outer.dedup();
+                self.inner = Inner { outer, ..Inner::default() };
+            }
+            Item::Close(block) => self.close(block),
             Item::Watch(watch) => {
                 let w = &self.program.watches[watch as usize];
-                let (pivot, scale) = (self.register[w.pivot.index()], self.register[w.scale.index()]);
-                self.routine.code.push(Instruction::Watch { pivot, scale, watch });
-                [w.pivot, w.scale].into_iter().for_each(|v| self.release(v, at));
+                let (pivot, scale) = (self.arg(w.pivot), self.arg(w.scale));
+                self.code.steps.push(Step::Watch { watch, pivot, scale });
             }
         }
     }
 
-    fn open(&mut self, block: BlockId) {
-        let newton = matches!(self.program.blocks[block], Block::Newton { .. });
-        let size = if newton { self.program.blocks[block].size() } else { 0 };
-        let guess: Vec<Register> = (0..size).map(|_| self.take()).collect();
-        for (i, &register) in guess.iter().enumerate() {
-            if let Some(v) = self.program.values.find(Op::Guess(block, i as u32)) {
-                self.register[v.index()] = register;
-                self.last_use[v.index()] = NONE; // until the block is closed
+    fn value(&mut self, v: Value) {
+        let op = self.program.values.op(v);
+        let step = match op {
+            Op::Parameter(index) => {
+                let default = self.arg(self.program.parameters[index as usize].default);
+                Step::Parameter { out: self.code.define(Some(v)), index, default }
             }
-        }
-        let (unknowns, code) = (Vec::new(), Vec::new());
-        let (matrix, right, outer) = (Vec::new(), Vec::new(), Vec::new());
-        let shared = self.program.shared(block);
-        self.routine.solves.push(Solve {
-            block,
-            shared,
-            unknowns,
-            guess,
-            outer,
-            code,
-            matrix,
-            entries: Vec::new(),
-            right,
-        });
-    }
-
-    fn close(&mut self, block: BlockId, at: u32, live: &[bool]) {
-        let (matrix, right) = match &self.program.blocks[block] {
-            Block::Linear { matrix, right, .. } => (matrix, right),
-            Block::Newton { jacobian, residuals, .. } => (jacobian, residuals),
+            _ => {
+                let op = op.map_operands(|o| self.arg(o));
+                Step::Op { out: self.code.define(Some(v)), op }
+            }
         };
-        let of = |values: &[Value]| values.iter().map(|v| self.register[v.index()]).collect::<Vec<_>>();
-        let (matrix_registers, right_registers) = (of(matrix), of(right));
-        let newton = matches!(self.program.blocks[block], Block::Newton { .. });
-        let mut outer = if newton { self.outer_reads(block) } else { Vec::new() };
-        outer.sort_unstable();
-        outer.dedup();
-        let varies = |v: &&Value| self.program.values.reads(**v) != Reads::PARAMETERS;
-        let outer: Vec<Register> = outer.iter().filter(varies).map(|v| self.register[v.index()]).collect();
-        let mut dead = Vec::new();
-        let mut unknowns = Vec::new();
-        for i in 0..right.len() {
-            let solution = self.program.values.find(Op::Solution(block, i as u32));
-            let fixed = solution.map(|v| self.register[v.index()]).filter(|&r| r < self.layout.size);
-            let register = fixed.unwrap_or_else(|| self.take());
-            unknowns.push(register);
-            match solution {
-                Some(v) if live[v.index()] => self.register[v.index()] = register,
-                _ if fixed.is_none() => dead.push(register),
-                _ => {}
-            }
-        }
-        let solve = self.routine.solves.last_mut().expect("a block is open");
-        let entries = (0u32..).zip(matrix).filter(|(_, v)| self.program.values.constant(**v) != Some(0.0));
-        solve.entries = entries.map(|(place, _)| place).collect();
-        (solve.matrix, solve.right, solve.unknowns) = (matrix_registers, right_registers, unknowns);
-        solve.outer = outer;
-        self.free.extend(&solve.guess);
-        self.free.extend(dead);
-        let index = self.routine.solves.len() as u32 - 1;
-        self.routine.code.push(Instruction::Solve { solve: index });
-        let mut reads: Vec<Value> = self.program.blocks[block].reads().collect();
-        reads.extend(self.outer_reads(block));
-        reads.sort_unstable();
-        reads.dedup();
-        reads.into_iter().for_each(|v| self.release(v, at));
+        self.local.insert(v, step.defines()[0]);
+        self.code.steps.push(step);
     }
 
-    /// What stands outside a block and is read inside: those whose last use is its end. Found from its code's values.
+    fn close(&mut self, block: BlockId) {
+        let program = self.program;
+        let of = |this: &Self, values: &[Value]| values.iter().map(|&v| this.arg(v)).collect::<Vec<Arg>>();
+        let (matrix, method) = match &program.blocks[block] {
+            Block::Linear { matrix, right, .. } => {
+                let (shared, right) = (program.shared(block), of(self, right));
+                (matrix, Method::Linear { shared, matrix: of(self, matrix), right })
+            }
+            Block::Newton { jacobian, residuals, .. } => {
+                let outputs = residuals.iter().chain(jacobian).map(|&v| self.inner_arg(v)).collect();
+                let Inner { outer, code, .. } = std::mem::take(&mut self.inner);
+                let code = Code { outputs, ..code };
+                (jacobian, Method::Newton { outer: of(self, &outer), code })
+            }
+        };
+        let unknowns = (0..program.blocks[block].size()).map(|i| {
+            let solution = program.values.find(Op::Solution(block, i as u32));
+            let local = self.code.define(solution);
+            solution.map(|v| self.local.insert(v, local));
+            local
+        });
+        let unknowns = unknowns.collect();
+        let entries = (0u32..).zip(matrix).filter(|(_, v)| program.values.constant(**v) != Some(0.0));
+        let entries = entries.map(|(place, _)| place).collect();
+        self.code.steps.push(Step::Solve(Solve { block, unknowns, entries, method }));
+    }
+
+    fn arg(&self, v: Value) -> Arg {
+        self.local.get(&v).map_or(Arg::Given(v), |&local| Arg::Local(local))
+    }
+
+    /// What stands in the code of the open block for a value.
+    fn inner_arg(&self, v: Value) -> Arg {
+        let varies = self.program.values.reads(v) != Reads::PARAMETERS;
+        match self.program.values.op(v) {
+            Op::Guess(_, i) => Arg::Guess(i),
+            _ if !varies => Arg::Given(v),
+            _ => match self.inner.local.get(&v) {
+                Some(&local) => Arg::Local(local),
+                None => {
+                    let place = self.inner.outer.binary_search(&v);
+                    Arg::Outer(place.expect("what varies and is read inside is known before") as u32)
+                }
+            },
+        }
+    }
+
+    /// What stands outside a block and is read inside.
     fn outer_reads(&self, block: BlockId) -> Vec<Value> {
         let mut found = Vec::new();
-        let mut seen = rustc_hash::FxHashSet::default();
+        let mut seen = FxHashSet::default();
         let mut open: Vec<Value> = self.program.blocks[block].reads().collect();
         while let Some(v) = open.pop() {
             if !self.program.values.reads(v).includes(Reads::GUESS) {
@@ -584,70 +477,5 @@ impl<'a> Builder<'a> {
             }
         }
         found
-    }
-
-    fn take(&mut self) -> Register {
-        self.free.pop().unwrap_or_else(|| {
-            self.next += 1;
-            self.next - 1
-        })
-    }
-
-    /// Frees the register of a value that is read for the last time here.
-    fn release(&mut self, v: Value, at: u32) {
-        let register = self.register[v.index()];
-        if self.last_use[v.index()] == at && register != NONE && register >= self.layout.size {
-            self.free.push(register);
-            self.last_use[v.index()] = NONE;
-        }
-    }
-
-    fn instruction(&mut self, value: Value, op: Op, at: u32) -> Instruction {
-        let r = |v: Value| self.register[v.index()];
-        let mut operands = [NONE; 3];
-        let mut n = 0;
-        op.for_each_operand(|v| {
-            operands[n] = r(v);
-            n += 1;
-        });
-        let [a, b, c] = operands;
-        op.for_each_operand(|v| self.release(v, at));
-        let out = match self.register[value.index()] {
-            NONE => self.take(),
-            fixed => fixed,
-        };
-        self.register[value.index()] = out;
-        if self.last_use[value.index()] == 0 && out >= self.layout.size {
-            self.free.push(out); // nobody reads it
-        }
-        match op {
-            Op::Parameter(index) => {
-                let default = self.register[self.program.parameters[index as usize].default.index()];
-                Instruction::Parameter { out, index, default }
-            }
-            Op::Neg(_) => Instruction::Neg { out, a },
-            Op::Add(..) => Instruction::Add { out, a, b },
-            Op::Sub(..) => Instruction::Sub { out, a, b },
-            Op::Mul(..) => Instruction::Mul { out, a, b },
-            Op::Div(..) => Instruction::Div { out, a, b },
-            Op::Powi(_, n) => Instruction::Powi { out, a, n },
-            Op::Pow(..) => Instruction::Pow { out, a, b },
-            Op::Call(f, _) => Instruction::Call { f, out, a },
-            Op::Call2(f, ..) => Instruction::Call2 { f, out, a, b },
-            Op::Positive(_) => Instruction::Positive { out, a },
-            Op::Side(condition, _) => Instruction::Side { out, a, condition },
-            Op::Floor(condition, _) => Instruction::Floor { out, a, condition },
-            Op::And(..) => Instruction::And { out, a, b },
-            Op::Or(..) => Instruction::Or { out, a, b },
-            Op::Not(_) => Instruction::Not { out, a },
-            Op::Select(..) => Instruction::Select { out, c: a, a: b, b: c },
-            Op::Table(table, piece, _) => Instruction::Table { out, a, table, piece },
-            Op::TableSlope(table, piece, _) => Instruction::TableSlope { out, a, table, piece },
-            Op::TableCurvature(table, piece, _) => Instruction::TableCurvature { out, a, table, piece },
-            Op::Constant(_) | Op::Time | Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) | Op::Rate(_) => {
-                unreachable!("given before the routine runs")
-            }
-            Op::Guess(..) | Op::Solution(..) => unreachable!("written by its block"),
-        }
     }
 }

@@ -2,11 +2,12 @@
 
 use super::angles::sums_of_angles;
 use super::lower::Lowering;
+use super::op::Op;
 use super::sharing::share;
-use super::values::{Op, Reads};
+use super::values::Reads;
 use super::{
     Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
-    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
+    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
@@ -342,6 +343,7 @@ impl Schedule<'_> {
         program.place_guesses();
         find_causes(&mut program, &self.kinks);
         program.kept = kept(&program, equations);
+        debug_assert_eq!(verify(&program), Ok(()), "{}", program.name);
         program
     }
 }
@@ -364,7 +366,7 @@ fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
         moved.filter_map(|m| Some((of_state(m).filter(|&i| !is_sum(i))? as u32, program.momenta[&m.speed]))).collect();
     let sums: Vec<Value> = kept.iter().map(|k| k.1).collect();
     let live = program.live(&sums, false);
-    let jumps = |op: Op| condition_of(op).is_some() || matches!(op, Op::Held(_));
+    let jumps = |op: Op| op.condition().is_some() || matches!(op, Op::Held(_));
     let jumps = program.values.iter().any(|(v, op)| live[v.index()] && jumps(op));
     if jumps { kept } else { Vec::new() }
 }
@@ -541,7 +543,7 @@ fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
         let events = program.conditions.iter().filter(|(id, _)| causes[id.index()] == Cause::State);
         roots.extend(events.map(|(_, c)| c.operand));
         let live = program.live(&roots, false);
-        let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| condition_of(op));
+        let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| op.condition());
         // Not short-circuited: all of them are marked.
         if used.filter(|c| shown(&mut causes[c.index()])).count() == 0 {
             break;
@@ -550,15 +552,6 @@ fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
     program.conditions.iter_mut().for_each(|(id, condition): (ConditionId, &mut Condition)| {
         condition.cause = causes[id.index()];
     });
-}
-
-/// The condition that an operation reads.
-fn condition_of(op: Op) -> Option<ConditionId> {
-    match op {
-        Op::Side(c, _) | Op::Floor(c, _) => Some(c),
-        Op::Table(_, c, _) | Op::TableSlope(_, c, _) | Op::TableCurvature(_, c, _) => c,
-        _ => None,
-    }
 }
 
 fn degrees(program: &Program) -> Vec<Degree> {

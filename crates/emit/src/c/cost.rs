@@ -2,10 +2,10 @@
 
 use std::ops::{Add, Mul};
 
-use halfarrow_compiler::program::{BlockId, Program};
+use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::program::{self, Arg, BlockId, Code, Method, Op, Program, Solve, Step};
 
 use super::plan::Plan;
-use super::ssa::{Act, Code, Inner};
 
 /// Jumps within one step at most; more of them are an error.
 pub(super) const MOST_JUMPS: u64 = 64;
@@ -31,29 +31,42 @@ pub(super) struct Work {
 
 impl Work {
     /// What code does.
-    pub fn of(program: &Program, code: &Code, inner: &Inner) -> Work {
+    pub fn of(program: &Program, code: &Code) -> Work {
         let mut work = Work::default();
         for step in &code.steps {
-            match step.act {
-                Act::Div => work.divisions += 1,
-                Act::Call(halfarrow_compiler::algebra::Function::Sqrt) => work.divisions += 1,
-                Act::Call(_) | Act::Call2(_) | Act::Pow => work.calls += 1,
-                Act::Powi(n) => work.operations += u64::from(2 * n.max(1).ilog2()),
-                Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => work.operations += 40,
-                Act::Linear(block) => {
-                    work.solves += 1;
-                    work.operations += elimination(program.blocks[block].size());
-                }
-                Act::Newton(block) => {
-                    let n = program.blocks[block].size();
-                    let one = inner.get(&block).map(|code| Work::of(program, code, inner));
-                    let one = one.map_or(0, |w| w.operations + w.divisions + w.calls);
-                    work.newton.push((block, 1, one + elimination(n) + 20 * n as u64));
-                }
-                _ => work.operations += 1,
+            match step {
+                Step::Op { op, .. } => work.count(*op),
+                Step::Parameter { .. } | Step::Watch { .. } => work.operations += 1,
+                Step::Solve(solve) => work.solve(program, solve),
             }
         }
         work
+    }
+
+    fn count(&mut self, op: Op<Arg>) {
+        match (op.cost(), op) {
+            (_, Op::Call(Function::Sqrt, _)) | (program::Cost::Division, _) => self.divisions += 1,
+            (_, Op::Floor(..)) => self.operations += 1,
+            (program::Cost::Power, Op::Powi(n, _)) => self.operations += u64::from(2 * n.max(1).ilog2()),
+            (program::Cost::Table, _) => self.operations += 40,
+            (program::Cost::Call, _) => self.calls += 1,
+            _ => self.operations += 1,
+        }
+    }
+
+    fn solve(&mut self, program: &Program, solve: &Solve) {
+        let n = solve.unknowns.len();
+        match &solve.method {
+            Method::Linear { .. } => {
+                self.solves += 1;
+                self.operations += elimination(n);
+            }
+            Method::Newton { code, .. } => {
+                let one = Work::of(program, code);
+                let one = one.operations + one.divisions + one.calls;
+                self.newton.push((solve.block, 1, one + elimination(n) + 20 * n as u64));
+            }
+        }
     }
 
     /// The same with derivatives beside the values.

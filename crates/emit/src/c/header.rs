@@ -28,7 +28,6 @@ pub(super) fn header(export: &Export, plan: &Plan, names: &Names, cost: &Cost) -
         (format!("{}, {value:?} if not set{kind}", s.name), s.unit.as_ref())
     });
     let outputs = export.recorded.iter().map(|&i| (p.observed[i].name.clone(), p.observed[i].unit.as_ref()));
-    let held = !p.held.is_empty();
     let private = private_parts(export, plan);
     let words: Vec<(&str, String)> = vec![
         ("COST_LINES", lines.trim_end().to_string()),
@@ -53,24 +52,8 @@ pub(super) fn header(export: &Export, plan: &Plan, names: &Names, cost: &Cost) -
         ("PRIVATE_PARTS", private),
     ];
     let words = words.into_iter().map(|(word, text)| (word.to_string(), text)).collect();
-    let mut flags = std::collections::BTreeSet::new();
-    for (flag, holds) in [
-        ("states", !p.states.is_empty()),
-        ("inputs", !p.inputs.is_empty()),
-        ("parameters", !p.parameters.is_empty()),
-        ("outputs", !export.recorded.is_empty()),
-        ("tangent", plan.has_tangent()),
-        ("derivatives", export.derivatives),
-        ("switches", !plan.switches.is_empty()),
-        ("delays", !plan.delays.is_empty()),
-        ("samples", held && !plan.samples.is_empty()),
-        ("single", export.real == Real::Float),
-    ] {
-        if holds {
-            flags.insert(flag);
-        }
-    }
-    text = template::fill(&template::choose(&text, &flags), &words);
+    let flags = plan.flags();
+    text = template::fill(&template::choose(&text, |word| flags.holds(word)), &words);
     template::name(&real::of(&text, export.real), &plan.name)
 }
 
@@ -146,7 +129,7 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
         true,
         format!(
             "double along[{}], along_out[{}]; /* directions of derivatives */",
-            n(s.direction),
+            n(s.directions[4]),
             n(nx.max(export.recorded.len()))
         ),
     );

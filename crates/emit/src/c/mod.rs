@@ -3,7 +3,10 @@
 //! The operations are those of the interpreter, one by one and in its order, so that results are equal to the last bit
 //! wherever C computes in double precision without contraction.
 
+mod blocks;
 mod cost;
+pub(crate) mod flags;
+mod givens;
 mod header;
 mod messages;
 mod obligations;
@@ -12,9 +15,9 @@ mod project;
 mod range;
 mod real;
 mod slopes;
-mod ssa;
 mod start;
 pub(crate) mod template;
+mod terms;
 mod variables;
 mod write;
 

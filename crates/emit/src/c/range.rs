@@ -17,7 +17,7 @@ pub(super) fn check(export: &Export) -> Result<(), EmitError> {
     for (parameter, &value) in program.parameters.iter().zip(&start.parameters) {
         fits(&|| format!("the parameter {}", parameter.name), value)?;
     }
-    for (_, value) in program.layout().constants {
+    for value in program.determined(&[]).into_iter().filter_map(|v| program.values.constant(v)) {
         fits(&|| "a number of the equations".into(), value)?;
     }
     for &value in &start.derived {

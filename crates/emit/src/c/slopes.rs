@@ -1,10 +1,13 @@
-//! Values and derivatives of single steps as C expressions.
+//! Values and derivatives of single operations as C expressions.
 
-use std::fmt::Write;
+use std::fmt::{self, Display, Write};
 
 use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::for_each_op;
+use halfarrow_compiler::program::calculus::{Calculus, Moving};
+use halfarrow_compiler::program::elimination::Elimination;
+use halfarrow_compiler::program::{ConditionId, Op};
 
-use super::ssa::Act;
 use super::write::number;
 
 /// A whole power by repeated squaring, in the order of `math::powi`; gives the expression of the result.
@@ -35,71 +38,176 @@ pub(super) fn power(text: &mut String, (name, wide): (&str, bool), a: &str, n: u
     }
 }
 
-/// A function of one argument.
-pub(super) fn call(f: Function, a: &str) -> String {
-    match f {
-        Function::Sqrt => format!("sqrt({a})"),
-        Function::Abs => format!("fabs({a})"),
-        Function::Floor => format!("floor({a})"),
-        f => format!("ha_{}({a})", f.name()),
-    }
-}
+/// What is fixed in an operation, in C.
+struct InC<T>(T);
 
-/// The derivative of a plain step.
-pub(super) fn rate_of(act: Act, a: &[String], d: &[Option<String>], value: &str) -> Option<String> {
-    let along = |slope: &str, rate: &Option<String>| rate.as_ref().map(|r| format!("ha_along({slope}, {r})"));
-    let zero = |rate: &Option<String>| rate.clone().unwrap_or_else(|| "0.0".into());
-    let sum = |one: Option<String>, other: Option<String>| match (one, other) {
-        (Some(one), Some(other)) => Some(format!("{one} + {other}")),
-        (one, other) => one.or(other),
-    };
-    match act {
-        Act::Neg => d[0].as_ref().map(|d| format!("-{d}")),
-        Act::Add => sum(d[0].clone(), d[1].clone()),
-        Act::Sub => match (&d[0], &d[1]) {
-            (Some(one), Some(other)) => Some(format!("{one} - {other}")),
-            (Some(one), None) => Some(one.clone()),
-            (None, other) => other.as_ref().map(|other| format!("-{other}")),
-        },
-        Act::Mul => sum(along(&a[1], &d[0]), along(&a[0], &d[1])),
-        Act::Div => Some(match (&d[0], along(value, &d[1])) {
-            (Some(one), Some(other)) => format!("({one} - {other}) / {}", a[1]),
-            (Some(one), None) => format!("{one} / {}", a[1]),
-            (None, other) => format!("(0.0 - {}) / {}", other?, a[1]),
-        }),
-        Act::Pow => Some(format!("ha_pow_along({value}, {}, {}, {}, {})", a[0], zero(&d[0]), a[1], zero(&d[1]))),
-        Act::Call(f) => along(&slope(f, &a[0], value)?, &d[0]),
-        Act::Call2(f) => {
-            let (x, y, dx, dy) = (&a[0], &a[1], zero(&d[0]), zero(&d[1]));
-            Some(match f {
-                Function::Atan2 => format!("({y} * {dx} - {x} * {dy}) / ({x} * {x} + {y} * {y})"),
-                Function::Min => format!("{x} < {y} ? {dx} : {dy}"),
-                Function::Max => format!("{x} > {y} ? {dx} : {dy}"),
-                _ => format!("{dx} - {dy} * floor({x} / {y})"),
-            })
+impl Display for InC<Function> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Function::Sqrt => f.write_str("sqrt"),
+            Function::Abs => f.write_str("fabs"),
+            Function::Floor => f.write_str("floor"),
+            other => write!(f, "ha_{}", other.name()),
         }
-        Act::Select => Some(format!("{} != 0.0 ? {} : {}", a[0], zero(&d[1]), zero(&d[2]))),
-        _ => None,
     }
 }
 
-fn slope(f: Function, a: &str, value: &str) -> Option<String> {
-    use Function::*;
-    Some(match f {
-        Sin => format!("ha_cos({a})"),
-        Cos => format!("-ha_sin({a})"),
-        Tan => format!("1.0 + {value} * {value}"),
-        Asin => format!("1.0 / sqrt(1.0 - {a} * {a})"),
-        Acos => format!("-1.0 / sqrt(1.0 - {a} * {a})"),
-        Atan => format!("1.0 / (1.0 + {a} * {a})"),
-        Exp => value.to_string(),
-        Log => format!("1.0 / {a}"),
-        Log10 => format!("1.0 / ({a} * {})", number(std::f64::consts::LN_10)),
-        Sqrt => format!("0.5 / {value}"),
-        Abs => format!("ha_sign({a})"),
-        Sinh => format!("ha_cosh({a})"),
-        Cosh => format!("ha_sinh({a})"),
-        Tanh => format!("1.0 - {value} * {value}"),
-        Sign | Floor | Atan2 | Min | Max | Mod => return None,
-    })
+impl Display for InC<u32> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+/// A plain operation as a C expression.
+pub(super) fn expression<A: Copy + Display>(op: Op<A>) -> String {
+    macro_rules! write_c {
+        (($k:ident $value:ident)
+         given $given:tt
+         plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+            cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+         })* }
+         held $held:tt) => {
+            match op {
+                $(Op::$plain($($part,)* $($a),*) => {
+                    $(let $part = InC($part);)*
+                    format!($c)
+                })*
+                _ => unreachable!("written where it is given, or where its condition or table is"),
+            }
+        };
+    }
+    for_each_op!(write_c)
+}
+
+/// How closely the parts of an expression hang together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Binds {
+    Choice,
+    Sum,
+    Product,
+    Sign,
+    Whole,
+}
+
+/// Expressions, as numbers of the rules of derivatives.
+pub(super) struct Expressions<'t> {
+    all: Vec<(String, Binds)>,
+    /// Where the lines before the expression are written.
+    lines: &'t mut String,
+    /// How temporaries are called, and whether they are in double precision whatever real numbers are.
+    name: String,
+    wide: bool,
+    /// How far lines are indented, and how many temporaries there are.
+    pub indent: &'static str,
+    kept: usize,
+    /// What has to hold for the rest to count.
+    pub asked: Vec<String>,
+}
+
+/// An expression: its place among the others.
+pub(super) type Expression = usize;
+
+impl<'t> Expressions<'t> {
+    pub fn new(lines: &'t mut String, name: String, wide: bool) -> Self {
+        Expressions { all: Vec::new(), lines, name, wide, indent: "    ", kept: 0, asked: Vec::new() }
+    }
+
+    /// A name, or what else needs no brackets.
+    pub fn whole(&mut self, text: &str) -> Expression {
+        self.push(text.to_string(), Binds::Whole)
+    }
+
+    pub fn text(&self, expression: Expression) -> String {
+        self.all[expression].0.clone()
+    }
+
+    /// Writes a line.
+    pub fn line(&mut self, text: &str) {
+        let _ = writeln!(self.lines, "{}{text}", self.indent);
+    }
+
+    fn push(&mut self, text: String, binds: Binds) -> Expression {
+        self.all.push((text, binds));
+        self.all.len() - 1
+    }
+
+    /// An expression beside an operator that asks so much of it.
+    fn part(&self, expression: Expression, least: Binds) -> String {
+        let (text, binds) = &self.all[expression];
+        if *binds >= least { text.clone() } else { format!("({text})") }
+    }
+
+    /// `a sign b`, which is evaluated from the left.
+    fn infix(&mut self, a: Expression, sign: &str, b: Expression, binds: Binds) -> Expression {
+        let tighter = if binds == Binds::Sum { Binds::Product } else { Binds::Whole };
+        let text = format!("{} {sign} {}", self.part(a, binds), self.part(b, tighter));
+        self.push(text, binds)
+    }
+}
+
+impl Calculus for Expressions<'_> {
+    type Number = Expression;
+    fn number(&mut self, value: f64) -> Expression {
+        self.push(number(value), Binds::Whole)
+    }
+    fn neg(&mut self, a: Expression) -> Expression {
+        let text = format!("-{}", self.part(a, Binds::Whole));
+        self.push(text, Binds::Sign)
+    }
+    fn add(&mut self, a: Expression, b: Expression) -> Expression {
+        self.infix(a, "+", b, Binds::Sum)
+    }
+    fn sub(&mut self, a: Expression, b: Expression) -> Expression {
+        self.infix(a, "-", b, Binds::Sum)
+    }
+    fn mul(&mut self, a: Expression, b: Expression) -> Expression {
+        self.infix(a, "*", b, Binds::Product)
+    }
+    fn div(&mut self, a: Expression, b: Expression) -> Expression {
+        self.infix(a, "/", b, Binds::Product)
+    }
+    fn powi(&mut self, a: Expression, n: u32) -> Expression {
+        let a = self.part(a, Binds::Whole);
+        let text = power(self.lines, (&self.name, self.wide), &a, n);
+        self.push(text, Binds::Product)
+    }
+    fn call(&mut self, f: Function, a: Expression) -> Expression {
+        let text = expression(Op::Call(f, &self.all[a].0));
+        self.push(text, Binds::Whole)
+    }
+    fn select(&mut self, c: Expression, a: Expression, b: Expression) -> Expression {
+        let [c, a, b] = [c, a, b].map(|e| self.part(e, Binds::Sum));
+        self.push(expression(Op::Select(&c, &a, &b)), Binds::Choice)
+    }
+    fn along(&mut self, slope: impl FnOnce(&mut Self) -> Expression, rate: Expression) -> Expression {
+        let slope = slope(self);
+        let text = format!("ha_along({}, {})", self.all[slope].0, self.all[rate].0);
+        self.push(text, Binds::Whole)
+    }
+    fn along_power(&mut self, value: Expression, (a, da): Moving<Self>, (b, db): Moving<Self>) -> Option<Expression> {
+        let rate = |d: Option<Expression>| d.map_or("0.0".to_string(), |d| self.text(d));
+        let [value, a, b] = [value, a, b].map(|e| self.text(e));
+        let text = format!("ha_pow_along({value}, {a}, {}, {b}, {})", rate(da), rate(db));
+        Some(self.push(text, Binds::Whole))
+    }
+    fn table(&mut self, _: (u32, Option<ConditionId>), _: u32, _: Expression) -> Expression {
+        unreachable!("tables are looked up with their derivative")
+    }
+}
+
+impl Elimination for Expressions<'_> {
+    fn sign_of(&mut self, a: Expression) -> Expression {
+        let text = format!("copysign(1.0, {})", self.all[a].0);
+        self.push(text, Binds::Whole)
+    }
+    fn require(&mut self, pivot: Expression, least: Expression) {
+        let [p, least] = [pivot, least].map(|e| self.part(e, Binds::Product));
+        self.asked.push(format!("{p} > 0.0 && {p} > {least} && ha_finite({p})"));
+    }
+    fn keep(&mut self, a: Expression) -> Expression {
+        let (name, text) = (format!("{}_{}", self.name, self.kept), self.text(a));
+        self.kept += 1;
+        self.line(&format!("const double {name} = {text};"));
+        self.whole(&name)
+    }
 }

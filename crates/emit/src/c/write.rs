@@ -1,25 +1,22 @@
 //! Steps as C functions: straight lines in chunks, what crosses from one to the next in the model's work array.
 
-use std::cell::RefCell;
 use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{
-    Block, BlockId, Cause, ConditionId, ConditionKind, Layout, Program, Reads, Register,
+    Arg, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::blocks::Factored;
+use super::givens::Givens;
 use super::header::comment;
-use super::slopes::{call, power, rate_of};
-use super::ssa::{Act, Arg, Code, Step};
+use super::slopes::{Expressions, expression, power};
 use super::variables::Variables;
 use crate::Real;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
 const CHUNK: usize = 250;
-
-/// Symmetric linear equations of up to this many unknowns are written out.
-const WRITTEN_OUT: usize = 6;
 
 /// How a function is called.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +29,7 @@ pub(super) struct Shape {
     pub void: bool,
     /// Time, where failures note it.
     pub time: &'static str,
-    /// The fixed registers that move, if derivatives are wanted: ranges within the direction.
+    /// The givens that move, if derivatives are wanted.
     pub along: Option<Moving>,
     /// Whether what it gives is in double precision whatever real numbers are.
     pub wide: bool,
@@ -41,7 +38,8 @@ pub(super) struct Shape {
 /// What has derivatives.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moving {
-    pub time: bool,
+    /// The rate of time in C.
+    pub time: Option<&'static str>,
     pub inputs: bool,
     pub held: bool,
     pub conserved: bool,
@@ -50,30 +48,10 @@ pub(super) struct Moving {
     pub outer: bool,
 }
 
-/// Numbers that `lu.c` takes for a matrix: twice the matrix, scales of rows, work, what is left, and in single precision the
-/// magnitudes of columns.
-pub(super) fn elimination_room(n: usize, real: Real) -> usize {
-    2 * n * n + if real == Real::Double { 3 * n } else { 4 * n }
-}
-
-/// Where linear blocks with a constant matrix keep their factors.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Factored {
-    /// Number, first place and first place of the order of each such block.
-    pub places: FxHashMap<u32, (usize, usize, usize)>,
-    /// Numbers taken in all.
-    pub size: usize,
-    /// Places of orders taken in all.
-    pub orders: usize,
-}
-
 /// Writes functions.
 pub(super) struct Writer<'a> {
     pub program: &'a Program,
-    pub layout: &'a Layout,
-    /// The place in `m->c` of each fixed register computed from parameters.
-    pub derived: FxHashMap<Register, usize>,
-    constants: FxHashMap<Register, f64>,
+    pub givens: Givens<'a>,
     pub factored: Factored,
     /// Places of the work array taken so far.
     pub crossing: usize,
@@ -82,8 +60,8 @@ pub(super) struct Writer<'a> {
     pub real: Real,
     /// Places of the array for what crosses in double precision, if real numbers are less.
     pub wide_crossing: usize,
-    /// The place of each fixed register computed from parameters that is read in double precision.
-    pub exact: RefCell<FxHashMap<Register, usize>>,
+    /// The Newton blocks in use, by which they are numbered.
+    pub newton: &'a [BlockId],
 }
 
 /// A number as C reads it back to the bit.
@@ -110,132 +88,78 @@ pub(super) fn numbers(values: &[f64]) -> String {
 }
 
 impl<'a> Writer<'a> {
-    pub fn new(program: &'a Program, layout: &'a Layout, real: Real) -> Writer<'a> {
-        let constants: FxHashMap<Register, f64> = layout.constants.iter().copied().collect();
-        let first = program.parameters.len() as Register;
-        let computed = (first..layout.time).filter(|r| !constants.contains_key(r));
-        let derived = computed.enumerate().map(|(place, r)| (r, place)).collect();
-        let mut factored = Factored::default();
-        for (id, block) in program.blocks.iter() {
-            let Block::Linear { matrix, .. } = block else { continue };
-            let n = block.size();
-            if n > 1 && matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
-                let number = factored.places.len();
-                factored.places.insert(id.0, (number, factored.size, factored.orders));
-                factored.size += elimination_room(n, real);
-                factored.orders += n;
-            }
-        }
-        let variables = Variables::of(program, layout);
-        Writer {
-            program,
-            layout,
-            derived,
-            constants,
-            factored,
-            crossing: 0,
-            variables,
-            real,
-            wide_crossing: 0,
-            exact: RefCell::default(),
-        }
-    }
-
-    /// A fixed register in C.
-    pub fn fixed(&self, r: Register) -> String {
-        let l = self.layout;
-        match r {
-            r if r < self.program.parameters.len() as Register => format!("m->p[{r}]"),
-            r if r < l.time => match self.constants.get(&r) {
-                Some(&value) => number(value),
-                None => format!("m->c[{}]", self.derived[&r]),
-            },
-            r if r == l.time => "t".into(),
-            r if r < l.held => format!("m->u[{}]", r - l.inputs),
-            r if r < l.conserved => format!("m->z[{}]", r - l.held),
-            r if r < l.states => format!("m->k[{}]", r - l.conserved),
-            r => format!("x[{}]", r - l.states),
-        }
-    }
-
-    /// A fixed register in C, in double precision.
-    pub fn fixed_wide(&self, r: Register) -> String {
-        let constant = self.constants.contains_key(&r);
-        match r {
-            _ if self.real == Real::Double || constant || r == self.layout.time => self.fixed(r),
-            r if r < self.program.parameters.len() as Register => format!("m->p_exact[{r}]"),
-            r if r < self.layout.time => {
-                let mut exact = self.exact.borrow_mut();
-                let next = exact.len();
-                format!("m->c_exact[{}]", exact.entry(r).or_insert(next))
-            }
-            r => format!("ha_widen({})", self.fixed(r)),
-        }
+    pub fn new(program: &'a Program, newton: &'a [BlockId], real: Real) -> Writer<'a> {
+        let factored = Factored::of(program, real);
+        let givens = Givens::new(program, real);
+        let variables = Variables::of(program, &givens);
+        Writer { program, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton }
     }
 
     /// Which locals are in double precision whatever real numbers are: those that follow from time and parameters alone,
     /// so that time has its digits in long runs.
     fn wide(&self, code: &Code) -> Vec<bool> {
-        let mut wide = vec![false; code.locals as usize];
+        let mut wide = vec![false; code.values.len()];
         if self.real == Real::Double {
             return wide;
         }
         for step in &code.steps {
             let solved = matches!(
-                step.act,
-                Act::Linear(_) | Act::Newton(_) | Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..)
+                step,
+                Step::Solve(_) | Step::Op { op: Op::Table(..) | Op::TableSlope(..) | Op::TableCurvature(..), .. }
             );
-            let all = step.args.iter().all(|&a| match a {
-                Arg::Fixed(r) => r <= self.layout.time,
-                Arg::Local(i) => wide[i as usize],
-                Arg::Outer(_) | Arg::Guess(_) => false,
-            });
-            step.outs.iter().for_each(|&out| wide[out as usize] = all && !solved);
+            let all = self.all_timely(step, &wide);
+            step.defines().iter().for_each(|out| wide[out.0 as usize] = all && !solved);
         }
         wide
     }
 
-    /// Whether a fixed register moves, and where it stands in the direction.
-    fn fixed_rate(&self, r: Register, moving: Moving) -> Option<String> {
-        let l = self.layout;
-        let moves = match r {
-            r if r < l.time => false,
-            r if r == l.time => moving.time,
-            r if r < l.held => moving.inputs,
-            r if r < l.conserved => moving.held,
-            r if r < l.states => moving.conserved,
-            _ => moving.states,
-        };
-        moves.then(|| format!("e[{}]", r - l.time))
+    /// Whether all that a step reads follows from time and parameters alone.
+    fn all_timely(&self, step: &Step, wide: &[bool]) -> bool {
+        let mut all = true;
+        step.for_each_read(|a| {
+            all &= match a {
+                Arg::Given(value) => self.givens.is_timely(value),
+                Arg::Local(i) => wide[i.0 as usize],
+                Arg::Outer(_) | Arg::Guess(_) => false,
+            }
+        });
+        all
     }
 
-    /// A function that computes code; `values` says where its outputs go, `rates` where their derivatives go.
-    pub fn function(&mut self, name: &str, shape: Shape, code: &Code, values: &[String], rates: &[String]) -> String {
+    /// A function that computes code; `values` says where its outputs go, `rates` where their derivatives go, `kept` what it
+    /// computes of what stands before other routines.
+    pub fn function(
+        &mut self,
+        name: &str,
+        shape: Shape,
+        (code, kept): (&Code, &[(u32, Value)]),
+        (values, rates): (&[String], &[String]),
+    ) -> String {
         let moves = self.moves(code, shape, !rates.is_empty());
         let chunks: Vec<&[Step]> = if code.steps.is_empty() { vec![&[]] } else { code.steps.chunks(CHUNK).collect() };
         let mut f = Body {
             shape,
             moves,
             wide: self.wide(code),
-            read: code.read(),
-            home: vec![0; code.locals as usize],
-            place: vec![usize::MAX; code.locals as usize],
-            rate_place: vec![usize::MAX; code.locals as usize],
+            read: read_of(code, kept),
+            home: vec![0; code.values.len()],
+            place: vec![usize::MAX; code.values.len()],
+            rate_place: vec![usize::MAX; code.values.len()],
             chunk: 0,
             turns: FxHashMap::default(),
             names: self.variables.of_locals(code),
+            kept: kept.iter().copied().collect(),
             text: String::new(),
         };
         for (c, steps) in chunks.iter().enumerate() {
-            steps.iter().flat_map(|s| &s.outs).for_each(|&out| f.home[out as usize] = c);
+            steps.iter().flat_map(Step::defines).for_each(|out| f.home[out.0 as usize] = c);
         }
         for (c, steps) in chunks.iter().enumerate() {
-            for a in steps.iter().flat_map(|s| &s.args) {
-                if let Arg::Local(i) = *a
-                    && f.home[i as usize] != c
-                {
-                    self.cross(&mut f, i as usize);
-                }
+            for step in *steps {
+                step.for_each_read(|a| match a {
+                    Arg::Local(i) if f.home[i.0 as usize] != c => self.cross(&mut f, i.0 as usize),
+                    _ => {}
+                });
             }
         }
         let mut names = Vec::new();
@@ -293,42 +217,41 @@ impl<'a> Writer<'a> {
 
     /// Which locals have derivatives that somebody asks for.
     fn moves(&self, code: &Code, shape: Shape, rates: bool) -> Vec<bool> {
-        let mut moves = vec![false; code.locals as usize];
+        let mut moves = vec![false; code.values.len()];
         let Some(moving) = shape.along else { return moves };
         for step in &code.steps {
-            let one = step.args.iter().any(|&a| match a {
-                Arg::Fixed(r) => self.fixed_rate(r, moving).is_some(),
-                Arg::Local(i) => moves[i as usize],
-                Arg::Outer(_) => moving.outer,
-                Arg::Guess(_) => false,
+            let mut one = false;
+            step.for_each_read(|a| {
+                one |= match a {
+                    Arg::Given(value) => self.givens.rate(value, moving).is_some(),
+                    Arg::Local(i) => moves[i.0 as usize],
+                    Arg::Outer(_) => moving.outer,
+                    Arg::Guess(_) => false,
+                }
             });
-            let none = matches!(
-                step.act,
-                Act::Positive | Act::Side(_) | Act::Floor(_) | Act::And | Act::Or | Act::Not | Act::Parameter(_)
-            ) || matches!(step.act, Act::Call(Function::Sign | Function::Floor));
-            step.outs.iter().for_each(|&out| moves[out as usize] = one && !none);
+            let can = match step {
+                Step::Op { op, .. } => op.moves(),
+                Step::Solve(_) => true,
+                Step::Parameter { .. } | Step::Watch { .. } => false,
+            };
+            step.defines().iter().for_each(|out| moves[out.0 as usize] = one && can);
         }
         let mut asked = vec![false; moves.len()];
         let ask = |asked: &mut Vec<bool>, a: Arg| {
             if let Arg::Local(i) = a {
-                asked[i as usize] = true;
+                asked[i.0 as usize] = true;
             }
         };
         code.outputs.iter().filter(|_| rates).for_each(|&a| ask(&mut asked, a));
         for step in code.steps.iter().rev() {
-            let wanted = step.outs.iter().any(|&out| moves[out as usize] && asked[out as usize]);
-            let condition = match step.act {
-                Act::Side(c)
-                | Act::Floor(c)
-                | Act::Table(_, Some(c))
-                | Act::TableSlope(_, Some(c))
-                | Act::TableCurvature(_, Some(c)) => Some(c),
-                _ => None,
-            };
+            let wanted = step.defines().iter().any(|out| moves[out.0 as usize] && asked[out.0 as usize]);
+            let condition = if let Step::Op { op, .. } = step { op.condition() } else { None };
             let timed = condition.is_some_and(|c| self.takes_rate(c, moving));
-            let first = usize::from(step.act == Act::Select);
             if wanted || timed {
-                step.args[first..].iter().for_each(|&a| ask(&mut asked, a));
+                match step {
+                    Step::Op { op: Op::Select(_, a, b), .. } => [*a, *b].into_iter().for_each(|a| ask(&mut asked, a)),
+                    _ => step.for_each_read(|a| ask(&mut asked, a)),
+                }
             }
         }
         moves.iter().zip(&asked).map(|(moves, asked)| *moves && *asked).collect()
@@ -336,15 +259,12 @@ impl<'a> Writer<'a> {
 
     /// Whether a condition is taken with the rate of its operand: only what time alone moves is.
     fn takes_rate(&self, condition: ConditionId, moving: Moving) -> bool {
-        moving.time && self.program.conditions[condition].cause != Cause::State
+        moving.time.is_some() && self.program.conditions[condition].cause != Cause::State
     }
 
     fn outputs(&self, f: &mut Body, code: &Code, (values, rates): (&[String], &[String]), chunks: usize) {
-        let here = |a: Arg, f: &Body| match a {
-            Arg::Local(i) => f.home[i as usize] == f.chunk,
-            _ => f.chunk + 1 == chunks,
-        };
-        let wanted: Vec<(usize, Arg)> = code.outputs.iter().copied().enumerate().filter(|(_, a)| here(*a, f)).collect();
+        let wanted: Vec<(usize, Arg)> =
+            code.outputs.iter().copied().enumerate().filter(|(_, a)| f.is_here(*a, chunks)).collect();
         for (i, a) in wanted {
             if let Some(place) = values.get(i) {
                 let value = self.arg(f, a, f.shape.wide);
@@ -355,42 +275,50 @@ impl<'a> Writer<'a> {
                 let _ = writeln!(f.text, "    {place} = {rate};");
             }
         }
-        let fixed: Vec<(Register, Arg)> = code.fixed.iter().copied().filter(|(_, a)| here(*a, f)).collect();
-        for (r, a) in fixed {
-            let (place, value) = (self.fixed(r), self.arg(f, a, false));
-            let _ = writeln!(f.text, "    {place} = {value};");
-            if self.real == Real::Float {
-                self.keep_exact(f, r, a);
-            }
+    }
+
+    /// Puts what other routines and Newton blocks read where these find it, as soon as it is computed.
+    fn keep(&self, f: &mut Body, out: u32) {
+        let Some(&given) = f.kept.get(&out) else { return };
+        let a = Arg::Local(Local(out));
+        let (place, value) = (self.givens.text(given), self.arg(f, a, false));
+        let _ = writeln!(f.text, "    {place} = {value};");
+        if self.real == Real::Float {
+            self.keep_exact(f, given, a);
         }
     }
 
     /// Keeps what follows from parameters in double precision too where that is read, and sees that it fits.
-    fn keep_exact(&self, f: &mut Body, r: Register, a: Arg) {
+    fn keep_exact(&self, f: &mut Body, given: Value, a: Arg) {
         let value = self.arg(f, a, true);
-        let count = self.program.parameters.len();
-        if (r as usize) < count || self.exact.borrow().contains_key(&r) {
-            let _ = writeln!(f.text, "    {} = {value};", self.fixed_wide(r));
+        if self.givens.is_exact(given) {
+            let _ = writeln!(f.text, "    {} = {value};", self.givens.wide_text(given));
         }
+        let parameter = match self.program.values.op(given) {
+            Op::Parameter(i) => i as usize,
+            _ => self.program.parameters.len(),
+        };
         let _ = writeln!(
             f.text,
-            "    if (!ha_fits({value})) {{\n        return ha_fail(m, MODEL_OUT_OF_RANGE, {}, {});\n    }}",
-            count.min(r as usize),
+            "    if (!ha_fits({value})) {{\n        return ha_fail(m, MODEL_OUT_OF_RANGE, {parameter}, {});\n    }}",
             f.shape.time
         );
     }
 
     /// A value, in double precision or in that of real numbers.
     fn arg(&self, f: &Body, a: Arg, wide: bool) -> String {
-        let local = |i: u32| match (f.home[i as usize] == f.chunk, f.wide[i as usize]) {
-            (true, _) => format!("v{i}"),
-            (false, true) => format!("m->wide[{}]", f.place[i as usize]),
-            (false, false) => format!("m->w[{}]", f.place[i as usize]),
-        };
         let (text, is_wide) = match a {
-            Arg::Fixed(r) if wide => (self.fixed_wide(r), true),
-            Arg::Fixed(r) => (self.fixed(r), r == self.layout.time),
-            Arg::Local(i) => (local(i), f.wide[i as usize]),
+            Arg::Given(value) if wide => (self.givens.wide_text(value), true),
+            Arg::Given(value) => (self.givens.text(value), self.givens.is_time(value)),
+            Arg::Local(local) => {
+                let i = local.0 as usize;
+                let text = match (f.home[i] == f.chunk, f.wide[i]) {
+                    (true, _) => format!("v{i}"),
+                    (false, true) => format!("m->wide[{}]", f.place[i]),
+                    (false, false) => format!("m->w[{}]", f.place[i]),
+                };
+                (text, f.wide[i])
+            }
             Arg::Outer(i) => (format!("o[{i}]"), false),
             Arg::Guess(i) => (format!("g[{i}]"), false),
         };
@@ -410,11 +338,12 @@ impl<'a> Writer<'a> {
     fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<String> {
         let moving = f.shape.along?;
         let (text, is_wide) = match a {
-            Arg::Fixed(r) => (self.fixed_rate(r, moving)?, false),
-            Arg::Local(i) if !f.moves[i as usize] => return None,
-            Arg::Local(i) => {
-                let (place, is_wide) = (f.rate_place[i as usize], f.wide[i as usize]);
-                match f.home[i as usize] == f.chunk {
+            Arg::Given(value) => (self.givens.rate(value, moving)?, false),
+            Arg::Local(local) if !f.moves[local.0 as usize] => return None,
+            Arg::Local(local) => {
+                let i = local.0 as usize;
+                let (place, is_wide) = (f.rate_place[i], f.wide[i]);
+                match f.home[i] == f.chunk {
                     true => (format!("d{i}"), is_wide),
                     false => (format!("m->{}[{place}]", if is_wide { "wide" } else { "w" }), is_wide),
                 }
@@ -428,17 +357,12 @@ impl<'a> Writer<'a> {
     /// Whether a step is computed in double precision, and whether its derivative is, if real numbers are less.
     fn precision(&self, f: &Body, step: &Step) -> (bool, bool) {
         let single = self.real == Real::Float;
-        let all = || {
-            step.args.iter().all(|&a| {
-                matches!(a, Arg::Local(i) if f.wide[i as usize]) || matches!(a, Arg::Fixed(r) if r <= self.layout.time)
-            })
-        };
-        match step.act {
-            Act::Side(_) | Act::Floor(_) => (single, single),
-            Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => (single, false),
-            Act::Watch(_) => (single && all(), false),
+        match step {
+            Step::Op { op: Op::Side(..) | Op::Floor(..), .. } => (single, single),
+            Step::Op { op: Op::Table(..) | Op::TableSlope(..) | Op::TableCurvature(..), .. } => (single, false),
+            Step::Watch { .. } => (single && self.all_timely(step, &f.wide), false),
             _ => {
-                let wide = step.outs.first().is_some_and(|&out| f.wide[out as usize]);
+                let wide = step.defines().first().is_some_and(|out| f.wide[out.0 as usize]);
                 (wide, wide)
             }
         }
@@ -446,10 +370,14 @@ impl<'a> Writer<'a> {
 
     fn step(&self, f: &mut Body, step: &Step, place: usize) {
         let (wide, wide_rate) = self.precision(f, step);
-        let a: Vec<String> = step.args.iter().map(|&a| self.arg(f, a, wide)).collect();
-        let d: Vec<Option<String>> = step.args.iter().map(|&a| self.rate(f, a, wide_rate)).collect();
-        match step.act {
-            Act::Watch(watch) => {
+        let mut reads = Reading::default();
+        step.for_each_read(|a| {
+            reads.values.push(self.arg(f, a, wide));
+            reads.rates.push(self.rate(f, a, wide_rate));
+        });
+        let a = &reads.values;
+        match step {
+            Step::Watch { watch, .. } => {
                 let rounding = 64.0 * if wide { f64::EPSILON } else { self.real.epsilon() };
                 let holds = format!("{0} != 0.0 && fabs({0}) > {1} * {2}", a[0], number(rounding), a[1]);
                 let holds = if wide { format!("HA_WIDE({holds})") } else { format!("({holds})") };
@@ -459,83 +387,77 @@ impl<'a> Writer<'a> {
                     f.shape.time
                 );
             }
-            Act::Linear(block) => self.linear(f, step, (&a, &d), (block.0, place)),
-            Act::Newton(block) => self.newton(f, step, (&a, &d), (block.0, place)),
-            Act::Table(table, piece) | Act::TableSlope(table, piece) | Act::TableCurvature(table, piece) => {
-                self.table(f, step, (&a[0], d[0].as_deref()), (table, piece, place));
+            Step::Parameter { out, index, default: _ } => {
+                let given = format!("m->p{}[{index}]", if self.real == Real::Float { "_exact" } else { "" });
+                self.put(f, out.0, &format!("m->set[{index}] ? {given} : {}", a[0]), None);
             }
-            Act::Call(Function::Sin | Function::Cos) if f.turns.contains_key(&angle(step.args[0])) => {
-                self.turn(f, step, (&a, &d), place);
-            }
-            _ => self.plain(f, step, &a, &d),
+            Step::Solve(solve) => match solve.method {
+                Method::Linear { .. } => self.linear(f, solve, &reads, place),
+                Method::Newton { .. } => self.newton(f, solve, &reads, place),
+            },
+            Step::Op { out, op } => self.operation(f, (out.0, *op), &reads, place),
         }
     }
 
+    fn operation(&self, f: &mut Body, (out, op): (u32, Op<Arg>), reads: &Reading, place: usize) {
+        let (a, d) = (&reads.values[..], &reads.rates[..]);
+        match op {
+            Op::Table(table, piece, _) => self.table(f, (out, 0), (&a[0], d[0].as_deref()), (table, piece, place)),
+            Op::TableSlope(table, piece, _) => self.table(f, (out, 1), (&a[0], d[0].as_deref()), (table, piece, place)),
+            Op::TableCurvature(table, piece, _) => {
+                self.table(f, (out, 2), (&a[0], d[0].as_deref()), (table, piece, place));
+            }
+            Op::Side(condition, _) | Op::Floor(condition, _) => {
+                let taken = self.condition(f, condition, &a[0], d[0].as_deref());
+                self.put(f, out, &self.cast(taken, true, f.wide[out as usize]), None);
+            }
+            Op::Call(function @ (Function::Sin | Function::Cos), angle) if f.turns.contains_key(&angle) => {
+                let value = self.turn(f, (out, function), (&a[0], angle), place);
+                let rate = self.slope(f, out, op, reads);
+                self.put(f, out, &value, rate.as_deref());
+            }
+            Op::Powi(n, _) => {
+                let value = power(&mut f.text, (&format!("v{out}"), f.wide[out as usize]), &a[0], n);
+                self.put(f, out, &value, None);
+                if let Some(rate) = self.slope(f, out, op, reads) {
+                    self.put_rate(f, out, &rate);
+                }
+            }
+            _ => {
+                let mut operands = a.iter();
+                let value = expression(op.map_operands(|_| operands.next().expect("as many as operands")));
+                let rate = self.slope(f, out, op, reads);
+                self.put(f, out, &value, rate.as_deref());
+            }
+        }
+    }
+
+    /// The derivative of an operation by the rules of the table, if it moves.
+    fn slope(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<String> {
+        if !f.moves[out as usize] {
+            return None;
+        }
+        let mut k = Expressions::new(&mut f.text, format!("d{out}"), f.wide[out as usize]);
+        let value = k.whole(&format!("v{out}"));
+        let mut operands = reads.values.iter().zip(&reads.rates);
+        let slope = op.slope(&mut k, value, |k, _| {
+            let (value, rate) = operands.next().expect("as many as operands");
+            (k.whole(value), rate.as_ref().map(|rate| k.whole(rate)))
+        });
+        slope.map(|slope| k.text(slope))
+    }
+
     /// One of a sine and a cosine that are computed together.
-    fn turn(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), place: usize) {
-        let out = step.outs[0];
-        let pair = f.turns.entry(angle(step.args[0])).or_default();
-        let number = *pair.get_or_insert(place);
+    fn turn(&self, f: &mut Body, (out, function): (u32, Function), (a, angle): (&str, Arg), place: usize) -> String {
+        let number = *f.turns.entry(angle).or_default().get_or_insert(place);
         if number == place {
-            let call = format!("ha_turn({}, h{place})", a[0]);
+            let call = format!("ha_turn({a}, h{place})");
             let _ = match f.wide[out as usize] {
                 true => writeln!(f.text, "    ha_wide h{place}[2];\n    HA_WIDE({call});"),
                 false => writeln!(f.text, "    double h{place}[2];\n    {call};"),
             };
         }
-        let value = format!("h{number}[{}]", usize::from(step.act == Act::Call(Function::Cos)));
-        let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
-        self.put(f, out, &value, rate.as_deref());
-    }
-
-    fn plain(&self, f: &mut Body, step: &Step, a: &[String], d: &[Option<String>]) {
-        let out = step.outs[0];
-        if let Act::Powi(n) = step.act {
-            let wide = f.wide[out as usize];
-            let value = power(&mut f.text, (&format!("v{out}"), wide), &a[0], n);
-            self.put(f, out, &value, None);
-            if f.moves[out as usize] {
-                let below = power(&mut f.text, (&format!("d{out}"), wide), &a[0], n.saturating_sub(1));
-                let slope = format!("{} * ({below})", number(f64::from(n)));
-                let rate = d[0].as_ref().map(|d| format!("ha_along({slope}, {d})"));
-                self.put_rate(f, out, &rate.unwrap_or_else(|| "0.0".into()));
-            }
-            return;
-        }
-        let value = self.value(f, (step.act, out), a, d);
-        let rate = if f.moves[out as usize] { rate_of(step.act, a, d, &format!("v{out}")) } else { None };
-        self.put(f, out, &value, rate.as_deref());
-    }
-
-    fn value(&self, f: &Body, (act, out): (Act, u32), a: &[String], d: &[Option<String>]) -> String {
-        match act {
-            Act::Neg => format!("-{}", a[0]),
-            Act::Add => format!("{} + {}", a[0], a[1]),
-            Act::Sub => format!("{} - {}", a[0], a[1]),
-            Act::Mul => format!("{} * {}", a[0], a[1]),
-            Act::Div => format!("{} / {}", a[0], a[1]),
-            Act::Pow => format!("ha_pow({}, {})", a[0], a[1]),
-            Act::Call(function) => call(function, &a[0]),
-            Act::Call2(Function::Atan2) => format!("ha_atan2({}, {})", a[0], a[1]),
-            Act::Call2(Function::Min) => format!("ha_min({}, {})", a[0], a[1]),
-            Act::Call2(Function::Max) => format!("ha_max({}, {})", a[0], a[1]),
-            Act::Call2(_) => format!("{0} - {1} * floor({0} / {1})", a[0], a[1]),
-            Act::Positive => format!("{} > 0.0 ? 1.0 : 0.0", a[0]),
-            Act::And => format!("{} != 0.0 && {} != 0.0 ? 1.0 : 0.0", a[0], a[1]),
-            Act::Or => format!("{} != 0.0 || {} != 0.0 ? 1.0 : 0.0", a[0], a[1]),
-            Act::Not => format!("{} == 0.0 ? 1.0 : 0.0", a[0]),
-            Act::Select => format!("{} != 0.0 ? {} : {}", a[0], a[1], a[2]),
-            Act::Parameter(index) => {
-                let given = self.fixed_wide(index);
-                format!("m->set[{index}] ? {given} : {}", a[0])
-            }
-            Act::Side(condition) | Act::Floor(condition) => {
-                let taken = self.condition(f, condition, &a[0], d[0].as_deref());
-                self.cast(taken, true, f.wide[out as usize])
-            }
-            Act::Powi(_) | Act::Watch(_) | Act::Linear(_) | Act::Newton(_) => unreachable!("written elsewhere"),
-            Act::Table(..) | Act::TableSlope(..) | Act::TableCurvature(..) => unreachable!("written elsewhere"),
-        }
+        format!("h{number}[{}]", usize::from(function == Function::Cos))
     }
 
     fn condition(&self, f: &Body, id: ConditionId, a: &str, d: Option<&str>) -> String {
@@ -559,7 +481,7 @@ impl<'a> Writer<'a> {
     fn table(
         &self,
         f: &mut Body,
-        step: &Step,
+        (out, order): (u32, usize),
         (a, d): (&str, Option<&str>),
         (table, piece, number): (u32, Option<ConditionId>, usize),
     ) {
@@ -569,103 +491,11 @@ impl<'a> Writer<'a> {
         };
         let _ = writeln!(f.text, "    double q{number}[4];");
         let _ = writeln!(f.text, "    ha_table_on(&ha_tables[{table}], {piece}, {a}, q{number});");
-        let at = match step.act {
-            Act::TableSlope(..) => 1,
-            Act::TableCurvature(..) => 2,
-            _ => 0,
-        };
-        let rate = d.map(|d| format!("ha_along(q{number}[{}], {d})", at + 1));
-        self.put(f, step.outs[0], &format!("q{number}[{at}]"), rate.as_deref());
+        let rate = d.map(|d| format!("ha_along(q{number}[{}], {d})", order + 1));
+        self.put(f, out, &format!("q{number}[{order}]"), rate.as_deref());
     }
 
-    fn linear(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), (block, number): (u32, usize)) {
-        let n = step.outs.len();
-        let fail = format!("        return ha_fail(m, MODEL_SINGULAR, {block}, {});\n    }}", f.shape.time);
-        let moves = step.outs.iter().any(|&out| f.moves[out as usize]);
-        if n == 1 {
-            let _ = writeln!(f.text, "    if (!ha_is_pivot({})) {{\n{fail}", a[0]);
-            let out = step.outs[0];
-            if !f.read[out as usize] {
-                return;
-            }
-            let rate = moves.then(|| {
-                let right = d[1].clone().unwrap_or_else(|| "0.0".into());
-                match &d[0] {
-                    Some(da) => format!("({right} - {da} * v{out}) / {}", a[0]),
-                    None => format!("{right} / {}", a[0]),
-                }
-            });
-            return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
-        }
-        let (matrix, right) = a.split_at(n * n);
-        let symmetric = self.program.blocks[BlockId(block)].is_symmetric();
-        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
-            f.text += &definite(matrix, right, (number, self.real.epsilon()), &fail);
-            return self.solved(f, step, number);
-        }
-        let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
-        let _ = writeln!(f.text, "    const double b{number}[] = {{{}}};", right.join(", "));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let lu = match self.factored.places.get(&block) {
-            Some((which, place, order)) => {
-                let call =
-                    format!("ha_linear_constant(m, {which}, {place}, {order}, {n}, a{number}, b{number}, s{number})");
-                let _ = writeln!(f.text, "    if (!{call}) {{\n{fail}");
-                format!("ha_lu_at(m->factors + {place}, m->factors_order + {order}, {n})")
-            }
-            None => {
-                let _ = writeln!(f.text, "    if (!ha_linear(m, {n}, a{number}, b{number}, s{number})) {{\n{fail}");
-                format!("ha_lu_at(m->work, m->order, {n})")
-            }
-        };
-        if moves {
-            let zero = |d: &Option<String>| d.clone().unwrap_or_else(|| "0.0".into());
-            let (matrix, right) = d.split_at(n * n);
-            let (matrix, right): (Vec<_>, Vec<_>) =
-                (matrix.iter().map(zero).collect(), right.iter().map(zero).collect());
-            let _ = writeln!(f.text, "    const double da{number}[] = {{{}}};", matrix.join(", "));
-            let _ = writeln!(f.text, "    const double db{number}[] = {{{}}};", right.join(", "));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(f.text, "    ha_linear_rate({lu}, da{number}, db{number}, s{number}, ds{number});");
-        }
-        self.solved(f, step, number);
-    }
-
-    fn newton(&self, f: &mut Body, step: &Step, (a, d): (&[String], &[Option<String>]), (block, number): (u32, usize)) {
-        let n = step.outs.len();
-        let list = |values: Vec<String>| if values.is_empty() { "0.0".to_string() } else { values.join(", ") };
-        let _ = writeln!(f.text, "    const double o{number}[] = {{{}}};", list(a.to_vec()));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let which = format!("BLOCK_{block}_");
-        if step.outs.iter().any(|&out| f.moves[out as usize]) {
-            let rates = d.iter().map(|d| d.clone().unwrap_or_else(|| "0.0".into())).collect();
-            let _ = writeln!(f.text, "    const double e{number}[] = {{{}}};", list(rates));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(
-                f.text,
-                "    status = ha_root_along(m, {which}, o{number}, e{number}, s{number}, ds{number});"
-            );
-        } else {
-            let _ = writeln!(f.text, "    status = ha_find_root(m, {which}, o{number}, s{number});");
-        }
-        let _ = writeln!(
-            f.text,
-            "    if (status != MODEL_OK) {{\n        return ha_fail(m, status, {block}, {});\n    }}",
-            f.shape.time
-        );
-        self.solved(f, step, number);
-    }
-
-    fn solved(&self, f: &mut Body, step: &Step, number: usize) {
-        for (i, &out) in step.outs.iter().enumerate() {
-            if f.read[out as usize] {
-                let rate = f.moves[out as usize].then(|| format!("ds{number}[{i}]"));
-                self.put(f, out, &format!("s{number}[{i}]"), rate.as_deref());
-            }
-        }
-    }
-
-    fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
+    pub fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
         let name = f.names[out as usize].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
         let _ = match f.wide[out as usize] {
             true => writeln!(f.text, "    const ha_wide v{out} = HA_WIDE({value});{name}"),
@@ -675,6 +505,7 @@ impl<'a> Writer<'a> {
             let array = if f.wide[out as usize] { "wide" } else { "w" };
             let _ = writeln!(f.text, "    m->{array}[{}] = v{out};", f.place[out as usize]);
         }
+        self.keep(f, out);
         if let Some(rate) = rate {
             self.put_rate(f, out, rate);
         }
@@ -693,12 +524,14 @@ impl<'a> Writer<'a> {
 }
 
 /// A function while it is written.
-struct Body {
-    shape: Shape,
-    moves: Vec<bool>,
+pub(super) struct Body {
+    pub shape: Shape,
+    /// Which locals have derivatives that somebody asks for.
+    pub moves: Vec<bool>,
     /// Which locals are in double precision whatever real numbers are.
     wide: Vec<bool>,
-    read: Vec<bool>,
+    /// Which are read.
+    pub read: Vec<bool>,
     /// The chunk that computes each local.
     home: Vec<usize>,
     /// Where a local is kept that crosses from one chunk to another, and where its derivative is.
@@ -706,77 +539,55 @@ struct Body {
     rate_place: Vec<usize>,
     chunk: usize,
     /// Angles whose sine and cosine are both wanted in this chunk, with the number of the pair once it is computed.
-    turns: FxHashMap<Angle, Option<usize>>,
+    turns: FxHashMap<Arg, Option<usize>>,
     /// What the locals are in the model, where they have a name there.
     names: Vec<Option<String>>,
-    text: String,
+    /// What other routines read of what is computed.
+    kept: FxHashMap<u32, Value>,
+    pub text: String,
 }
 
-/// What a sine reads, to tell equal ones.
-type Angle = (u8, u32);
-
-fn angle(a: Arg) -> Angle {
-    match a {
-        Arg::Fixed(r) => (0, r),
-        Arg::Local(i) => (1, i),
-        Arg::Outer(i) => (2, i),
-        Arg::Guess(i) => (3, i),
+impl Body {
+    /// Whether what is computed by now first has this value; what no chunk computes stands in the last one.
+    fn is_here(&self, a: Arg, chunks: usize) -> bool {
+        match a {
+            Arg::Local(i) => self.home[i.0 as usize] == self.chunk,
+            _ => self.chunk + 1 == chunks,
+        }
     }
+}
+
+/// What a step reads, in C: values and derivatives.
+#[derive(Default)]
+pub(super) struct Reading {
+    pub values: Vec<String>,
+    pub rates: Vec<Option<String>>,
+}
+
+/// Whether each local is read by a step or wanted.
+fn read_of(code: &Code, kept: &[(u32, Value)]) -> Vec<bool> {
+    let mut read = vec![false; code.values.len()];
+    let mut mark = |a: Arg| {
+        if let Arg::Local(i) = a {
+            read[i.0 as usize] = true;
+        }
+    };
+    code.steps.iter().for_each(|step| step.for_each_read(&mut mark));
+    code.outputs.iter().copied().chain(kept.iter().map(|k| Arg::Local(Local(k.0)))).for_each(mark);
+    read
 }
 
 /// The angles of which some steps want both sine and cosine.
-fn turns(steps: &[Step]) -> FxHashMap<Angle, Option<usize>> {
+fn turns(steps: &[Step]) -> FxHashMap<Arg, Option<usize>> {
     let of = |wanted: Function| {
-        let wanted = steps.iter().filter(move |s| s.act == Act::Call(wanted));
-        wanted.map(|s| angle(s.args[0])).collect::<FxHashSet<Angle>>()
+        let angle = move |step: &Step| match step {
+            Step::Op { op: Op::Call(f, a), .. } if *f == wanted => Some(*a),
+            _ => None,
+        };
+        steps.iter().filter_map(angle).collect::<FxHashSet<Arg>>()
     };
     let cosines = of(Function::Cos);
     of(Function::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()
-}
-
-/// Symmetric linear equations, solved as `lu.c` does where the matrix is definite; else by it. Solution in `s<number>`.
-fn definite(matrix: &[String], right: &[String], (number, epsilon): (usize, f64), fail: &str) -> String {
-    let n = right.len();
-    let mut text = format!("    double s{number}[{n}];\n    {{\n");
-    let mut line = |words: String| {
-        let _ = writeln!(text, "        {words}");
-    };
-    line(format!("const double sign = copysign(1.0, {});", matrix[0]));
-    let mut u: Vec<String> = matrix.to_vec();
-    let mut good = Vec::new();
-    for k in 0..n {
-        line(format!("const double p{k} = sign * {};", u[k * n + k]));
-        let rounding = self::number(epsilon * n as f64);
-        good.push(format!("p{k} > 0.0 && p{k} > {rounding} * (sign * {}) && ha_finite(p{k})", matrix[k * n + k]));
-        line(format!("const double i{k} = 1.0 / {};", u[k * n + k]));
-        for j in k + 1..n {
-            line(format!("const double f{k}_{j} = {} * i{k};", u[k * n + j]));
-        }
-        for j in k + 1..n {
-            for i in j..n {
-                line(format!("const double u{k}_{j}_{i} = {} - f{k}_{j} * {};", u[j * n + i], u[k * n + i]));
-                u[j * n + i] = format!("u{k}_{j}_{i}");
-            }
-        }
-    }
-    line(format!("if ({}) {{", good.join(" && ")));
-    right.iter().enumerate().for_each(|(i, b)| line(format!("    double x{i} = {b} + 0.0;")));
-    for k in 0..n {
-        (k + 1..n).for_each(|j| line(format!("    x{j} -= f{k}_{j} * x{k};")));
-    }
-    (0..n).for_each(|k| line(format!("    x{k} = x{k} * i{k} + 0.0;")));
-    for k in (0..n).rev() {
-        (0..k).for_each(|i| line(format!("    x{i} -= f{i}_{k} * x{k};")));
-    }
-    (0..n).for_each(|i| line(format!("    s{number}[{i}] = x{i};")));
-    line("} else {".into());
-    line(format!("    const double a[] = {{{}}};", matrix.join(", ")));
-    line(format!("    const double b[] = {{{}}};", right.join(", ")));
-    line(format!("    if (!ha_linear(m, {n}, a, b, s{number})) {{"));
-    fail.lines().for_each(|l| line(l.to_string()));
-    line("}".into());
-    text += "    }\n";
-    text
 }
 
 /// The lines of straight code without values that no later line reads.

@@ -10,6 +10,7 @@ mod package;
 mod units;
 mod variables;
 
+use crate::c::flags::Flags;
 use crate::c::{self, Cost, template};
 use crate::{EmitError, File, Real};
 use variables::Variables;
@@ -132,8 +133,8 @@ pub fn binary_path(version: Version, name: &str, os: &str, architecture: &str) -
 fn wrapper(text: &str, export: &c::Export, variables: &Variables, written: &c::Written) -> String {
     let common = include_str!("runtime/common.c");
     let text = text.replace("COMMON\n", common).replace("MODEL_TITLE", &export.program.name.replace("*/", "* /"));
-    let flags =
-        if written.source.contains(&format!("int {}_indicators(", written.name)) { vec!["switches"] } else { vec![] };
+    let switches = written.source.contains(&format!("int {}_indicators(", written.name));
+    let flags = Flags { switches, ..Flags::default() };
     let list = |values: Vec<String>| match values.is_empty() {
         true => "    0".to_string(),
         false => values.chunks(20).map(|row| format!("    {}", row.join(", "))).collect::<Vec<_>>().join(",\n"),
@@ -142,7 +143,7 @@ fn wrapper(text: &str, export: &c::Export, variables: &Variables, written: &c::W
         ("SETTABLE".to_string(), list(variables.settable().iter().map(u8::to_string).collect())),
         ("NOMINALS".to_string(), list(variables.nominals(export).iter().map(|v| format!("{v:?}")).collect())),
     ];
-    let text = template::choose(&text, &flags.into_iter().collect());
+    let text = template::choose(&text, |word| flags.holds(word));
     template::name(&template::fill(&text, &words.into_iter().collect()), &written.name)
 }
 

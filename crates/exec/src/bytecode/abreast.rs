@@ -5,12 +5,13 @@
 //! that needs anything else is left to the solver of single blocks.
 
 use super::frame::{Frame, Solver};
-use super::newton::{FINISHED, NEAR, SETTLED, has_conditions};
-use super::operands::{moved, reads, written};
+use super::instruction::{Register, Routine, Solve};
+use super::newton::{FINISHED, NEAR, SETTLED};
 use super::packed::Packed;
+use super::registers::Layout;
 use super::wide::{self, WideFrame};
-use halfarrow_compiler::program::{Instruction, Program, Register, Routine, Solve};
-use std::collections::{BTreeMap, BTreeSet};
+use halfarrow_compiler::program::{self, Arg, Code, Method, Program, Step};
+use std::collections::BTreeMap;
 
 /// Blocks that are solved at once: as many as it takes to keep the processor busy, since each step of an elimination
 /// waits for the one before.
@@ -43,7 +44,6 @@ struct Group {
     /// Which memory the first lanes have.
     first: usize,
     /// The inner code of all of them: guesses, then what is read from outside, then what is computed.
-    code: Routine,
     packed: Packed,
     /// The places of the matrix that are not 0, row by row, in the order of the first outputs; residuals follow.
     entries: Vec<u32>,
@@ -72,40 +72,46 @@ struct Member {
     outer: Vec<Register>,
 }
 
-/// A block with registers of its own.
+/// What a block computes, whatever it reads: inputs in the order in which it reads them.
 struct Shape {
     size: usize,
-    code: Vec<Instruction>,
+    /// The code, with inputs for all that it reads from outside.
+    code: Code,
     entries: Vec<u32>,
-    outputs: Vec<Register>,
-    inputs: Vec<Register>,
 }
 
 impl Abreast {
     /// The groups of a routine; `None` if there are none.
-    pub fn of(program: &Program, routine: &Routine) -> Option<Abreast> {
-        let mut written_at: BTreeMap<Register, usize> = BTreeMap::new();
+    pub fn of(program: &Program, layout: &Layout, routine: &Routine) -> Option<Abreast> {
+        let mut defined_at = vec![0; routine.source.values.len()];
+        let mut solves = routine.solves.iter();
         // Shape, position of the first and members.
         let mut open: Vec<(Shape, usize, Vec<Member>)> = Vec::new();
-        for (at, instruction) in routine.code.iter().enumerate() {
-            let Instruction::Solve { solve } = *instruction else {
-                written(instruction).map(|out| written_at.insert(out, at));
-                continue;
+        for (at, step) in routine.source.steps.iter().enumerate() {
+            step.defines().iter().for_each(|out| defined_at[out.0 as usize] = at);
+            let Step::Solve(solve) = step else { continue };
+            let there = solves.next().expect("as many solve blocks on registers");
+            let Method::Newton { outer, .. } = &solve.method else { continue };
+            let Some((shape, read)) = Shape::of(program, solve) else { continue };
+            let known = |a: &Arg| if let Arg::Local(local) = a { Some(defined_at[local.0 as usize]) } else { None };
+            let last = outer.iter().filter_map(known).max();
+            let place = |a: Arg| match a {
+                Arg::Given(value) => layout.registers[&value],
+                Arg::Outer(i) => there.outer[i as usize],
+                Arg::Local(_) | Arg::Guess(_) => unreachable!("these stand inside"),
             };
-            let solve = &routine.solves[solve as usize];
-            if let Some(shape) = Shape::of(program, solve) {
-                let there = |since: usize| shape.inputs.iter().all(|r| written_at.get(r).is_none_or(|&w| w < since));
-                let member =
-                    Member { block: solve.block.0 as usize, inputs: shape.inputs.clone(), outer: solve.outer.clone() };
-                let alike = |(other, since, _): &&mut (Shape, usize, Vec<Member>)| other.is(&shape) && there(*since);
-                match open.iter_mut().rev().find(alike) {
-                    Some((_, _, members)) => members.push(member),
-                    None => open.push((shape, at, vec![member])),
-                }
+            let member = Member {
+                block: solve.block.0 as usize,
+                inputs: read.iter().map(|&a| place(a)).collect(),
+                outer: there.outer.clone(),
+            };
+            let alike = |(other, since, _): &&mut (Shape, usize, Vec<Member>)| {
+                other.is(&shape) && last.is_none_or(|last| last < *since)
+            };
+            match open.iter_mut().rev().find(alike) {
+                Some((_, _, members)) => members.push(member),
+                None => open.push((shape, at, vec![member])),
             }
-            let inner = solve.code.iter().filter_map(written);
-            let all = inner.chain(solve.guess.iter().copied()).chain(solve.unknowns.iter().copied());
-            all.for_each(|out| _ = written_at.insert(out, at));
         }
         let mut first = 0;
         let together = open.into_iter().filter(|(_, _, members)| members.len() >= FEWEST);
@@ -123,68 +129,56 @@ impl Abreast {
 }
 
 impl Shape {
-    /// `None` if the block may take another way than the usual one, whatever its values.
-    fn of(program: &Program, solve: &Solve) -> Option<Shape> {
-        let size = solve.right.len();
+    /// The shape, and what the block reads from outside, in the order of the inputs; `None` if the block may take another
+    /// way than the usual one, whatever its values.
+    fn of(program: &Program, solve: &program::Solve) -> Option<(Shape, Vec<Arg>)> {
+        let Method::Newton { code, .. } = &solve.method else { return None };
+        let size = solve.unknowns.len();
         let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
-        if solve.guess.is_empty() || !symmetric || size > LARGEST || has_conditions(solve) {
+        let conditions = code.steps.iter().any(|step| matches!(step, Step::Op { op, .. } if op.is_held()));
+        if !symmetric || size > LARGEST || conditions {
             return None;
         }
-        // First what is read from outside, in the order in which it is read.
-        let mut inside: BTreeSet<Register> = solve.guess.iter().copied().collect();
-        let mut inputs: Vec<Register> = Vec::new();
-        let places = solve.entries.iter().map(|&place| solve.matrix[place as usize]);
-        let outputs: Vec<Register> = places.chain(solve.right.iter().copied()).collect();
-        let mut seen = BTreeSet::new();
-        let mut note = |r: Register, inside: &BTreeSet<Register>| {
-            if !inside.contains(&r) && seen.insert(r) {
-                inputs.push(r);
+        let mut read: Vec<Arg> = Vec::new();
+        let mut named = |a: Arg| match a {
+            Arg::Local(_) | Arg::Guess(_) => a,
+            Arg::Given(_) | Arg::Outer(_) => {
+                let known = read.iter().position(|&r| r == a);
+                Arg::Outer(known.unwrap_or_else(|| {
+                    read.push(a);
+                    read.len() - 1
+                }) as u32)
             }
         };
-        for instruction in &solve.code {
-            reads(instruction, |r| note(r, &inside));
-            inside.extend(written(instruction));
-        }
-        outputs.iter().for_each(|&r| note(r, &inside));
-        // A register that is an input first and written later would have two meanings.
-        if inputs.iter().any(|r| inside.contains(r)) {
-            return None;
-        }
-        let mut named: BTreeMap<Register, Register> = solve.guess.iter().chain(&inputs).copied().zip(0..).collect();
-        let mut next = (size + inputs.len()) as Register;
-        let code = solve.code.iter().map(|instruction| {
-            let mut read = [0; 3];
-            let mut n = 0;
-            reads(instruction, |r| {
-                read[n] = named[&r];
-                n += 1;
-            });
-            let out = written(instruction).inspect(|&out| {
-                named.insert(out, next);
-                next += 1;
-            });
-            moved(*instruction, &read[..n], out.map(|_| next - 1))
+        let steps = code.steps.iter().map(|step| match step {
+            Step::Op { out, op } => Step::Op { out: *out, op: op.map_operands(&mut named) },
+            _ => unreachable!("the code of a Newton block is plain"),
         });
-        let code = code.collect();
-        let outputs = outputs.iter().map(|r| named[r]).collect();
-        Some(Shape { size, code, entries: solve.entries.clone(), outputs, inputs })
+        let steps = steps.collect();
+        // The entries of the matrix, then the residuals.
+        let (right, matrix) = code.outputs.split_at(size);
+        let outputs = solve.entries.iter().map(|&place| matrix[place as usize]).chain(right.iter().copied());
+        let outputs = outputs.map(named).collect();
+        let code = Code { steps, outputs, values: vec![None; code.values.len()] };
+        Some((Shape { size, code, entries: solve.entries.clone() }, read))
     }
 
     fn is(&self, other: &Shape) -> bool {
-        self.size == other.size
-            && self.inputs.len() == other.inputs.len()
-            && self.entries == other.entries
-            && self.outputs == other.outputs
-            && self.code == other.code
+        self.size == other.size && self.entries == other.entries && self.code == other.code
     }
 }
 
 impl Group {
     fn of(shape: Shape, members: Vec<Member>, first: usize) -> Group {
         let n = shape.size;
-        let fixed = (n + shape.inputs.len()) as u32;
-        let code = Routine { code: shape.code, solves: Vec::new(), outputs: shape.outputs, registers: 0 };
-        let packed = Packed::new(&code, fixed);
+        let fixed = (n + members[0].inputs.len()) as u32;
+        let slot = |a: Arg| match a {
+            Arg::Guess(i) => i,
+            Arg::Outer(i) => n as u32 + i,
+            Arg::Local(local) => fixed + local.0,
+            Arg::Given(_) => unreachable!("inputs stand for what is given"),
+        };
+        let packed = Packed::of(&shape.code, fixed, &[], slot);
         let entry = |i: usize, j: usize| shape.entries.iter().position(|&place| place as usize == i * n + j);
         // What elimination fills.
         let mut full: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| entry(i, j).is_some()).collect()).collect();
@@ -204,7 +198,7 @@ impl Group {
             Row { diagonal: entry(i, i), start: starts[i], right, below }
         };
         let rows = (0..n).map(row).collect();
-        Group { size: n, members, first, code, packed, entries: shape.entries, rows }
+        Group { size: n, members, first, packed, entries: shape.entries, rows }
     }
 }
 
@@ -497,7 +491,7 @@ impl Space {
             };
         }
         let mut nobody: [Frame; 0] = [];
-        self.registers.all(&group.code, &group.packed, &mut nobody, &mut [true; LANES]);
+        self.registers.all(&[], &group.packed, &mut nobody, &mut [true; LANES]);
     }
 
     /// Greatest residual.
@@ -649,7 +643,6 @@ mod tests {
     use halfarrow_compiler::bond_graph::NoFiles;
     use halfarrow_compiler::compile::{Text, compile};
     use halfarrow_compiler::equations::Form;
-    use halfarrow_compiler::program::Layout;
     use std::sync::Arc;
 
     /// A ladder of resistors with a compliance in every so manieth section.
@@ -668,7 +661,7 @@ mod tests {
     }
 
     fn frame(program: &Program, layout: &Layout, routine: &Routine, abreast: Option<&Abreast>) -> Frame {
-        let preamble = program.preamble(layout);
+        let preamble = layout.preamble(program);
         let mut frame = Frame::new(program, layout, layout.size);
         frame.reserve(routine);
         frame.reserve(&preamble);
@@ -680,10 +673,10 @@ mod tests {
 
     /// Along states that move by more and by less; how many blocks have been solved on lanes.
     fn same_bits(program: &Program) -> usize {
-        let layout = program.layout();
+        let layout = Layout::new(program, &[]);
         let wanted: Vec<_> = program.states.iter().map(|s| s.rate).collect();
-        let routine = program.watched_routine(&layout, &wanted);
-        let abreast = Arc::new(Abreast::of(program, &routine).expect("blocks of one shape"));
+        let routine = layout.watched_routine(program, &wanted);
+        let abreast = Arc::new(Abreast::of(program, &layout, &routine).expect("blocks of one shape"));
         let mut alone = frame(program, &layout, &routine, None);
         let mut together = frame(program, &layout, &routine, Some(&abreast));
         let n = program.states.len();

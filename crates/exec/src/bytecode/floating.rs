@@ -5,8 +5,9 @@
 //! rest the shortest change is taken: it stays where it was.
 
 use super::frame::Frame;
+use super::instruction::{Operation, Solve};
 use super::newton::SETTLED;
-use halfarrow_compiler::program::{Instruction, Solve};
+use halfarrow_compiler::program::Op;
 
 /// A residual below this part of its terms is rounding.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -272,23 +273,22 @@ impl Frame {
         solve.guess.iter().zip(point).for_each(|(&g, &x)| {
             (self.r[g as usize], self.terms[g as usize]) = (x, x.abs());
         });
-        for instruction in &solve.code {
-            let terms = self.terms_of(instruction);
-            self.plain::<false>(std::slice::from_ref(instruction));
-            if let Some(out) = super::operands::written(instruction) {
-                self.terms[out as usize] = terms.unwrap_or(self.r[out as usize].abs());
-            }
+        for operation in &solve.code {
+            let terms = self.terms_of(operation);
+            self.plain::<false>(std::slice::from_ref(operation));
+            let out = operation.out as usize;
+            self.terms[out] = terms.unwrap_or(self.r[out].abs());
         }
     }
 
     /// What an operation adds up, in magnitude, before it is done; `None` where that is its value.
-    fn terms_of(&self, instruction: &Instruction) -> Option<f64> {
+    fn terms_of(&self, operation: &Operation) -> Option<f64> {
         let t = |r: u32| self.terms[r as usize];
-        match *instruction {
-            Instruction::Add { a, b, .. } | Instruction::Sub { a, b, .. } => Some(t(a) + t(b)),
-            Instruction::Neg { a, .. } => Some(t(a)),
-            Instruction::Mul { a, b, .. } => Some(t(a) * t(b)),
-            Instruction::Div { a, b, .. } => Some(t(a) / self.r[b as usize].abs()),
+        match operation.op {
+            Op::Add(a, b) | Op::Sub(a, b) => Some(t(a) + t(b)),
+            Op::Neg(a) => Some(t(a)),
+            Op::Mul(a, b) => Some(t(a) * t(b)),
+            Op::Div(a, b) => Some(t(a) / self.r[b as usize].abs()),
             _ => None,
         }
     }

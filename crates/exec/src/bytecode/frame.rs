@@ -2,13 +2,16 @@
 
 use super::abreast::{Abreast, Space};
 use super::conditions::{Conditions, table_on};
+use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
+use super::registers::Layout;
 use super::wide::Lane;
-use crate::math;
-use halfarrow_compiler::algebra::{Function, Table1d};
-use halfarrow_compiler::program::{Block, ConditionId, Instruction, Layout, Program, Reads, Routine, Solve};
+use halfarrow_compiler::algebra::Table1d;
+use halfarrow_compiler::for_each_op;
+use halfarrow_compiler::program::calculus::{Calculus, Plain};
+use halfarrow_compiler::program::{Block, ConditionId, Op, Program, Reads};
 use std::sync::Arc;
 
 /// A watched divisor vanishes below this part of the terms that it is made of.
@@ -153,15 +156,19 @@ impl Frame {
     /// Runs a part of the code of a routine.
     pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), Trouble> {
         for instruction in code {
-            match *instruction {
-                Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[solve as usize])?,
+            match instruction {
+                Instruction::Op(operation) => self.operation::<ALONG>(operation),
+                Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[*solve as usize])?,
                 Instruction::Watch { pivot, scale, watch } => {
-                    let (pivot, scale) = (self.r[pivot as usize], self.r[scale as usize]);
+                    let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     if !Frame::stands(pivot, scale) {
-                        return Err(Trouble::Vanished { watch });
+                        return Err(Trouble::Vanished { watch: *watch });
                     }
                 }
-                ref plain => self.step::<ALONG>(plain),
+                Instruction::Parameter { out, index, default } => {
+                    let value = self.set[*index as usize].unwrap_or(self.r[*default as usize]);
+                    self.put::<ALONG>(*out, value, 0.0);
+                }
             }
         }
         Ok(())
@@ -184,8 +191,8 @@ impl Frame {
         }
     }
 
-    pub(crate) fn plain<const ALONG: bool>(&mut self, code: &[Instruction]) {
-        code.iter().for_each(|instruction| self.step::<ALONG>(instruction));
+    pub(crate) fn plain<const ALONG: bool>(&mut self, code: &[Operation]) {
+        code.iter().for_each(|operation| self.operation::<ALONG>(operation));
     }
 
     pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
@@ -278,80 +285,59 @@ impl Frame {
     }
 
     #[inline]
-    fn put<const ALONG: bool>(&mut self, out: u32, value: f64, rate: f64) {
+    fn put<const ALONG: bool>(&mut self, out: Register, value: f64, rate: f64) {
         self.r[out as usize] = value;
         if ALONG {
             self.d[out as usize] = rate;
         }
     }
 
-    /// One instruction that is neither a solve block nor a watch.
+    /// One operation: its value, and by the rules of the table its rate.
     #[inline]
-    fn step<const ALONG: bool>(&mut self, instruction: &Instruction) {
-        use Instruction::*;
-        let r = |i: u32| self.r[i as usize];
-        let d = |i: u32| if ALONG { self.d[i as usize] } else { 0.0 };
-        match *instruction {
-            Add { out, a, b } => self.put::<ALONG>(out, r(a) + r(b), d(a) + d(b)),
-            Sub { out, a, b } => self.put::<ALONG>(out, r(a) - r(b), d(a) - d(b)),
-            Mul { out, a, b } => self.put::<ALONG>(out, r(a) * r(b), along(r(b), d(a)) + along(r(a), d(b))),
-            Div { out, a, b } => {
-                let value = r(a) / r(b);
-                let rate = if ALONG { (d(a) - along(value, d(b))) / r(b) } else { 0.0 };
-                self.put::<ALONG>(out, value, rate);
-            }
-            Neg { out, a } => self.put::<ALONG>(out, -r(a), -d(a)),
-            Powi { out, a, n } => {
-                let rate = if ALONG { along(f64::from(n) * math::powi(r(a), n - 1), d(a)) } else { 0.0 };
-                self.put::<ALONG>(out, math::powi(r(a), n), rate);
-            }
-            Pow { out, a, b } => {
-                let value = math::pow(r(a), r(b));
-                let rate = if ALONG { slope_of_power(value, (r(a), d(a)), (r(b), d(b))) } else { 0.0 };
-                self.put::<ALONG>(out, value, rate);
-            }
-            Call { f, out, a } => {
-                let value = math::call(f, r(a));
-                let rate = if ALONG && d(a) != 0.0 { math::slope(f, r(a), value) * d(a) } else { 0.0 };
-                self.put::<ALONG>(out, value, rate);
-            }
-            Call2 { f, out, a, b } => {
-                let rate = if ALONG { math::slope2(f, (r(a), d(a)), (r(b), d(b))) } else { 0.0 };
-                self.put::<ALONG>(out, math::call2(f, r(a), r(b)), rate);
-            }
-            Positive { out, a } => self.put::<ALONG>(out, f64::from(r(a) > 0.0), 0.0),
-            Side { out, a, condition } | Floor { out, a, condition } => {
-                let value = self.condition::<ALONG>(condition, a);
-                self.put::<ALONG>(out, value, 0.0);
-            }
-            And { out, a, b } => self.put::<ALONG>(out, f64::from(r(a) != 0.0 && r(b) != 0.0), 0.0),
-            Or { out, a, b } => self.put::<ALONG>(out, f64::from(r(a) != 0.0 || r(b) != 0.0), 0.0),
-            Not { out, a } => self.put::<ALONG>(out, f64::from(r(a) == 0.0), 0.0),
-            Select { out, c, a, b } => {
-                let chosen = if r(c) != 0.0 { a } else { b };
-                self.put::<ALONG>(out, r(chosen), d(chosen));
-            }
-            Table { out, a, table, piece } => {
-                let rate = d(a);
-                let [value, slope, ..] = self.table::<ALONG>(a, table, piece);
-                self.put::<ALONG>(out, value, along(slope, rate));
-            }
-            TableSlope { out, a, table, piece } => {
-                let rate = d(a);
-                let [_, slope, curvature, _] = self.table::<ALONG>(a, table, piece);
-                self.put::<ALONG>(out, slope, along(curvature, rate));
-            }
-            TableCurvature { out, a, table, piece } => {
-                let rate = d(a);
-                let [_, _, curvature, third] = self.table::<ALONG>(a, table, piece);
-                self.put::<ALONG>(out, curvature, along(third, rate));
-            }
-            Parameter { out, index, default } => {
-                let value = self.set[index as usize].unwrap_or(r(default));
-                self.put::<ALONG>(out, value, 0.0);
-            }
-            Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
+    #[allow(unused_variables, reason = "each rule reads what it needs")]
+    fn operation<const ALONG: bool>(&mut self, operation: &Operation) {
+        let out = operation.out;
+        macro_rules! compute {
+            (($k:ident $value:ident)
+             given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
+             plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+             })* }
+             held $held:tt) => {
+                match operation.op {
+                    $(Op::$plain($($part,)* $($a),*) => {
+                        $(let $da = if ALONG { Some(self.d[$a as usize]) } else { None };)*
+                        $(let $a = self.r[$a as usize];)*
+                        let $value = $meaning;
+                        let $k = &mut Plain;
+                        let rate = if ALONG { $slope.unwrap_or(0.0) } else { 0.0 };
+                        self.put::<ALONG>(out, $value, rate);
+                    })*
+                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                        let value = self.condition::<ALONG>(condition, a);
+                        self.put::<ALONG>(out, value, 0.0);
+                    }
+                    Op::Table(table, piece, a) => self.look_up::<ALONG>(out, a, (table, piece), 0),
+                    Op::TableSlope(table, piece, a) => self.look_up::<ALONG>(out, a, (table, piece), 1),
+                    Op::TableCurvature(table, piece, a) => self.look_up::<ALONG>(out, a, (table, piece), 2),
+                    $(Op::$given { .. })|* => unreachable!("given before the routine runs"),
+                }
+            };
         }
+        for_each_op!(compute);
+    }
+
+    /// A table, or its derivative of some order.
+    fn look_up<const ALONG: bool>(
+        &mut self,
+        out: Register,
+        a: Register,
+        (table, piece): (u32, Option<ConditionId>),
+        order: usize,
+    ) {
+        let rate = if ALONG { self.d[a as usize] } else { 0.0 };
+        let found = self.table::<ALONG>(a, table, piece);
+        self.put::<ALONG>(out, found[order], Plain.along(|_| found[order + 1], rate));
     }
 }
 
@@ -366,17 +352,4 @@ pub(super) fn put_entries(matrix: &mut [f64], solve: &Solve, r: &[f64]) {
     for &place in &solve.entries {
         matrix[place as usize] = r[solve.matrix[place as usize] as usize];
     }
-}
-
-/// A slope times a rate; what does not move has no rate even where the slope is infinite.
-#[inline]
-fn along(slope: f64, rate: f64) -> f64 {
-    if rate == 0.0 { 0.0 } else { slope * rate }
-}
-
-/// Derivative of `value = a^b`.
-pub(crate) fn slope_of_power(value: f64, (a, da): (f64, f64), (b, db): (f64, f64)) -> f64 {
-    let base = if da == 0.0 { 0.0 } else { b * math::pow(a, b - 1.0) * da };
-    let exponent = if db == 0.0 || value == 0.0 { 0.0 } else { value * math::call(Function::Log, a) * db };
-    base + exponent
 }

@@ -4,17 +4,20 @@ mod abreast;
 mod conditions;
 mod floating;
 mod frame;
+mod instruction;
 mod lu;
 mod newton;
-mod operands;
 mod packed;
+mod registers;
 mod wide;
 
 pub(crate) use abreast::Abreast;
 pub(crate) use conditions::{Hold, piece_of, table_on};
-pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble, slope_of_power};
-pub(crate) use lu::Lu;
+pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble};
 #[cfg(feature = "machine")]
-pub(crate) use operands::{reads, written};
+pub(crate) use instruction::Register;
+pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
+pub(crate) use lu::Lu;
 pub(crate) use packed::Packed;
+pub(crate) use registers::Layout;
 pub(crate) use wide::{Lane, Line, WideFrame};

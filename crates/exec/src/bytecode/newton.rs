@@ -11,7 +11,7 @@
 
 use super::floating::Floating;
 use super::frame::{Frame, Trouble, put_entries};
-use halfarrow_compiler::program::{Instruction, Solve};
+use super::instruction::Solve;
 
 /// Iterations of one attempt.
 const ITERATIONS: usize = 100;
@@ -982,11 +982,7 @@ impl Frame {
 
 /// Whether inner code reads conditions, which may be held or not.
 pub(super) fn has_conditions(solve: &Solve) -> bool {
-    use Instruction::*;
-    let condition = |i: &Instruction| {
-        matches!(i, Side { .. } | Floor { .. } | Table { .. } | TableSlope { .. } | TableCurvature { .. })
-    };
-    solve.code.iter().any(condition)
+    solve.code.iter().any(|operation| operation.op.is_held())
 }
 
 /// Distances from tiny to huge.

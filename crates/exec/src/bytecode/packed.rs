@@ -3,8 +3,9 @@
 //! To find out what an instruction does takes longer than to do it. Every value keeps the operation it comes from, hence
 //! its bits; only the order of what does not read each other changes.
 
-use super::operands::{moved, reads, written};
-use halfarrow_compiler::program::{Instruction, Register, Routine, Solve};
+use super::instruction::{Operation, Register, Routine, Solve};
+use super::registers::Layout;
+use halfarrow_compiler::program::{Arg, Code, Method, Op, Step};
 use std::collections::BTreeMap;
 
 /// What stands together.
@@ -22,8 +23,10 @@ pub(crate) enum Kind {
 pub(crate) enum Run {
     /// Operations of one kind: result and operands, in their slots.
     Many(Kind, Vec<[u32; 3]>),
-    /// Any other instruction, on slots.
-    One(Instruction),
+    /// Any other operation, on slots.
+    One(Operation),
+    /// A divisor that must not vanish against its scale.
+    Watch { pivot: u32, scale: u32 },
     /// A solve block.
     Solve(Block),
 }
@@ -49,73 +52,57 @@ pub(crate) struct Packed {
     pub slots: usize,
 }
 
-/// An instruction on values that are written once.
-struct Item {
+/// A step with the numbers of what it reads and defines: fixed slots first, then the locals of the code.
+struct Item<'a> {
     kind: Option<Kind>,
-    instruction: Instruction,
+    step: &'a Step,
     reads: Vec<u32>,
     writes: Vec<u32>,
 }
 
 impl Packed {
     /// The routine in packed order; registers below `fixed` are given.
-    pub fn new(routine: &Routine, fixed: u32) -> Packed {
-        let mut named = Named { of: BTreeMap::new(), fixed, next: fixed };
-        let items: Vec<Item> = routine.code.iter().map(|i| named.item(routine, i)).collect();
-        let outputs: Vec<u32> = routine.outputs.iter().map(|&r| named.read(r)).collect();
-        let order = packed_order(&items, named.next);
-        Slots::new(fixed, named.next, &items, &order, &outputs).place(routine, &items, order, &outputs)
+    pub fn new(layout: &Layout, routine: &Routine) -> Packed {
+        let slot = |a: Arg| match a {
+            Arg::Given(value) => layout.registers[&value],
+            Arg::Local(local) => layout.size + local.0,
+            Arg::Outer(_) | Arg::Guess(_) => unreachable!("no code of a Newton block"),
+        };
+        Packed::of(&routine.source, layout.size, &routine.solves, slot)
+    }
+
+    /// Code in packed order. `slot` is where it finds what it reads: below `fixed`, or a local that far above.
+    pub fn of(code: &Code, fixed: u32, solves: &[Solve], slot: impl Fn(Arg) -> u32) -> Packed {
+        let item = |step| Item::of(step, fixed, &slot);
+        let items: Vec<Item> = code.steps.iter().map(item).collect();
+        let outputs: Vec<u32> = code.outputs.iter().map(|&a| slot(a)).collect();
+        let values = fixed + code.values.len() as u32;
+        let order = packed_order(&items, values);
+        Slots::new(fixed, values, &items, &order, &outputs).place(solves, &items, order, &outputs)
     }
 }
 
-/// Registers as values that are written once.
-struct Named {
-    of: BTreeMap<Register, u32>,
-    fixed: u32,
-    next: u32,
-}
-
-impl Named {
-    fn read(&self, r: Register) -> u32 {
-        if r < self.fixed { r } else { self.of[&r] }
-    }
-
-    fn write(&mut self, r: Register) -> u32 {
-        self.of.insert(r, self.next);
-        self.next += 1;
-        self.next - 1
-    }
-
-    fn item(&mut self, routine: &Routine, instruction: &Instruction) -> Item {
-        use Instruction::*;
-        if let Solve { solve } = *instruction {
-            let solve = &routine.solves[solve as usize];
-            assert!(solve.shared.is_none(), "rates and recorded values share no factors");
-            let reads = read_by(solve).map(|r| self.read(r)).collect();
-            let writes = solve.unknowns.iter().map(|&r| self.write(r)).collect();
-            return Item { kind: None, instruction: *instruction, reads, writes };
-        }
-        let kind = match instruction {
-            Add { .. } => Some(Kind::Add),
-            Sub { .. } => Some(Kind::Sub),
-            Mul { .. } => Some(Kind::Mul),
-            Div { .. } => Some(Kind::Div),
-            Neg { .. } => Some(Kind::Neg),
+impl Item<'_> {
+    fn of<'s>(step: &'s Step, fixed: u32, slot: &impl Fn(Arg) -> u32) -> Item<'s> {
+        let kind = match step {
+            Step::Op { op: Op::Add(..), .. } => Some(Kind::Add),
+            Step::Op { op: Op::Sub(..), .. } => Some(Kind::Sub),
+            Step::Op { op: Op::Mul(..), .. } => Some(Kind::Mul),
+            Step::Op { op: Op::Div(..), .. } => Some(Kind::Div),
+            Step::Op { op: Op::Neg(..), .. } => Some(Kind::Neg),
             _ => None,
         };
-        let mut read = Vec::new();
-        reads(instruction, |r| read.push(self.read(r)));
-        let writes = written(instruction).map(|r| self.write(r)).into_iter().collect();
-        Item { kind, instruction: *instruction, reads: read, writes }
+        let mut reads = Vec::new();
+        step.for_each_read(|a| reads.push(slot(a)));
+        Item { kind, step, reads, writes: step.defines().iter().map(|out| fixed + out.0).collect() }
     }
 }
 
-/// What a solve block reads from outside.
+/// Where a solve block of the frame has what it reads from outside, in the order of [`program::Solve::reads`].
 fn read_by(solve: &Solve) -> impl Iterator<Item = Register> + '_ {
     let linear = solve.guess.is_empty();
-    let of_linear = if linear { &solve.matrix[..] } else { &[] };
-    let right = if linear { &solve.right[..] } else { &[] };
-    solve.outer.iter().chain(of_linear).chain(right).copied()
+    let (matrix, right) = if linear { (&solve.matrix[..], &solve.right[..]) } else { (&[][..], &[][..]) };
+    solve.outer.iter().chain(matrix).chain(right).copied()
 }
 
 /// All that is ready of the kind of which most is, again and again.
@@ -194,7 +181,8 @@ impl Slots {
         slot
     }
 
-    fn place(mut self, routine: &Routine, items: &[Item], order: Vec<Vec<usize>>, outputs: &[u32]) -> Packed {
+    fn place(mut self, solves: &[Solve], items: &[Item], order: Vec<Vec<usize>>, outputs: &[u32]) -> Packed {
+        let number_of: BTreeMap<u32, usize> = solves.iter().enumerate().map(|(i, s)| (s.block.0, i)).collect();
         let mut runs = Vec::with_capacity(order.len());
         for group in order {
             let kind = items[group[0]].kind;
@@ -203,16 +191,26 @@ impl Slots {
                 let item = &items[i];
                 let reads: Vec<u32> = item.reads.iter().map(|&value| self.read(value)).collect();
                 let writes: Vec<u32> = item.writes.iter().map(|&value| self.write(value)).collect();
-                match (kind, item.instruction) {
+                match (kind, item.step) {
                     (Some(_), _) => many.push([writes[0], reads[0], reads.get(1).copied().unwrap_or(reads[0])]),
-                    (None, Instruction::Solve { solve }) => {
-                        let solve = solve as usize;
-                        let block = &routine.solves[solve];
+                    (None, Step::Op { op, .. }) => {
+                        let mut reads = reads.into_iter();
+                        let op = op.map_operands(|_| reads.next().expect("as many slots as operands"));
+                        runs.push(Run::One(Operation { out: writes[0], op }));
+                    }
+                    (None, Step::Watch { .. }) => {
+                        runs.push(Run::Watch { pivot: reads[0], scale: reads[1] });
+                    }
+                    (None, Step::Solve(solve)) => {
+                        let alone = !matches!(solve.method, Method::Linear { shared: Some(_), .. });
+                        assert!(alone, "rates and recorded values share no factors");
+                        let solve = number_of[&solve.block.0];
+                        let block = &solves[solve];
                         let reads = reads.into_iter().zip(read_by(block)).collect();
                         let finds = writes.into_iter().zip(block.unknowns.iter().copied()).collect();
                         runs.push(Run::Solve(Block { solve, reads, finds }));
                     }
-                    (None, instruction) => runs.push(Run::One(moved(instruction, &reads, writes.first().copied()))),
+                    (None, Step::Parameter { .. }) => unreachable!("parameters are set lane by lane"),
                 }
             }
             if let Some(kind) = kind {

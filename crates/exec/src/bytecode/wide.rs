@@ -4,9 +4,11 @@
 //! through the frame of each lane.
 
 use super::frame::Frame;
+use super::instruction::{Operation, Routine, Solve};
 use super::packed::{Block, Kind, Packed, Run};
 use crate::math;
-use halfarrow_compiler::program::{ConditionId, Instruction, Routine};
+use halfarrow_compiler::for_each_op;
+use halfarrow_compiler::program::{ConditionId, Op};
 
 /// What has a frame of its own.
 pub(crate) trait Lane {
@@ -52,7 +54,7 @@ pub(crate) struct WideFrame<const N: usize> {
 /// for them.
 struct All<'a, L, const N: usize> {
     registers: &'a mut WideFrame<N>,
-    routine: &'a Routine,
+    solves: &'a [Solve],
     packed: &'a Packed,
     frames: &'a mut [L],
     good: &'a mut [bool; N],
@@ -63,7 +65,7 @@ impl<L: Lane, const N: usize> pulp::WithSimd for All<'_, L, N> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.registers.all(self.routine, self.packed, self.frames, self.good);
+        self.registers.all(self.solves, self.packed, self.frames, self.good);
     }
 }
 
@@ -77,12 +79,12 @@ impl<const N: usize> WideFrame<N> {
     /// filled.
     pub fn run<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
         // The widest vectors that the machine has; they round as narrow ones do.
-        self.arch.dispatch(All { registers: self, routine, packed, frames, good });
+        self.arch.dispatch(All { registers: self, solves: &routine.solves, packed, frames, good });
     }
 
     /// The same where the vectors of the machine are in use already.
     #[inline(always)]
-    pub(super) fn all<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
+    pub(super) fn all<L: Lane>(&mut self, solves: &[Solve], packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
         for run in &packed.runs {
             match run {
                 Run::Many(Kind::Add, all) => self.many(all, |a, b| a + b),
@@ -90,12 +92,12 @@ impl<const N: usize> WideFrame<N> {
                 Run::Many(Kind::Mul, all) => self.many(all, |a, b| a * b),
                 Run::Many(Kind::Div, all) => self.many(all, |a, b| a / b),
                 Run::Many(Kind::Neg, all) => self.many(all, |a, _| -a),
-                Run::Solve(block) => self.solve(routine, block, frames, good),
-                Run::One(Instruction::Watch { pivot, scale, .. }) => {
+                Run::Solve(block) => self.solve(solves, block, frames, good),
+                Run::Watch { pivot, scale } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     (0..N).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
                 }
-                Run::One(plain) => self.step(plain, frames),
+                Run::One(operation) => self.step(operation, frames),
             }
         }
     }
@@ -109,14 +111,14 @@ impl<const N: usize> WideFrame<N> {
     }
 
     #[inline(never)]
-    fn solve<L: Lane>(&mut self, routine: &Routine, block: &Block, frames: &mut [L], good: &mut [bool; N]) {
+    fn solve<L: Lane>(&mut self, solves: &[Solve], block: &Block, frames: &mut [L], good: &mut [bool; N]) {
         for lane in 0..N {
             if !good[lane] {
                 continue;
             }
             let frame = frames[lane].frame();
             block.reads.iter().for_each(|&(slot, r)| frame.r[r as usize] = self.r[slot as usize][lane]);
-            good[lane] = frame.solve::<false>(&routine.solves[block.solve]).is_ok();
+            good[lane] = frame.solve::<false>(&solves[block.solve]).is_ok();
             block.finds.iter().for_each(|&(slot, r)| self.r[slot as usize][lane] = frame.r[r as usize]);
         }
     }
@@ -126,55 +128,45 @@ impl<const N: usize> WideFrame<N> {
         self.r[out as usize] = Line(std::array::from_fn(value));
     }
 
+    /// One operation: what has a way of its own for lanes, else lane by lane as the table says.
     #[inline(always)]
-    fn step<L: Lane>(&mut self, instruction: &Instruction, frames: &mut [L]) {
-        use Instruction::*;
-        let r = |i: u32| self.r[i as usize].0;
-        let truth = f64::from;
-        match *instruction {
-            Powi { out, a, n } => {
-                let a = r(a);
-                self.r[out as usize] = Line(powers(a, n));
-            }
-            Pow { out, a, b } => self.r[out as usize] = Line(math::pow_lanes(&r(a), &r(b))),
-            Call { f, out, a } => self.r[out as usize] = Line(math::call_lanes(f, &r(a))),
-            Call2 { f, out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| math::call2(f, a[l], b[l]));
-            }
-            Positive { out, a } => {
-                let a = r(a);
-                self.each(out, |l| truth(a[l] > 0.0));
-            }
-            Side { out, a, condition } | Floor { out, a, condition } => {
-                let a = r(a);
-                for (lane, frame) in frames.iter_mut().enumerate() {
-                    self.r[out as usize][lane] = frame.frame().condition_at(condition, a[lane]);
+    #[allow(unreachable_patterns, unused_variables, reason = "the table has what has a way of its own as well")]
+    fn step<L: Lane>(&mut self, operation: &Operation, frames: &mut [L]) {
+        let out = operation.out;
+        macro_rules! compute {
+            (($k:ident $value:ident)
+             given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
+             plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+             })* }
+             held $held:tt) => {
+                match operation.op {
+                    Op::Powi(n, a) => self.r[out as usize] = Line(powers(self.r[a as usize].0, n)),
+                    Op::Pow(a, b) => {
+                        self.r[out as usize] = Line(math::pow_lanes(&self.r[a as usize].0, &self.r[b as usize].0));
+                    }
+                    Op::Call(f, a) => self.r[out as usize] = Line(math::call_lanes(f, &self.r[a as usize].0)),
+                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                        let a = self.r[a as usize];
+                        for (lane, frame) in frames.iter_mut().enumerate() {
+                            self.r[out as usize][lane] = frame.frame().condition_at(condition, a[lane]);
+                        }
+                    }
+                    Op::Table(table, piece, a) => self.table(frames, (out, a), (table, piece), 0),
+                    Op::TableSlope(table, piece, a) => self.table(frames, (out, a), (table, piece), 1),
+                    Op::TableCurvature(table, piece, a) => self.table(frames, (out, a), (table, piece), 2),
+                    $(Op::$given { .. })|* => unreachable!("given before the routine runs"),
+                    $(Op::$plain($($part,)* $($a),*) => {
+                        $(let $a = self.r[$a as usize].0;)*
+                        self.each(out, |l| {
+                            $(let $a = $a[l];)*
+                            $meaning
+                        });
+                    })*
                 }
-            }
-            And { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| truth(a[l] != 0.0 && b[l] != 0.0));
-            }
-            Or { out, a, b } => {
-                let (a, b) = (r(a), r(b));
-                self.each(out, |l| truth(a[l] != 0.0 || b[l] != 0.0));
-            }
-            Not { out, a } => {
-                let a = r(a);
-                self.each(out, |l| truth(a[l] == 0.0));
-            }
-            Select { out, c, a, b } => {
-                let (c, a, b) = (r(c), r(a), r(b));
-                self.each(out, |l| if c[l] != 0.0 { a[l] } else { b[l] });
-            }
-            Table { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 0),
-            TableSlope { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 1),
-            TableCurvature { out, a, table, piece } => self.table(frames, (out, a), (table, piece), 2),
-            Parameter { .. } => unreachable!("parameters are set lane by lane"),
-            Add { .. } | Sub { .. } | Mul { .. } | Div { .. } | Neg { .. } => unreachable!("arithmetic is packed"),
-            Solve { .. } | Watch { .. } => unreachable!("solve blocks and watches stand at the top level"),
+            };
         }
+        for_each_op!(compute);
     }
 
     /// A table, or its derivative of some order.

@@ -1,7 +1,7 @@
 //! What stands in the place of machine code where it is left out.
 
-use crate::bytecode::{Frame, Trouble};
-use halfarrow_compiler::program::{Layout, Program, Routine};
+use crate::bytecode::{Frame, Layout, Routine, Trouble};
+use halfarrow_compiler::program::Program;
 use std::fmt;
 
 /// Why there is no machine code; the bytecode runs all the same.

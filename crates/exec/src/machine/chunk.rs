@@ -2,12 +2,15 @@
 
 use super::arithmetic::Writer;
 use super::{RARE, STATUS_OF_WATCH, kernels};
-use crate::bytecode::PIVOT_BELOW;
+use crate::bytecode::{Operation, PIVOT_BELOW, Register, Solve};
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, Value, types};
 use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::ids::Table;
-use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Instruction, Register, Solve};
+use halfarrow_compiler::program::calculus::{Calculus, Moving};
+use halfarrow_compiler::program::elimination::{Definite, Elimination};
+use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Op};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What is the same for all chunks of a model.
@@ -29,7 +32,13 @@ pub(super) struct Direct {
 /// What a chunk consists of.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Item<'a> {
-    Plain(&'a Instruction),
+    Op(&'a Operation),
+    /// Stops if the pivot vanishes against its scale.
+    Watch {
+        pivot: Register,
+        scale: Register,
+        watch: u32,
+    },
     /// A small linear block, written out.
     Solve(&'a Solve),
 }
@@ -93,7 +102,8 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     pub fn item(&mut self, item: Item) {
         match item {
-            Item::Plain(instruction) => self.instruction(instruction),
+            Item::Op(&Operation { out, op }) => self.operation(out, op),
+            Item::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
             Item::Solve(solve) => self.solve(solve),
         }
     }
@@ -191,7 +201,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         }
     }
 
-    fn call(&mut self, function: usize, arguments: &[Value]) -> Value {
+    fn call_kernel(&mut self, function: usize, arguments: &[Value]) -> Value {
         let result = self.w.call(function, arguments);
         for register in std::mem::take(&mut self.loaded) {
             self.r.remove(&register);
@@ -204,24 +214,12 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.w.number(0.0)
     }
 
-    /// `slope · rate`, 0 where nothing moves.
-    fn along(&mut self, slope: impl FnOnce(&mut Self) -> Value, rate: Value) -> Value {
-        let zero = self.zero();
-        if rate == zero {
-            return zero;
-        }
-        let slope = slope(self);
-        let product = self.w.mul(slope, rate);
-        let rests = self.w.is(FloatCC::Equal, rate, zero);
-        self.w.choose(rests, zero, product)
-    }
-
     /// Truth as a number.
-    fn truth(&mut self, register: Register, condition: Value) {
+    fn truth(&mut self, condition: Value) -> Value {
         let (one, zero) = (self.w.number(1.0), self.zero());
         let value = self.w.choose(condition, one, zero);
         self.truth.insert(value, condition);
-        self.put(register, value, |this| this.zero());
+        value
     }
 
     /// Whether a number is not 0.
@@ -233,124 +231,90 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.w.is(FloatCC::NotEqual, value, zero)
     }
 
-    fn instruction(&mut self, instruction: &Instruction) {
-        use Instruction::*;
-        match *instruction {
-            Add { out, a, b } => self.sum(out, a, b, Writer::add),
-            Sub { out, a, b } => self.sum(out, a, b, Writer::sub),
-            Mul { out, a, b } => {
-                let (va, vb) = (self.value(a), self.value(b));
-                let value = self.w.mul(va, vb);
-                self.put(out, value, |this| {
-                    let (da, db) = (this.slope(a), this.slope(b));
-                    let (left, right) = (this.along(|_| vb, da), this.along(|_| va, db));
-                    this.w.add(left, right)
-                });
-            }
-            Div { out, a, b } => {
-                let (va, vb) = (self.value(a), self.value(b));
-                let value = self.w.div(va, vb);
-                self.put(out, value, |this| {
-                    let (da, db) = (this.slope(a), this.slope(b));
-                    let moved = this.along(|_| value, db);
-                    let rest = this.w.sub(da, moved);
-                    this.w.div(rest, vb)
-                });
-            }
-            Neg { out, a } => {
-                let va = self.value(a);
-                let value = self.w.neg(va);
-                self.put(out, value, |this| {
-                    let da = this.slope(a);
-                    this.w.neg(da)
-                });
-            }
-            Powi { out, a, n } => {
-                let va = self.value(a);
-                let value = self.power(va, n);
-                self.put(out, value, |this| {
-                    let da = this.slope(a);
-                    this.along(
-                        |this| {
-                            let (less, factor) = (this.power(va, n - 1), this.w.number(f64::from(n)));
-                            this.w.mul(factor, less)
-                        },
-                        da,
-                    )
-                });
-            }
-            Pow { out, a, b } => self.pow(out, a, b),
-            Call { f, out, a } => self.function(f, out, a),
-            Call2 { f, out, a, b } => {
-                let (va, vb) = (self.value(a), self.value(b));
-                let slope = self.along.then(|| {
-                    let (da, db) = (self.slope(a), self.slope(b));
-                    self.call(kernels::slope_of_two(f), &[va, da, vb, db])
-                });
-                let value = self.call(kernels::two(f), &[va, vb]);
-                self.put(out, value, |_| slope.unwrap_or(value));
-            }
-            Positive { out, a } => {
-                let (va, zero) = (self.value(a), self.zero());
-                let above = self.w.is(FloatCC::GreaterThan, va, zero);
-                self.truth(out, above);
-            }
-            Side { out, a, condition } | Floor { out, a, condition } => {
-                let va = self.value(a);
-                let value = self.condition(condition, va);
-                self.put(out, value, |this| this.zero());
-            }
-            And { out, a, b } => {
-                let (va, vb) = (self.value(a), self.value(b));
-                let (ha, hb) = (self.holds(va), self.holds(vb));
-                let both = self.w.both(ha, hb);
-                self.truth(out, both);
-            }
-            Or { out, a, b } => {
-                let (va, vb) = (self.value(a), self.value(b));
-                let (ha, hb) = (self.holds(va), self.holds(vb));
-                let either = self.w.either(ha, hb);
-                self.truth(out, either);
-            }
-            Not { out, a } => {
-                let va = self.value(a);
-                let zero = self.zero();
-                let fails = self.w.is(FloatCC::Equal, va, zero);
-                self.truth(out, fails);
-            }
-            Select { out, c, a, b } => {
-                let (vc, va, vb) = (self.value(c), self.value(a), self.value(b));
-                let holds = self.holds(vc);
-                let value = self.w.choose(holds, va, vb);
-                self.put(out, value, |this| {
-                    let (da, db) = (this.slope(a), this.slope(b));
-                    this.w.choose(holds, da, db)
-                });
-            }
-            Table { out, a, table, piece } => self.table(out, a, (table, 0), piece),
-            TableSlope { out, a, table, piece } => self.table(out, a, (table, 1), piece),
-            TableCurvature { out, a, table, piece } => self.table(out, a, (table, 2), piece),
-            Watch { pivot, scale, watch } => {
-                let (pivot, scale) = (self.value(pivot), self.value(scale));
-                let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
-                let least = self.w.mul(factor, scale);
-                let size = self.w.abs(pivot);
-                let above = self.w.is(FloatCC::GreaterThan, size, least);
-                let some = self.w.is(FloatCC::NotEqual, pivot, zero);
-                let stands = self.w.both(above, some);
-                self.require(stands, STATUS_OF_WATCH + u64::from(watch));
-            }
-            Parameter { .. } | Solve { .. } => unreachable!("neither parameters nor large blocks stand in a chunk"),
-        }
+    fn watch(&mut self, pivot: Register, scale: Register, watch: u32) {
+        let (pivot, scale) = (self.value(pivot), self.value(scale));
+        let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
+        let least = self.w.mul(factor, scale);
+        let size = self.w.abs(pivot);
+        let above = self.w.is(FloatCC::GreaterThan, size, least);
+        let some = self.w.is(FloatCC::NotEqual, pivot, zero);
+        let stands = self.w.both(above, some);
+        self.stop_unless(stands, STATUS_OF_WATCH + u64::from(watch));
     }
 
-    fn sum(&mut self, out: Register, a: Register, b: Register, how: fn(&mut Writer<'a>, Value, Value) -> Value) {
-        let (va, vb) = (self.value(a), self.value(b));
-        let value = how(&mut self.w, va, vb);
-        self.put(out, value, |this| {
-            let (da, db) = (this.slope(a), this.slope(b));
-            how(&mut this.w, da, db)
-        });
+    /// One operation: its value, and by the rules of the table its slope.
+    #[allow(unused_variables, reason = "each rule reads what it needs")]
+    fn operation(&mut self, out: Register, op: Op<Register>) {
+        macro_rules! lower {
+            (($k:ident $value:ident)
+             given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
+             plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+             })* }
+             held $held:tt) => {
+                match op {
+                    $(Op::$plain($($part,)* $($a),*) => {
+                        $(let $da = if self.along { Some(self.slope($a)) } else { None };)*
+                        $(let $a = self.value($a);)*
+                        let $value = self.lowered(Op::$plain($($part,)* $($a),*));
+                        self.put(out, $value, |$k| {
+                            let slope = $slope;
+                            slope.unwrap_or_else(|| $k.zero())
+                        });
+                    })*
+                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                        let va = self.value(a);
+                        let value = self.condition(condition, va);
+                        self.put(out, value, |this| this.zero());
+                    }
+                    Op::Table(table, piece, a) => self.look_up(out, a, (table, 0), piece),
+                    Op::TableSlope(table, piece, a) => self.look_up(out, a, (table, 1), piece),
+                    Op::TableCurvature(table, piece, a) => self.look_up(out, a, (table, 2), piece),
+                    $(Op::$given { .. })|* => unreachable!("given before the routine runs"),
+                }
+            };
+        }
+        for_each_op!(lower);
+    }
+
+    /// The value of a plain operation: what the processor does itself, else a call of what it means.
+    fn lowered(&mut self, op: Op<Value>) -> Value {
+        match op {
+            Op::Add(a, b) => self.w.add(a, b),
+            Op::Sub(a, b) => self.w.sub(a, b),
+            Op::Mul(a, b) => self.w.mul(a, b),
+            Op::Div(a, b) => self.w.div(a, b),
+            Op::Neg(a) => self.w.neg(a),
+            Op::Powi(n, a) => self.power(a, n),
+            Op::Call(f, a) => self.call_one(f, a),
+            Op::Positive(a) => {
+                let zero = self.zero();
+                let above = self.w.is(FloatCC::GreaterThan, a, zero);
+                self.truth(above)
+            }
+            Op::And(a, b) => {
+                let (a, b) = (self.holds(a), self.holds(b));
+                let both = self.w.both(a, b);
+                self.truth(both)
+            }
+            Op::Or(a, b) => {
+                let (a, b) = (self.holds(a), self.holds(b));
+                let either = self.w.either(a, b);
+                self.truth(either)
+            }
+            Op::Not(a) => {
+                let zero = self.zero();
+                let fails = self.w.is(FloatCC::Equal, a, zero);
+                self.truth(fails)
+            }
+            Op::Select(c, a, b) => self.select(c, a, b),
+            other => {
+                let mut operands = Vec::with_capacity(3);
+                other.for_each_operand(|a| operands.push(a));
+                let kernel = kernels::of(other).expect("what is fixed in an operation is lowered above");
+                self.call_kernel(kernel, &operands)
+            }
+        }
     }
 
     /// `a^n` by repeated squaring, as `math::powi` does it.
@@ -371,22 +335,6 @@ impl<'a, 'b> Chunk<'a, 'b> {
         result.unwrap_or_else(|| self.w.number(1.0))
     }
 
-    fn pow(&mut self, out: Register, a: Register, b: Register) {
-        let (va, vb) = (self.value(a), self.value(b));
-        let slopes = self.along.then(|| (self.slope(a), self.slope(b)));
-        let value = self.call(kernels::power(), &[va, vb]);
-        let slope = slopes.map(|(da, db)| self.call(kernels::slope_of_pow(), &[value, va, da, vb, db]));
-        self.put(out, value, |_| slope.unwrap_or(value));
-    }
-
-    fn function(&mut self, f: Function, out: Register, a: Register) {
-        let va = self.value(a);
-        let da = if self.along { Some(self.slope(a)) } else { None };
-        let value = self.call_one(f, va);
-        let slope = da.map(|da| self.along(|this| this.slope_of_one(f, va, value), da));
-        self.put(out, value, |_| slope.unwrap_or(value));
-    }
-
     fn call_one(&mut self, f: Function, a: Value) -> Value {
         match f {
             Function::Sqrt => self.w.builder.ins().sqrt(a),
@@ -403,22 +351,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 self.usual(good);
                 value
             }
-            _ => self.call(kernels::one(f), &[a]),
-        }
-    }
-
-    /// As `math::slope`.
-    fn slope_of_one(&mut self, f: Function, a: Value, value: Value) -> Value {
-        let one = self.w.number(1.0);
-        match f {
-            Function::Sin => self.call_one(Function::Cos, a),
-            Function::Cos => {
-                let sine = self.call_one(Function::Sin, a);
-                self.w.neg(sine)
-            }
-            Function::Exp => value,
-            Function::Log => self.w.div(one, a),
-            _ => self.call(kernels::slope_of_one(f), &[a, value]),
+            _ => self.call_kernel(kernels::one(f), &[a]),
         }
     }
 
@@ -440,7 +373,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         });
     }
 
-    fn require(&mut self, stands: Value, status: u64) {
+    fn stop_unless(&mut self, stands: Value, status: u64) {
         let (fine, wrong) = (self.w.integer(0), self.w.integer(status));
         let mine = self.w.choose(stands, fine, wrong);
         self.status = Some(match self.status {
@@ -464,10 +397,10 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 }
                 value
             }
-            ConditionKind::Floor => self.call(kernels::one(Function::Floor), &[operand]),
+            ConditionKind::Floor => self.call_kernel(kernels::one(Function::Floor), &[operand]),
             ConditionKind::Piece(table) => {
                 let table = self.w.integer(u64::from(table));
-                self.call(kernels::piece(), &[self.tables, table, operand])
+                self.call_kernel(kernels::piece(), &[self.tables, table, operand])
             }
         };
         let Some(kept) = self.kept(cause) else { return follow };
@@ -489,7 +422,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.kept[place]
     }
 
-    fn table(&mut self, out: Register, a: Register, (table, order): (u32, u64), piece: Option<ConditionId>) {
+    fn look_up(&mut self, out: Register, a: Register, (table, order): (u32, u64), piece: Option<ConditionId>) {
         let va = self.value(a);
         let da = if self.along { Some(self.slope(a)) } else { None };
         let piece = match piece {
@@ -499,11 +432,62 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let index = self.w.integer(u64::from(table));
         let at = |this: &mut Self, order: u64| {
             let order = this.w.integer(order);
-            this.call(kernels::table(), &[this.tables, index, order, piece, va])
+            this.call_kernel(kernels::table(), &[this.tables, index, order, piece, va])
         };
         let value = at(self, order);
         let slope = da.map(|da| self.along(|this| at(this, order + 1), da));
         self.put(out, value, |_| slope.unwrap_or(value));
+    }
+}
+
+/// Values of the function that is written, as numbers of the rules of derivatives.
+impl Calculus for Chunk<'_, '_> {
+    type Number = Value;
+    fn number(&mut self, value: f64) -> Value {
+        self.w.number(value)
+    }
+    fn neg(&mut self, a: Value) -> Value {
+        self.w.neg(a)
+    }
+    fn add(&mut self, a: Value, b: Value) -> Value {
+        self.w.add(a, b)
+    }
+    fn sub(&mut self, a: Value, b: Value) -> Value {
+        self.w.sub(a, b)
+    }
+    fn mul(&mut self, a: Value, b: Value) -> Value {
+        self.w.mul(a, b)
+    }
+    fn div(&mut self, a: Value, b: Value) -> Value {
+        self.w.div(a, b)
+    }
+    fn powi(&mut self, a: Value, n: u32) -> Value {
+        self.power(a, n)
+    }
+    fn call(&mut self, f: Function, a: Value) -> Value {
+        self.call_one(f, a)
+    }
+    fn select(&mut self, c: Value, a: Value, b: Value) -> Value {
+        let holds = self.holds(c);
+        self.w.choose(holds, a, b)
+    }
+    fn along(&mut self, slope: impl FnOnce(&mut Self) -> Value, rate: Value) -> Value {
+        let zero = self.zero();
+        if rate == zero {
+            return zero;
+        }
+        let slope = slope(self);
+        let product = self.w.mul(slope, rate);
+        let rests = self.w.is(FloatCC::Equal, rate, zero);
+        self.w.choose(rests, zero, product)
+    }
+    fn along_power(&mut self, value: Value, (a, da): Moving<Self>, (b, db): Moving<Self>) -> Option<Value> {
+        let zero = self.zero();
+        let (da, db) = (da.unwrap_or(zero), db.unwrap_or(zero));
+        Some(self.call_kernel(kernels::slope_of_pow(), &[value, a, da, b, db]))
+    }
+    fn table(&mut self, _: (u32, Option<ConditionId>), _: u32, _: Value) -> Value {
+        unreachable!("tables are looked up with their derivative")
     }
 }
 
@@ -518,7 +502,8 @@ impl Chunk<'_, '_> {
             right[0] = self.w.div(right[0], pivot);
         } else {
             let matrix: Vec<Value> = solve.matrix.iter().map(|&r| self.value(r)).collect();
-            self.definite(n, &matrix, &mut right);
+            let factors = Definite::factor(self, &matrix, n, f64::EPSILON * n as f64);
+            factors.solve(self, &mut right);
         }
         for (&out, value) in solve.unknowns.iter().zip(right) {
             self.put(out, value, |_| unreachable!("blocks are written out for values only"));
@@ -536,51 +521,17 @@ impl Chunk<'_, '_> {
         let good = self.w.both(some, finite);
         self.usual(good);
     }
+}
 
-    /// `Uᵀ D U x = b`.
-    fn definite(&mut self, n: usize, matrix: &[Value], b: &mut [Value]) {
-        let mut u = matrix.to_vec();
-        let mut inverses = Vec::with_capacity(n);
-        let (zero, one) = (self.w.number(0.0), self.w.number(1.0));
-        let (high, rounding) = (self.w.number(f64::INFINITY), self.w.number(f64::EPSILON * n as f64));
-        let sign = self.w.sign_of(matrix[0]);
-        for k in 0..n {
-            let pivot = u[k * n + k];
-            let (size, entry) = (self.w.mul(sign, pivot), self.w.mul(sign, matrix[k * n + k]));
-            let least = self.w.mul(rounding, entry);
-            for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)]
-            {
-                let good = self.w.is(how, size, bound);
-                self.usual(good);
-            }
-            let inverse = self.w.div(one, pivot);
-            let row: Vec<Value> = (k + 1..n).map(|j| u[k * n + j]).collect();
-            for j in k + 1..n {
-                let factor = self.w.mul(row[j - k - 1], inverse);
-                for i in j..n {
-                    let product = self.w.mul(factor, row[i - k - 1]);
-                    u[j * n + i] = self.w.sub(u[j * n + i], product);
-                }
-                u[k * n + j] = factor;
-            }
-            inverses.push(inverse);
-        }
-        b.iter_mut().for_each(|b| *b = self.w.add(*b, zero));
-        for k in 0..n {
-            for j in k + 1..n {
-                let product = self.w.mul(u[k * n + j], b[k]);
-                b[j] = self.w.sub(b[j], product);
-            }
-        }
-        for (b, inverse) in b.iter_mut().zip(inverses) {
-            let scaled = self.w.mul(*b, inverse);
-            *b = self.w.add(scaled, zero);
-        }
-        for k in (0..n).rev() {
-            for i in 0..k {
-                let product = self.w.mul(u[i * n + k], b[k]);
-                b[i] = self.w.sub(b[i], product);
-            }
+impl Elimination for Chunk<'_, '_> {
+    fn sign_of(&mut self, a: Value) -> Value {
+        self.w.sign_of(a)
+    }
+    fn require(&mut self, pivot: Value, least: Value) {
+        let (zero, high) = (self.zero(), self.w.number(f64::INFINITY));
+        for (how, bound) in [(FloatCC::GreaterThan, zero), (FloatCC::GreaterThan, least), (FloatCC::LessThan, high)] {
+            let good = self.w.is(how, pivot, bound);
+            self.usual(good);
         }
     }
 }

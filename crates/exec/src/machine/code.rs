@@ -4,9 +4,9 @@ use super::chunk::{Item, Setting};
 use super::live::Live;
 use super::memory::{Arrays, Gathered, Memory, Reach, Start};
 use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_WATCH, WRITTEN_OUT};
-use crate::bytecode::{Frame, Hold, InnerCode, Trouble};
+use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, Trouble};
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{Instruction, Layout, Program, Register, Routine, Solve};
+use halfarrow_compiler::program::{Op, Program};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ impl Generator {
         let cuts = cuts(routine, &written_out);
         let mut live = Live::of(&routine.outputs);
         let mut steps = Vec::with_capacity(cuts.len());
-        let inline = inlines(&routine.code);
+        let inline = inlines(operations(&routine.code));
         for cut in cuts.into_iter().rev() {
             let items: Vec<Item> = routine.code[cut.clone()].iter().map(|i| item(routine, i)).collect();
             if let [Instruction::Solve { solve }] = routine.code[cut.clone()]
@@ -80,7 +80,8 @@ impl Generator {
             }
             let start = self.chunk(&mut gathered, &setting, &items, &live.registers(), (along, inline))?;
             items.iter().rev().for_each(|item| match item {
-                Item::Plain(instruction) => live.before(instruction),
+                Item::Op(operation) => live.before(operation),
+                Item::Watch { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
                 Item::Solve(solve) => live.before_solve(solve),
             });
             steps.push(Step::Piece(Piece { start, code: cut }));
@@ -125,13 +126,13 @@ impl Generator {
         let wanted: Vec<Register> = solve.matrix.iter().chain(&solve.right).copied().collect();
         let mut live = Live::of(&wanted);
         let mut pieces = Vec::new();
-        let inline = inlines(&solve.code);
+        let inline = inlines(solve.code.iter());
         let starts: Vec<usize> = (0..solve.code.len()).step_by(CHUNK).collect();
         for start in starts.into_iter().rev() {
             let code = start..(start + CHUNK).min(solve.code.len());
-            let items: Vec<Item> = solve.code[code.clone()].iter().map(Item::Plain).collect();
+            let items: Vec<Item> = solve.code[code.clone()].iter().map(Item::Op).collect();
             let start = self.chunk(gathered, setting, &items, &live.registers(), (along, inline))?;
-            solve.code[code.clone()].iter().rev().for_each(|instruction| live.before(instruction));
+            solve.code[code.clone()].iter().rev().for_each(|operation| live.before(operation));
             pieces.push(Piece { start, code });
         }
         pieces.reverse();
@@ -178,18 +179,23 @@ fn is_written_out(program: &Program, layout: &Layout, routine: &Routine, solve: 
 }
 
 fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> Item<'a> {
-    match *instruction {
-        Instruction::Solve { solve } => Item::Solve(&routine.solves[solve as usize]),
-        _ => Item::Plain(instruction),
+    match instruction {
+        Instruction::Op(operation) => Item::Op(operation),
+        &Instruction::Watch { pivot, scale, watch } => Item::Watch { pivot, scale, watch },
+        Instruction::Solve { solve } => Item::Solve(&routine.solves[*solve as usize]),
+        Instruction::Parameter { .. } => unreachable!("parameters are set by the bytecode"),
     }
 }
 
 /// Whether functions are written out: not where there are many, as that takes long to compile.
-fn inlines(code: &[Instruction]) -> bool {
-    let wanted = |i: &&Instruction| {
-        matches!(i, Instruction::Call { f: Function::Sin | Function::Cos | Function::Exp | Function::Log, .. })
-    };
-    code.iter().filter(wanted).count() <= INLINE
+fn inlines<'a>(code: impl Iterator<Item = &'a Operation>) -> bool {
+    let wanted =
+        |o: &&Operation| matches!(o.op, Op::Call(Function::Sin | Function::Cos | Function::Exp | Function::Log, _));
+    code.filter(wanted).count() <= INLINE
+}
+
+fn operations(code: &[Instruction]) -> impl Iterator<Item = &Operation> {
+    code.iter().filter_map(|i| if let Instruction::Op(operation) = i { Some(operation) } else { None })
 }
 
 impl Code {

@@ -1,8 +1,11 @@
 //! Functions that machine code calls.
 
-use crate::bytecode::{piece_of, slope_of_power, table_on};
+use crate::bytecode::{piece_of, table_on};
 use crate::math;
 use halfarrow_compiler::algebra::{Function, Table1d};
+use halfarrow_compiler::for_each_op;
+use halfarrow_compiler::program::Op;
+use halfarrow_compiler::program::calculus::{Calculus, Plain};
 
 /// A function of one argument.
 pub(super) fn one(f: Function) -> usize {
@@ -18,62 +21,38 @@ pub(super) fn one(f: Function) -> usize {
     kernels!(Sin, Cos, Tan, Asin, Acos, Atan, Exp, Log, Log10, Sqrt, Abs, Sign, Sinh, Cosh, Tanh, Floor)
 }
 
-/// Its derivative, of argument and value.
-pub(super) fn slope_of_one(f: Function) -> usize {
+/// What an operation means, as a function of its operands; none if something is fixed in it besides them.
+#[allow(unused_variables, reason = "what is fixed is not read")]
+pub(super) fn of<A: Copy>(op: Op<A>) -> Option<usize> {
+    macro_rules! kernel {
+        ([] [$($a:ident)*] $meaning:expr) => {{
+            extern "C" fn kernel($($a: f64),*) -> f64 {
+                $meaning
+            }
+            Some(kernel as *const () as usize)
+        }};
+        ([$($part:ident)+] [$($a:ident)*] $meaning:expr) => { None };
+    }
     macro_rules! kernels {
-        ($($name:ident),*) => { match f {
-            $(Function::$name => {
-                extern "C" fn kernel(x: f64, value: f64) -> f64 { math::slope(Function::$name, x, value) }
-                kernel as extern "C" fn(f64, f64) -> f64 as usize
-            })*
-            Function::Atan2 | Function::Min | Function::Max | Function::Mod => unreachable!("it takes two arguments"),
-        } };
+        (($k:ident $value:ident)
+         given $given:tt
+         plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+            cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+         })* }
+         held $held:tt) => {
+            match op {
+                $(Op::$plain(..) => kernel!([$($part)*] [$($a)*] $meaning),)*
+                _ => None,
+            }
+        };
     }
-    kernels!(Sin, Cos, Tan, Asin, Acos, Atan, Exp, Log, Log10, Sqrt, Abs, Sign, Sinh, Cosh, Tanh, Floor)
-}
-
-/// A function of two arguments.
-pub(super) fn two(f: Function) -> usize {
-    macro_rules! kernels {
-        ($($name:ident),*) => { match f {
-            $(Function::$name => {
-                extern "C" fn kernel(x: f64, y: f64) -> f64 { math::call2(Function::$name, x, y) }
-                kernel as extern "C" fn(f64, f64) -> f64 as usize
-            })*
-            _ => unreachable!("it takes one argument"),
-        } };
-    }
-    kernels!(Atan2, Min, Max, Mod)
-}
-
-/// Its derivative, of `x`, `dx`, `y`, `dy`.
-pub(super) fn slope_of_two(f: Function) -> usize {
-    macro_rules! kernels {
-        ($($name:ident),*) => { match f {
-            $(Function::$name => {
-                extern "C" fn kernel(x: f64, dx: f64, y: f64, dy: f64) -> f64 {
-                    math::slope2(Function::$name, (x, dx), (y, dy))
-                }
-                kernel as extern "C" fn(f64, f64, f64, f64) -> f64 as usize
-            })*
-            _ => unreachable!("it takes one argument"),
-        } };
-    }
-    kernels!(Atan2, Min, Max, Mod)
-}
-
-/// `x` to the power `y`.
-pub(super) fn power() -> usize {
-    extern "C" fn kernel(x: f64, y: f64) -> f64 {
-        math::pow(x, y)
-    }
-    kernel as extern "C" fn(f64, f64) -> f64 as usize
+    for_each_op!(kernels)
 }
 
 /// Derivative of a power, of its value, `a`, `da`, `b`, `db`.
 pub(super) fn slope_of_pow() -> usize {
     extern "C" fn kernel(value: f64, a: f64, da: f64, b: f64, db: f64) -> f64 {
-        slope_of_power(value, (a, da), (b, db))
+        Plain.along_power(value, (a, Some(da)), (b, Some(db))).unwrap_or(0.0)
     }
     kernel as extern "C" fn(f64, f64, f64, f64, f64) -> f64 as usize
 }

@@ -1,7 +1,6 @@
 //! What is read after a place in a routine.
 
-use crate::bytecode::{reads, written};
-use halfarrow_compiler::program::{Instruction, Register, Solve};
+use crate::bytecode::{Operation, Register, Solve};
 use std::collections::BTreeSet;
 
 /// Registers that are read before they are written.
@@ -13,14 +12,15 @@ impl Live {
         Live(registers.iter().copied().collect())
     }
 
-    /// Goes back over an instruction.
-    pub fn before(&mut self, instruction: &Instruction) {
-        if let Some(out) = written(instruction) {
-            self.0.remove(&out);
-        }
-        reads(instruction, |register| {
-            self.0.insert(register);
-        });
+    /// Goes back over an operation.
+    pub fn before(&mut self, operation: &Operation) {
+        self.0.remove(&operation.out);
+        operation.op.for_each_operand(|register| self.read(register));
+    }
+
+    /// Notes that a register is read.
+    pub fn read(&mut self, register: Register) {
+        self.0.insert(register);
     }
 
     /// Goes back over a solve block.
@@ -29,7 +29,7 @@ impl Live {
             self.0.remove(register);
         }
         self.0.extend(solve.matrix.iter().chain(&solve.right));
-        solve.code.iter().rev().for_each(|instruction| self.before(instruction));
+        solve.code.iter().rev().for_each(|operation| self.before(operation));
         for register in &solve.guess {
             self.0.remove(register);
         }

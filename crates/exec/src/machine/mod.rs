@@ -18,6 +18,7 @@ mod memory;
 
 pub(crate) use code::Code;
 
+use crate::bytecode::Register;
 use arithmetic::Writer;
 use chunk::{Chunk, Direct, Item, Setting};
 use cranelift_codegen::control::ControlPlane;
@@ -26,7 +27,6 @@ use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::Configurable;
 use cranelift_codegen::{Context, settings};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
-use halfarrow_compiler::program::Register;
 use memory::{Gathered, Start};
 use std::fmt;
 

@@ -1,7 +1,8 @@
 //! Conditions that time alone moves: when they change next.
 
 use crate::bytecode::{Frame, Hold};
-use halfarrow_compiler::program::{Cause, ConditionId, Layout, Program, Routine, Value};
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Cause, ConditionId, Program, Value};
 
 /// Evaluations in one search along a curve; at its end the run makes a stop at which nothing changes.
 const SEARCH: usize = 4000;
@@ -24,7 +25,7 @@ impl Clock {
     pub fn new(program: &Program, layout: &Layout) -> Clock {
         let timed = program.conditions.iter().filter(|(_, c)| matches!(c.cause, Cause::Clock | Cause::Curve));
         let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.cause), c.operand)).unzip();
-        let routine = program.routine(layout, &operands);
+        let routine = layout.routine(program, &operands);
         Clock { conditions, routine, time: layout.time as usize, next: None }
     }
 

@@ -28,7 +28,7 @@ impl Model {
         let mut wanted = vec![domain.argument];
         wanted.extend(domain.asked.as_ref().map(|a| a.1));
         wanted.extend(domain.limit);
-        let routine = self.program.routine(&self.layout, &wanted);
+        let routine = self.layout.routine(&self.program, &wanted);
         self.frame.reserve(&routine);
         self.frame.run(&routine).ok()?;
         let mut values = routine.outputs.iter().map(|&out| self.frame.r[out as usize]);

@@ -1,9 +1,10 @@
 //! Any form of a graph as a system `F(t, y, y') = 0`, with the minimal form beside it: that knows what is consistent.
 
 use super::{InputError, Model, Operations, ParameterError, RecordError, StartError};
+use crate::bytecode::Routine;
 use crate::bytecode::Trouble;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Implicit, Op, Program, Routine, Unavailable, Value};
+use halfarrow_compiler::program::{Implicit, Op, Program, Unavailable, Value};
 use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
 use std::collections::BTreeMap;
 

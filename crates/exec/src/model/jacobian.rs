@@ -2,7 +2,8 @@
 
 use super::Model;
 use super::system::What;
-use halfarrow_compiler::program::{Entry, Layout, Program, Routine, Value};
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Entry, Program, Value};
 use halfarrow_sim::{Failure, Sparsity, System};
 
 /// The code of the derivatives, and where in the pattern each of them stands.
@@ -20,7 +21,7 @@ impl Slopes {
             let found = sparsity.column(column).binary_search(&row);
             sparsity.places(column).start + found.expect("what moves stands in the pattern")
         };
-        Slopes { routine: program.watched_routine(layout, &values), places: entries.iter().map(place).collect() }
+        Slopes { routine: layout.watched_routine(program, &values), places: entries.iter().map(place).collect() }
     }
 }
 

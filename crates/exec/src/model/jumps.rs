@@ -1,7 +1,8 @@
 //! Jumps of sources where speeds are states: what stays as it is are sums of stored quantities, and the speeds follow.
 
 use super::Model;
-use halfarrow_compiler::program::{Layout, Program, Routine, Value};
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Program, Value};
 use halfarrow_sim::Failure;
 
 /// Passes of Newton on the speeds after a jump.
@@ -22,7 +23,7 @@ impl Kept {
     /// `None` where no source that jumps moves a storage that follows a state.
     pub fn of(program: &Program, layout: &Layout) -> Option<Kept> {
         let (states, sums): (Vec<usize>, Vec<Value>) = program.kept.iter().map(|k| (k.0 as usize, k.1)).unzip();
-        (!states.is_empty()).then(|| Kept { sums: program.routine(layout, &sums), states })
+        (!states.is_empty()).then(|| Kept { sums: layout.routine(program, &sums), states })
     }
 
     pub fn routine(&self) -> &Routine {

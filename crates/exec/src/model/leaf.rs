@@ -7,8 +7,9 @@
 
 use super::start::Constraint;
 use super::{Model, minimum_norm};
+use crate::bytecode::Routine;
 use faer::Mat;
-use halfarrow_compiler::program::{Op, Routine};
+use halfarrow_compiler::program::Op;
 use std::ops::Range;
 
 /// Singular values below this fraction of the greatest count as zero.

@@ -27,11 +27,10 @@ pub use operations::Operations;
 pub use wide::WideModel;
 
 use crate::bytecode::{Abreast, Frame, Hold, Trouble};
+use crate::bytecode::{Layout, Routine};
 use clock::Clock;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{
-    Assumption, BlockId, Cause, ConditionId, Entry, Layout, Program, Reads, Routine, Value, first_of,
-};
+use halfarrow_compiler::program::{Assumption, BlockId, Cause, ConditionId, Entry, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap, Sparsity};
 use history::{Delay, Sample};
 use inputs::Signal;
@@ -121,20 +120,20 @@ impl Model {
 
     fn made_of(program: Program, entries: Option<Vec<Entry>>) -> Result<Model, Failure> {
         let derivatives = entries.iter().flatten().map(|e| e.value);
-        let layout = program.layout_with(&derivatives.chain(program.relations.values()).collect::<Vec<_>>());
+        let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = program.watched_routine(&layout, &rates);
-        let preamble = program.preamble(&layout);
+        let rates = layout.watched_routine(&program, &rates);
+        let preamble = layout.preamble(&program);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
-        let sources = program.routine(&layout, &sources);
+        let sources = layout.routine(&program, &sources);
         let of = |wanted: Cause| program.conditions.iter().filter(move |(_, c)| c.cause == wanted);
         let switches: Vec<ConditionId> = of(Cause::State).map(|(id, _)| id).collect();
         let operands: Vec<Value> = of(Cause::State).map(|(_, c)| c.operand).collect();
-        let switching = program.routine(&layout, &operands);
+        let switching = layout.routine(&program, &operands);
         let clock = Clock::new(&program, &layout);
         let mut frame = Frame::new(&program, &layout, layout.size);
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
-        let assumed = program.routine(&layout, &assumed);
+        let assumed = layout.routine(&program, &assumed);
         let sparsity = sparsity_of(&program);
         let slopes = entries.map(|entries| Slopes::new(&program, &layout, &sparsity, &entries));
         let kept = Kept::of(&program, &layout);
@@ -380,13 +379,13 @@ impl Model {
     }
 
     fn abreast_of(&self, routine: &Routine) -> Option<Arc<Abreast>> {
-        Abreast::of(&self.program, routine).map(Arc::new)
+        Abreast::of(&self.program, &self.layout, routine).map(Arc::new)
     }
 
     fn choose_recorded(&mut self) {
         let value = |&i: &usize| self.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = self.recorded.iter().filter_map(value).collect();
-        self.observe = self.program.watched_routine(&self.layout, &wanted);
+        self.observe = self.layout.watched_routine(&self.program, &wanted);
         self.frame.reserve(&self.observe);
         self.abreast.1 = self.abreast_of(&self.observe);
         for abreast in [&self.abreast.0, &self.abreast.1].into_iter().flatten() {

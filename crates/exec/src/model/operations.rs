@@ -1,7 +1,8 @@
 //! What one evaluation takes, counted in the code that is run.
 
 use super::Model;
-use halfarrow_compiler::program::{Instruction, Routine, Solve};
+use crate::bytecode::{Instruction, Operation, Routine, Solve};
+use halfarrow_compiler::program::{Cost, Op};
 
 /// Operations of one evaluation of rates or residuals.
 ///
@@ -30,34 +31,21 @@ impl Operations {
 
     fn of(routine: &Routine) -> Operations {
         let mut counted = Operations::default();
-        routine.code.iter().for_each(|instruction| counted.count(instruction));
+        // What is handed through or watched is not counted, blocks are below.
+        let operations = routine.code.iter().filter_map(|i| if let Instruction::Op(o) = i { Some(o) } else { None });
+        operations.for_each(|operation| counted.count(operation));
         routine.solves.iter().for_each(|solve| counted.solve(solve));
         counted
     }
 
-    fn count(&mut self, instruction: &Instruction) {
-        match instruction {
-            Instruction::Neg { .. }
-            | Instruction::Add { .. }
-            | Instruction::Sub { .. }
-            | Instruction::Positive { .. }
-            | Instruction::Side { .. }
-            | Instruction::And { .. }
-            | Instruction::Or { .. }
-            | Instruction::Not { .. }
-            | Instruction::Select { .. } => self.additions += 1,
-            Instruction::Mul { .. } => self.multiplications += 1,
-            Instruction::Div { .. } => self.divisions += 1,
-            Instruction::Powi { n, .. } => self.multiplications += (n.ilog2() + n.count_ones() - 1) as usize,
-            Instruction::Pow { .. }
-            | Instruction::Call { .. }
-            | Instruction::Call2 { .. }
-            | Instruction::Floor { .. }
-            | Instruction::Table { .. }
-            | Instruction::TableSlope { .. }
-            | Instruction::TableCurvature { .. } => self.calls += 1,
-            // Handed through, watched, or counted with its block.
-            Instruction::Parameter { .. } | Instruction::Watch { .. } | Instruction::Solve { .. } => {}
+    fn count(&mut self, &Operation { op, .. }: &Operation) {
+        match (op.cost(), op) {
+            (Cost::Given, _) => {}
+            (Cost::Addition, _) => self.additions += 1,
+            (Cost::Multiplication, _) => self.multiplications += 1,
+            (Cost::Division, _) => self.divisions += 1,
+            (Cost::Power, Op::Powi(n, _)) => self.multiplications += (n.ilog2() + n.count_ones() - 1) as usize,
+            (Cost::Power | Cost::Call | Cost::Table, _) => self.calls += 1,
         }
     }
 
@@ -71,7 +59,7 @@ impl Operations {
         if !solve.guess.is_empty() {
             self.iterated += 1;
             self.additions += n;
-            solve.code.iter().for_each(|instruction| self.count(instruction));
+            solve.code.iter().for_each(|operation| self.count(operation));
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
-use halfarrow_compiler::program::{Routine, StartGroup, Value};
+use crate::bytecode::Routine;
+use halfarrow_compiler::program::{StartGroup, Value};
 use halfarrow_sim::Failure;
 use std::collections::BTreeMap;
 
@@ -546,7 +547,7 @@ impl Model {
     }
 
     pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {
-        let routine = self.program.routine(&self.layout, wanted);
+        let routine = self.layout.routine(&self.program, wanted);
         self.frame.reserve(&routine);
         routine
     }

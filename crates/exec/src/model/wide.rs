@@ -2,8 +2,8 @@
 
 use super::Model;
 use super::system::What;
+use crate::bytecode::Routine;
 use crate::bytecode::{Frame, Lane, Line, Packed, WideFrame};
-use halfarrow_compiler::program::Routine;
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
 use halfarrow_sim::{Failure, System};
 
@@ -26,7 +26,7 @@ impl WideModel {
     /// The same model in every lane, recording what it records.
     pub fn new(model: &Model) -> WideModel {
         let mut frame = WideFrame::default();
-        let packed = |routine: &Routine| (routine.clone(), Packed::new(routine, model.layout.size));
+        let packed = |routine: &Routine| (routine.clone(), Packed::new(&model.layout, routine));
         let (rates, observe) = (packed(&model.rates), packed(&model.observe));
         frame.reserve(rates.1.slots.max(observe.1.slots).max(model.layout.size as usize));
         let mut lane = model.clone();

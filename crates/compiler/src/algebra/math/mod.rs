@@ -144,37 +144,3 @@ pub fn whole_power(x: f64, n: i64) -> f64 {
         Err(_) => pow(x, n as f64),
     }
 }
-
-/// Derivative of [`call`] by its argument; `value` is `call(f, x)`.
-pub fn slope(f: Function, x: f64, value: f64) -> f64 {
-    use Function::*;
-    match f {
-        Sin => cos(x),
-        Cos => -sin(x),
-        Tan => 1.0 + value * value,
-        Asin => 1.0 / (1.0 - x * x).sqrt(),
-        Acos => -1.0 / (1.0 - x * x).sqrt(),
-        Atan => 1.0 / (1.0 + x * x),
-        Exp => value,
-        Log => 1.0 / x,
-        Log10 => 1.0 / (x * std::f64::consts::LN_10),
-        Sqrt => 0.5 / value,
-        Abs => call(Sign, x),
-        Sinh => cosh(x),
-        Cosh => sinh(x),
-        Tanh => 1.0 - value * value,
-        Sign | Floor | Atan2 | Min | Max | Mod => 0.0,
-    }
-}
-
-/// Derivative of [`call2`] along `(dx, dy)`.
-pub fn slope2(f: Function, (x, dx): (f64, f64), (y, dy): (f64, f64)) -> f64 {
-    use Function::*;
-    match f {
-        Atan2 => (y * dx - x * dy) / (x * x + y * y),
-        Min => [dy, dx][usize::from(x < y)],
-        Max => [dy, dx][usize::from(x > y)],
-        Mod => dx - dy * (x / y).floor(),
-        _ => 0.0,
-    }
-}

@@ -1,22 +1,25 @@
 //! All functions of a model, and the source that they make.
 
+mod routines;
 mod words;
-
-use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::program;
 use halfarrow_compiler::program::{
-    Assumption, Block, BlockId, Cause, ConditionId, ConditionKind, DomainKind, Holds, Layout, Program, Reads, Routine,
+    Assumption, Block, BlockId, Cause, Code, ConditionId, ConditionKind, DomainKind, Holds, Program, Reads, Routine,
     Value,
 };
 
+use super::blocks::elimination_room;
 use super::cost::{Cost, Work};
-use super::ssa::{self, Code, Inner};
+use super::flags::Flags;
 use super::start::{self, Group, Pass};
-use super::write::{Moving, Shape, Writer, elimination_room, number};
+use super::terms;
+use super::write::{Moving, Shape, Writer, number};
 use super::{Export, messages, real, template};
 use crate::{EmitError, Method, Real};
+use routines::{Routines, newton_of};
 
 /// A sum of floats below this fraction of its terms is rounding of the operations that lead to it.
 const ROUNDING_OF_FLOATS: f64 = 1e-5;
@@ -38,12 +41,14 @@ const ALONG: Shape = Shape {
     ..PLAIN
 };
 
+/// The rate of time where a direction gives it.
+const ALONG_TIME: Option<&str> = Some("e[0]");
+
 /// The functions of a model.
 pub(super) struct Plan<'a> {
     pub export: &'a Export<'a>,
     pub program: &'a Program,
     pub name: String,
-    pub layout: Layout,
     /// Functions in C.
     functions: String,
     /// Conditions of the state, in order.
@@ -80,7 +85,8 @@ pub(super) struct Sizes {
     pub factors: usize,
     pub factors_order: usize,
     pub factored: usize,
-    pub direction: usize,
+    /// First places in directions of inputs, held signals, conserved constants and states, and the number of places.
+    pub directions: [usize; 5],
     pub indicators: usize,
 }
 
@@ -95,6 +101,20 @@ struct Works {
     clock: Work,
 }
 
+/// Values of parameters alone, from where the preamble leaves them.
+fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> String {
+    let kind = if wide { "ha_wide" } else { "double" };
+    let mut text = format!("static void {name}(const ha_model *m, {kind} *out)\n{{\n");
+    for (i, value) in values.enumerate() {
+        let place = match wide {
+            true => format!("HA_WIDE({})", writer.givens.wide_text(value)),
+            false => writer.givens.text(value),
+        };
+        text += &format!("    out[{i}] = {place};\n");
+    }
+    text + "    (void)m;\n    (void)out;\n}\n\n"
+}
+
 impl<'a> Plan<'a> {
     pub fn new(export: &'a Export<'a>, name: &str) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
@@ -105,7 +125,6 @@ impl<'a> Plan<'a> {
             export,
             program,
             name: name.to_string(),
-            layout: program.layout(),
             functions: String::new(),
             switches: of(|cause| cause == Cause::State),
             clocks: of(|cause| matches!(cause, Cause::Clock | Cause::Curve)),
@@ -127,141 +146,83 @@ impl<'a> Plan<'a> {
 
     fn write_functions(&mut self) {
         let program = self.program;
-        let layout = self.layout.clone();
-        let mut writer = Writer::new(program, &layout, self.export.real);
-        let mut inner = Inner::default();
-        let mut text = String::new();
+        let routines = Routines::of(self);
+        let blocks = routines.newton();
+        let used: Vec<BlockId> = blocks.keys().copied().collect();
+        let mut writer = Writer::new(program, &used, self.export.real);
         let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
+        let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
+        self.rates_blocks = numbers(&routines.rates);
+        self.shown_blocks = numbers(&routines.observe);
+        self.shown_blocks.retain(|block| !self.rates_blocks.contains(block));
 
-        let preamble = ssa::of_routine(program, &layout, &program.preamble(&layout), &mut inner);
-        let preamble = Code { outputs: Vec::new(), ..preamble };
-        text += &self.of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false);
-        text += &self.of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true);
-        text += &self.of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false);
-
-        let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = program.watched_routine(&layout, &rates);
-        let wanted = self.export.recorded.iter().filter_map(|&i| program.observed[i].value.clone().ok());
-        let observe = program.watched_routine(&layout, &wanted.collect::<Vec<_>>());
-        let operands = |ids: &[ConditionId]| ids.iter().map(|&c| program.conditions[c].operand).collect::<Vec<_>>();
-        let switching = program.routine(&layout, &operands(&self.switches));
-        let clock = program.routine(&layout, &operands(&self.clocks));
-        let sources = program.routine(&layout, &program.held.iter().map(|h| h.source).collect::<Vec<_>>());
-        let domains = program.routine(&layout, &program.domains.iter().map(|d| d.argument).collect::<Vec<_>>());
-        let newton = |r: &Routine| r.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block).collect::<Vec<_>>();
-        self.rates_blocks = newton(&rates);
-        self.shown_blocks = newton(&observe).into_iter().filter(|b| !self.rates_blocks.contains(b)).collect();
-
-        let mut blocks = BTreeMap::new();
-        for solve in rates.solves.iter().chain(&observe.solves).chain(&switching.solves).chain(&sources.solves) {
-            blocks.insert(solve.block, solve.outer.len());
-        }
-        let mut plain = |writer: &mut Writer, inner: &mut Inner, name: &str, routine: &Routine| {
-            let code = ssa::of_routine(program, &layout, routine, inner);
-            routine.solves.iter().for_each(|s| {
-                blocks.insert(s.block, s.outer.len());
-            });
-            let text = writer.function(name, PLAIN, &code, &values("out", code.outputs.len()), &[]);
-            (text, code)
+        let mut text = String::new();
+        text += &of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false);
+        text += &of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true);
+        text += &of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false);
+        let plain = |writer: &mut Writer, name: &str, routine: &Routine| {
+            let n = routine.code.outputs.len();
+            writer.function(name, PLAIN, (&routine.code, &[]), (&values("out", n), &[]))
         };
-        let (body, code) = plain(&mut writer, &mut inner, "ha_rates_code", &rates);
-        text += &body;
-        let rates_code = code;
-        let (body, code) = plain(&mut writer, &mut inner, "ha_observe_code", &observe);
-        text += &body;
-        let observe_code = code;
-        let (body, code) = plain(&mut writer, &mut inner, "ha_switching_code", &switching);
-        text += &body;
-        let switching_code = code;
-        text += &plain(&mut writer, &mut inner, "ha_domains_code", &domains).0;
-        text += &self.domain_checks(&writer, &domains);
+        text += &plain(&mut writer, "ha_rates_code", &routines.rates);
+        text += &plain(&mut writer, "ha_observe_code", &routines.observe);
+        text += &plain(&mut writer, "ha_switching_code", &routines.switching);
+        text += &plain(&mut writer, "ha_domains_code", &routines.domains);
+        text += &self.domain_checks(&writer);
         text += &self.assumption_checks(&writer);
 
-        let along = |writer: &mut Writer, name: &str, code: &Code, moving: Moving| {
-            let shape = Shape { along: Some(moving), ..ALONG };
-            writer.function(name, shape, code, &values("out", code.outputs.len()), &values("rates", code.outputs.len()))
+        let along = |writer: &mut Writer, name: &str, shape: Shape, routine: &Routine, moving: Moving| {
+            let n = routine.code.outputs.len();
+            let shape = Shape { along: Some(moving), ..shape };
+            writer.function(name, shape, (&routine.code, &[]), (&values("out", n), &values("rates", n)))
         };
-        let of = |routine: &Routine, inner: &mut Inner| ssa::of_routine(program, &layout, routine, inner);
-        let clock_code = of(&clock, &mut inner);
-        let shape = Shape {
+        let clock = Shape {
             parameters: "ha_model *m, ha_wide t, ha_wide *out, ha_wide *rates",
             arguments: "m, t, out, rates",
-            along: Some(Moving { time: true, ..Moving::default() }),
             wide: true,
             ..PLAIN
         };
-        let n = clock_code.outputs.len();
-        let body = writer.function("ha_clock_code", shape, &clock_code, &values("out", n), &values("rates", n));
         // Time runs at one second a second.
-        text += &body.replace("e[0]", "1.0");
-        let sources_code = of(&sources, &mut inner);
-        let run = Moving { time: true, inputs: true, held: true, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_sources_along", &sources_code, run);
+        let runs = Moving { time: Some("1.0"), ..Moving::default() };
+        text += &along(&mut writer, "ha_clock_code", clock, &routines.clock, runs);
+        let run = Moving { time: ALONG_TIME, inputs: true, held: true, states: true, ..Moving::default() };
+        text += &along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run);
         let tangent = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_rates_along", &rates_code, tangent);
+        text += &along(&mut writer, "ha_rates_along", ALONG, &routines.rates, tangent);
         if self.export.method.is_linearly_implicit() {
-            let drift = Moving { time: true, held: true, ..Moving::default() };
-            text += &along(&mut writer, "ha_rates_drift", &rates_code, drift);
+            let drift = Moving { time: ALONG_TIME, held: true, ..Moving::default() };
+            text += &along(&mut writer, "ha_rates_drift", ALONG, &routines.rates, drift);
         }
         if self.export.derivatives {
-            text += &along(&mut writer, "ha_observe_along", &observe_code, tangent);
+            text += &along(&mut writer, "ha_observe_along", ALONG, &routines.observe, tangent);
         }
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
-        let residuals =
-            |conditions: &[usize]| conditions.iter().map(|&c| program.start[c].residual).collect::<Vec<_>>();
-        let passes = self.passes.iter().enumerate().map(|(i, p)| ("pass", i, residuals(&p.conditions)));
-        let groups = self.groups.iter().enumerate().filter(|(_, g)| g.together);
-        let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
-        let guesses = program.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
-        for (kind, number, wanted) in passes.chain(groups).chain(guesses) {
-            let routine = program.routine(&layout, &wanted);
-            routine.solves.iter().for_each(|s| {
-                blocks.insert(s.block, s.outer.len());
-            });
-            let code = of(&routine, &mut inner);
-            text += &along(&mut writer, &format!("ha_start_{kind}_{number}"), &code, begin);
+        for (name, routine) in &routines.starts {
+            text += &along(&mut writer, name, ALONG, routine, begin);
+        }
+
+        self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
+        let mut block_text = String::new();
+        for (i, (block, (_, code))) in blocks.iter().enumerate() {
+            block_text += &self.block(&mut writer, i, program.blocks[*block].size(), code);
         }
 
         // Last, once it is known what is read in double precision.
         let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
-        text = writer.function("ha_preamble_code", shape, &preamble, &[], &[]) + &text;
-
-        let used: Vec<BlockId> = {
-            let mut used: Vec<BlockId> = inner.keys().copied().collect();
-            used.sort_unstable();
-            used
-        };
-        self.reads = used.iter().map(|b| blocks.get(b).copied().unwrap_or(0)).collect();
-        let mut block_text = String::new();
-        for (i, block) in used.iter().enumerate() {
-            block_text += &self.block(&mut writer, i, program.blocks[*block].size(), &inner[block]);
-        }
-        self.newton = used;
+        let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
+        let preamble = writer.function("ha_preamble_code", shape, (&preamble, &routines.kept()), (&[], &[]));
+        let work = |routine: &Routine| Work::of(program, &routine.code);
         self.works = Works {
-            rates: Work::of(program, &rates_code, &inner),
-            observe: Work::of(program, &observe_code, &inner),
-            switching: Work::of(program, &switching_code, &inner),
-            sources: Work::of(program, &sources_code, &inner),
-            tangent: Work::of(program, &rates_code, &inner).along(),
-            clock: Work::of(program, &clock_code, &inner).along(),
+            rates: work(&routines.rates),
+            observe: work(&routines.observe),
+            switching: work(&routines.switching),
+            sources: work(&routines.sources),
+            tangent: work(&routines.rates).along(),
+            clock: work(&routines.clock).along(),
         };
+        self.newton = used.clone();
         self.find_sizes(&writer);
-        let whole = block_text + &text;
-        self.functions = self.with_block_numbers(&whole);
-    }
-
-    /// Values of parameters alone, from where the preamble leaves them.
-    fn of_parameters(&self, writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> String {
-        let kind = if wide { "ha_wide" } else { "double" };
-        let mut text = format!("static void {name}(const ha_model *m, {kind} *out)\n{{\n");
-        for (i, value) in values.enumerate() {
-            let place = self.layout.registers.get(&value).map_or("0.0".into(), |&r| match wide {
-                true => format!("HA_WIDE({})", writer.fixed_wide(r)),
-                false => writer.fixed(r),
-            });
-            text += &format!("    out[{i}] = {place};\n");
-        }
-        text + "    (void)m;\n    (void)out;\n}\n\n"
+        self.functions = block_text + &preamble + &text;
     }
 
     /// The functions of a Newton block.
@@ -276,28 +237,30 @@ impl<'a> Plan<'a> {
         };
         let right = (0..n).map(|i| format!("right[{i}]"));
         let values: Vec<String> = right.chain((0..n * n).map(|i| format!("matrix[{i}]"))).collect();
-        let mut text = writer.function(&format!("ha_block_{number}"), shape, code, &values, &[]);
+        let mut text = writer.function(&format!("ha_block_{number}"), shape, (code, &[]), (&values, &[]));
         let terms = Shape {
             parameters: "ha_model *m, const double *o, const double *g, double *terms",
             arguments: "m, o, g, terms",
             ..shape
         };
         let values: Vec<String> = (0..n).map(|i| format!("terms[{i}]")).collect();
-        text += &writer.function(&format!("ha_block_{number}_terms"), terms, &ssa::terms_of(code, n), &values, &[]);
+        let sums = terms::terms_of(code, n);
+        text += &writer.function(&format!("ha_block_{number}_terms"), terms, (&sums, &[]), (&values, &[]));
         let shape = Shape {
             parameters: "ha_model *m, const double *o, const double *e, const double *g, double *rates",
             arguments: "m, o, e, g, rates",
             along: Some(Moving { outer: true, ..Moving::default() }),
             ..shape
         };
-        let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() }.without_the_unread();
+        let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() };
+        let residuals = terms::without_the_unread(residuals);
         let rates: Vec<String> = (0..n).map(|i| format!("rates[{i}]")).collect();
-        text += &writer.function(&format!("ha_block_{number}_along"), shape, &residuals, &[], &rates);
+        text += &writer.function(&format!("ha_block_{number}_along"), shape, (&residuals, &[]), (&[], &rates));
         text
     }
 
     /// Which domain an argument has to lie in, and the check of those that parameters alone decide.
-    fn domain_checks(&self, writer: &Writer, routine: &Routine) -> String {
+    fn domain_checks(&self, writer: &Writer) -> String {
         let mut text = String::from("static int ha_is_within(int domain, double a)\n{\n    switch (domain) {\n");
         for (i, domain) in self.program.domains.iter().enumerate() {
             let holds = match domain.kind {
@@ -310,7 +273,7 @@ impl<'a> Plan<'a> {
         text += "    default:\n        return a == a;\n    }\n}\n\nstatic int ha_check_domains(ha_model *m)\n{\n";
         for (i, domain) in self.program.domains.iter().enumerate() {
             if self.program.values.reads(domain.argument) == Reads::PARAMETERS {
-                let a = writer.fixed(routine.outputs[i]);
+                let a = writer.givens.text(domain.argument);
                 text += &format!(
                     "    if (ha_finite({a}) && !ha_is_within({i}, {a})) {{\n        return ha_fail(m, MODEL_OUT_OF_DOMAIN, {i}, HA_WIDE((double)NAN));\n    }}\n"
                 );
@@ -324,14 +287,13 @@ impl<'a> Plan<'a> {
         if self.program.assumptions.is_empty() {
             return String::new();
         }
-        let fixed = |value: Value| writer.fixed(self.layout.registers[&value]);
         let rounding = number(match self.export.real {
             Real::Double => Assumption::ROUNDING,
             Real::Float => ROUNDING_OF_FLOATS,
         });
         let mut text = String::from("static int ha_broken(const ha_model *m)\n{\n");
         for (i, a) in self.program.assumptions.iter().enumerate() {
-            let (v, s) = (fixed(a.value), fixed(a.scale));
+            let (v, s) = (writer.givens.text(a.value), writer.givens.text(a.scale));
             let holds = match a.holds {
                 Holds::Zero => format!("{v} <= {rounding} * {s} && -{v} <= {rounding} * {s}"),
                 Holds::NotZero => format!("{v} > {rounding} * {s} || -{v} > {rounding} * {s}"),
@@ -352,8 +314,8 @@ impl<'a> Plan<'a> {
         let lu = |n: usize| elimination_room(n, self.export.real);
         let work = |&(n, reads): &(usize, usize)| 17 * n + reads + 4 * n * n + lu(n);
         self.sizes = Sizes {
-            derived: writer.derived.len(),
-            exact: writer.exact.borrow().len(),
+            derived: writer.givens.derived(),
+            exact: writer.givens.exact(),
             wide: writer.wide_crossing,
             crossing: writer.crossing,
             memory: newton.iter().map(|(n, reads)| 2 * (n + reads + n * n)).sum(),
@@ -362,15 +324,9 @@ impl<'a> Plan<'a> {
             factors: writer.factored.size,
             factors_order: writer.factored.orders,
             factored: writer.factored.places.len(),
-            direction: (self.layout.rates - self.layout.time) as usize,
+            directions: writer.givens.directions(),
             indicators: self.switches.iter().map(|&c| program.conditions[c].kind.switches()).sum(),
         };
-    }
-
-    fn with_block_numbers(&self, text: &str) -> String {
-        let words: BTreeMap<String, String> =
-            self.newton.iter().enumerate().map(|(i, b)| (format!("BLOCK_{}_", b.0), i.to_string())).collect();
-        template::fill(text, &words)
     }
 
     /// The functions of the equations.
@@ -384,7 +340,7 @@ impl<'a> Plan<'a> {
         words.insert("OBLIGATION_LINES".into(), obligations.to_string());
         words.insert("MODEL_TITLE".into(), super::header::comment(&self.program.name));
         let size = self.export.real;
-        let filled = |text: &str| template::fill(&template::choose(text, &flags), &words);
+        let filled = |text: &str| template::fill(&template::choose(text, |word| flags.holds(word)), &words);
         let piece = |text: &str| real::of(&filled(text), size);
         let mut text = piece(include_str!("../runtime/top.c"));
         text += math::C_SOURCE;
@@ -438,52 +394,48 @@ impl<'a> Plan<'a> {
         self.program.conditions.values().map(|c| c.kind)
     }
 
-    fn flags(&self) -> BTreeSet<&'static str> {
-        let held = !self.program.held.is_empty();
-        let conditions = &self.program.conditions;
-        let drift = self.export.method.is_linearly_implicit();
-        let all: [(&str, bool); 36] = [
-            ("single", self.export.real == Real::Float),
-            ("tables", !self.program.tables.is_empty()),
-            ("conditions", !conditions.is_empty()),
-            ("conditions_along", !conditions.is_empty()),
-            ("borders", !conditions.is_empty()),
-            ("sign_conditions", self.kinds().any(|k| k == ConditionKind::Sign)),
-            ("floor_conditions", self.kinds().any(|k| k == ConditionKind::Floor)),
-            ("piece_conditions", self.kinds().any(|k| matches!(k, ConditionKind::Piece(_)))),
-            ("clocks", !self.clocks.is_empty()),
-            ("curves", self.clocks.iter().any(|&c| conditions[c].cause == Cause::Curve)),
-            ("switches", !self.switches.is_empty()),
-            ("held", held),
-            ("delays", !self.delays.is_empty()),
-            ("samples", !self.samples.is_empty()),
-            ("only_samples", held && self.delays.is_empty()),
-            ("newton", !self.newton.is_empty()),
-            ("newton_along", true),
-            ("newton_single", self.newton.iter().any(|&b| self.program.blocks[b].size() == 1)),
-            ("follows", !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty())),
-            ("rates_newton", !self.rates_blocks.is_empty()),
-            ("shown_newton", !self.shown_blocks.is_empty()),
-            ("domains", !self.program.domains.is_empty()),
-            (
-                "domains_always",
-                self.program.domains.iter().any(|d| self.program.values.reads(d.argument) == Reads::PARAMETERS),
-            ),
-            ("assumptions", !self.program.assumptions.is_empty()),
-            ("outputs", !self.export.recorded.is_empty()),
-            ("tangent", self.has_tangent()),
-            ("derivatives", self.export.derivatives),
-            ("drift", drift),
-            ("time_passes", drift || held),
-            ("conserved", !self.program.conserved.is_empty()),
-            ("inputs", !self.program.inputs.is_empty()),
-            ("parameters", !self.program.parameters.is_empty()),
-            ("linear_constant", self.sizes.factored > 0),
-            ("solves_start", self.solves_start()),
-            ("guesses", !self.program.guesses.is_empty()),
-            ("start_groups", self.groups.iter().any(|g| g.together)),
-        ];
-        all.into_iter().filter(|(_, holds)| *holds).map(|(flag, _)| flag).collect()
+    /// What the model has.
+    pub fn flags(&self) -> Flags {
+        let Plan { export, program: p, .. } = *self;
+        let held = !p.held.is_empty();
+        let drift = export.method.is_linearly_implicit();
+        let always = |d: &program::Domain| p.values.reads(d.argument) == Reads::PARAMETERS;
+        Flags {
+            single: export.real == Real::Float,
+            states: !p.states.is_empty(),
+            inputs: !p.inputs.is_empty(),
+            parameters: !p.parameters.is_empty(),
+            outputs: !export.recorded.is_empty(),
+            conserved: !p.conserved.is_empty(),
+            tables: !p.tables.is_empty(),
+            conditions: !p.conditions.is_empty(),
+            sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),
+            floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
+            piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
+            clocks: !self.clocks.is_empty(),
+            curves: self.clocks.iter().any(|&c| p.conditions[c].cause == Cause::Curve),
+            switches: !self.switches.is_empty(),
+            held,
+            delays: !self.delays.is_empty(),
+            samples: !self.samples.is_empty(),
+            only_samples: held && self.delays.is_empty(),
+            newton: !self.newton.is_empty(),
+            newton_single: self.newton.iter().any(|&b| p.blocks[b].size() == 1),
+            follows: !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty()),
+            rates_newton: !self.rates_blocks.is_empty(),
+            shown_newton: !self.shown_blocks.is_empty(),
+            domains: !p.domains.is_empty(),
+            domains_always: p.domains.iter().any(always),
+            assumptions: !p.assumptions.is_empty(),
+            tangent: self.has_tangent(),
+            derivatives: export.derivatives,
+            drift,
+            time_passes: drift || held,
+            linear_constant: self.sizes.factored > 0,
+            solves_start: self.solves_start(),
+            guesses: !p.guesses.is_empty(),
+            start_groups: self.groups.iter().any(|g| g.together),
+        }
     }
 
     /// Whether a start may differ from the exported one.

@@ -14,7 +14,6 @@ impl Plan<'_> {
     /// Each word with its text.
     pub(super) fn words(&self) -> BTreeMap<String, String> {
         let program = self.program;
-        let layout = &self.layout;
         let join = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
         let lines = |values: Vec<String>| match values.is_empty() {
             true => "    0".to_string(),
@@ -46,7 +45,7 @@ impl Plan<'_> {
         let constants = program.parameters.iter().map(|p| u8::from(p.constant).to_string()).collect();
         let most =
             |of: &dyn Fn(&Group) -> usize| self.groups.iter().filter(|g| g.together).map(of).max().unwrap_or(1).max(1);
-        let offset = |first: u32| (first - layout.time).to_string();
+        let [_, held, conserved, states, direction] = self.sizes.directions.map(|place| place.to_string());
         let words: Vec<(&str, String)> = vec![
             ("TABLES", self.tables()),
             ("KINDS", lines(self.kinds().map(|k| kind(k).to_string()).collect())),
@@ -99,10 +98,10 @@ impl Plan<'_> {
             ("MOST_AT_ONCE", self.passes.iter().map(|p| p.unknowns.len()).max().unwrap_or(1).to_string()),
             ("MOST_ROWS", most(&|g| g.conditions.len()).to_string()),
             ("MOST_COLUMNS", most(&|g| g.unknowns.len()).to_string()),
-            ("LAYOUT_DIRECTION", self.sizes.direction.to_string()),
-            ("LAYOUT_HELD", offset(layout.held)),
-            ("LAYOUT_CONSERVED", offset(layout.conserved)),
-            ("LAYOUT_STATES", offset(layout.states)),
+            ("LAYOUT_DIRECTION", direction),
+            ("LAYOUT_HELD", held),
+            ("LAYOUT_CONSERVED", conserved),
+            ("LAYOUT_STATES", states),
             ("COUNT_HELD", program.held.len().to_string()),
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),

@@ -49,7 +49,7 @@ static double ha_piece(ha_model *m, int hold, int number, int table, double a)
 }
 
 //end
-//if conditions_along
+//if conditions
 static int ha_is_at(double a, double border, double reach)
 {
     return fabs(a - border) <= reach + 16.0 * DBL_EPSILON * fabs(border);
@@ -101,7 +101,7 @@ static double ha_piece_along(ha_model *m, int hold, int number, int table, doubl
 //end
 //end
 //end
-//if borders
+//if conditions
 /* What each condition is: 0 the sign, 1 the integer part, 2 + i the piece of table i. */
 static const int ha_kinds[] = {
 KINDS

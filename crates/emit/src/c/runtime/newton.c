@@ -10,7 +10,7 @@ typedef struct {
     void (*code)(ha_model *m, const double *o, const double *g, double *right, double *matrix);
     /* Of what the residuals are the sums, in magnitude. */
     void (*terms)(ha_model *m, const double *o, const double *g, double *terms);
-//if newton_along
+//if newton
     void (*along)(ha_model *m, const double *o, const double *e, const double *g, double *rates);
 //end
 } ha_block;
@@ -1136,7 +1136,7 @@ static int ha_find_root(ha_model *m, int number, const double *o, double *x)
     return MODEL_OK;
 }
 
-//if newton_along
+//if newton
 /* The same with the rates of the unknowns, by the implicit function theorem; e: rates of what the block reads. */
 static int ha_root_along(ha_model *m, int number, const double *o, const double *e, double *x, double *dx)
 {

@@ -1,0 +1,75 @@
+//! Which parts of the texts of `runtime/` a model has: the words behind `//if` there.
+
+macro_rules! flags {
+    ($($(#[$doc:meta])* $name:ident)*) => {
+        /// What a model has, a flag for each word behind `//if`.
+        #[derive(Debug, Clone, Copy, Default)]
+        pub(crate) struct Flags {
+            $($(#[$doc])* pub $name: bool,)*
+        }
+
+        impl Flags {
+            /// Whether a condition holds.
+            ///
+            /// # Panics
+            /// There is no such flag.
+            pub fn holds(&self, word: &str) -> bool {
+                match word {
+                    $(stringify!($name) => self.$name,)*
+                    _ => panic!("`//if {word}` asks for a flag that there is not"),
+                }
+            }
+        }
+    };
+}
+
+flags! {
+    /// Real numbers are of single precision.
+    single
+    states
+    inputs
+    parameters
+    outputs
+    conserved
+    tables
+    conditions
+    sign_conditions
+    floor_conditions
+    piece_conditions
+    /// Conditions of time.
+    clocks
+    /// Such along curves.
+    curves
+    /// Conditions of the state.
+    switches
+    /// Delays or samples.
+    held
+    delays
+    samples
+    /// Samples and no delays.
+    only_samples
+    /// Newton blocks.
+    newton
+    /// Such of one unknown.
+    newton_single
+    /// Newton blocks in rates or outputs.
+    follows
+    rates_newton
+    shown_newton
+    domains
+    /// Domains that parameters alone decide.
+    domains_always
+    assumptions
+    /// A function for derivatives of the rates.
+    tangent
+    /// Derivatives for the user.
+    derivatives
+    /// Derivatives of the rates by time.
+    drift
+    time_passes
+    /// Linear blocks with a constant matrix.
+    linear_constant
+    solves_start
+    guesses
+    start_groups
+}

@@ -1,0 +1,118 @@
+//! Where values stand in C that stand before a routine runs.
+
+use std::cell::RefCell;
+
+use halfarrow_compiler::program::{Op, Program, Reads, Value};
+use rustc_hash::FxHashMap;
+
+use super::write::{Moving, number};
+use crate::Real;
+
+/// The places of givens: parameters, what follows from them, time, inputs, held signals, conserved constants, states.
+#[derive(Debug, Clone)]
+pub(super) struct Givens<'a> {
+    program: &'a Program,
+    real: Real,
+    /// The place in `m->c` of each that is computed from parameters.
+    derived: FxHashMap<Value, usize>,
+    /// The place of each of them that is read in double precision.
+    exact: RefCell<FxHashMap<Value, usize>>,
+}
+
+impl<'a> Givens<'a> {
+    pub fn new(program: &'a Program, real: Real) -> Givens<'a> {
+        let determined = program.determined(&[]);
+        let computed = determined.iter().filter(|v| !program.values.op(**v).is_given());
+        let derived = computed.enumerate().map(|(place, &v)| (v, place)).collect();
+        Givens { program, real, derived, exact: RefCell::default() }
+    }
+
+    /// How many values are computed from parameters.
+    pub fn derived(&self) -> usize {
+        self.derived.len()
+    }
+
+    /// How many of them are read in double precision, as far as is written.
+    pub fn exact(&self) -> usize {
+        self.exact.borrow().len()
+    }
+
+    /// Whether something in double precision reads it.
+    pub fn is_exact(&self, value: Value) -> bool {
+        matches!(self.program.values.op(value), Op::Parameter(_)) || self.exact.borrow().contains_key(&value)
+    }
+
+    /// Whether it follows from time and parameters alone.
+    pub fn is_timely(&self, value: Value) -> bool {
+        self.is_time(value) || self.program.values.reads(value) == Reads::PARAMETERS
+    }
+
+    /// Whether it is time.
+    pub fn is_time(&self, value: Value) -> bool {
+        self.program.values.op(value) == Op::Time
+    }
+
+    /// A value in C.
+    pub fn text(&self, value: Value) -> String {
+        match self.program.values.op(value) {
+            Op::Constant(bits) => number(bits.number()),
+            Op::Parameter(i) => format!("m->p[{i}]"),
+            Op::Time => "t".into(),
+            Op::Input(i) => format!("m->u[{i}]"),
+            Op::Held(i) => format!("m->z[{i}]"),
+            Op::Conserved(i) => format!("m->k[{i}]"),
+            Op::State(i) => format!("x[{i}]"),
+            _ => format!("m->c[{}]", self.derived[&value]),
+        }
+    }
+
+    /// A value in C, in double precision.
+    pub fn wide_text(&self, value: Value) -> String {
+        match self.program.values.op(value) {
+            _ if self.real == Real::Double => self.text(value),
+            Op::Constant(_) | Op::Time => self.text(value),
+            Op::Parameter(i) => format!("m->p_exact[{i}]"),
+            _ if self.derived.contains_key(&value) => {
+                let mut exact = self.exact.borrow_mut();
+                let next = exact.len();
+                format!("m->c_exact[{}]", exact.entry(value).or_insert(next))
+            }
+            _ => format!("ha_widen({})", self.text(value)),
+        }
+    }
+
+    /// Its place in directions of derivatives; none if it is of parameters alone.
+    pub fn direction(&self, value: Value) -> Option<usize> {
+        let [_, held, conserved, states, _] = self.directions();
+        match self.program.values.op(value) {
+            Op::Time => Some(0),
+            Op::Input(i) => Some(1 + i as usize),
+            Op::Held(i) => Some(held + i as usize),
+            Op::Conserved(i) => Some(conserved + i as usize),
+            Op::State(i) => Some(states + i as usize),
+            _ => None,
+        }
+    }
+
+    /// First places of inputs, held signals, conserved constants and states in directions, and their number of places.
+    pub fn directions(&self) -> [usize; 5] {
+        let p = self.program;
+        let held = 1 + p.inputs.len();
+        let conserved = held + p.held.len();
+        let states = conserved + p.conserved.len();
+        [1, held, conserved, states, states + p.states.len()]
+    }
+
+    /// Its derivative in C, if it moves.
+    pub fn rate(&self, value: Value, moving: Moving) -> Option<String> {
+        let place = self.direction(value)?;
+        let moves = match self.program.values.op(value) {
+            Op::Time => return moving.time.map(str::to_string),
+            Op::Input(_) => moving.inputs,
+            Op::Held(_) => moving.held,
+            Op::Conserved(_) => moving.conserved,
+            _ => moving.states,
+        };
+        moves.then(|| format!("e[{place}]"))
+    }
+}

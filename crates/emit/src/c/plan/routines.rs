@@ -1,0 +1,77 @@
+//! What the functions of a model compute.
+
+use std::collections::BTreeMap;
+
+use halfarrow_compiler::program::{Arg, BlockId, Code, ConditionId, Method, Routine, Solve, Value};
+
+use super::Plan;
+
+/// What the functions compute.
+pub(super) struct Routines {
+    pub preamble: Routine,
+    pub rates: Routine,
+    pub observe: Routine,
+    pub switching: Routine,
+    pub clock: Routine,
+    pub sources: Routine,
+    pub domains: Routine,
+    /// What the start of a run asks for, each with the name of its function.
+    pub starts: Vec<(String, Routine)>,
+}
+
+impl Routines {
+    pub fn of(plan: &Plan) -> Routines {
+        let p = plan.program;
+        let rates: Vec<Value> = p.states.iter().map(|s| s.rate).collect();
+        let shown = plan.export.recorded.iter().filter_map(|&i| p.observed[i].value.clone().ok());
+        let operands = |ids: &[ConditionId]| ids.iter().map(|&c| p.conditions[c].operand).collect::<Vec<_>>();
+        let residuals = |conditions: &[usize]| conditions.iter().map(|&c| p.start[c].residual).collect::<Vec<_>>();
+        let passes = plan.passes.iter().enumerate().map(|(i, p)| ("pass", i, residuals(&p.conditions)));
+        let groups = plan.groups.iter().enumerate().filter(|(_, g)| g.together);
+        let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
+        let guesses = p.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
+        let start = |(kind, number, wanted): (&str, usize, Vec<Value>)| {
+            (format!("ha_start_{kind}_{number}"), p.routine(&wanted))
+        };
+        Routines {
+            preamble: p.preamble(&p.determined(&[])),
+            rates: p.watched_routine(&rates),
+            observe: p.watched_routine(&shown.collect::<Vec<_>>()),
+            switching: p.routine(&operands(&plan.switches)),
+            clock: p.routine(&operands(&plan.clocks)),
+            sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
+            domains: p.routine(&p.domains.iter().map(|d| d.argument).collect::<Vec<_>>()),
+            starts: passes.chain(groups).chain(guesses).map(start).collect(),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Routine> {
+        let Routines { preamble, rates, observe, switching, clock, sources, domains, starts } = self;
+        let all = [preamble, rates, observe, switching, clock, sources, domains];
+        all.into_iter().chain(starts.iter().map(|s| &s.1))
+    }
+
+    /// All Newton blocks, each with what it reads from outside and its code.
+    pub fn newton(&self) -> BTreeMap<BlockId, (&[Arg], &Code)> {
+        let mut blocks = BTreeMap::new();
+        for solve in self.all().flat_map(|r| newton_of(&r.code)) {
+            if let Method::Newton { outer, code } = &solve.method {
+                blocks.entry(solve.block).or_insert((&outer[..], code));
+            }
+        }
+        blocks
+    }
+
+    /// What the preamble computes of what other routines read.
+    pub fn kept(&self) -> Vec<(u32, Value)> {
+        let Routine { wanted, code } = &self.preamble;
+        let local =
+            |(&value, &a): (&Value, &Arg)| if let Arg::Local(local) = a { Some((local.0, value)) } else { None };
+        wanted.iter().zip(&code.outputs).filter_map(local).collect()
+    }
+}
+
+/// The Newton blocks of some code.
+pub(super) fn newton_of(code: &Code) -> impl Iterator<Item = &Solve> {
+    code.solves().filter(|solve| matches!(solve.method, Method::Newton { .. }))
+}

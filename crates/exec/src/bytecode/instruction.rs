@@ -1,0 +1,64 @@
+//! The bytecode: operations on registers, and the code that they make.
+
+use halfarrow_compiler::program::{self, BlockId, Op};
+
+/// A place for one number.
+pub(crate) type Register = u32;
+
+/// An operation on registers; `out` may be one of its operands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Operation {
+    pub out: Register,
+    pub op: Op<Register>,
+}
+
+/// What the interpreter does in one go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Instruction {
+    /// An operation.
+    Op(Operation),
+    /// The parameter's set value, or `default` where none is set.
+    Parameter { out: Register, index: u32, default: Register },
+    /// Stops if the pivot vanishes against its scale.
+    Watch { pivot: Register, scale: Register, watch: u32 },
+    /// A solve block: index into [`Routine::solves`].
+    Solve { solve: u32 },
+}
+
+/// A solve block in a routine.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Solve {
+    /// The block.
+    pub block: BlockId,
+    /// The block that has factored the same matrix, if there is one.
+    pub shared: Option<BlockId>,
+    /// Where the unknowns are written.
+    pub unknowns: Vec<Register>,
+    /// Newton: where the guess is put before `code` runs; empty for a linear block.
+    pub guess: Vec<Register>,
+    /// Newton: what varies outside and is read by `code`, in the order of the values; the same in every routine.
+    pub outer: Vec<Register>,
+    /// Newton: computes right side and matrix at the guess.
+    pub code: Vec<Operation>,
+    /// Matrix of a linear block, Jacobian of a Newton block, row by row.
+    pub matrix: Vec<Register>,
+    /// The places of the matrix that are not 0 whatever happens.
+    pub entries: Vec<u32>,
+    /// Right-hand side of a linear block, residuals of a Newton block.
+    pub right: Vec<Register>,
+}
+
+/// A routine on registers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Routine {
+    /// The code.
+    pub code: Vec<Instruction>,
+    /// Its solve blocks.
+    pub solves: Vec<Solve>,
+    /// Where the wanted values stand when it has run.
+    pub outputs: Vec<Register>,
+    /// Number of registers it needs, fixed ones included.
+    pub registers: u32,
+    /// What it was made of.
+    pub source: program::Code,
+}
