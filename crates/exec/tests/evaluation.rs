@@ -7,7 +7,7 @@ use halfarrow_compiler::algebra::{Expr, Function};
 use halfarrow_compiler::equations::Step;
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, System};
 
 fn rates(model: &mut Model, t: f64, x: &[f64]) -> Vec<f64> {
     let mut dx = vec![0.0; x.len()];

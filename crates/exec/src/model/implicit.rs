@@ -4,7 +4,7 @@ use super::{InputError, Model, Operations, ParameterError, RecordError, StartErr
 use crate::bytecode::Trouble;
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{Implicit, Op, Program, Routine, Unavailable, Value};
-use halfarrow_sim::{Failure, ImplicitSystem, Sparsity, System};
+use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System, halves, halves_mut};
 use std::collections::BTreeMap;
 
 /// Passes of Newton on states of the minimal form.
@@ -273,10 +273,10 @@ impl ImplicitModel {
         if self.twin {
             self.form.conserved.copy_from_slice(&self.reference.conserved);
         }
-        self.reference.cross_jump(t, &mut self.x)?;
+        self.reference.handle_event(t, &mut self.x)?;
         self.guess(t)?;
         self.take_over(t, &mut y)?;
-        self.form.cross_jump(t, &mut y)?;
+        self.form.handle_event(t, &mut y)?;
         self.take_rates(t, &y, &mut yp)?;
         self.settle(t, &mut y, &mut yp)?;
         self.begun = true;
@@ -598,14 +598,6 @@ impl ImplicitSystem for ImplicitModel {
         }
     }
 
-    fn switch_name(&self, switch: usize) -> String {
-        self.form.switch_name(switch)
-    }
-
-    fn observed_name(&self, value: usize) -> String {
-        System::observed_name(&self.form, value)
-    }
-
     /// Those of the minimal form where it has the same unknown.
     fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
         let ImplicitModel { reference, form, x, .. } = self;
@@ -668,52 +660,52 @@ impl ImplicitSystem for ImplicitModel {
         let none = !self.equations.explicit.iter().zip(&self.equations.differential).any(free);
         none.then_some(&self.equations.explicit[..])
     }
+}
 
-    fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        let (y, yp) = match (self.form.recorded.is_empty(), self.uncontrolled.is_empty()) {
-            (true, _) => (y.to_vec(), yp.to_vec()),
-            (false, true) => self.consistent(t, y, yp)?,
-            (false, false) => self.controlled(t, y, yp)?,
-        };
-        self.place_rates(&yp);
-        self.form.observe(t, &y, out)
-    }
-
-    fn observed(&self) -> usize {
-        System::observed(&self.form)
-    }
-
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.form.next_jump(t)
+impl Events for ImplicitModel {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        self.form.next_time_event(t)
     }
 
     fn is_corner(&mut self, t: f64) -> bool {
         self.form.is_corner(t)
     }
 
-    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+    fn indicators(&self) -> usize {
+        self.form.indicators()
+    }
+
+    fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
+        self.place_rates(yp);
+        self.form.event_indicators(t, y, g)
+    }
+
+    fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves_mut(point);
         let implicit = self.form.program.implicit.is_some();
         if !self.begun || !implicit {
             self.begun = true;
             self.place_rates(yp);
-            self.form.cross_jump(t, y)?;
+            self.form.handle_event(t, y)?;
             if !implicit {
                 return self.take_rates(t, y, yp);
             }
-            self.reference.cross_jump(t, &mut self.x)?;
+            self.reference.handle_event(t, &mut self.x)?;
         } else {
-            // What is sampled at a jump, and the side of a condition, are those of the unknowns after it.
+            // What is sampled at an event, and the sign of a condition, are those of the unknowns after it.
             self.follow_back(t, y, yp)?;
-            self.reference.cross_jump(t, &mut self.x)?;
+            self.reference.handle_event(t, &mut self.x)?;
             self.take_over(t, y)?;
-            self.form.cross_jump(t, y)?;
+            self.form.handle_event(t, y)?;
         }
         self.take_over(t, y)?;
         self.take_rates(t, y, yp)?;
         self.settle(t, y, yp)
     }
 
-    fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
+    fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
         self.place_rates(yp);
         self.form.accept(t, y)?;
         let observed = !self.uncontrolled.is_empty() && !self.form.recorded.is_empty();
@@ -724,12 +716,22 @@ impl ImplicitSystem for ImplicitModel {
         Ok(())
     }
 
-    fn switches(&self) -> usize {
-        System::switches(&self.form)
+    fn observed(&self) -> usize {
+        self.form.observed()
     }
 
-    fn switch_values(&mut self, t: f64, y: &[f64], yp: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.place_rates(yp);
-        self.form.switch_values(t, y, g)
+    fn observed_name(&self, value: usize) -> String {
+        self.form.observed_name(value)
+    }
+
+    fn observe(&mut self, t: f64, point: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
+        let (y, yp) = match (self.form.recorded.is_empty(), self.uncontrolled.is_empty()) {
+            (true, _) => (y.to_vec(), yp.to_vec()),
+            (false, true) => self.consistent(t, y, yp)?,
+            (false, false) => self.controlled(t, y, yp)?,
+        };
+        self.place_rates(&yp);
+        self.form.observe(t, &y, out)
     }
 }

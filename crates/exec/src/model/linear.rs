@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::system::What;
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, System as _};
 
 /// `x' = f + A dx + B du`, `y = g + C dx + D du` near a state: matrices row by row, in SI units.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,6 +3,7 @@
 mod clock;
 mod equilibrium;
 mod errors;
+mod events;
 mod explain;
 mod history;
 mod implicit;

@@ -5,7 +5,7 @@ use super::system::What;
 use crate::bytecode::{Frame, Lane, Line, Packed, WideFrame};
 use halfarrow_compiler::program::Routine;
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, HybridSystem, System as _};
 
 /// A model in as many copies as there are lanes, each with parameters, inputs, start and memory of its own, whose rates
 /// and recorded values are computed together.
@@ -133,7 +133,7 @@ impl Lane for Model {
 }
 
 impl WideSystem for WideModel {
-    fn lane(&mut self, lane: usize) -> &mut dyn System {
+    fn lane(&mut self, lane: usize) -> &mut dyn HybridSystem {
         &mut self.models[lane]
     }
 
