@@ -74,6 +74,8 @@ struct Lane<'a> {
     /// Where its step ends.
     target: f64,
     ticks: Grid,
+    /// Whether what happens where it stands is done with, samples included.
+    settled: bool,
     over: bool,
 }
 
@@ -107,6 +109,7 @@ impl<'a> Batch<'a> {
             stop: Stop { time: options.from, is_event: false },
             target: options.from,
             ticks: Grid::new(options.from, step),
+            settled: false,
             over: false,
         };
         let lanes: Vec<Lane<'a>> = sinks.iter_mut().enumerate().map(lane).collect();
@@ -173,6 +176,7 @@ impl<'a> Batch<'a> {
         x.iter_mut().zip(&self.trial).for_each(|(x, trial)| x[i] = trial[i]);
         let lane = &mut self.lanes[i];
         lane.run.counts.steps += 1;
+        lane.settled = false;
         let at_event = lane.stop.is_event && lane.stop.time == target;
         if at_event || self.remembers || lane.run.has_indicators() {
             self.alone(i, x, Lane::arrive);
@@ -180,7 +184,7 @@ impl<'a> Batch<'a> {
             lane.run.time = target;
         }
         let lane = &self.lanes[i];
-        if lane.over { None } else { lane.run.due() }
+        if lane.over || lane.settled { None } else { lane.run.due() }
     }
 
     /// Lets a lane act on its own, and puts its state back.
@@ -241,6 +245,7 @@ impl Lane<'_> {
             return Ok(());
         }
         self.run.go_over(system, reason, x)?;
+        self.settled = true;
         self.stop = self.run.next_stop(system);
         self.over = self.run.time >= self.run.to;
         Ok(())
