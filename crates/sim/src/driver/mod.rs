@@ -1,10 +1,12 @@
 //! The driver: takes a run from event to event, whatever the method, and hands what it computes to a [`Sink`].
 
 mod grid;
+mod position;
 mod sink;
 mod stepper;
 
 pub(crate) use grid::Grid;
+pub use position::Position;
 pub use sink::{Crawl, Sink, Stopped, Summary};
 pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 
@@ -80,9 +82,18 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// A run of which nobody takes samples.
-    pub(crate) fn unsampled(options: &'a Options, sink: &'a mut dyn Sink, events: &dyn Events) -> Run<'a> {
-        Run { samples: Samples::Nowhere, ..Run::new(options, sink, events) }
+    /// A run of which nobody takes samples, from where it stands.
+    pub(crate) fn unsampled(options: &'a Options, sink: &'a mut dyn Sink, position: Position) -> Run<'a> {
+        let Position { time, signs, counts } = position;
+        let chatter = Chatter::new(options.to - options.from);
+        let (values, inside) = (Vec::new(), Vec::new());
+        let (samples, watched, seen) = (Samples::Nowhere, false, None);
+        Run { options, time, to: options.to, counts, signs, chatter, sink, watched, seen, samples, values, inside }
+    }
+
+    /// Where it stands.
+    pub(crate) fn into_position(self) -> Position {
+        Position { time: self.time, signs: self.signs, counts: self.counts }
     }
 
     /// The start counts as an event.

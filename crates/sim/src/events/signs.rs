@@ -4,6 +4,7 @@ use super::Events;
 use crate::Failure;
 
 /// The sign of each event indicator during the present mode.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Signs {
     pub(super) held: Vec<bool>,
     pub(super) values: Vec<f64>,

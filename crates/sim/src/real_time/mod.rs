@@ -9,10 +9,8 @@ mod statistics;
 pub use clock::Clock;
 pub use statistics::{Histogram, Statistics};
 
-use crate::driver::Run;
-use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
-use crate::shared::Counted;
-use crate::{HybridSystem, Method, Options, Sink, Stopped};
+use crate::fixed_step::FixedMethod;
+use crate::{HybridSystem, Stepwise, Stopped};
 
 /// What to do when a tick ends after the next one was due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,53 +57,41 @@ pub fn run_real_time<S: HybridSystem>(
     exchange: &mut dyn Exchange<S>,
     statistics: &Statistics,
 ) -> Result<(), Stopped> {
-    let options =
-        Options { method: Method::Fixed(method), step: Some(pace.step), to: f64::INFINITY, ..Options::default() };
-    let (mut nobody, mut vain) = (Nobody, x.to_vec());
-    let mut method = FixedStep::new(method, system.sparsity());
-    let mut run = Run::unsampled(&options, &mut nobody, system);
+    let mut vain = x.to_vec();
+    let mut run = Stepwise::new(method, 0.0, system);
     let mut values = vec![0.0; system.observed()];
-    let end = run.start(system, x).and_then(|()| {
-        let mut due = clock.now();
-        let mut last = f64::INFINITY;
-        for tick in 0..pace.ticks.unwrap_or(u64::MAX) {
-            // What has not run for a while has left the caches: while there is time, the step is taken in vain.
-            clock.wait_busily(due, &mut |left| {
-                if left > REHEARSED * last {
-                    vain.copy_from_slice(x);
-                    let done = method.step(system, run.time, pace.step, &mut vain);
-                    let _ = done.and_then(|()| system.observe(run.time, &vain, &mut values));
-                }
-            });
-            let begun = clock.now();
-            if !exchange.input(run.time, system) {
-                break;
+    run.start(system, x)?;
+    let mut due = clock.now();
+    let mut last = f64::INFINITY;
+    for tick in 0..pace.ticks.unwrap_or(u64::MAX) {
+        // What has not run for a while has left the caches: while there is time, the step is taken in vain.
+        clock.wait_busily(due, &mut |left| {
+            if left > REHEARSED * last {
+                vain.copy_from_slice(x);
+                let done = run.try_step(system, pace.step, &mut vain);
+                let _ = done.and_then(|()| system.observe(run.time(), &vain, &mut values));
             }
-            let fed = clock.now();
-            // Ticks are counted, not added up: a day of 1 ms is a day.
-            run.to = (tick + 1) as f64 * pace.step;
-            run.drive(&mut Ticks::one(&mut method, Counted::new(system)), x)?;
-            system.observe(run.time, x, &mut values)?;
-            let done = clock.now();
-            exchange.output(run.time, &values);
-            let late = clock.now() - (due + pace.step);
-            last = done - fed;
-            statistics.tick(run.time, begun - due, done - fed, late > 0.0);
-            due += pace.step;
-            if late > 0.0 && pace.on_miss == OnMiss::Skip {
-                let left_out = (late / pace.step).ceil();
-                statistics.leave_out(left_out as u64);
-                due += left_out * pace.step;
-            }
+        });
+        let begun = clock.now();
+        if !exchange.input(run.time(), system) {
+            break;
         }
-        Ok(())
-    });
-    run.ended(end).map(|_| ())
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
+        let fed = clock.now();
+        // Ticks are counted, not added up: a day of 1 ms is a day.
+        run.advance(system, (tick + 1) as f64 * pace.step, x)?;
+        let observed = system.observe(run.time(), x, &mut values);
+        observed.map_err(|failure| run.stopped(failure))?;
+        let done = clock.now();
+        exchange.output(run.time(), &values);
+        let late = clock.now() - (due + pace.step);
+        last = done - fed;
+        statistics.tick(run.time(), begun - due, done - fed, late > 0.0);
+        due += pace.step;
+        if late > 0.0 && pace.on_miss == OnMiss::Skip {
+            let left_out = (late / pace.step).ceil();
+            statistics.leave_out(left_out as u64);
+            due += left_out * pace.step;
+        }
+    }
+    Ok(())
 }
