@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 /// A signal as it was some time ago: cubics through recorded values and slopes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Delay {
     /// The delay in s.
     pub time: f64,
@@ -12,7 +12,7 @@ pub(super) struct Delay {
     start: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Point {
     t: f64,
     value: f64,
@@ -107,7 +107,7 @@ fn cubic(a: &Point, b: &Point, s: f64) -> (f64, f64) {
 }
 
 /// A signal sampled at multiples of a period.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sample {
     period: f64,
     /// The value held.

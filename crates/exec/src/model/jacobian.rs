@@ -27,7 +27,7 @@ impl Slopes {
 impl Model {
     /// Writes the nonzeros in the order of the pattern; false if the model was made without them.
     pub(super) fn slopes_at(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        if self.slopes.is_none() {
+        if self.code.slopes.is_none() {
             return Ok(false);
         }
         self.place(t, x);
@@ -40,7 +40,7 @@ impl Model {
         match self.take_entries(values) {
             None => Ok(true),
             Some(place) => {
-                let row = self.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
+                let row = self.code.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
                 let what = format!("the derivative of the rate of {}", self.state_name(row));
                 Err(Failure::NotFinite { time: t, what })
             }
@@ -48,7 +48,7 @@ impl Model {
     }
     /// Writes what the routine has computed; the first place that is not finite.
     fn take_entries(&self, values: &mut [f64]) -> Option<usize> {
-        let slopes = self.slopes.as_ref()?;
+        let slopes = self.code.slopes.as_ref()?;
         values.fill(0.0);
         for (&place, &register) in slopes.places.iter().zip(&slopes.routine.outputs) {
             values[place] = self.frame.r[register as usize];

@@ -1,6 +1,6 @@
 //! The model as a system to integrate.
 
-use super::{Held, Model};
+use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Trouble};
 use halfarrow_sim::{Failure, Sparsity, System};
 
@@ -12,7 +12,7 @@ const BESIDE: f64 = 1e-8;
 pub(super) enum What {
     Rates,
     Recorded,
-    Switches,
+    Indicators,
     /// Derivatives of the rates, if the model has them.
     Slopes,
 }
@@ -20,17 +20,17 @@ pub(super) enum What {
 impl Model {
     fn once(&mut self, what: What, along: bool) -> Result<bool, Trouble> {
         let routine = match what {
-            What::Rates => &self.rates,
-            What::Recorded => &self.observe,
-            What::Switches => &self.switching,
-            What::Slopes => &self.slopes.as_ref().expect("asked for only where they are").routine,
+            What::Rates => &self.code.rates,
+            What::Recorded => &self.recorded.routine,
+            What::Indicators => &self.code.indicators,
+            What::Slopes => &self.code.slopes.as_ref().expect("asked for only where they are").routine,
         };
         self.frame.begin(match what {
-            What::Rates => self.abreast.0.as_ref(),
-            What::Recorded => self.abreast.1.as_ref(),
-            What::Switches | What::Slopes => None,
+            What::Rates => self.code.abreast.as_ref(),
+            What::Recorded => self.recorded.abreast.as_ref(),
+            What::Indicators | What::Slopes => None,
         });
-        match (self.codes.of(what, along), along) {
+        match (self.codes.of(&self.recorded, what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,
             (None, false) => self.frame.run(routine)?,
             (None, true) => self.frame.run_along(routine)?,
@@ -43,7 +43,7 @@ impl Model {
     /// conditions are followed instead.
     pub(super) fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
         let first = self.once(what, along);
-        let held = self.frame.conditions.state == Hold::Keep && !self.switches.is_empty();
+        let held = self.frame.conditions.state == Hold::Keep && !self.code.switching.is_empty();
         if !held || matches!(first, Ok(true)) {
             return first.map(|_| ()).map_err(|trouble| self.failure(t, trouble));
         }
@@ -70,11 +70,14 @@ impl Model {
 
     /// Sets the direction of derivatives to that of time: inputs and held signals move, states do not.
     pub(super) fn let_time_pass(&mut self, t: f64) {
-        let Model { frame, layout, inputs, held, crossed, .. } = self;
+        let Model { frame, code, setup, run, .. } = self;
+        let layout = &code.layout;
         frame.d[layout.time as usize] = 1.0;
-        inputs.iter().enumerate().for_each(|(i, s)| frame.d[layout.inputs as usize + i] = s.at(t).1);
-        for (i, held) in held.iter().enumerate() {
-            let slope = if let Held::Delay(delay) = held { delay.at(t, *crossed).1 } else { 0.0 };
+        for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
+            frame.d[layout.inputs as usize + i] = signal.at(t, *piece).1;
+        }
+        for (i, held) in run.held.iter().enumerate() {
+            let slope = if let DelayOrSample::Delay(delay) = held { delay.at(t, run.crossed).1 } else { 0.0 };
             frame.d[layout.held as usize + i] = slope;
         }
     }
@@ -83,7 +86,7 @@ impl Model {
     pub(super) fn tangent_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, y);
         self.still();
-        self.along(t, y, self.layout.rates, v, jv)
+        self.along(t, y, self.code.layout.rates, v, jv)
     }
 
     /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
@@ -112,14 +115,14 @@ impl Model {
 
     /// Writes the derivatives of the rates; the first state for whose rate there is none.
     fn take_slopes(&self, jv: &mut [f64]) -> Option<usize> {
-        jv.iter_mut().zip(&self.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
+        jv.iter_mut().zip(&self.code.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
         jv.iter().position(|slope| !slope.is_finite())
     }
 
     /// Puts states in their registers that are a little further on the way that the rates, evaluated last, lead.
     pub(super) fn place_beside(&mut self, t: f64, x: &[f64]) {
         let mut beside = std::mem::take(&mut self.beside);
-        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.rates.outputs) {
+        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.code.rates.outputs) {
             let rate = self.frame.r[register as usize];
             let rate = if rate.is_finite() { rate } else { 0.0 };
             let size = if rate < 0.0 { -x.abs() } else { x.abs() };
@@ -132,21 +135,21 @@ impl Model {
 
     /// Whether there are laws solved by Newton, whose last solution decides which one comes next.
     pub(super) fn follows_solutions_at_all(&self) -> bool {
-        !self.shown_blocks.is_empty() || self.rates.solves.iter().any(|solve| !solve.guess.is_empty())
+        !self.recorded.blocks.is_empty() || self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty())
     }
 }
 
 impl System for Model {
     fn states(&self) -> usize {
-        self.program.states.len()
+        self.code.program.states.len()
     }
 
     fn state_name(&self, state: usize) -> String {
-        self.program.states[state].name.clone()
+        self.code.program.states[state].name.clone()
     }
 
     fn scales(&self) -> &[f64] {
-        &self.scales
+        &self.run.scales
     }
 
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
@@ -155,7 +158,7 @@ impl System for Model {
         }
         self.place(t, x);
         self.evaluate(What::Rates, false, t)?;
-        for (state, (dx, &register)) in dx.iter_mut().zip(&self.rates.outputs).enumerate() {
+        for (state, (dx, &register)) in dx.iter_mut().zip(&self.code.rates.outputs).enumerate() {
             *dx = self.frame.r[register as usize];
             if !dx.is_finite() {
                 let what = format!("the rate of {}", self.state_name(state));
@@ -169,7 +172,7 @@ impl System for Model {
     fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
-        self.along(t, x, self.layout.states, v, jv)
+        self.along(t, x, self.code.layout.states, v, jv)
     }
 
     fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
@@ -180,7 +183,7 @@ impl System for Model {
     }
 
     fn sparsity(&self) -> &Sparsity {
-        &self.sparsity
+        &self.code.sparsity
     }
 
     fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {

@@ -1,7 +1,9 @@
 //! The driver: takes a run from event to event, whatever the method, and hands what it computes to a [`Sink`].
 
+mod crossing;
 mod grid;
 mod position;
+mod recording;
 mod sink;
 mod stepper;
 
@@ -12,11 +14,9 @@ pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 
 use std::ops::ControlFlow;
 
-use crate::events::{Chatter, Events, Signs, first_crossing};
+use crate::events::{Chatter, Events, Signs};
 use crate::{Failure, Options};
-
-/// Parts of a step by which it is made to go beyond a zero crossing.
-const MARGINS: [f64; 2] = [1e-3, 1e-6];
+use recording::Samples;
 
 /// Why the driver looks up at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,16 +30,6 @@ pub(crate) enum StopReason {
     },
     /// The sign of an event indicator has changed, with or without a time event.
     ZeroCrossing,
-}
-
-/// Where samples are taken.
-enum Samples {
-    /// At the end of every step, and on both sides of every event.
-    EveryStep,
-    /// At these times.
-    Grid(Grid),
-    /// Nowhere: somebody else does.
-    Nowhere,
 }
 
 /// A run on its way: where it stands, the signs of its event indicators, what it has taken so far.
@@ -168,65 +158,6 @@ impl<'a> Run<'a> {
         Ok(reason)
     }
 
-    /// Writes the point that the step has led to: its end, or a zero crossing before it. Gives when that is, and whether an
-    /// event indicator has changed its sign there.
-    fn accept_step<S: Stepper>(
-        &mut self,
-        stepper: &mut S,
-        end: f64,
-        point: &mut [f64],
-    ) -> Result<(f64, bool), Failure> {
-        if !S::DENSE {
-            stepper.accept(end, point);
-            let crossed = self.signs.crossed(&mut *stepper.events(), end, point)?;
-            return Ok((end, crossed.is_some()));
-        }
-        self.inside.resize(point.len(), 0.0);
-        match self.exact_crossing(stepper, end)? {
-            (end, None) => {
-                stepper.accept(end, point);
-                Ok((end, false))
-            }
-            (_, Some((time, indicator))) => {
-                if self.chatter.is_one(time) {
-                    let what = stepper.events().indicator_name(indicator);
-                    return Err(Failure::Chattering { time, what });
-                }
-                stepper.land(time, point);
-                Ok((time, true))
-            }
-        }
-    }
-
-    /// The first zero crossing in the step that ends at `end`, which it is, and where the step ends now: where its end is
-    /// more exact than its inside, it is made again to just beyond the crossing.
-    fn exact_crossing<S: Stepper>(
-        &mut self,
-        stepper: &mut S,
-        mut end: f64,
-    ) -> Result<(f64, Option<(f64, usize)>), Failure> {
-        let mut crossing = self.crossing(stepper, end)?;
-        for margin in MARGINS {
-            let Some((time, _)) = crossing else { break };
-            let beyond = time + margin * (time - self.time);
-            if beyond >= end || !stepper.shorten(beyond) {
-                break;
-            }
-            end = beyond;
-            crossing = self.crossing(stepper, end)?;
-        }
-        Ok((end, crossing))
-    }
-
-    /// The first zero crossing in the step that ends at `end`, by its dense output, and which it is.
-    fn crossing<S: Stepper>(&mut self, stepper: &mut S, end: f64) -> Result<Option<(f64, usize)>, Failure> {
-        let Run { signs, inside, time, .. } = self;
-        first_crossing(signs, *time, end, |signs, t| {
-            stepper.interpolate(t, inside);
-            signs.crossed(&mut *stepper.events(), t, inside)
-        })
-    }
-
     /// A step to `(end, point)` is accepted; what happens there.
     pub(crate) fn reach(
         &mut self,
@@ -277,16 +208,6 @@ impl<'a> Run<'a> {
         if self.seen == Some(self.time) { Ok(()) } else { self.show(events, point) }
     }
 
-    /// Shows the sink where the run stands, if it wants to see every step.
-    fn show(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
-        if !self.watched {
-            return Ok(());
-        }
-        self.seen = Some(self.time);
-        events.observe(self.time, point, &mut self.values)?;
-        self.sink.watch(self.time, &self.values)
-    }
-
     fn report_progress(&mut self) -> Result<(), Failure> {
         match self.sink.progress(self.time) {
             ControlFlow::Continue(()) => Ok(()),
@@ -302,75 +223,6 @@ impl<'a> Run<'a> {
     /// Says that the run crawls.
     pub(crate) fn tell_crawl(&mut self, crawl: &Crawl) {
         self.sink.crawls(crawl);
-    }
-
-    /// As which time a sample is due where the run stands, if it is. On a grid the sample bears the time of the grid, from
-    /// which the run may be a rounding error away.
-    pub(crate) fn due(&self) -> Option<f64> {
-        let due = match &self.samples {
-            Samples::Nowhere => return None,
-            Samples::EveryStep => Some(self.time),
-            Samples::Grid(grid) => grid.is_due(self.time).then(|| grid.next()),
-        };
-        (self.time >= self.to).then_some(self.to).or(due)
-    }
-
-    /// Samples where the run stands, if that is due.
-    fn settle(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
-        self.due().map_or(Ok(()), |label| self.record(events, label, self.time, point))
-    }
-
-    /// The next time of the grid.
-    pub(crate) fn next_sample(&self) -> f64 {
-        if let Samples::Grid(grid) = &self.samples { grid.next() } else { f64::INFINITY }
-    }
-
-    /// Samples of the grid inside the last step, clearly before `end`.
-    fn samples_before<S: Stepper>(&mut self, stepper: &mut S, end: f64) -> Result<(), Failure> {
-        while let Samples::Grid(grid) = &self.samples
-            && grid.next() + grid.slack() < end
-        {
-            let t = grid.next();
-            let mut inside = std::mem::take(&mut self.inside);
-            stepper.sample(t, &mut inside);
-            let recorded = self.record(&mut *stepper.events(), t, t, &inside);
-            self.inside = inside;
-            recorded?;
-        }
-        Ok(())
-    }
-
-    /// Hands over the values at `(t, point)` as the sample of time `label`.
-    fn record(&mut self, events: &mut dyn Events, label: f64, t: f64, point: &[f64]) -> Result<(), Failure> {
-        events.observe(t, point, &mut self.values)?;
-        if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: events.observed_name(value) });
-        }
-        self.hand_over(label);
-        Ok(())
-    }
-
-    /// Hands over values that were observed elsewhere, as the sample that is due.
-    pub(crate) fn record_values(&mut self, label: f64, values: impl Iterator<Item = f64>) {
-        self.values.iter_mut().zip(values).for_each(|(own, value)| *own = value);
-        self.hand_over(label);
-    }
-
-    fn hand_over(&mut self, label: f64) {
-        self.sink.sample(label, &self.values);
-        if let Samples::Grid(grid) = &mut self.samples {
-            grid.pass(label);
-        }
-    }
-
-    /// Whether there are event indicators.
-    pub(crate) fn has_indicators(&self) -> bool {
-        !self.signs.is_empty()
-    }
-
-    /// Whether an event indicator has another sign at `(t, point)` than that held.
-    pub(crate) fn has_crossed(&mut self, events: &mut dyn Events, t: f64, point: &[f64]) -> Result<bool, Failure> {
-        self.signs.crossed(events, t, point).map(|crossed| crossed.is_some())
     }
 
     /// What came of it.
