@@ -54,7 +54,7 @@ fn a_step_takes_no_memory() {
     let model = s.model();
     takes_no_memory(model.clone());
     let mut machine = model;
-    if machine.compile_machine().and_then(|()| machine.compile_tangent()).is_ok() {
+    if machine.compile_machine().and_then(|()| machine.compile_directional()).is_ok() {
         takes_no_memory(machine);
     }
 }
@@ -67,7 +67,7 @@ fn takes_no_memory(mut model: halfarrow_exec::Model) {
         for i in 0..100 {
             let (t, x) = (0.01 * f64::from(i), [0.1 + f64::from(i)]);
             model.rates(t, &x, &mut dx).unwrap();
-            model.tangent(t, &x, &[1.0], &mut dx).unwrap();
+            model.directional_derivative(t, &x, &[1.0], &mut dx).unwrap();
             model.observe(t, &x, &mut out).unwrap();
             model.event_indicators(t, &x, &mut g).unwrap();
             model.accept(t, &x).unwrap();

@@ -18,7 +18,7 @@ fn compare(name: &str, model: &mut Model, t: f64, x: &[f64]) -> usize {
     for column in 0..x.len() {
         along.fill(0.0);
         along[column] = 1.0;
-        model.tangent(t, x, &along, &mut product).unwrap_or_else(|why| panic!("{name} at {t}: {why:?}"));
+        model.directional_derivative(t, x, &along, &mut product).unwrap_or_else(|why| panic!("{name} at {t}: {why:?}"));
         for (place, &row) in pattern.places(column).zip(pattern.column(column)) {
             let (here, there) = (values[place], product[row]);
             let size = product.iter().fold(there.abs(), |most, p| most.max(p.abs()));

@@ -19,7 +19,7 @@ fn same(a: f64, b: f64) -> bool {
 fn compiled(model: &Model) -> Model {
     let mut model = model.clone();
     model.compile_machine().expect("machine code for this processor");
-    model.compile_tangent().expect("machine code for this processor");
+    model.compile_directional().expect("machine code for this processor");
     assert!(model.runs_machine_code());
     model
 }
@@ -41,7 +41,8 @@ fn compare(name: &str, bytecode: &mut Model, machine: &mut Model, t: f64, x: &[f
     }
     bits(&here, &there, "rate")?;
     let v: Vec<f64> = (0..n).map(|i| [1.0, 0.0, -0.7][i % 3]).collect();
-    let results = (bytecode.tangent(t, x, &v, &mut here), machine.tangent(t, x, &v, &mut there));
+    let results =
+        (bytecode.directional_derivative(t, x, &v, &mut here), machine.directional_derivative(t, x, &v, &mut there));
     prop_assert_eq!(format!("{:?}", results.0), format!("{:?}", results.1));
     if results.0.is_ok() {
         bits(&here, &there, "derivative")?;

@@ -16,7 +16,7 @@ proptest! {
         let mut start = x.to_vec();
         model.handle_event(0.7, &mut start).unwrap();
         let mut jv = [0.0; STATES];
-        prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+        prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
         let mut at = |h: f64| {
             let moved: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + h * v).collect();
             let mut dx = [0.0; STATES];
@@ -42,12 +42,12 @@ proptest! {
         let pattern = model.sparsity().clone();
         let mut values = vec![0.0; pattern.nonzeros()];
         let mut jv = [0.0; STATES];
-        prop_assume!(model.tangent(0.7, &x, &[1.0; STATES], &mut jv).is_ok());
+        prop_assume!(model.directional_derivative(0.7, &x, &[1.0; STATES], &mut jv).is_ok());
         prop_assert_eq!(model.jacobian(0.7, &x, &mut values), Ok(true));
         for column in 0..STATES {
             let mut v = [0.0; STATES];
             v[column] = 1.0;
-            prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+            prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
             for (place, &row) in pattern.places(column).zip(pattern.column(column)) {
                 let size = 1.0 + jv[row].abs();
                 prop_assert!((values[place] - jv[row]).abs() <= 1e-9 * size, "{} {}", values[place], jv[row]);
@@ -62,7 +62,7 @@ proptest! {
         for column in 0..STATES {
             let (mut v, mut jv) = ([0.0; STATES], [0.0; STATES]);
             v[column] = 1.0;
-            prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+            prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
             for (row, &entry) in jv.iter().enumerate() {
                 prop_assert!(entry == 0.0 || model.sparsity().column(column).contains(&row));
             }

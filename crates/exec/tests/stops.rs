@@ -245,7 +245,7 @@ fn a_run_can_be_rolled_back() {
             let away: Vec<f64> = saved_x.iter().map(|x| x + 0.05 * f64::from(k)).collect();
             let _ = saved.rates(0.2, &away, &mut dx);
             let _ = saved.observe(0.2, &away, &mut out);
-            let _ = saved.tangent(0.2, &away, &vec![1.0; n], &mut dx.clone());
+            let _ = saved.directional_derivative(0.2, &away, &vec![1.0; n], &mut dx.clone());
         }
         let second = stepped(&mut saved, &mut saved_x, 20);
         assert_eq!(first, second);

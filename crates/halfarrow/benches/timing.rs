@@ -89,7 +89,7 @@ fn run(file: &str, [to, rtol, atol]: [f64; 3]) -> serde_json::Value {
     let start = bytecode.initialise(0.0).expect("a start");
     let mut machine = bytecode.clone();
     let from = Instant::now();
-    machine.compile_machine().and_then(|()| machine.compile_tangent()).expect("machine code");
+    machine.compile_machine().and_then(|()| machine.compile_directional()).expect("machine code");
     let made = from.elapsed().as_secs_f64();
     let options = Options {
         method: Method::Auto,

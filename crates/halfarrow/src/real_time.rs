@@ -164,7 +164,7 @@ impl Model {
         let machine = system.compile_machine().is_ok();
         if machine && run.method.is_implicit() {
             // So do derivatives.
-            let _ = system.compile_tangent();
+            let _ = system.compile_directional();
         }
         let mut ports = Ports::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);

@@ -91,12 +91,12 @@ impl System for Counted<'_> {
         }
         done
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.tangents += 1;
-        self.system.tangent(t, x, v, jv)
+        self.system.directional_derivative(t, x, v, jv)
     }
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.system.drift(t, x, out)
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.system.time_derivative(t, x, out)
     }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()

@@ -32,20 +32,20 @@ pub trait System {
     ///
     /// # Errors
     /// As [`rates`](System::rates).
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure>;
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure>;
 
     /// Derivative of the rates by time alone, `out = (∂f/∂t)(t, x)`, exact: what sources, inputs and held signals do to
     /// them.
     ///
     /// # Errors
     /// As [`rates`](System::rates).
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure>;
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure>;
 
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 
     /// All of `∂f/∂x` at once: its nonzeros in the order of [`sparsity`](System::sparsity). False if the system has it by
-    /// [`tangent`](System::tangent) only; then nothing is written.
+    /// [`directional_derivative`](System::directional_derivative) only; then nothing is written.
     ///
     /// # Errors
     /// As [`rates`](System::rates).

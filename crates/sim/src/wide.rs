@@ -137,15 +137,11 @@ impl<'a> Batch<'a> {
         }
         self.explicit(tableau, &t, &h, x);
         let mut due = [None; LANES];
-        for i in 0..LANES {
-            if self.lanes[i].over {
-                continue;
+        for (i, due) in due.iter_mut().enumerate() {
+            self.lanes[i].over |= self.failures[i].is_some();
+            if !self.lanes[i].over {
+                *due = self.arrive(i, x);
             }
-            if self.failures[i].is_some() {
-                self.lanes[i].over = true;
-                continue;
-            }
-            due[i] = self.arrive(i, x);
         }
         if due.iter().any(Option::is_some) {
             self.record(due, x);

@@ -1,7 +1,7 @@
 //! What of a model never changes: its programs and the code made of them, shared by everything that runs it.
 
 use super::clock::Clock;
-use super::jacobian::Slopes;
+use super::jacobian::JacobianCode;
 use super::jumps::Kept;
 use crate::bytecode::Abreast;
 use halfarrow_compiler::program::{Cause, ConditionId, Entry, Layout, Program, Routine, Value};
@@ -64,8 +64,8 @@ pub(super) struct Mode {
     /// Computes what is assumed of parameters, each value with its scale.
     pub assumed: Routine,
     pub rates: Routine,
-    /// Derivatives of the rates, if they are computed at once.
-    pub slopes: Option<Slopes>,
+    /// The Jacobian of the rates, if it is computed at once.
+    pub jacobian: Option<JacobianCode>,
     pub sparsity: Sparsity,
     /// Newton blocks of the rates that are solved together.
     pub abreast: Option<Arc<Abreast>>,
@@ -94,7 +94,7 @@ impl Mode {
         Mode {
             preamble: program.preamble(&layout),
             assumed: program.routine(&layout, &assumed),
-            slopes: entries.map(|entries| Slopes::new(&program, &layout, &sparsity, &entries)),
+            jacobian: entries.map(|entries| JacobianCode::new(&program, &layout, &sparsity, &entries)),
             sparsity,
             abreast: Abreast::of(&program, &rates).map(Arc::new),
             rates,
@@ -111,7 +111,7 @@ impl Mode {
     /// Everything that runs on registers.
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
         let Mode { rates, preamble, assumed, sources, indicators, clock, .. } = self;
-        let more = self.slopes.as_ref().map(|s| &s.routine).into_iter().chain(self.kept.as_ref().map(Kept::routine));
+        let more = self.jacobian.as_ref().map(|j| &j.routine).into_iter().chain(self.kept.as_ref().map(Kept::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

@@ -13,7 +13,7 @@ pub(super) struct Codes {
     rates: Option<Arc<Code>>,
     along: Option<Arc<Code>>,
     indicators: Option<Arc<Code>>,
-    slopes: Option<Arc<Code>>,
+    jacobian: Option<Arc<Code>>,
 }
 
 impl Codes {
@@ -24,7 +24,7 @@ impl Codes {
             (What::Rates, true) => self.along.as_ref(),
             (What::Recorded, false) => recorded.code.as_ref(),
             (What::Indicators, false) => self.indicators.as_ref(),
-            (What::Slopes, false) => self.slopes.as_ref(),
+            (What::Jacobian, false) => self.jacobian.as_ref(),
             (_, true) => None,
         }
     }
@@ -71,7 +71,7 @@ impl Model {
             rates: Some(made(&code.rates, false)?),
             along: None,
             indicators: if code.switching.is_empty() { None } else { Some(made(&code.indicators, false)?) },
-            slopes: code.slopes.as_ref().map(|slopes| made(&slopes.routine, false)).transpose()?,
+            jacobian: code.jacobian.as_ref().map(|jacobian| made(&jacobian.routine, false)).transpose()?,
         };
         self.compile_recorded()
     }
@@ -85,14 +85,14 @@ impl Model {
         if evaluations * gain <= 2.0 * cost || self.compile_machine().is_err() {
             return false;
         }
-        !derivatives || self.compile_tangent().is_ok()
+        !derivatives || self.compile_directional().is_ok()
     }
 
     /// The same for derivatives along directions, which stiff methods ask for.
     ///
     /// # Errors
     /// As [`compile_machine`](Model::compile_machine).
-    pub fn compile_tangent(&mut self) -> Result<(), MachineError> {
+    pub fn compile_directional(&mut self) -> Result<(), MachineError> {
         let code = Generator::new()?.compile(&self.code.program, &self.code.layout, &self.code.rates, true)?;
         self.codes.along = Some(Arc::new(code));
         Ok(())

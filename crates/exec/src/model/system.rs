@@ -13,8 +13,8 @@ pub(super) enum What {
     Rates,
     Recorded,
     Indicators,
-    /// Derivatives of the rates, if the model has them.
-    Slopes,
+    /// The Jacobian of the rates, if the model has its code.
+    Jacobian,
 }
 
 impl Model {
@@ -23,12 +23,12 @@ impl Model {
             What::Rates => &self.code.rates,
             What::Recorded => &self.recorded.routine,
             What::Indicators => &self.code.indicators,
-            What::Slopes => &self.code.slopes.as_ref().expect("asked for only where they are").routine,
+            What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
         };
         self.frame.begin(match what {
             What::Rates => self.code.abreast.as_ref(),
             What::Recorded => self.recorded.abreast.as_ref(),
-            What::Indicators | What::Slopes => None,
+            What::Indicators | What::Jacobian => None,
         });
         match (self.codes.of(&self.recorded, what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,
@@ -83,7 +83,7 @@ impl Model {
     }
 
     /// Derivative of rates and residuals along a direction of the free rates, at what was placed last.
-    pub(super) fn tangent_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    pub(super) fn derivative_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, y);
         self.still();
         self.along(t, y, self.code.layout.rates, v, jv)
@@ -92,19 +92,19 @@ impl Model {
     /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
     fn along(&mut self, t: f64, x: &[f64], first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.frame.d[first as usize..][..v.len()].copy_from_slice(v);
-        self.slopes_along(t, x, jv)
+        self.derivative_along(t, x, jv)
     }
 
     /// Derivative of the rates along the direction that is set. Where the slope of a law is infinite it is that a little
     /// beside.
-    fn slopes_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn derivative_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;
-        if self.take_slopes(jv).is_none() {
+        if self.take_derivatives(jv).is_none() {
             return Ok(());
         }
         self.place_beside(t, x);
         self.evaluate(What::Rates, true, t)?;
-        match self.take_slopes(jv) {
+        match self.take_derivatives(jv) {
             None => Ok(()),
             Some(state) => {
                 let what = format!("the derivative of the rate of {}", self.state_name(state));
@@ -114,7 +114,7 @@ impl Model {
     }
 
     /// Writes the derivatives of the rates; the first state for whose rate there is none.
-    fn take_slopes(&self, jv: &mut [f64]) -> Option<usize> {
+    fn take_derivatives(&self, jv: &mut [f64]) -> Option<usize> {
         jv.iter_mut().zip(&self.code.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
         jv.iter().position(|slope| !slope.is_finite())
     }
@@ -169,17 +169,17 @@ impl System for Model {
         Ok(())
     }
 
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
         self.along(t, x, self.code.layout.states, v, jv)
     }
 
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
         self.let_time_pass(t);
-        self.slopes_along(t, x, out)
+        self.derivative_along(t, x, out)
     }
 
     fn sparsity(&self) -> &Sparsity {
@@ -187,6 +187,6 @@ impl System for Model {
     }
 
     fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        self.slopes_at(t, x, values)
+        self.jacobian_at(t, x, values)
     }
 }

@@ -322,7 +322,7 @@ fn check_polynomial(
     for j in 0..n {
         let (mut v, mut jv) = (vec![0.0; n], vec![0.0; n]);
         v[j] = 1.0;
-        if let Err(failure) = built.model.tangent(t, x, &v, &mut jv) {
+        if let Err(failure) = built.model.directional_derivative(t, x, &v, &mut jv) {
             return fault("tangent", failure.to_string());
         }
         (0..n).for_each(|i| jacobian[i][j] = jv[i]);

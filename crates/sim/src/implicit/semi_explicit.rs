@@ -79,14 +79,14 @@ impl System for SemiExplicit<'_> {
         dx.iter_mut().for_each(|rate| *rate = -*rate);
         Ok(())
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.linearise(t, x)?;
         jv.fill(0.0);
         let entries = self.system.sparsity().entries().zip(&self.dy);
         entries.for_each(|((row, column), dy)| jv[row] -= dy * v[column]);
         Ok(())
     }
-    fn drift(&mut self, t: f64, _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
         // Only methods of fixed step ask for it, which no implicit form has.
         Err(Failure::NotFinite { time: t, what: "the derivative by time of an implicit form".into() })
     }

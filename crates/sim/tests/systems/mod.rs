@@ -106,11 +106,11 @@ impl System for Known {
             false => Err(Failure::NotFinite { time: t, what: "a rate".into() }),
         }
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         (self.tangent)(t, x, v, &self.mode, jv);
         Ok(())
     }
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         (self.drift)(t, x, out);
         Ok(())
     }

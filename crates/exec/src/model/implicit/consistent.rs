@@ -231,8 +231,8 @@ impl ImplicitModel {
             for (column, &unknown) in rows.iter().enumerate() {
                 along[unknown] = 1.0;
                 match self.map.equations.differential[unknown] {
-                    true => self.form.tangent_by_rates(t, &whole, &along, &mut slope)?,
-                    false => self.form.tangent(t, &whole, &along, &mut slope)?,
+                    true => self.form.derivative_by_rates(t, &whole, &along, &mut slope)?,
+                    false => self.form.directional_derivative(t, &whole, &along, &mut slope)?,
                 }
                 along[unknown] = 0.0;
                 (0..k).for_each(|row| matrix[row * k + column] = slope[rows[row]]);

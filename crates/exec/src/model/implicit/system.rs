@@ -55,7 +55,7 @@ impl ImplicitSystem for ImplicitModel {
         for group in &self.map.groups {
             along.fill(0.0);
             group.iter().for_each(|&column| along[column] = 1.0);
-            self.form.tangent(t, y, &along, &mut product)?;
+            self.form.directional_derivative(t, y, &along, &mut product)?;
             for &column in group {
                 for (place, &row) in self.map.sparsity.places(column).zip(self.map.sparsity.column(column)) {
                     let explicit = self.map.equations.explicit[row];
@@ -66,7 +66,7 @@ impl ImplicitSystem for ImplicitModel {
             let free = |c: &&usize| self.map.equations.differential[**c] && !self.map.equations.explicit[**c];
             if group.iter().any(|c| free(&c)) {
                 along.iter_mut().enumerate().for_each(|(c, a)| *a = if free(&&c) { *a } else { 0.0 });
-                self.form.tangent_by_rates(t, y, &along, &mut product)?;
+                self.form.derivative_by_rates(t, y, &along, &mut product)?;
                 for &column in group.iter().filter(free) {
                     for (place, &row) in self.map.sparsity.places(column).zip(self.map.sparsity.column(column)) {
                         let explicit = self.map.equations.explicit[row];
