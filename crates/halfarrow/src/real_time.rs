@@ -13,7 +13,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, run_real_time};
-use halfarrow_sim::{Failure, Method, Options, Sink};
+use halfarrow_sim::{Failure, Method, Nobody, Options};
 use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
@@ -223,13 +223,6 @@ impl Model {
             None => Ok(report),
         }
     }
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 /// A frequency in Hz from text such as `1kHz`, `500 Hz` or `500`; `None` if it is none.

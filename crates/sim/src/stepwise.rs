@@ -1,6 +1,6 @@
 //! A run that the caller takes from one time to the next.
 
-use crate::driver::{Position, Run, Sink};
+use crate::driver::{Nobody, Position, Run};
 use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
 use crate::shared::Counted;
 use crate::simulate::check_start;
@@ -92,11 +92,4 @@ impl Stepwise {
         self.position = run.into_position();
         done
     }
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }

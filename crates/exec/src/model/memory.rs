@@ -70,10 +70,10 @@ impl Model {
     /// # Panics
     /// If it is the memory of another model.
     pub fn restore(&mut self, memory: &Memory) {
-        self.code = self.compiled.mode(memory.run.mode).clone();
+        let same = self.run.mode == memory.run.mode && self.frame.solvers.len() == memory.solutions.len();
+        assert!(same, "the memory of another model");
         self.run.clone_from(&memory.run);
         self.frame.conditions.hold_again(&memory.conditions);
-        assert_eq!(self.frame.solvers.len(), memory.solutions.len(), "the memory of another model");
         self.frame.solvers.iter_mut().zip(&memory.solutions).for_each(|(solver, from)| solver.newton.follow_from(from));
         self.rated = None;
         self.place_constant_inputs();

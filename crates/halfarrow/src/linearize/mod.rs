@@ -13,7 +13,7 @@ use halfarrow_compiler::bond_graph::{BondGraph, Input, InputId, Kind, Meaning, V
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
-use halfarrow_sim::{Events as _, Options, Sink, simulate};
+use halfarrow_sim::{Events as _, Nobody, Options, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
@@ -296,13 +296,6 @@ impl Model {
         }
         notes
     }
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 fn delay(name: &str) -> String {

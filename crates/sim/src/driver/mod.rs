@@ -9,7 +9,7 @@ mod stepper;
 
 pub(crate) use grid::Grid;
 pub use position::Position;
-pub use sink::{Crawl, Sink, Stopped, Summary};
+pub use sink::{Crawl, Nobody, Sink, Stopped, Summary};
 pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 
 use std::ops::ControlFlow;

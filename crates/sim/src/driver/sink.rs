@@ -43,6 +43,13 @@ pub trait Sink {
     }
 }
 
+/// The sink that takes nothing.
+pub struct Nobody;
+
+impl Sink for Nobody {
+    fn sample(&mut self, _: f64, _: &[f64]) {}
+}
+
 /// A run that takes very many steps. Times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crawl {
