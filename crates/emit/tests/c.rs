@@ -7,7 +7,7 @@ mod common;
 use common::{Exported, Rows, build, build_with, export, models, own};
 use halfarrow_compiler::algebra::math;
 use halfarrow_emit::Method;
-use halfarrow_sim::System;
+use halfarrow_sim::{Events, System};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
@@ -110,7 +110,7 @@ fn unknowns_that_are_rounding_hide_no_solution() {
     );
     let output = build("hidden", &all, &text).run(&[]);
     let (mut model, mut x) = (all[0].model.clone(), all[0].start.clone());
-    model.cross_jump(0.0, &mut x).expect("a start");
+    model.handle_event(0.0, &mut x).expect("a start");
     model.accept(0.0, &x).expect("a start");
     for (found, charge) in output.split_whitespace().zip(charges) {
         let mut rate = [0.0];

@@ -15,6 +15,6 @@ mod model;
 pub use halfarrow_compiler::algebra::math;
 pub use machine::MachineError;
 pub use model::{
-    Equilibrium, EquilibriumError, ImplicitModel, InputError, Linearised, Model, Operations, ParameterError,
-    RecordError, StartConflict, StartError, StartValue, WideModel,
+    Compiled, Equilibrium, EquilibriumError, ImplicitMemory, ImplicitModel, InputError, Linearised, Memory, ModeId,
+    Model, Operations, ParameterError, RecordError, Setup, StartConflict, StartError, StartValue, WideModel,
 };

@@ -5,7 +5,7 @@ mod common;
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::equations::Step;
-use halfarrow_sim::System;
+use halfarrow_sim::{Events, System};
 use std::alloc::{GlobalAlloc, Layout, System as Memory};
 use std::cell::Cell;
 
@@ -54,24 +54,24 @@ fn a_step_takes_no_memory() {
     let model = s.model();
     takes_no_memory(model.clone());
     let mut machine = model;
-    if machine.compile_machine().and_then(|()| machine.compile_tangent()).is_ok() {
+    if machine.compile_machine().and_then(|()| machine.compile_directional()).is_ok() {
         takes_no_memory(machine);
     }
 }
 
 fn takes_no_memory(mut model: halfarrow_exec::Model) {
     let mut x = model.initialise(0.0).unwrap();
-    model.cross_jump(0.0, &mut x).unwrap();
-    let (mut dx, mut out, mut g) = ([0.0], [0.0], vec![0.0; model.switches()]);
+    model.handle_event(0.0, &mut x).unwrap();
+    let (mut dx, mut out, mut g) = ([0.0], [0.0], vec![0.0; model.indicators()]);
     let count = allocations_during(|| {
         for i in 0..100 {
             let (t, x) = (0.01 * f64::from(i), [0.1 + f64::from(i)]);
             model.rates(t, &x, &mut dx).unwrap();
-            model.tangent(t, &x, &[1.0], &mut dx).unwrap();
+            model.directional_derivative(t, &x, &[1.0], &mut dx).unwrap();
             model.observe(t, &x, &mut out).unwrap();
-            model.switch_values(t, &x, &mut g).unwrap();
+            model.event_indicators(t, &x, &mut g).unwrap();
             model.accept(t, &x).unwrap();
-            assert_eq!(model.next_jump(t), None);
+            assert_eq!(model.next_time_event(t), None);
         }
     });
     assert_eq!(count, 0);

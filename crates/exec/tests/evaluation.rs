@@ -7,7 +7,7 @@ use halfarrow_compiler::algebra::{Expr, Function};
 use halfarrow_compiler::equations::Step;
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, System};
 
 fn rates(model: &mut Model, t: f64, x: &[f64]) -> Vec<f64> {
     let mut dx = vec![0.0; x.len()];
@@ -58,7 +58,7 @@ fn powers_and_quotients() {
     let mut model = s.model();
     assert_eq!(rates(&mut model, 0.0, &[4.0]), [0.75 + 8.0 - 2.0 + 8.0 + 0.0625]);
     let mut jv = [0.0];
-    model.tangent(0.0, &[4.0], &[1.0], &mut jv).unwrap();
+    model.directional_derivative(0.0, &[4.0], &[1.0], &mut jv).unwrap();
     let exact = -3.0 / 16.0 + 4.0 - 0.25 + 3.0 - 2.0 / 64.0;
     assert!((jv[0] - exact).abs() < 1e-15, "{} {exact}", jv[0]);
 }
@@ -93,7 +93,7 @@ fn a_linear_block_is_solved_and_differentiated() {
     assert!((dx[0] - 0.2).abs() < 1e-15 && (dx[1] - 0.2).abs() < 1e-15, "{dx:?}");
     // Derivative by a: A [u' v'] = -[u 0], so u' = -9u/15, v' = u/15.
     let mut jv = [0.0; 2];
-    model.tangent(0.0, &x, &[1.0, 0.0], &mut jv).unwrap();
+    model.directional_derivative(0.0, &x, &[1.0, 0.0], &mut jv).unwrap();
     assert!((jv[0] + 0.12).abs() < 1e-15 && (jv[1] - 0.2 / 15.0).abs() < 1e-15, "{jv:?}");
 }
 
@@ -139,7 +139,7 @@ fn a_diode_is_solved_to_rounding_from_nothing() {
         let exact = 1e-12 * (halfarrow_exec::math::call(Function::Exp, e / 0.026) - 1.0);
         assert!((i - exact).abs() <= 1e-11 * exact.abs() + 1e-16, "{x}: {i} {exact}");
         let mut jv = [0.0];
-        model.tangent(0.0, &[x], &[1.0], &mut jv).unwrap();
+        model.directional_derivative(0.0, &[x], &[1.0], &mut jv).unwrap();
         let slope = (i + 1e-12) / 0.026;
         assert!((jv[0] - slope / (1.0 + 100.0 * slope)).abs() <= 1e-9 * jv[0].abs() + 1e-18, "{x}: {}", jv[0]);
     }

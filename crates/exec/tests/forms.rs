@@ -9,7 +9,7 @@ use halfarrow_compiler::compile::{Text, to_causal_graph};
 use halfarrow_compiler::equations::{Form, derive_equations};
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_exec::{ImplicitModel, Model};
-use halfarrow_sim::{ImplicitSystem, Method, Options, Sink, System, simulate};
+use halfarrow_sim::{Events, ImplicitSystem, Method, Options, Sink, simulate};
 
 /// Agreement of variables, relative to the greatest of the run.
 const AGREES: f64 = 1e-8;
@@ -64,8 +64,8 @@ fn points(causal: &CausalGraph) -> Vec<Point> {
     model.record(&names.iter().map(String::as_str).collect::<Vec<_>>()).expect("states can be recorded");
     let mut x = model.initialise(0.0).expect("there is a start");
     let mut start = model.clone();
-    start.cross_jump(0.0, &mut x.clone()).expect("a start");
-    let to = start.next_jump(0.0).unwrap_or(1.0).min(1.0);
+    start.handle_event(0.0, &mut x.clone()).expect("a start");
+    let to = start.next_time_event(0.0).unwrap_or(1.0).min(1.0);
     let mut all = Vec::new();
     let options = Options { method: Method::Auto, to, every: Some(to / 4.0), rtol: 1e-9, ..Options::default() };
     // A model that ends early, where plates touch, has the points before that.
@@ -84,15 +84,15 @@ fn compare(name: &str, form: Form, model: &mut ImplicitModel, reference: &mut Mo
     reference.record(&common).expect("they have values");
     let n = model.unknowns();
     let (mut y, mut yp) = model.start_at(points[0].t, &points[0].x).unwrap_or_else(|f| panic!("{name} {form:?}: {f}"));
-    reference.cross_jump(points[0].t, &mut points[0].x.clone()).expect("a start");
+    reference.handle_event(points[0].t, &mut points[0].x.clone()).expect("a start");
     let (mut ours, mut theirs) = (vec![0.0; common.len()], vec![0.0; common.len()]);
     let mut greatest = vec![0.0f64; common.len()];
     let mut apart = vec![0.0f64; common.len()];
     let mut out = vec![0.0; n];
     for point in points {
         model.at(point.t, &point.x, &mut y, &mut yp).unwrap_or_else(|f| panic!("{name} {form:?}: {f}"));
-        model.observe(point.t, &y, &yp, &mut ours).expect("values");
-        reference.cross_jump(point.t, &mut point.x.clone()).expect("a point");
+        model.observe(point.t, &[&y[..], &yp].concat(), &mut ours).expect("values");
+        reference.handle_event(point.t, &mut point.x.clone()).expect("a point");
         reference.observe(point.t, &point.x, &mut theirs).expect("values");
         for i in 0..common.len() {
             greatest[i] = greatest[i].max(theirs[i].abs());

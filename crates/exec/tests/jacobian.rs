@@ -7,7 +7,7 @@ use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::equations::Step;
 use halfarrow_compiler::program::{Op, Program};
 use halfarrow_exec::Model;
-use halfarrow_sim::{Method, Options, Sink, System, simulate};
+use halfarrow_sim::{Events, Method, Options, Sink, System, simulate};
 
 /// Compares at a point; how many derivatives are there.
 fn compare(name: &str, model: &mut Model, t: f64, x: &[f64]) -> usize {
@@ -18,7 +18,7 @@ fn compare(name: &str, model: &mut Model, t: f64, x: &[f64]) -> usize {
     for column in 0..x.len() {
         along.fill(0.0);
         along[column] = 1.0;
-        model.tangent(t, x, &along, &mut product).unwrap_or_else(|why| panic!("{name} at {t}: {why:?}"));
+        model.directional_derivative(t, x, &along, &mut product).unwrap_or_else(|why| panic!("{name} at {t}: {why:?}"));
         for (place, &row) in pattern.places(column).zip(pattern.column(column)) {
             let (here, there) = (values[place], product[row]);
             let size = product.iter().fold(there.abs(), |most, p| most.max(p.abs()));
@@ -43,8 +43,8 @@ fn points(program: &Program) -> Vec<(f64, Vec<f64>)> {
     model.record(&names.iter().map(String::as_str).collect::<Vec<_>>()).expect("states can be recorded");
     let mut x = model.initialise(0.0).expect("there is a start");
     let mut start = model.clone();
-    start.cross_jump(0.0, &mut x.clone()).expect("a start");
-    let to = start.next_jump(0.0).unwrap_or(0.4).min(0.4);
+    start.handle_event(0.0, &mut x.clone()).expect("a start");
+    let to = start.next_time_event(0.0).unwrap_or(0.4).min(0.4);
     let mut all = Vec::new();
     let options = Options { method: Method::Auto, to, every: Some(to / 3.0), ..Options::default() };
     let end = simulate(&mut model, &options, &mut x, &mut Points(&mut all)).map_or_else(|s| 0.5 * s.time, |_| to);
@@ -60,7 +60,7 @@ fn every_model_has_its_derivatives_at_once() {
         for (t, x) in points(&program) {
             model.restart();
             // A law with several solutions may not be found again in the middle of a run.
-            if model.cross_jump(t, &mut x.clone()).is_err() {
+            if model.handle_event(t, &mut x.clone()).is_err() {
                 continue;
             }
             compared += compare(&name, &mut model, t, &x);
@@ -108,7 +108,7 @@ fn blocks_are_differentiated_by_inputs_time_and_parameters() {
         model.set_parameter("k", k).unwrap();
         model.connect("u", &[0.0], &[u]).unwrap();
         model.record(&[what]).unwrap();
-        model.cross_jump(t, &mut [x]).unwrap();
+        model.handle_event(t, &mut [x]).unwrap();
         let mut out = [0.0];
         model.observe(t, &[x], &mut out).unwrap();
         out[0]

@@ -8,7 +8,7 @@ mod recipes;
 use halfarrow_compiler::program::Program;
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Method, Options, Sink, System, simulate};
+use halfarrow_sim::{Events, Method, Options, Sink, System, simulate};
 use proptest::prelude::*;
 use recipes::{Recipe, STATES, recipe};
 
@@ -19,7 +19,7 @@ fn same(a: f64, b: f64) -> bool {
 fn compiled(model: &Model) -> Model {
     let mut model = model.clone();
     model.compile_machine().expect("machine code for this processor");
-    model.compile_tangent().expect("machine code for this processor");
+    model.compile_directional().expect("machine code for this processor");
     assert!(model.runs_machine_code());
     model
 }
@@ -41,7 +41,8 @@ fn compare(name: &str, bytecode: &mut Model, machine: &mut Model, t: f64, x: &[f
     }
     bits(&here, &there, "rate")?;
     let v: Vec<f64> = (0..n).map(|i| [1.0, 0.0, -0.7][i % 3]).collect();
-    let results = (bytecode.tangent(t, x, &v, &mut here), machine.tangent(t, x, &v, &mut there));
+    let results =
+        (bytecode.directional_derivative(t, x, &v, &mut here), machine.directional_derivative(t, x, &v, &mut there));
     prop_assert_eq!(format!("{:?}", results.0), format!("{:?}", results.1));
     if results.0.is_ok() {
         bits(&here, &there, "derivative")?;
@@ -58,9 +59,9 @@ fn compare(name: &str, bytecode: &mut Model, machine: &mut Model, t: f64, x: &[f
     if results.0.is_ok() {
         bits(&here, &there, "recorded value")?;
     }
-    let count = bytecode.switches();
+    let count = bytecode.indicators();
     let (mut here, mut there) = (vec![0.0; count], vec![0.0; count]);
-    let results = (bytecode.switch_values(t, x, &mut here), machine.switch_values(t, x, &mut there));
+    let results = (bytecode.event_indicators(t, x, &mut here), machine.event_indicators(t, x, &mut there));
     prop_assert_eq!(format!("{:?}", results.0), format!("{:?}", results.1));
     bits(&here, &there, "switching function")
 }
@@ -107,7 +108,7 @@ fn every_model_runs_the_same() {
         for (at, shift) in [0.0, 1e-3, -0.4, 1e6].into_iter().enumerate() {
             for model in [&mut bytecode, &mut machine] {
                 model.restart();
-                let _ = model.cross_jump(0.0, &mut x.clone());
+                let _ = model.handle_event(0.0, &mut x.clone());
             }
             let moved: Vec<f64> = x.iter().enumerate().map(|(i, x)| x + shift * (1.0 + i as f64)).collect();
             compare(&name, &mut bytecode, &mut machine, at as f64 * 0.01, &moved).unwrap_or_else(|why| panic!("{why}"));
@@ -124,7 +125,7 @@ proptest! {
         let mut bytecode = with_all(&program);
         let mut machine = compiled(&bytecode);
         for model in [&mut bytecode, &mut machine] {
-            let _ = model.cross_jump(0.7, &mut x.to_vec());
+            let _ = model.handle_event(0.7, &mut x.to_vec());
         }
         compare("a random program", &mut bytecode, &mut machine, 0.7, &x)?;
         let moved = x.map(|x| 1e5 * x);
@@ -142,7 +143,7 @@ fn long_programs_run_the_same() {
     let x = [0.3, -0.2, 0.9];
     assert_eq!(x.len(), STATES);
     for model in [&mut bytecode, &mut machine] {
-        let _ = model.cross_jump(0.7, &mut x.to_vec());
+        let _ = model.handle_event(0.7, &mut x.to_vec());
     }
     compare("a long program", &mut bytecode, &mut machine, 0.7, &x).unwrap_or_else(|why| panic!("{why}"));
 }

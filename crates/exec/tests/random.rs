@@ -3,7 +3,7 @@
 mod common;
 mod recipes;
 
-use halfarrow_sim::System;
+use halfarrow_sim::{Events, System};
 use proptest::prelude::*;
 use recipes::{Recipe, STATES, build, recipe};
 
@@ -14,9 +14,9 @@ proptest! {
     fn derivatives_are_those_of_differences(recipe in recipe(), x in prop::array::uniform3(-2.0f64..2.0), v in prop::array::uniform3(-1.0f64..1.0)) {
         let mut model = build(&recipe).0.model();
         let mut start = x.to_vec();
-        model.cross_jump(0.7, &mut start).unwrap();
+        model.handle_event(0.7, &mut start).unwrap();
         let mut jv = [0.0; STATES];
-        prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+        prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
         let mut at = |h: f64| {
             let moved: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + h * v).collect();
             let mut dx = [0.0; STATES];
@@ -38,16 +38,16 @@ proptest! {
     fn derivatives_at_once_are_those_along_directions(recipe in recipe(), x in prop::array::uniform3(-2.0f64..2.0)) {
         let program = halfarrow_compiler::program::schedule(&build(&recipe).0.equations());
         let mut model = halfarrow_exec::Model::with_jacobian(program).unwrap();
-        model.cross_jump(0.7, &mut x.to_vec()).unwrap();
+        model.handle_event(0.7, &mut x.to_vec()).unwrap();
         let pattern = model.sparsity().clone();
         let mut values = vec![0.0; pattern.nonzeros()];
         let mut jv = [0.0; STATES];
-        prop_assume!(model.tangent(0.7, &x, &[1.0; STATES], &mut jv).is_ok());
+        prop_assume!(model.directional_derivative(0.7, &x, &[1.0; STATES], &mut jv).is_ok());
         prop_assert_eq!(model.jacobian(0.7, &x, &mut values), Ok(true));
         for column in 0..STATES {
             let mut v = [0.0; STATES];
             v[column] = 1.0;
-            prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+            prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
             for (place, &row) in pattern.places(column).zip(pattern.column(column)) {
                 let size = 1.0 + jv[row].abs();
                 prop_assert!((values[place] - jv[row]).abs() <= 1e-9 * size, "{} {}", values[place], jv[row]);
@@ -62,7 +62,7 @@ proptest! {
         for column in 0..STATES {
             let (mut v, mut jv) = ([0.0; STATES], [0.0; STATES]);
             v[column] = 1.0;
-            prop_assume!(model.tangent(0.7, &x, &v, &mut jv).is_ok());
+            prop_assume!(model.directional_derivative(0.7, &x, &v, &mut jv).is_ok());
             for (row, &entry) in jv.iter().enumerate() {
                 prop_assert!(entry == 0.0 || model.sparsity().column(column).contains(&row));
             }

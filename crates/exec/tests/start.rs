@@ -98,7 +98,7 @@ fn conserved_constants_are_fixed_by_the_start() {
     let mut model = s.model();
     assert_eq!(model.initialise(0.0), Ok(vec![1.0]));
     let (mut out, x) = ([0.0; 2], [1.0]);
-    halfarrow_sim::System::observe(&mut model, 0.0, &x, &mut out).unwrap();
+    halfarrow_sim::Events::observe(&mut model, 0.0, &x, &mut out).unwrap();
     assert_eq!(out, [1.0, 4.0]);
 }
 

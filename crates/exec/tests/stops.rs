@@ -7,7 +7,7 @@ use halfarrow_compiler::program::schedule;
 use halfarrow_compiler::{ast, bond_graph, causal_graph};
 use halfarrow_exec::{Model, StartError};
 use halfarrow_sim::fixed_step::FixedMethod::Rk4;
-use halfarrow_sim::{Failure, Method, Options, Sink, Stopped, System, simulate};
+use halfarrow_sim::{Events, Failure, Method, Options, Sink, Stopped, System, simulate};
 
 fn try_model(text: &str) -> Result<Model, Failure> {
     let text = format!("model M\n{}", text.replace("; ", "\n"));
@@ -148,7 +148,7 @@ fn the_rate_of_a_displacement_that_sets_its_own_ratio_is_its_slope() {
         let angle = 0.7 * f64::from(k);
         let x = [2.0 * angle.sin(), 2.0 * (1.7 * angle).cos()];
         model.restart();
-        if model.cross_jump(0.0, &mut x.clone()).is_err() {
+        if model.handle_event(0.0, &mut x.clone()).is_err() {
             continue;
         }
         let mut dx = [0.0; 2];
@@ -225,7 +225,7 @@ fn a_run_can_be_rolled_back() {
         model.record_all();
         let n = model.states();
         let mut x = vec![0.3; n];
-        model.cross_jump(0.0, &mut x).unwrap();
+        model.handle_event(0.0, &mut x).unwrap();
         let stepped = |model: &mut Model, x: &mut Vec<f64>, from: usize| {
             let mut out = vec![0.0; model.observed()];
             for k in from..from + 20 {
@@ -245,7 +245,7 @@ fn a_run_can_be_rolled_back() {
             let away: Vec<f64> = saved_x.iter().map(|x| x + 0.05 * f64::from(k)).collect();
             let _ = saved.rates(0.2, &away, &mut dx);
             let _ = saved.observe(0.2, &away, &mut out);
-            let _ = saved.tangent(0.2, &away, &vec![1.0; n], &mut dx.clone());
+            let _ = saved.directional_derivative(0.2, &away, &vec![1.0; n], &mut dx.clone());
         }
         let second = stepped(&mut saved, &mut saved_x, 20);
         assert_eq!(first, second);

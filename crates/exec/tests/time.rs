@@ -7,7 +7,7 @@ use common::Sketch;
 use halfarrow_compiler::algebra::{Comparison, Function};
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_exec::Model;
-use halfarrow_sim::{Method, Options, Sink, Summary, System, simulate};
+use halfarrow_sim::{Events, Method, Options, Sink, Summary, System, simulate};
 
 struct Last(Rows);
 
@@ -30,12 +30,12 @@ fn run(model: &mut Model, to: f64, rtol: f64) -> (Vec<f64>, Summary, Rows) {
 fn jumps(model: &mut Model, to: f64) -> Vec<f64> {
     let mut x = model.initialise(0.0).unwrap();
     let (mut t, mut found) = (0.0, Vec::new());
-    model.cross_jump(t, &mut x).unwrap();
-    while let Some(next) = model.next_jump(t).filter(|&next| next <= to) {
+    model.handle_event(t, &mut x).unwrap();
+    while let Some(next) = model.next_time_event(t).filter(|&next| next <= to) {
         assert!(next > t);
         found.push(next);
         t = next;
-        model.cross_jump(t, &mut x).unwrap();
+        model.handle_event(t, &mut x).unwrap();
     }
     found
 }
@@ -52,13 +52,13 @@ fn a_step_in_time_has_two_sides() {
         s.rate("x", rate);
         let mut model = s.model();
         let (mut x, mut dx) = (model.initialise(0.0).unwrap(), [0.0]);
-        model.cross_jump(0.0, &mut x).unwrap();
-        assert_eq!(model.next_jump(0.0), Some(0.3));
+        model.handle_event(0.0, &mut x).unwrap();
+        assert_eq!(model.next_time_event(0.0), Some(0.3));
         model.rates(0.3, &x, &mut dx).unwrap();
         assert_eq!(dx, [1.0]);
-        model.cross_jump(0.3, &mut x).unwrap();
+        model.handle_event(0.3, &mut x).unwrap();
         model.rates(0.3, &x, &mut dx).unwrap();
-        assert_eq!((dx, model.next_jump(0.3)), ([-2.0], None));
+        assert_eq!((dx, model.next_time_event(0.3)), ([-2.0], None));
         let (x, summary, _) = run(&mut model, 1.0, 1e-6);
         assert!((x[0] - (0.3 - 1.4)).abs() < 1e-15, "{x:?}");
         assert_eq!(summary.jumps, 1);
@@ -150,7 +150,7 @@ fn a_tank_runs_empty() {
     s.rate("x", rate);
     s.start("x", x, 1.0);
     let mut model = s.model();
-    assert_eq!(model.switches(), 1);
+    assert_eq!(model.indicators(), 1);
     assert!((run(&mut model, 1.0, 1e-10).0[0] - 0.25).abs() < 1e-9);
     let (x, ..) = run(&mut model, 3.0, 1e-8);
     assert!(x[0].abs() < 1e-8, "{x:?}");
@@ -174,7 +174,7 @@ fn stops_are_met_by_switches() {
     let period = 4.0 + 2.0 * std::f64::consts::PI / 10.0;
     let (x, summary, _) = run(&mut model, 3.0 * period, 1e-10);
     assert!(x[0].abs() < 1e-8 && (x[1] - 1.0).abs() < 1e-8, "{x:?}");
-    assert_eq!(summary.switches, 12);
+    assert_eq!(summary.crossings, 12);
 }
 
 /// `x' = -x(t - 1)`, 1 before the start: on [1, 2] `x = 1 - t + (t-1)²/2`.

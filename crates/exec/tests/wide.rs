@@ -45,7 +45,7 @@ fn set(model: &mut Model, lane: usize) {
 }
 
 fn outcome(end: Result<Summary, Stopped>) -> Result<(usize, usize, usize), String> {
-    end.map(|s| (s.steps, s.jumps, s.switches)).map_err(|s| format!("{} {}", s.time, s.failure))
+    end.map(|s| (s.steps, s.jumps, s.crossings)).map_err(|s| format!("{} {}", s.time, s.failure))
 }
 
 fn compare(name: &str, model: &Model, options: &Options) -> usize {

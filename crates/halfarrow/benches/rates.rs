@@ -14,7 +14,7 @@ use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec::Model;
-use halfarrow_sim::System;
+use halfarrow_sim::{Events, System};
 
 const MODELS: [&str; 5] = ["pendulum", "double_pendulum", "slider_crank", "quarter_car", "dc_motor_pid"];
 /// Batches of each, short enough to run undisturbed.
@@ -48,7 +48,7 @@ fn compare(name: &str) {
     let start = hand.run(0).1;
     for model in [&mut bytecode, &mut machine] {
         model.restart();
-        model.cross_jump(0.0, &mut start.clone()).expect("a start");
+        model.handle_event(0.0, &mut start.clone()).expect("a start");
     }
     let there = hand.run(COUNT).1;
     for (a, b) in ours(&mut machine, &start, COUNT).1.iter().zip(&there) {

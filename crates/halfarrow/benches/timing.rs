@@ -10,7 +10,7 @@ use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
 use halfarrow_exec::Model;
-use halfarrow_sim::{AbsoluteTolerance, Method, Options, Sink, System, simulate};
+use halfarrow_sim::{AbsoluteTolerance, Events, Method, Options, Sink, System, simulate};
 use serde_json::json;
 
 #[global_allocator]
@@ -37,7 +37,7 @@ fn program(file: &str) -> Program {
 fn rates(file: &str, count: usize) -> serde_json::Value {
     let mut bytecode = Model::new(program(file)).expect("parameters that fit");
     let mut start = bytecode.initialise(0.0).expect("a start");
-    bytecode.cross_jump(0.0, &mut start).expect("a start");
+    bytecode.handle_event(0.0, &mut start).expect("a start");
     let mut machine = bytecode.clone();
     machine.compile_machine().expect("machine code");
     let (machine_ns, dx) = evaluate(&mut machine, &start, count);
@@ -89,7 +89,7 @@ fn run(file: &str, [to, rtol, atol]: [f64; 3]) -> serde_json::Value {
     let start = bytecode.initialise(0.0).expect("a start");
     let mut machine = bytecode.clone();
     let from = Instant::now();
-    machine.compile_machine().and_then(|()| machine.compile_tangent()).expect("machine code");
+    machine.compile_machine().and_then(|()| machine.compile_directional()).expect("machine code");
     let made = from.elapsed().as_secs_f64();
     let options = Options {
         method: Method::Auto,

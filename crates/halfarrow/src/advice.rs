@@ -2,8 +2,8 @@
 
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec as exec;
-use halfarrow_sim::System;
 use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::{Events as _, System};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::linear_algebra::eigenvalues;
@@ -70,7 +70,7 @@ fn matrix_at(system: &exec::Model, x: &[f64]) -> Option<Vec<Vec<f64>>> {
         return None;
     }
     let (mut system, mut x) = (system.clone(), x.to_vec());
-    system.cross_jump(0.0, &mut x).ok()?;
+    system.handle_event(0.0, &mut x).ok()?;
     Some(system.linearise(0.0, &x, &[]).ok()?.a)
 }
 

@@ -1,4 +1,4 @@
-//! A system whose every step is recorded for the audit.
+//! A sink that records every step for the audit.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -6,9 +6,7 @@ use std::ops::ControlFlow;
 use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
-use halfarrow_sim::{
-    Crawl, Failure, ImplicitSystem, Options, Sink, Sparsity, Stopped, Summary, System, simulate, simulate_implicit,
-};
+use halfarrow_sim::{Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit};
 use serde::Serialize;
 
 use crate::run::Recording;
@@ -51,7 +49,7 @@ pub struct Miss {
     pub resolution: f64,
 }
 
-/// A model that records for the audit what it hands out no one else.
+/// A model that records for the audit what no one else asks for.
 pub struct Audited<'a, M> {
     model: &'a mut M,
     book: Book,
@@ -74,9 +72,8 @@ struct Book {
     sources: usize,
     /// What the user records that was infinite, and when first.
     infinite: BTreeMap<usize, f64>,
-    /// Where rates had no finite value last.
-    failed: Option<(f64, Vec<f64>)>,
-    values: Vec<f64>,
+    /// What is handed out.
+    out: Vec<f64>,
 }
 
 impl<'a, M: Recording + Parameters> Audited<'a, M> {
@@ -96,14 +93,13 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             parameters: known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect(),
             shown: (names.len()..count).collect(),
             columns: vec![Vec::new(); names.len()],
-            values: vec![0.0; count],
             times: Vec::new(),
             auditor: Auditor::new(graph),
             neglected: Vec::new(),
             suspects,
             sources,
             infinite: BTreeMap::new(),
-            failed: None,
+            out: Vec::new(),
             names,
         };
         Audited { model, book }
@@ -177,9 +173,9 @@ const GROWN: f64 = 1e3;
 const POLE: f64 = 1e9;
 
 impl Book {
-    /// Keeps the values just observed at `t`.
-    fn keep(&mut self, t: f64) -> Result<(), Failure> {
-        if let Some(what) = self.not_finite() {
+    /// Keeps the values at `t`.
+    fn keep(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
+        if let Some(what) = self.not_finite(values) {
             return Err(Failure::NotFinite { time: t, what: what.to_string() });
         }
         // A part of the run never ends between the two samples of a jump.
@@ -187,13 +183,13 @@ impl Book {
             self.audit();
         }
         self.times.push(t);
-        self.columns.iter_mut().zip(&self.values).for_each(|(column, value)| column.push(*value));
+        self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
         Ok(())
     }
 
     /// A value of the graph that is not finite, of a source if there is one.
-    fn not_finite(&self) -> Option<&str> {
-        let found = self.suspects.iter().find(|&&i| !self.values[i].is_finite());
+    fn not_finite(&self, values: &[f64]) -> Option<&str> {
+        let found = self.suspects.iter().find(|&&i| !values[i].is_finite());
         found.map(|&i| self.names[i].as_str())
     }
 
@@ -223,20 +219,13 @@ impl Book {
     }
 
     /// The values that the user asked for.
-    fn hand_out(&mut self, t: f64, out: &mut [f64]) {
-        for (k, (value, &i)) in out.iter_mut().zip(&self.shown).enumerate() {
-            *value = self.values[i];
-            if value.is_infinite() {
-                self.infinite.entry(k).or_insert(t);
-            }
+    fn shown(&mut self, t: f64, values: &[f64]) -> &[f64] {
+        self.out.clear();
+        self.out.extend(self.shown.iter().map(|&i| values[i]));
+        for k in (0..self.out.len()).filter(|&k| self.out[k].is_infinite()) {
+            self.infinite.entry(k).or_insert(t);
         }
-    }
-
-    /// Remembers where rates had no finite value.
-    fn note_failure(&mut self, result: &Result<(), Failure>, t: f64, x: &[f64]) {
-        if matches!(result, Err(Failure::NotFinite { .. })) {
-            self.failed = Some((t, x.to_vec()));
-        }
+        &self.out
     }
 
     /// Audits what has been recorded, and keeps the last sample to go on from.
@@ -259,19 +248,19 @@ impl Audited<'_, exec::Model> {
     /// As [`simulate`].
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     pub fn simulate(&mut self, options: &Options, x: &mut [f64], sink: &mut dyn Sink) -> Result<Summary, Stopped> {
-        let mut sink = Told { sink, rtol: options.rtol, neglected: Vec::new() };
-        let done = simulate(self, options, x, &mut sink);
-        self.book.neglected = sink.neglected;
-        done
+        let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
+        simulate(self.model, options, x, &mut sink)
     }
 
     /// Names the source behind rates that are not finite, if there is one.
-    pub fn explain(&mut self, failure: Failure) -> Failure {
+    pub fn explain(&mut self, stopped: &Stopped) -> Failure {
+        let failure = stopped.failure.clone();
         let Failure::NotFinite { time, what } = &failure else { return failure };
-        let Some((t, x)) = self.book.failed.take().filter(|(t, _)| t == time) else { return failure };
+        let Some((t, x)) = stopped.without_rates.as_ref().filter(|(t, _)| t == time) else { return failure };
+        let mut values = vec![0.0; self.model.observed()];
         // It has no value, which is why it is looked at; what has one is written.
-        let _ = self.model.observe(t, &x, &mut self.book.values);
-        match self.book.not_finite() {
+        let _ = self.model.observe(*t, x, &mut values);
+        match self.book.not_finite(&values) {
             Some(name) if name != what => {
                 Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") }
             }
@@ -292,30 +281,34 @@ impl Audited<'_, exec::ImplicitModel> {
         (y, yp): (&mut [f64], &mut [f64]),
         sink: &mut dyn Sink,
     ) -> Result<Summary, Stopped> {
-        let mut sink = Told { sink, rtol: options.rtol, neglected: Vec::new() };
-        let done = simulate_implicit(self, options, y, yp, &mut sink);
-        self.book.neglected = sink.neglected;
-        done
+        let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
+        simulate_implicit(self.model, options, y, yp, &mut sink)
     }
 }
 
-/// A sink that remembers the magnitude below which the method neglects what happens to each state.
-struct Told<'a> {
+/// The sink that sees every step, and hands on what another one asked for.
+struct Auditing<'a> {
+    book: &'a mut Book,
     sink: &'a mut dyn Sink,
     rtol: f64,
-    neglected: Vec<f64>,
 }
 
-impl Sink for Told<'_> {
+impl Sink for Auditing<'_> {
     fn sample(&mut self, t: f64, values: &[f64]) {
-        self.sink.sample(t, values);
+        self.sink.sample(t, self.book.shown(t, values));
+    }
+    fn watches(&self) -> bool {
+        true
+    }
+    fn watch(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
+        self.book.keep(t, values)
     }
     fn progress(&mut self, t: f64) -> ControlFlow<()> {
         self.sink.progress(t)
     }
     fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
-        self.neglected.clear();
-        self.neglected.extend(absolute.iter().map(|error| error / self.rtol));
+        self.book.neglected.clear();
+        self.book.neglected.extend(absolute.iter().map(|error| error / self.rtol));
         self.sink.tolerances(magnitudes, absolute);
     }
     fn crawls(&mut self, crawl: &Crawl) {
@@ -341,142 +334,5 @@ impl From<Audit> for AuditReport {
 impl From<Finding> for Miss {
     fn from(f: Finding) -> Miss {
         Miss { value: f.value, time: f.time, place: f.place, resolution: f.resolution }
-    }
-}
-
-impl System for Audited<'_, exec::Model> {
-    fn states(&self) -> usize {
-        self.model.states()
-    }
-    fn state_name(&self, state: usize) -> String {
-        self.model.state_name(state)
-    }
-    fn switch_name(&self, switch: usize) -> String {
-        self.model.switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.model.observed_name(self.book.shown[value])
-    }
-    fn scales(&self) -> &[f64] {
-        self.model.scales()
-    }
-    fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
-        let done = self.model.rates(t, x, dx);
-        self.book.note_failure(&done, t, x);
-        done
-    }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
-        self.model.tangent(t, x, v, jv)
-    }
-    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        self.model.jacobian(t, x, values)
-    }
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.drift(t, x, out)
-    }
-    fn sparsity(&self) -> &Sparsity {
-        self.model.sparsity()
-    }
-    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.observe(t, x, &mut self.book.values)?;
-        self.book.hand_out(t, out);
-        Ok(())
-    }
-    fn observed(&self) -> usize {
-        self.book.shown.len()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.model.next_jump(t)
-    }
-    fn is_corner(&mut self, t: f64) -> bool {
-        self.model.is_corner(t)
-    }
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.model.cross_jump(t, x)?;
-        self.model.observe(t, x, &mut self.book.values)?;
-        self.book.keep(t)
-    }
-    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.model.accept(t, x)?;
-        if self.book.times.last() != Some(&t) {
-            self.model.observe(t, x, &mut self.book.values)?;
-            self.book.keep(t)?;
-        }
-        Ok(())
-    }
-    fn switches(&self) -> usize {
-        self.model.switches()
-    }
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.model.switch_values(t, x, g)
-    }
-}
-
-impl ImplicitSystem for Audited<'_, exec::ImplicitModel> {
-    fn unknowns(&self) -> usize {
-        self.model.unknowns()
-    }
-    fn unknown_name(&self, unknown: usize) -> String {
-        self.model.unknown_name(unknown)
-    }
-    fn equation_name(&self, equation: usize) -> String {
-        self.model.equation_name(equation)
-    }
-    fn switch_name(&self, switch: usize) -> String {
-        self.model.switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.model.observed_name(self.book.shown[value])
-    }
-    fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
-        self.model.scales(t, span)
-    }
-    fn index(&self, unknown: usize) -> u8 {
-        self.model.index(unknown)
-    }
-    fn residual(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.residual(t, y, yp, out)
-    }
-    fn sparsity(&self) -> &Sparsity {
-        self.model.sparsity()
-    }
-    fn jacobian(&mut self, t: f64, y: &[f64], yp: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
-        self.model.jacobian(t, y, yp, dy, dyp)
-    }
-    fn semi_explicit(&self) -> Option<&[bool]> {
-        self.model.semi_explicit()
-    }
-    fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.observe(t, y, yp, &mut self.book.values)?;
-        self.book.hand_out(t, out);
-        Ok(())
-    }
-    fn observed(&self) -> usize {
-        self.book.shown.len()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.model.next_jump(t)
-    }
-    fn is_corner(&mut self, t: f64) -> bool {
-        self.model.is_corner(t)
-    }
-    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
-        self.model.cross_jump(t, y, yp)?;
-        self.model.observe(t, y, yp, &mut self.book.values)?;
-        self.book.keep(t)
-    }
-    fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
-        self.model.accept(t, y, yp)?;
-        if self.book.times.last() != Some(&t) {
-            self.model.observe(t, y, yp, &mut self.book.values)?;
-            self.book.keep(t)?;
-        }
-        Ok(())
-    }
-    fn switches(&self) -> usize {
-        self.model.switches()
-    }
-    fn switch_values(&mut self, t: f64, y: &[f64], yp: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.model.switch_values(t, y, yp, g)
     }
 }

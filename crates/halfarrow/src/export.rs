@@ -8,7 +8,7 @@ use halfarrow_emit::fmu::{self, Version};
 use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Options, Sink, System, simulate};
+use halfarrow_sim::{Events as _, Options, Sink, System as _, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
@@ -272,7 +272,7 @@ fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarro
     let mut begun = system.clone();
     let mut x = states.clone();
     let mut observed = vec![0.0; system.observed()];
-    begun.cross_jump(0.0, &mut x)?;
+    begun.handle_event(0.0, &mut x)?;
     begun.observe(0.0, &x, &mut observed)?;
     let p = system.program();
     Ok(emit::Start {

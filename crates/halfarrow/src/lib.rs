@@ -33,6 +33,7 @@ mod stage;
 mod sweep;
 mod table_file;
 mod verdict;
+mod wall_clock;
 
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;

@@ -12,8 +12,8 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, WallClock, run_real_time};
-use halfarrow_sim::{Failure, Method, Options, Sink, simulate};
+use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, run_real_time};
+use halfarrow_sim::{Failure, Method, Nobody, Options};
 use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
@@ -22,6 +22,7 @@ use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::run::{Record, Run, Start, choose, connect, units};
 use crate::verdict::Made;
+use crate::wall_clock::WallClock;
 
 /// Evaluations of a block of nonlinear equations at most in one solution, where none are given.
 const MOST_EVALUATIONS: usize = 50;
@@ -163,7 +164,7 @@ impl Model {
         let machine = system.compile_machine().is_ok();
         if machine && run.method.is_implicit() {
             // So do derivatives.
-            let _ = system.compile_tangent();
+            let _ = system.compile_directional();
         }
         let mut ports = Ports::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);
@@ -210,7 +211,7 @@ impl Model {
         let options = Options { method: Method::Fixed(run.method), to, step: Some(step), ..Options::default() };
         let mut audited = Audited::new(&mut system, &self.graph);
         // What stops it stops the run itself, which tells it.
-        let _ = simulate(&mut audited, &options, &mut x, &mut Nobody);
+        let _ = audited.simulate(&options, &mut x, &mut Nobody);
         let mut report = audited.finish();
         let made = Made::by(&Run { method: options.method, step: options.step, ..Run::default() });
         report.judge(&made);
@@ -222,13 +223,6 @@ impl Model {
             None => Ok(report),
         }
     }
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 /// A frequency in Hz from text such as `1kHz`, `500 Hz` or `500`; `None` if it is none.

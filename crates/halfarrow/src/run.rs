@@ -13,7 +13,9 @@ use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Input, Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
-use halfarrow_sim::{AbsoluteTolerance, Crawl, Failure, ImplicitSystem as _, Method, Options, Sink, Summary, System};
+use halfarrow_sim::{
+    AbsoluteTolerance, Crawl, Events as _, Failure, ImplicitSystem as _, Method, Options, Sink, Summary,
+};
 use halfarrow_trace::Trace;
 use serde::Serialize;
 
@@ -281,7 +283,7 @@ impl Model {
         let mut system = self.implicit_system(equations, run)?;
         let notes = choose(&mut system, &run.record)?;
         let x = self.start(system.reference_mut(), run.start)?;
-        quicken(&mut system, &x)?;
+        set_spring_rate(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         timings.start = begun.elapsed().as_secs_f64();
         let options = if explicit { options(run)? } else { implicit_options(run)? };
@@ -312,7 +314,7 @@ impl Model {
         let mut audited = Audited::new(system, &self.graph);
         let mut outcome = audited.simulate(options, &mut x, &mut sink);
         if let Err(stopped) = &mut outcome {
-            stopped.failure = audited.explain(stopped.failure.clone());
+            stopped.failure = audited.explain(stopped);
         }
         let tolerances = sink.tolerances(names);
         let mut notes = sink.notes;
@@ -395,7 +397,7 @@ impl Model {
             tangents: summary.tangents,
             jumps: summary.jumps,
             corners: summary.corners,
-            switches: summary.switches,
+            switches: summary.crossings,
             stiff: summary.stiff,
             audit,
             notes,
@@ -525,7 +527,7 @@ impl Model {
             let mut x = self.start(&mut system, Start::Given)?;
             let mut trace = empty_trace(&system);
             let mut values = vec![0.0; trace.columns.len()];
-            let observed = system.cross_jump(0.0, &mut x).and_then(|()| system.observe(0.0, &x, &mut values));
+            let observed = system.handle_event(0.0, &mut x).and_then(|()| system.observe(0.0, &x, &mut values));
             observed.map_err(|failure| self.stopped(failure))?;
             trace.sample(0.0, &values);
             Ok(trace)
@@ -676,7 +678,7 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
 
 /// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does
 /// not tell: a pendulum swings without a spring.
-pub(crate) fn quicken(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
+pub(crate) fn set_spring_rate(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
     let Some(rate) = system.program().parameters.iter().position(|p| p.name == "form.rate") else { return Ok(()) };
     let (Some(fastest), Some(own)) = (system.fastest_rate(0.0, x), system.parameter(rate)) else { return Ok(()) };
     if fastest <= own {

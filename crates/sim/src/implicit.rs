@@ -1,23 +1,22 @@
 //! A whole run of a system in implicit form.
 
-mod drive;
+mod collocated;
 mod semi_explicit;
 mod tolerances;
 
-use std::cell::RefCell;
-
+use collocated::Collocated;
 use semi_explicit::SemiExplicit;
 
-use crate::scene::Implicit;
+use crate::driver::Run;
 use crate::shared::Shared;
-use crate::simulate::Run;
-use crate::{Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary};
+use crate::simulate::{check_start, counted_in};
+use crate::{Failure, HybridImplicitSystem, ImplicitSystem, Method, Options, Sink, Stopped, Summary, halves};
 
 /// Integrates `system` in implicit form from the unknowns `y` and their rates `yp` at `options.from` to `options.to`, and
 /// leaves the last ones reached in `y` and `yp`. The method is [`Method::Radau`], or [`Method::Bdf`] for semi-explicit
 /// systems of index 1.
 ///
-/// Start values may be rough: [`cross_jump`](ImplicitSystem::cross_jump), which is called at the start, makes them
+/// Start values may be rough: [`handle_event`](crate::Events::handle_event), which is called at the start, makes them
 /// consistent. Samples by `Radau` are exact: where a step does not end at one, it is made again up to there, so that
 /// `F = 0` holds in every sample as well as at the ends of steps.
 ///
@@ -25,7 +24,7 @@ use crate::{Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary};
 /// The run stopped; what was computed so far is with the sink, and `y` and `yp` belong to `Stopped::time`.
 #[allow(clippy::result_large_err, reason = "a run fails once")]
 pub fn simulate_implicit(
-    system: &mut dyn ImplicitSystem,
+    system: &mut dyn HybridImplicitSystem,
     options: &Options,
     y: &mut [f64],
     yp: &mut [f64],
@@ -39,7 +38,7 @@ pub fn simulate_implicit(
     match checked {
         Ok(None) => by_radau(system, options, y, yp, sink),
         Ok(Some(differential)) => by_bdf(system, differential, options, y, yp, sink),
-        Err(failure) => Err(Stopped { failure, time: options.from, summary: Summary::default() }),
+        Err(failure) => Run::new(options, sink, &*system).ended(Err::<(), _>(failure)),
     }
 }
 
@@ -54,42 +53,61 @@ fn semi_explicit_of_index_1(system: &dyn ImplicitSystem) -> Result<Vec<bool>, Fa
 
 #[allow(clippy::result_large_err, reason = "a run fails once")]
 fn by_radau(
-    system: &mut dyn ImplicitSystem,
+    system: &mut dyn HybridImplicitSystem,
     options: &Options,
     y: &mut [f64],
     yp: &mut [f64],
     sink: &mut dyn Sink,
 ) -> Result<Summary, Stopped> {
     let mut point = [&*y, &*yp].concat();
-    let shared = RefCell::new(Implicit(system));
-    let mut run = Run::new(&shared, options, sink);
-    let end = drive::run(&mut run, &shared, &mut point);
-    let (time, summary) = (run.time, run.counts);
-    let (last, rates) = crate::scene::halves(&point);
+    let mut run = Run::new(options, sink, &*system);
+    let end = radau(&mut run, system, &mut point);
+    let (last, rates) = halves(&point);
     y.copy_from_slice(last);
     yp.copy_from_slice(rates);
-    end.map(|()| summary).map_err(|failure| Stopped { failure, time, summary })
+    run.ended(end)
+}
+
+fn radau(run: &mut Run<'_>, system: &mut dyn HybridImplicitSystem, point: &mut [f64]) -> Result<(), Failure> {
+    check_point(&*system, run.time, point)?;
+    run.start(system, point)?;
+    let mut stepper = Collocated::new(run, system)?;
+    let end = run.drive(&mut stepper, point);
+    stepper.add_work(&mut run.counts);
+    end.map(|_| ())
+}
+
+/// Whether all unknowns and rates are finite where a run starts.
+fn check_point(system: &dyn HybridImplicitSystem, time: f64, point: &[f64]) -> Result<(), Failure> {
+    let Some(value) = point.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+    let unknowns = system.unknowns();
+    let what = match value < unknowns {
+        true => system.unknown_name(value),
+        false => format!("the rate of {}", system.unknown_name(value - unknowns)),
+    };
+    Err(Failure::NotFinite { time, what })
 }
 
 #[allow(clippy::result_large_err, reason = "a run fails once")]
 fn by_bdf(
-    system: &mut dyn ImplicitSystem,
+    system: &mut dyn HybridImplicitSystem,
     differential: Vec<bool>,
     options: &Options,
     y: &mut [f64],
     yp: &mut [f64],
     sink: &mut dyn Sink,
 ) -> Result<Summary, Stopped> {
-    let scales = system.scales(options.from, options.to - options.from);
-    let scales = scales.map_err(|failure| Stopped { failure, time: options.from, summary: Summary::default() })?;
+    let scales = match system.scales(options.from, options.to - options.from) {
+        Ok(scales) => scales,
+        Err(failure) => return Run::new(options, sink, &*system).ended(Err::<(), _>(failure)),
+    };
     let mut states = SemiExplicit::new(system, differential.clone(), scales);
+    let mut run = Run::new(options, sink, &states);
+    let checked = check_start(&states, options.from, y);
     let end = {
         let shared = Shared::semi_explicit(&mut states, differential);
-        let mut run = Run::new(shared.scene(), options, sink);
-        let end = crate::variable_step::run(&mut run, &shared, y);
-        let (time, system) = (run.time, shared.system());
-        let summary = Summary { rates: system.rates, tangents: system.tangents, ..run.counts };
-        end.map(|()| summary).map_err(|failure| Stopped { failure, time, summary })
+        let end = checked.and_then(|()| crate::variable_step::run(&mut run, &shared, y));
+        counted_in(run.ended(end), &shared.system())
     };
     yp.copy_from_slice(states.last_rates());
     end

@@ -1,6 +1,6 @@
 //! What can be integrated in implicit form.
 
-use crate::{Failure, Sparsity};
+use crate::{Events, Failure, Sparsity};
 
 /// What is integrated in implicit form: `F(t, y, y') = 0`, as many equations as unknowns. `∂F/∂y'` may depend on `y` and
 /// may be singular: unknowns whose rate occurs nowhere are algebraic.
@@ -19,10 +19,8 @@ use crate::{Failure, Sparsity};
 /// the length as the constraint 1, 2, 3; with the velocity 1, 1, 2; with the acceleration 1, 1, 1. Errors of an unknown
 /// of index `i` are weighted with the step to the power `i - 1`, without which no step is short enough.
 ///
-/// # Jumps and sides
-///
-/// As for [`System`](crate::System): between two jumps every function here is smooth, and only
-/// [`cross_jump`](ImplicitSystem::cross_jump) changes the mode.
+/// All functions are evaluated in the present mode of the system, which its [`Events`] describe and change; their point is
+/// `y`, then `y'`.
 ///
 /// All slices have the documented lengths; times are in s, everything else in the unit of its unknown or equation.
 pub trait ImplicitSystem {
@@ -39,16 +37,6 @@ pub trait ImplicitSystem {
         format!("equation {}", equation + 1)
     }
 
-    /// How messages name a switching function, as in `the condition of valve`. Called only when a run fails.
-    fn switch_name(&self, switch: usize) -> String {
-        format!("condition {}", switch + 1)
-    }
-
-    /// How messages name a recorded value, as in `R1.e`. Called only when a run fails.
-    fn observed_name(&self, value: usize) -> String {
-        format!("recorded value {}", value + 1)
-    }
-
     /// Typical magnitude of each unknown where a run starts at `t`, `span` s before its end, one entry an unknown, each at
     /// least 0; 0 where it is not known. Absolute tolerances come from it when the user gives none.
     ///
@@ -59,7 +47,7 @@ pub trait ImplicitSystem {
     /// Index of an unknown: 1, 2 or 3.
     fn index(&self, unknown: usize) -> u8;
 
-    /// Residuals `out = F(t, y, y')` in the present mode. `yp` of an algebraic unknown is not read.
+    /// Residuals `out = F(t, y, y')`. `yp` of an algebraic unknown is not read.
     ///
     /// # Errors
     /// A failure names time and element: not finite, vanishing pivot, law out of its domain. A shorter step is tried
@@ -69,7 +57,7 @@ pub trait ImplicitSystem {
     /// Where `∂F/∂y` or `∂F/∂y'` may be nonzero, in whatever mode: one column an unknown, one row an equation.
     fn sparsity(&self) -> &Sparsity;
 
-    /// Exact derivatives in the present mode: `dy = ∂F/∂y` and `dyp = ∂F/∂y'`, each one entry for every nonzero of
+    /// Exact derivatives: `dy = ∂F/∂y` and `dyp = ∂F/∂y'`, each one entry for every nonzero of
     /// [`sparsity`](ImplicitSystem::sparsity), column by column, rows ascending. Entries that are 0 are written as well.
     ///
     /// # Errors
@@ -82,48 +70,20 @@ pub trait ImplicitSystem {
     fn semi_explicit(&self) -> Option<&[bool]> {
         None
     }
+}
 
-    /// Values recorded at `(t, y, y')`, [`observed`](ImplicitSystem::observed) of them.
-    ///
-    /// # Errors
-    /// As [`residual`](ImplicitSystem::residual).
-    fn observe(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure>;
+/// A system in implicit form with events: what a run takes.
+pub trait HybridImplicitSystem: ImplicitSystem + Events {}
 
-    /// Number of values that [`observe`](ImplicitSystem::observe) writes.
-    fn observed(&self) -> usize;
+impl<S: ImplicitSystem + Events> HybridImplicitSystem for S {}
 
-    /// The first instant after `t` known in advance at which something jumps. `None`: nothing jumps any more. The
-    /// integrator stops exactly there, to the last bit.
-    fn next_jump(&mut self, t: f64) -> Option<f64>;
+/// The unknowns and the rates of a point of a system in implicit form.
+pub fn halves(point: &[f64]) -> (&[f64], &[f64]) {
+    point.split_at(point.len() / 2)
+}
 
-    /// Whether the jump announced at `t` is a mere corner, as between rows of an input table: no value jumps there. Asked
-    /// before it is crossed.
-    fn is_corner(&mut self, t: f64) -> bool {
-        let _ = t;
-        false
-    }
-
-    /// The integration stands at `t`: at its start, exactly at an announced jump, or just past a located crossing. Moves
-    /// the current interval, takes the sides, and leaves `y` and `yp` consistent with the new mode: `F = 0`, and the
-    /// hidden constraints of a higher index hold as well. `yp` of an algebraic unknown may be anything finite.
-    ///
-    /// # Errors
-    /// As [`residual`](ImplicitSystem::residual).
-    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure>;
-
-    /// The step that ends at `(t, y, y')` is accepted, or the run starts there. Times never decrease from call to call.
-    ///
-    /// # Errors
-    /// As [`residual`](ImplicitSystem::residual).
-    fn accept(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure>;
-
-    /// Number of switching functions; 0 if there are none.
-    fn switches(&self) -> usize;
-
-    /// Switching functions at `(t, y, y')`, [`switches`](ImplicitSystem::switches) of them, in the present mode. The side
-    /// of one is `true` while it is `> 0`.
-    ///
-    /// # Errors
-    /// As [`residual`](ImplicitSystem::residual).
-    fn switch_values(&mut self, t: f64, y: &[f64], yp: &[f64], g: &mut [f64]) -> Result<(), Failure>;
+/// As [`halves`].
+pub fn halves_mut(point: &mut [f64]) -> (&mut [f64], &mut [f64]) {
+    let half = point.len() / 2;
+    point.split_at_mut(half)
 }

@@ -43,7 +43,7 @@ impl Jacobian {
         for group in &self.groups {
             self.direction.fill(0.0);
             group.iter().for_each(|&column| self.direction[column] = 1.0);
-            system.tangent(t, x, &self.direction, &mut self.product)?;
+            system.directional_derivative(t, x, &self.direction, &mut self.product)?;
             for &column in group {
                 for (place, &row) in self.sparsity.places(column).zip(self.sparsity.column(column)) {
                     entry(row, column, place, self.product[row]);

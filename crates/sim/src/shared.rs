@@ -2,8 +2,8 @@
 
 use std::cell::{RefCell, RefMut};
 
-use crate::scene::Scene;
-use crate::{Failure, Sparsity, System};
+use crate::events::Events;
+use crate::{Failure, HybridSystem, Sparsity, System};
 
 /// A system that the run and the integrator's library both call, and the failure that the library cannot pass on.
 pub(crate) struct Shared<'a> {
@@ -14,12 +14,12 @@ pub(crate) struct Shared<'a> {
 }
 
 impl<'a> Shared<'a> {
-    pub(crate) fn new(system: &'a mut dyn System) -> Shared<'a> {
+    pub(crate) fn new(system: &'a mut dyn HybridSystem) -> Shared<'a> {
         Shared { system: RefCell::new(Counted::new(system)), failure: RefCell::new(None), differential: None }
     }
 
     /// A system of which only the states marked have rates; those of the others have to be 0.
-    pub(crate) fn semi_explicit(system: &'a mut dyn System, differential: Vec<bool>) -> Shared<'a> {
+    pub(crate) fn semi_explicit(system: &'a mut dyn HybridSystem, differential: Vec<bool>) -> Shared<'a> {
         Shared { differential: Some(differential), ..Shared::new(system) }
     }
 
@@ -33,12 +33,9 @@ impl<'a> Shared<'a> {
         self.system.borrow_mut()
     }
 
-    /// The system as a run sees it.
-    pub(crate) fn scene<'r>(&'r self) -> &'r RefCell<dyn Scene + 'r>
-    where
-        'a: 'r,
-    {
-        &self.system
+    /// Its events, likewise.
+    pub(crate) fn events(&self) -> RefMut<'_, dyn Events + '_> {
+        RefMut::map(self.system(), |counted| -> &mut (dyn Events + '_) { counted.events() })
     }
 
     /// Keeps a failure until somebody can return it.
@@ -59,14 +56,20 @@ impl<'a> Shared<'a> {
 
 /// A system whose evaluations are counted.
 pub(crate) struct Counted<'a> {
-    system: &'a mut dyn System,
+    system: &'a mut dyn HybridSystem,
     pub(crate) rates: usize,
     pub(crate) tangents: usize,
+    /// Where the rates had no finite value last.
+    pub(crate) without_rates: Option<(f64, Vec<f64>)>,
 }
 
 impl<'a> Counted<'a> {
-    pub(crate) fn new(system: &'a mut dyn System) -> Counted<'a> {
-        Counted { system, rates: 0, tangents: 0 }
+    pub(crate) fn new(system: &'a mut dyn HybridSystem) -> Counted<'a> {
+        Counted { system, rates: 0, tangents: 0, without_rates: None }
+    }
+
+    pub(crate) fn events(&mut self) -> &mut (dyn Events + 'a) {
+        &mut *self.system
     }
 }
 
@@ -77,54 +80,28 @@ impl System for Counted<'_> {
     fn state_name(&self, state: usize) -> String {
         self.system.state_name(state)
     }
-    fn switch_name(&self, switch: usize) -> String {
-        self.system.switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.system.observed_name(value)
-    }
     fn scales(&self) -> &[f64] {
         self.system.scales()
     }
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
         self.rates += 1;
-        self.system.rates(t, x, dx)
+        let done = self.system.rates(t, x, dx);
+        if matches!(done, Err(Failure::NotFinite { .. })) {
+            self.without_rates = Some((t, x.to_vec()));
+        }
+        done
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.tangents += 1;
-        self.system.tangent(t, x, v, jv)
+        self.system.directional_derivative(t, x, v, jv)
     }
-    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        self.system.jacobian(t, x, values)
-    }
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.system.drift(t, x, out)
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.system.time_derivative(t, x, out)
     }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }
-    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.system.observe(t, x, out)
-    }
-    fn observed(&self) -> usize {
-        self.system.observed()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.system.next_jump(t)
-    }
-    fn is_corner(&mut self, t: f64) -> bool {
-        self.system.is_corner(t)
-    }
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.system.cross_jump(t, x)
-    }
-    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.system.accept(t, x)
-    }
-    fn switches(&self) -> usize {
-        self.system.switches()
-    }
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.system.switch_values(t, x, g)
+    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        self.system.jacobian(t, x, values)
     }
 }

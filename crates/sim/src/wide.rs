@@ -1,13 +1,12 @@
 //! Several runs of one system at once, each with parameters of its own: explicit methods of fixed step on vectors of lanes.
 //!
-//! Every lane goes its own way in time: its steps end at its own jumps and samples. A lane does to the last bit what its
+//! Every lane goes its own way in time: its steps end at its own events and samples. A lane does to the last bit what its
 //! system does alone.
 
-use crate::events::Sides;
-use crate::fixed_step::{FixedMethod, Tableau};
-use crate::grid::Grid;
-use crate::shared::Counted;
-use crate::{Failure, Method, Options, Sink, Stopped, Summary, System};
+use crate::driver::{Grid, Run, Stop, StopReason};
+use crate::fixed_step::{FixedMethod, Tableau, target};
+use crate::simulate::check_start;
+use crate::{Failure, HybridSystem, Method, Options, Sink, Stopped, Summary};
 
 /// Runs at once.
 pub const LANES: usize = 16;
@@ -20,19 +19,20 @@ pub type Wide = [f64; LANES];
 /// `failures` holds a failure for each lane that is out: its numbers mean nothing, and nobody looks at them. A lane that
 /// fails puts its own there.
 pub trait WideSystem {
-    /// The system of a lane: its jumps, switches and memory, and all that is not done together.
-    fn lane(&mut self, lane: usize) -> &mut dyn System;
-    /// Rates at `(t, x)`, as [`System::rates`].
+    /// The system of a lane: its events and memory, and all that is not done together.
+    fn lane(&mut self, lane: usize) -> &mut dyn HybridSystem;
+    /// Rates at `(t, x)`, as [`System::rates`](crate::System::rates).
     fn rates(&mut self, t: &Wide, x: &[Wide], dx: &mut [Wide], failures: &mut [Option<Failure>; LANES]);
-    /// Recorded values at `(t, x)`, as [`System::observe`].
+    /// Recorded values at `(t, x)`, as [`Events::observe`](crate::Events::observe).
     fn observe(&mut self, t: &Wide, x: &[Wide], out: &mut [Wide], failures: &mut [Option<Failure>; LANES]);
-    /// Whether [`System::accept`] has something to do.
+    /// Whether [`Events::accept`](crate::Events::accept) has something to do.
     fn remembers(&self) -> bool;
 }
 
 /// Integrates all lanes from the states `x`; a method of fixed step that is explicit. `wanted` says which lanes count.
 ///
-/// Gives what came of each lane, as [`simulate`](crate::simulate) does; lanes that do not count have done nothing.
+/// Gives what came of each lane, as [`simulate`](crate::simulate) does, though without the number of evaluations, which are
+/// shared, and without asking sinks after each step whether to go on; lanes that do not count have done nothing.
 ///
 /// # Panics
 /// If the method is not explicit with a step of fixed length, or the options make no sense.
@@ -47,19 +47,18 @@ pub fn simulate_wide<S: Sink>(
         panic!("lanes need a method of fixed step, and its step")
     };
     let tableau = method.tableau().expect("lanes need an explicit method");
-    let mut all = All::new(system, options, step, x.len());
-    for (lane, sink) in sinks.iter_mut().enumerate() {
-        if wanted[lane] {
-            let state: Vec<f64> = x.iter().map(|x| x[lane]).collect();
-            all.settle_lane(lane, state, x, sink, Lane::start);
+    let mut batch = Batch::new(system, options, step, x.len(), sinks);
+    for (lane, wanted) in wanted.into_iter().enumerate() {
+        if wanted {
+            batch.alone(lane, x, Lane::start);
         } else {
-            all.lanes[lane].over = true;
+            batch.lanes[lane].over = true;
         }
     }
-    while all.lanes.iter().any(|lane| !lane.over) {
-        all.step(tableau, x, sinks);
+    while batch.lanes.iter().any(|lane| !lane.over) {
+        batch.step(tableau, x);
     }
-    all.outcomes()
+    batch.outcomes()
 }
 
 /// Whether lanes can take this method.
@@ -68,25 +67,22 @@ pub fn is_wide(method: Method) -> bool {
 }
 
 /// One lane on its way.
-struct Lane {
-    time: f64,
+struct Lane<'a> {
+    run: Run<'a>,
+    /// Where it has to stop at the latest.
+    stop: Stop,
+    /// Where its step ends.
     target: f64,
-    jump: Option<f64>,
     ticks: Grid,
-    grid: Option<Grid>,
-    sides: Sides,
-    counts: Summary,
-    /// Whether a sample was taken where the lane stands.
-    sampled: bool,
+    /// Whether what happens where it stands is done with, samples included.
+    settled: bool,
     over: bool,
-    values: Vec<f64>,
 }
 
 /// All lanes on their way.
-struct All<'a> {
+struct Batch<'a> {
     system: &'a mut dyn WideSystem,
-    options: &'a Options,
-    lanes: Vec<Lane>,
+    lanes: Vec<Lane<'a>>,
     failures: [Option<Failure>; LANES],
     stages: Vec<Wide>,
     trial: Vec<Wide>,
@@ -98,33 +94,31 @@ struct All<'a> {
 }
 
 /// What a lane does with its system where it stands.
-type Act<S> = fn(&mut Lane, &Options, &mut dyn System, &mut [f64], &mut S) -> Result<(), Failure>;
+type Act<'a> = fn(&mut Lane<'a>, &mut dyn HybridSystem, &mut [f64]) -> Result<(), Failure>;
 
-impl<'a> All<'a> {
-    fn new(system: &'a mut dyn WideSystem, options: &'a Options, step: f64, states: usize) -> All<'a> {
-        let lane = |lane: usize, system: &mut dyn WideSystem| {
-            let (switches, observed) = (system.lane(lane).switches(), system.lane(lane).observed());
-            Lane {
-                time: options.from,
-                target: options.from,
-                jump: None,
-                ticks: Grid::new(options.from, step),
-                grid: options.every.map(|every| Grid::new(options.from, every)),
-                sides: Sides::new(switches),
-                counts: Summary::default(),
-                sampled: false,
-                over: false,
-                values: vec![0.0; observed],
-            }
+impl<'a> Batch<'a> {
+    fn new<S: Sink>(
+        system: &'a mut dyn WideSystem,
+        options: &'a Options,
+        step: f64,
+        states: usize,
+        sinks: &'a mut [S; LANES],
+    ) -> Batch<'a> {
+        let lane = |(lane, sink): (usize, &'a mut S)| Lane {
+            run: Run::new(options, sink, &*system.lane(lane)),
+            stop: Stop { time: options.from, is_event: false },
+            target: options.from,
+            ticks: Grid::new(options.from, step),
+            settled: false,
+            over: false,
         };
-        let lanes: Vec<Lane> = (0..LANES).map(|i| lane(i, system)).collect();
-        All {
+        let lanes: Vec<Lane<'a>> = sinks.iter_mut().enumerate().map(lane).collect();
+        Batch {
             remembers: system.remembers(),
             arch: pulp::Arch::new(),
-            out: vec![[0.0; LANES]; lanes[0].values.len()],
+            out: vec![[0.0; LANES]; system.lane(0).observed()],
             lanes,
             system,
-            options,
             failures: [const { None }; LANES],
             stages: vec![[0.0; LANES]; 4 * states],
             trial: vec![[0.0; LANES]; states],
@@ -133,28 +127,24 @@ impl<'a> All<'a> {
     }
 
     /// A step of every lane that is not over.
-    fn step<S: Sink>(&mut self, tableau: &Tableau, x: &mut [Wide], sinks: &mut [S; LANES]) {
+    fn step(&mut self, tableau: &Tableau, x: &mut [Wide]) {
         let (mut t, mut h) = ([0.0; LANES], [0.0; LANES]);
         for (i, lane) in self.lanes.iter_mut().enumerate() {
             if !lane.over {
-                lane.aim(self.options, self.system.lane(i));
+                lane.target = target(&mut lane.ticks, lane.run.time, lane.run.next_sample(), lane.stop.time);
             }
-            (t[i], h[i]) = (lane.time, lane.target - lane.time);
+            (t[i], h[i]) = (lane.run.time, lane.target - lane.run.time);
         }
         self.explicit(tableau, &t, &h, x);
-        let mut due = [false; LANES];
-        for i in 0..LANES {
-            if self.lanes[i].over {
-                continue;
+        let mut due = [None; LANES];
+        for (i, due) in due.iter_mut().enumerate() {
+            self.lanes[i].over |= self.failures[i].is_some();
+            if !self.lanes[i].over {
+                *due = self.arrive(i, x);
             }
-            if self.failures[i].is_some() {
-                self.lanes[i].over = true;
-                continue;
-            }
-            due[i] = self.arrive(i, x, &mut sinks[i]);
         }
-        if due.contains(&true) {
-            self.record(due, x, sinks);
+        if due.iter().any(Option::is_some) {
+            self.record(due, x);
         }
     }
 
@@ -170,63 +160,56 @@ impl<'a> All<'a> {
         self.arch.dispatch(Advance { x, h, weights: tableau.weights, rates: stages, out: trial });
     }
 
-    /// A lane has come to the end of its step. Gives whether a sample is due there that can be taken with those of others.
-    fn arrive<S: Sink>(&mut self, i: usize, x: &mut [Wide], sink: &mut S) -> bool {
+    /// A lane has come to the end of its step. Gives as which time a sample is due there that can be taken with those of
+    /// others.
+    fn arrive(&mut self, i: usize, x: &mut [Wide]) -> Option<f64> {
         let target = self.lanes[i].target;
         if let Some(state) = self.trial.iter().position(|value| !value[i].is_finite()) {
             let what = self.system.lane(i).state_name(state);
             self.fail(i, Failure::NotFinite { time: target, what });
-            return false;
+            return None;
         }
         x.iter_mut().zip(&self.trial).for_each(|(x, trial)| x[i] = trial[i]);
         let lane = &mut self.lanes[i];
-        lane.counts.steps += 1;
-        let at_jump = lane.jump == Some(target);
-        if !(at_jump || self.remembers || !lane.sides.is_empty()) {
-            lane.time = target;
-            return lane.is_due(self.options);
+        lane.run.counts.steps += 1;
+        lane.settled = false;
+        let at_event = lane.stop.is_event && lane.stop.time == target;
+        if at_event || self.remembers || lane.run.has_indicators() {
+            self.alone(i, x, Lane::arrive);
+        } else {
+            lane.run.time = target;
         }
-        self.state.iter_mut().zip(&*x).for_each(|(state, x)| *state = x[i]);
-        let state = std::mem::take(&mut self.state);
-        self.state = self.settle_lane(i, state, x, sink, Lane::arrive);
         let lane = &self.lanes[i];
-        !lane.over && !lane.sampled && lane.is_due(self.options)
+        if lane.over || lane.settled { None } else { lane.run.due() }
     }
 
     /// Lets a lane act on its own, and puts its state back.
-    fn settle_lane<S: Sink>(
-        &mut self,
-        i: usize,
-        mut state: Vec<f64>,
-        x: &mut [Wide],
-        sink: &mut S,
-        act: Act<S>,
-    ) -> Vec<f64> {
-        let done = act(&mut self.lanes[i], self.options, self.system.lane(i), &mut state, sink);
+    fn alone(&mut self, i: usize, x: &mut [Wide], act: Act<'a>) {
+        let mut state = std::mem::take(&mut self.state);
+        state.iter_mut().zip(&*x).for_each(|(state, x)| *state = x[i]);
+        let done = act(&mut self.lanes[i], self.system.lane(i), &mut state);
         x.iter_mut().zip(&state).for_each(|(x, state)| x[i] = *state);
+        self.state = state;
         if let Err(failure) = done {
             self.fail(i, failure);
-        } else if self.lanes[i].sampled && self.lanes[i].time >= self.options.to {
-            self.lanes[i].over = true;
         }
-        state
     }
 
     /// Samples of several lanes together.
-    fn record<S: Sink>(&mut self, due: [bool; LANES], x: &[Wide], sinks: &mut [S; LANES]) {
-        let t: Wide = std::array::from_fn(|l| self.lanes[l].time);
-        let mut failures =
-            std::array::from_fn(|l| if due[l] { None } else { Some(Failure::Interrupted { time: t[l] }) });
+    fn record(&mut self, due: [Option<f64>; LANES], x: &[Wide]) {
+        let t: Wide = std::array::from_fn(|l| self.lanes[l].run.time);
+        let out_of = |l: usize| due[l].is_none().then_some(Failure::Interrupted { time: t[l] });
+        let mut failures = std::array::from_fn(out_of);
         self.system.observe(&t, x, &mut self.out, &mut failures);
-        for (i, failure) in failures.into_iter().enumerate().filter(|(i, _)| due[*i]) {
+        for (i, failure) in failures.into_iter().enumerate() {
+            let Some(label) = due[i] else { continue };
             if let Some(failure) = failure {
                 self.fail(i, failure);
                 continue;
             }
             let lane = &mut self.lanes[i];
-            lane.values.iter_mut().zip(&self.out).for_each(|(value, out)| *value = out[i]);
-            lane.hand_over(self.options, &mut sinks[i]);
-            lane.over = lane.time >= self.options.to;
+            lane.run.record_values(label, self.out.iter().map(|out| out[i]));
+            lane.over = lane.run.time >= lane.run.to;
         }
     }
 
@@ -237,104 +220,31 @@ impl<'a> All<'a> {
 
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     fn outcomes(self) -> Vec<Result<Summary, Stopped>> {
-        let outcome = |(lane, failure): (Lane, Option<Failure>)| match failure {
-            None => Ok(lane.counts),
-            Some(failure) => Err(Stopped { failure, time: lane.time, summary: lane.counts }),
-        };
+        let outcome = |(lane, failure): (Lane<'_>, Option<Failure>)| lane.run.ended(failure.map_or(Ok(()), Err));
         self.lanes.into_iter().zip(self.failures).map(outcome).collect()
     }
 }
 
-impl Lane {
-    /// Where the step that starts now has to end, as in a run alone.
-    fn aim(&mut self, options: &Options, system: &mut dyn System) {
-        self.sampled = false;
-        self.ticks.pass(self.time);
-        self.jump = system.next_jump(self.time);
-        let tick = self.ticks.next();
-        let target = tick.min(self.grid.as_ref().map_or(tick, Grid::next));
-        let slack = self.ticks.slack();
-        let target = if target + slack >= options.to { options.to } else { target };
-        self.target = self.jump.filter(|&jump| jump <= target + slack && jump <= options.to).unwrap_or(target);
-    }
-
-    fn start<S: Sink>(
-        &mut self,
-        options: &Options,
-        system: &mut dyn System,
-        x: &mut [f64],
-        sink: &mut S,
-    ) -> Result<(), Failure> {
-        if let Some(state) = x.iter().position(|value| !value.is_finite()) {
-            return Err(Failure::NotFinite { time: self.time, what: system.state_name(state) });
-        }
-        self.cross(system, x)?;
-        system.accept(self.time, x)?;
-        self.sample(options, system, x, sink)
-    }
-
-    /// The end of a step of a lane that has jumps, switches or memory.
-    fn arrive<S: Sink>(
-        &mut self,
-        options: &Options,
-        system: &mut dyn System,
-        x: &mut [f64],
-        sink: &mut S,
-    ) -> Result<(), Failure> {
-        let switched = self.sides.crossed(&mut Counted::new(system), self.target, x)?.is_some();
-        let at_jump = self.jump == Some(self.target);
-        self.counts.switches += usize::from(switched);
-        if at_jump {
-            self.counts.meet(system.is_corner(self.target));
-        }
-        self.time = self.target;
-        system.accept(self.time, x)?;
-        if switched || at_jump {
-            if self.grid.is_none() {
-                self.sample(options, system, x, sink)?;
-            }
-            self.cross(system, x)?;
-            if self.is_due(options) {
-                self.sample(options, system, x, sink)?;
-            }
-        }
+impl Lane<'_> {
+    fn start(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Failure> {
+        check_start(system, self.run.time, x)?;
+        self.run.start(system, x)?;
+        self.stop = self.run.next_stop(system);
         Ok(())
     }
 
-    fn cross(&mut self, system: &mut dyn System, x: &mut [f64]) -> Result<(), Failure> {
-        system.cross_jump(self.time, x)?;
-        self.sides.take(&mut Counted::new(system), self.time, x)
-    }
-
-    fn sample<S: Sink>(
-        &mut self,
-        options: &Options,
-        system: &mut dyn System,
-        x: &[f64],
-        sink: &mut S,
-    ) -> Result<(), Failure> {
-        system.observe(self.time, x, &mut self.values)?;
-        if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: self.time, what: system.observed_name(value) });
+    /// The end of a step of a lane that has events or memory.
+    fn arrive(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Failure> {
+        let crossed = self.run.has_crossed(system, self.target, x)?;
+        let reason = self.run.reach(system, self.target, self.stop, crossed, x)?;
+        if reason == StopReason::StepEnd {
+            return Ok(());
         }
-        self.hand_over(options, sink);
+        self.run.go_over(system, reason, x)?;
+        self.settled = true;
+        self.stop = self.run.next_stop(system);
+        self.over = self.run.time >= self.run.to;
         Ok(())
-    }
-
-    /// Hands over the values, as those of the time on the grid that is meant.
-    fn hand_over<S: Sink>(&mut self, options: &Options, sink: &mut S) {
-        let due = self.grid.as_ref().filter(|grid| grid.is_due(self.time)).map_or(self.time, Grid::next);
-        let label = if self.time >= options.to { options.to } else { due };
-        sink.sample(label, &self.values);
-        if let Some(grid) = &mut self.grid {
-            grid.pass(label);
-        }
-        self.sampled = true;
-    }
-
-    /// Whether a sample is due where the lane stands.
-    fn is_due(&self, options: &Options) -> bool {
-        self.time >= options.to || self.grid.as_ref().is_none_or(|grid| grid.is_due(self.time))
     }
 }
 

@@ -4,8 +4,8 @@
 mod systems;
 
 use halfarrow_sim::fixed_step::{FixedMethod, FixedStep};
-use halfarrow_sim::{Failure, Method, Options, System};
-use systems::{Known, decay, driven, hyperbola, oscillator, stepped, swinging};
+use halfarrow_sim::{Failure, Method, Options, Stepwise, Summary, System, simulate};
+use systems::{Known, Samples, ball, decay, driven, hyperbola, oscillator, stepped, swinging};
 
 fn allocations_during(work: impl FnOnce()) -> u64 {
     allocation_counter::measure(work).count_total
@@ -146,6 +146,41 @@ fn lands_on_jumps_and_samples_both_sides() {
     let (samples, end) = system.run(&options(FixedMethod::Rk4, 0.25, 1.0));
     assert_eq!(samples.times, [0.0, 0.25, 0.3, 0.3, 0.5, 0.75, 0.77, 0.77, 1.0]);
     assert_eq!(end.unwrap().jumps, 2);
+}
+
+/// A run in the caller's hands, a step at a time, is the run at once; saved in its middle it goes on alike.
+#[test]
+fn step_by_step_is_the_same_run() {
+    for (method, _) in ALL {
+        for make in [stepped as fn() -> Known, ball] {
+            let mut whole = make();
+            let mut at_once = whole.start.clone();
+            let options = options(method, 1.0 / 64.0, 2.0);
+            let summary = simulate(&mut whole, &options, &mut at_once, &mut Samples::default()).unwrap();
+
+            let mut system = make();
+            let mut x = system.start.clone();
+            let mut run = Stepwise::new(method, 0.0, &system);
+            run.start(&mut system, &mut x).unwrap();
+            let mut saved = None;
+            for step in 1..=128 {
+                run.advance(&mut system, f64::from(step) / 64.0, &mut x).unwrap();
+                if step == 50 {
+                    saved = Some((run.position().clone(), system.clone(), x.clone()));
+                }
+            }
+            assert_eq!(x, at_once, "{method:?}");
+            let count = |s: Summary| (s.steps, s.jumps, s.crossings);
+            assert_eq!(count(run.summary()), count(summary), "{method:?}");
+
+            let (position, mut system, mut x) = saved.expect("it was saved");
+            run.restore(&position);
+            for step in 51..=128 {
+                run.advance(&mut system, f64::from(step) / 64.0, &mut x).unwrap();
+            }
+            assert_eq!((x, count(run.summary())), (at_once, count(summary)), "{method:?}");
+        }
+    }
 }
 
 #[test]

@@ -2,7 +2,8 @@
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use halfarrow_sim::{
-    AbsoluteTolerance, Failure, ImplicitSystem, Method, Options, Sink, Sparsity, Stopped, Summary, simulate_implicit,
+    AbsoluteTolerance, Events, Failure, ImplicitSystem, Method, Options, Sink, Sparsity, Stopped, Summary, halves,
+    halves_mut, simulate_implicit,
 };
 
 /// `(t, y, y', mode, out)`.
@@ -20,7 +21,7 @@ struct Form {
     /// Which equations hold a rate, if that is `y' - f`.
     differential: Option<Vec<bool>>,
     jumps: Vec<f64>,
-    switch: Option<fn(&[f64]) -> f64>,
+    indicator: Option<fn(&[f64]) -> f64>,
     /// Makes the unknowns and rates consistent: `(mode, y, yp)`.
     settle: fn(usize, &mut [f64], &mut [f64]),
     mode: usize,
@@ -37,7 +38,7 @@ impl Form {
             derivatives,
             differential: None,
             jumps: vec![],
-            switch: None,
+            indicator: None,
             settle: |_, _, _| {},
             mode: 0,
             accepted: vec![],
@@ -87,34 +88,37 @@ impl ImplicitSystem for Form {
     fn semi_explicit(&self) -> Option<&[bool]> {
         self.differential.as_deref()
     }
-    fn observe(&mut self, _: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        out[..y.len()].copy_from_slice(y);
-        out[y.len()..].copy_from_slice(yp);
+}
+
+impl Events for Form {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        self.jumps.iter().copied().find(|&jump| jump > t)
+    }
+    fn indicators(&self) -> usize {
+        usize::from(self.indicator.is_some())
+    }
+    fn event_indicators(&mut self, _: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        if let Some(indicator) = self.indicator {
+            g[0] = indicator(halves(point).0);
+        }
+        Ok(())
+    }
+    fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        self.mode += usize::from(t > 0.0);
+        let (y, yp) = halves_mut(point);
+        (self.settle)(self.mode, y, yp);
+        Ok(())
+    }
+    fn accept(&mut self, t: f64, _: &[f64]) -> Result<(), Failure> {
+        assert!(self.accepted.last().is_none_or(|&last| last <= t), "time ran backwards");
+        self.accepted.push(t);
         Ok(())
     }
     fn observed(&self) -> usize {
         2 * self.index.len()
     }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.jumps.iter().copied().find(|&jump| jump > t)
-    }
-    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
-        self.mode += usize::from(t > 0.0);
-        (self.settle)(self.mode, y, yp);
-        Ok(())
-    }
-    fn accept(&mut self, t: f64, _: &[f64], _: &[f64]) -> Result<(), Failure> {
-        assert!(self.accepted.last().is_none_or(|&last| last <= t), "time ran backwards");
-        self.accepted.push(t);
-        Ok(())
-    }
-    fn switches(&self) -> usize {
-        usize::from(self.switch.is_some())
-    }
-    fn switch_values(&mut self, _: f64, y: &[f64], _: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        if let Some(switch) = self.switch {
-            g[0] = switch(y);
-        }
+    fn observe(&mut self, _: f64, point: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        out.copy_from_slice(point);
         Ok(())
     }
 }
@@ -274,7 +278,7 @@ fn ball() -> Form {
         },
     )
     .with_rates_in(&[true, true, false]);
-    form.switch = Some(|y| y[0]);
+    form.indicator = Some(|y| y[0]);
     form.settle = |mode, y, yp| {
         if mode > 0 && y[0] <= 0.0 {
             (y[0], y[1]) = (f64::MIN_POSITIVE, -0.5 * y[1]);
@@ -290,7 +294,7 @@ fn every_bounce_is_found() {
     let bounces: Vec<f64> = (0..8).map(|n| first * (1.0 + 2.0 * (1.0 - 0.5_f64.powi(n)))).collect();
     for options in [options(1e-9, 1.3485, None), bdf(1e-9, 1.3485, None)] {
         let (samples, end) = ball().run(&options);
-        assert_eq!(end.unwrap().switches, 8);
+        assert_eq!(end.unwrap().crossings, 8);
         let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
         assert_eq!(found.len(), 8);
         found.iter().zip(&bounces).for_each(|(t, exact)| assert!((t - exact).abs() < 1e-9, "{t} {exact}"));

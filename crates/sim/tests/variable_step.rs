@@ -252,7 +252,7 @@ fn every_bounce_is_found() {
     let bounces: Vec<f64> = (0..8).map(|n| first * (1.0 + 2.0 * (1.0 - 0.5_f64.powi(n)))).collect();
     for method in [Explicit, Bdf, Radau] {
         let (samples, end) = ball().run(&Options { every: None, ..options(method, 1e-9, 1.3485) });
-        assert_eq!(end.unwrap().switches, 8);
+        assert_eq!(end.unwrap().crossings, 8);
         let found: Vec<f64> = samples.times.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
         assert_eq!(found.len(), 8);
         found.iter().zip(&bounces).for_each(|(t, exact)| assert!((t - exact).abs() < 1e-9, "{t} {exact}"));
@@ -272,7 +272,7 @@ fn bounces_without_end_are_reported() {
 fn two_crossings_in_one_step_are_both_found() {
     for (method, rtol) in [(Explicit, 1e-3), (Explicit, 1e-6), (Bdf, 1e-4), (Radau, 1e-4)] {
         let (_, end) = grazing().run(&options(method, rtol, 10.0));
-        assert_eq!(end.unwrap().switches, 2, "{method:?} {rtol:e}");
+        assert_eq!(end.unwrap().crossings, 2, "{method:?} {rtol:e}");
     }
 }
 
@@ -344,6 +344,63 @@ fn the_sink_may_stop_the_run() {
     let stopped = simulate(&mut system, &options(Auto, 1e-6, 10.0), &mut x, &mut sink).unwrap_err();
     assert_eq!(stopped.failure, Failure::Interrupted { time: stopped.time });
     assert!((x[0] - stopped.time.cos()).abs() < 1e-5 && *sink.0.last().unwrap() <= stopped.time);
+}
+
+/// Of two events that time cannot tell apart the first is a mere corner, and the second moves the state.
+#[test]
+fn a_state_that_jumps_right_after_a_corner() {
+    for method in [Explicit, Bdf, Radau, Auto] {
+        let mut system = Known::new(
+            &[0.0],
+            |_, _, _, dx| dx[0] = 1.0,
+            |_, _, _, _, jv| jv[0] = 0.0,
+            |t| vec![t + f64::from(t > 0.5)],
+        );
+        system.jumps = vec![0.5, 0.5_f64.next_up()];
+        system.reset = |t, _, x| x[0] += f64::from(t > 0.5);
+        let (samples, end) = system.run(&options(method, 1e-6, 1.0));
+        assert_eq!(end.unwrap().jumps, 2, "{method:?}");
+        let last = samples.values.last().unwrap()[0];
+        assert!((last - 2.0).abs() < 1e-12, "{method:?}: {last}");
+    }
+}
+
+/// What watches sees every step and both sides of every event, whatever is sampled.
+#[test]
+fn every_step_is_watched() {
+    #[derive(Default)]
+    struct Watching {
+        seen: Vec<(f64, f64)>,
+        sampled: Vec<(f64, f64)>,
+    }
+    impl Sink for Watching {
+        fn sample(&mut self, t: f64, values: &[f64]) {
+            self.sampled.push((t, values[0]));
+        }
+        fn watches(&self) -> bool {
+            true
+        }
+        fn watch(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
+            self.seen.push((t, values[0]));
+            if t > 0.9 { Err(Failure::Interrupted { time: t }) } else { Ok(()) }
+        }
+    }
+    let fixed = Method::Fixed(halfarrow_sim::fixed_step::FixedMethod::Rk4);
+    for method in [Explicit, Bdf, Radau, fixed] {
+        let run = |every| {
+            let (mut system, mut sink) = (stepped(), Watching::default());
+            let options = Options { every, step: Some(0.01), ..options(method, 1e-6, 1.0) };
+            let mut x = system.start.clone();
+            let stopped = simulate(&mut system, &options, &mut x, &mut sink).unwrap_err();
+            assert!(matches!(stopped.failure, Failure::Interrupted { time } if time > 0.9), "{stopped}");
+            sink
+        };
+        let Watching { mut seen, sampled } = run(None);
+        seen.pop();
+        assert_eq!(seen, sampled, "{method:?}");
+        let times = run(Some(0.25)).sampled;
+        assert_eq!(times.iter().map(|s| s.0).collect::<Vec<_>>(), [0.0, 0.25, 0.5, 0.75], "{method:?}");
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use halfarrow_emit::c::{Export, Written, write};
 use halfarrow_emit::{EmitError, Method, Real, Start};
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Options, Sink, System, simulate};
+use halfarrow_sim::{Events as _, Options, Sink, System, simulate};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

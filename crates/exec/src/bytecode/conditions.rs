@@ -26,6 +26,14 @@ pub(crate) struct Conditions {
     pub state: Hold,
 }
 
+/// What conditions remember of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct HeldConditions {
+    held: Vec<f64>,
+    clock: Hold,
+    state: Hold,
+}
+
 /// How far from a border rounding may carry an operand that reaches it, in units of the terms it is made of.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
@@ -34,6 +42,17 @@ impl Conditions {
         let (kinds, causes): (Vec<_>, Vec<_>) = conditions.map(|c| (c.kind, c.cause)).unzip();
         let held = vec![0.0; kinds.len()];
         Conditions { kinds, causes, held, clock: Hold::Follow, state: Hold::Follow }
+    }
+
+    /// What they remember of the run.
+    pub fn held(&self) -> HeldConditions {
+        HeldConditions { held: self.held.clone(), clock: self.clock, state: self.state }
+    }
+
+    /// Holds them as they were.
+    pub fn hold_again(&mut self, from: &HeldConditions) {
+        self.held.copy_from_slice(&from.held);
+        (self.clock, self.state) = (from.clock, from.state);
     }
 
     fn hold(&self, condition: ConditionId) -> Hold {

@@ -12,12 +12,13 @@ mod registers;
 mod wide;
 
 pub(crate) use abreast::Abreast;
-pub(crate) use conditions::{Hold, piece_of, table_on};
+pub(crate) use conditions::{HeldConditions, Hold, piece_of, table_on};
 pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble};
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
 pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
 pub(crate) use lu::Lu;
+pub(crate) use newton::Followed;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;
 pub(crate) use wide::{Lane, Line, WideFrame};

@@ -108,6 +108,18 @@ pub(crate) struct Newton {
     pub floating: Floating,
 }
 
+/// What a Newton block remembers of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Followed {
+    memory: Vec<f64>,
+    following: bool,
+    /// What the block read at the accepted solution, and its Jacobian there.
+    outer: Vec<f64>,
+    jacobian: Vec<f64>,
+    /// Unknowns that have floated.
+    floated: Vec<bool>,
+}
+
 impl Newton {
     pub fn new(size: usize) -> Newton {
         let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
@@ -179,6 +191,27 @@ impl Newton {
         self.outer_memory.copy_from_slice(&self.outer);
         self.jacobian_memory.copy_from_slice(&self.jacobian);
         (self.following, self.fresh) = (true, false);
+    }
+
+    /// What it remembers of the run.
+    pub fn followed(&self) -> Followed {
+        Followed {
+            memory: self.memory.clone(),
+            following: self.following,
+            outer: self.outer_memory.clone(),
+            jacobian: self.jacobian_memory.clone(),
+            floated: self.floating.ever.clone(),
+        }
+    }
+
+    /// Goes on from what it remembered.
+    pub fn follow_from(&mut self, from: &Followed) {
+        self.version += 1;
+        self.memory.copy_from_slice(&from.memory);
+        self.outer_memory.copy_from_slice(&from.outer);
+        self.jacobian_memory.copy_from_slice(&from.jacobian);
+        self.floating.ever.copy_from_slice(&from.floated);
+        (self.following, self.fresh) = (from.following, false);
     }
 
     /// Gives an unknown that is 0, and stays so in the first step, the magnitude at which it would count in one of the

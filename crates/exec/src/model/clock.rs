@@ -17,8 +17,6 @@ pub(super) struct Clock {
     /// Computes their operands.
     routine: Routine,
     time: usize,
-    /// The next change, in s.
-    pub next: Option<f64>,
 }
 
 impl Clock {
@@ -26,15 +24,15 @@ impl Clock {
         let timed = program.conditions.iter().filter(|(_, c)| matches!(c.cause, Cause::Clock | Cause::Curve));
         let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.cause), c.operand)).unzip();
         let routine = layout.routine(program, &operands);
-        Clock { conditions, routine, time: layout.time as usize, next: None }
+        Clock { conditions, routine, time: layout.time as usize }
     }
 
     pub fn routine(&self) -> &Routine {
         &self.routine
     }
 
-    /// Takes all of them as they are just after `t`, and finds when the first of them changes.
-    pub fn cross(&mut self, frame: &mut Frame, t: f64) {
+    /// Takes all of them as they are just after `t`, and finds when the first of them changes next, in s.
+    pub fn cross(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
         if self.conditions.is_empty() {
             return;
         }
@@ -48,7 +46,7 @@ impl Clock {
         let lines = self.next_on_lines(frame, t);
         let curves: Vec<usize> = (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
         let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
-        self.next = along.chain(lines).reduce(f64::min);
+        *next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);
         frame.d[self.time] = 0.0;
     }

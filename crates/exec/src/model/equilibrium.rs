@@ -194,7 +194,7 @@ impl Model {
         let (mut jacobian, mut v, mut jv) = (vec![0.0; n * n], vec![0.0; n], vec![0.0; n]);
         for j in 0..n {
             v[j] = 1.0;
-            self.tangent(t, x, &v, &mut jv)?;
+            self.directional_derivative(t, x, &v, &mut jv)?;
             v[j] = 0.0;
             (0..n).for_each(|i| jacobian[i * n + j] = jv[i]);
         }

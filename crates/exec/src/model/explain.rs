@@ -11,24 +11,24 @@ impl Model {
     /// The failure behind a value that is not a number: at the point placed last, the first law without a value, if there
     /// is one.
     pub(super) fn explain(&mut self, time: f64) -> Option<Failure> {
-        let domains = self.program.domains.len().min(MOST);
+        let domains = self.code.program.domains.len().min(MOST);
         (0..domains).find_map(|index| self.violated(time, index))
     }
 
     /// A law that has no value whatever happens: all it is asked for are parameters.
     pub(super) fn violated_always(&mut self) -> Option<Failure> {
-        let constant = |d: &Domain| self.program.values.reads(d.argument) == Reads::PARAMETERS;
+        let constant = |d: &Domain| self.code.program.values.reads(d.argument) == Reads::PARAMETERS;
         let constant: Vec<usize> =
-            self.program.domains.iter().enumerate().filter(|(_, d)| constant(d)).map(|(i, _)| i).collect();
+            self.code.program.domains.iter().enumerate().filter(|(_, d)| constant(d)).map(|(i, _)| i).collect();
         constant.into_iter().find_map(|index| self.violated(f64::NAN, index))
     }
 
     fn violated(&mut self, time: f64, index: usize) -> Option<Failure> {
-        let domain = self.program.domains[index].clone();
+        let domain = self.code.program.domains[index].clone();
         let mut wanted = vec![domain.argument];
         wanted.extend(domain.asked.as_ref().map(|a| a.1));
         wanted.extend(domain.limit);
-        let routine = self.layout.routine(&self.program, &wanted);
+        let routine = self.code.layout.routine(&self.code.program, &wanted);
         self.frame.reserve(&routine);
         self.frame.run(&routine).ok()?;
         let mut values = routine.outputs.iter().map(|&out| self.frame.r[out as usize]);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 /// A signal as it was some time ago: cubics through recorded values and slopes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Delay {
     /// The delay in s.
     pub time: f64,
@@ -12,7 +12,7 @@ pub(super) struct Delay {
     start: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Point {
     t: f64,
     value: f64,
@@ -86,7 +86,7 @@ impl Delay {
     }
 
     /// The next time after `t` at which a jump arrives or a step has to end because nothing later is recorded yet.
-    pub fn next_jump(&self, t: f64) -> Option<f64> {
+    pub fn next_time_event(&self, t: f64) -> Option<f64> {
         let arrival = self.points.iter().filter(|p| p.jump).map(|p| p.t + self.time).find(|&a| a > t);
         let whole = ((t - self.start) / self.time).floor() + 1.0;
         let horizon = [whole, whole + 1.0].into_iter().map(|k| self.start + k * self.time).find(|&h| h > t);
@@ -107,7 +107,7 @@ fn cubic(a: &Point, b: &Point, s: f64) -> (f64, f64) {
 }
 
 /// A signal sampled at multiples of a period.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sample {
     period: f64,
     /// The value held.
@@ -163,7 +163,7 @@ mod tests {
             let exact = f(t - 1.0);
             assert!((value - exact.0).abs() < 1e-13 && (slope - exact.1).abs() < 1e-12, "{t}: {value} {exact:?}");
         }
-        assert_eq!(delay.next_jump(0.5), Some(1.0));
+        assert_eq!(delay.next_time_event(0.5), Some(1.0));
     }
 
     #[test]
@@ -174,7 +174,7 @@ mod tests {
         delay.jump(0.05, 7.0, 0.0);
         delay.append(0.12, 7.0, 0.0);
         let arrival = 0.05 + 0.1;
-        assert_eq!(delay.next_jump(0.12), Some(arrival));
+        assert_eq!(delay.next_time_event(0.12), Some(arrival));
         assert_eq!(delay.at(arrival, 0.1).0, 1.0);
         assert_eq!(delay.at(arrival + 1e-9, 0.1).0, 1.0);
         assert_eq!(delay.at(arrival, arrival).0, 7.0);

@@ -1,16 +1,19 @@
 //! What is connected to inputs.
 
+use std::sync::Arc;
+
 /// A signal over time: constant, or points with straight lines between them.
 ///
 /// Between two corners it is one straight line, which is evaluated beyond its ends as it is inside.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Signal {
     default: f64,
-    times: Vec<f64>,
-    values: Vec<f64>,
-    /// The points (first and last index) between which the held line runs; `None`: not held.
-    held: Option<(usize, usize)>,
+    times: Arc<[f64]>,
+    values: Arc<[f64]>,
 }
+
+/// The points (first and last index) between which a held line runs.
+pub(super) type Piece = (usize, usize);
 
 impl Signal {
     /// A signal through points; times ascend, a time given twice is a jump.
@@ -30,7 +33,7 @@ impl Signal {
         if let Some(i) = (2..times.len()).find(|&i| times[i] == times[i - 2]) {
             return Err(format!("{} s stands there more than twice", times[i]));
         }
-        Ok(Signal { default: 0.0, times: times.to_vec(), values: values.to_vec(), held: None })
+        Ok(Signal { default: 0.0, times: times.into(), values: values.into() })
     }
 
     /// The value where nothing is connected.
@@ -43,15 +46,15 @@ impl Signal {
         !self.times.is_empty()
     }
 
-    /// Value and slope at `t`.
+    /// Value and slope at `t`, on a piece, or where none is held on that of the points around.
     #[inline]
-    pub fn at(&self, t: f64) -> (f64, f64) {
-        if self.times.is_empty() { (self.default, 0.0) } else { self.among_points(t) }
+    pub fn at(&self, t: f64, piece: Option<Piece>) -> (f64, f64) {
+        if self.times.is_empty() { (self.default, 0.0) } else { self.among_points(t, piece) }
     }
 
-    fn among_points(&self, t: f64) -> (f64, f64) {
+    fn among_points(&self, t: f64, piece: Option<Piece>) -> (f64, f64) {
         let n = self.times.len();
-        match self.held {
+        match piece {
             Some((first, last)) if first == last => (self.values[first], 0.0),
             Some((first, last)) => {
                 let k = self.times[..=last].partition_point(|&p| p <= t).clamp(first + 1, last) - 1;
@@ -65,25 +68,19 @@ impl Signal {
         }
     }
 
-    /// Holds the line that begins at `t` or runs through it.
-    pub fn hold(&mut self, t: f64) {
+    /// The line that begins at `t` or runs through it, if something is connected.
+    pub fn piece(&self, t: f64) -> Option<Piece> {
         let n = self.times.len();
         if n == 0 {
-            return;
+            return None;
         }
         let after = self.times.partition_point(|&p| p <= t);
         if after == 0 || after == n {
             let end = if after == 0 { 0 } else { n - 1 };
-            self.held = Some((end, end));
-            return;
+            return Some((end, end));
         }
         let last = (after..n).find(|&k| self.is_corner(k)).unwrap_or(n - 1);
-        self.held = Some((after - 1, last));
-    }
-
-    /// Follows the points again.
-    pub fn release(&mut self) {
-        self.held = None;
+        Some((after - 1, last))
     }
 
     /// The first corner after `t`.
@@ -128,16 +125,14 @@ mod tests {
 
     #[test]
     fn jumps_have_two_sides() {
-        let mut signal = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
+        let signal = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
         assert_eq!(signal.next_corner(-1.0), Some(0.0));
-        signal.hold(0.0);
-        assert_eq!((signal.at(0.5), signal.at(1.0)), ((0.5, 1.0), (1.0, 1.0)));
+        let on = |start: f64, t: f64| signal.at(t, signal.piece(start));
+        assert_eq!((on(0.0, 0.5), on(0.0, 1.0)), ((0.5, 1.0), (1.0, 1.0)));
         assert_eq!(signal.next_corner(0.0), Some(1.0));
-        signal.hold(1.0);
-        assert_eq!((signal.at(1.0), signal.at(1.5)), ((5.0, 0.0), (5.0, 0.0)));
+        assert_eq!((on(1.0, 1.0), on(1.0, 1.5)), ((5.0, 0.0), (5.0, 0.0)));
         assert_eq!(signal.next_corner(1.0), Some(2.0).filter(|_| signal.is_corner(3)));
-        signal.hold(3.0);
-        assert_eq!((signal.at(3.0), signal.next_corner(3.0)), ((5.0, 0.0), None));
+        assert_eq!((on(3.0, 3.0), signal.next_corner(3.0)), ((5.0, 0.0), None));
     }
 
     #[test]

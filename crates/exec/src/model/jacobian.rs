@@ -8,40 +8,40 @@ use halfarrow_sim::{Failure, Sparsity, System};
 
 /// The code of the derivatives, and where in the pattern each of them stands.
 #[derive(Debug, Clone)]
-pub(super) struct Slopes {
+pub(super) struct JacobianCode {
     pub routine: Routine,
     places: Vec<usize>,
 }
 
-impl Slopes {
-    pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[Entry]) -> Slopes {
+impl JacobianCode {
+    pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[Entry]) -> JacobianCode {
         let values: Vec<Value> = entries.iter().map(|e| e.value).collect();
         let place = |e: &Entry| {
             let (row, column) = (e.row as usize, e.column as usize);
             let found = sparsity.column(column).binary_search(&row);
             sparsity.places(column).start + found.expect("what moves stands in the pattern")
         };
-        Slopes { routine: layout.watched_routine(program, &values), places: entries.iter().map(place).collect() }
+        JacobianCode { routine: layout.watched_routine(program, &values), places: entries.iter().map(place).collect() }
     }
 }
 
 impl Model {
     /// Writes the nonzeros in the order of the pattern; false if the model was made without them.
-    pub(super) fn slopes_at(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        if self.slopes.is_none() {
+    pub(super) fn jacobian_at(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
+        if self.code.jacobian.is_none() {
             return Ok(false);
         }
         self.place(t, x);
-        self.evaluate(What::Slopes, false, t)?;
+        self.evaluate(What::Jacobian, false, t)?;
         if self.take_entries(values).is_some() {
             self.rates_at(t, x)?;
             self.place_beside(t, x);
-            self.evaluate(What::Slopes, false, t)?;
+            self.evaluate(What::Jacobian, false, t)?;
         }
         match self.take_entries(values) {
             None => Ok(true),
             Some(place) => {
-                let row = self.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
+                let row = self.code.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
                 let what = format!("the derivative of the rate of {}", self.state_name(row));
                 Err(Failure::NotFinite { time: t, what })
             }
@@ -49,9 +49,9 @@ impl Model {
     }
     /// Writes what the routine has computed; the first place that is not finite.
     fn take_entries(&self, values: &mut [f64]) -> Option<usize> {
-        let slopes = self.slopes.as_ref()?;
+        let code = self.code.jacobian.as_ref()?;
         values.fill(0.0);
-        for (&place, &register) in slopes.places.iter().zip(&slopes.routine.outputs) {
+        for (&place, &register) in code.places.iter().zip(&code.routine.outputs) {
             values[place] = self.frame.r[register as usize];
         }
         values.iter().position(|v| !v.is_finite())

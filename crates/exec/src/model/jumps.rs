@@ -34,20 +34,18 @@ impl Kept {
 impl Model {
     /// The sums at `(t, x)` in the present mode.
     pub(super) fn sums(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {
-        let Some(kept) = self.kept.take() else { return Ok(Vec::new()) };
+        let code = self.code.clone();
+        let Some(kept) = &code.kept else { return Ok(Vec::new()) };
         self.place(t, x);
-        let run = self.frame.run(&kept.sums);
-        let sums = kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
-        self.kept = Some(kept);
-        run.map(|()| sums).map_err(|trouble| self.failure(t, trouble))
+        self.frame.run(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+        Ok(kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect())
     }
 
     /// Gives the states that jump the values at which the sums in the present mode are what they were; whether any moved.
     pub(super) fn keep_sums(&mut self, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
-        let Some(kept) = self.kept.take() else { return Ok(false) };
-        let moved = self.solve_sums(&kept, t, x, before);
-        self.kept = Some(kept);
-        moved
+        let code = self.code.clone();
+        let Some(kept) = &code.kept else { return Ok(false) };
+        self.solve_sums(kept, t, x, before)
     }
 
     fn solve_sums(&mut self, kept: &Kept, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
@@ -58,7 +56,7 @@ impl Model {
             for column in 0..n {
                 self.place(t, x);
                 self.still();
-                self.frame.d[self.layout.states as usize + kept.states[column]] = 1.0;
+                self.frame.d[self.code.layout.states as usize + kept.states[column]] = 1.0;
                 self.frame.run_along(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
                 for (row, &register) in kept.sums.outputs.iter().enumerate() {
                     matrix[row * n + column] = self.frame.d[register as usize];

@@ -105,17 +105,17 @@ impl Model {
 
     /// The same where `own` tells what those states count as one of that stand in no relation.
     fn leaf_by(&mut self, t: f64, x: &[f64], own: impl FnOnce(&mut Model) -> Vec<f64>) -> Option<Leaf> {
-        if self.program.relations.rows.is_empty() {
+        if self.code.program.relations.rows.is_empty() {
             return None;
         }
         let mut wanted = Vec::new();
         let mut rows = Vec::new();
-        for row in &self.program.relations.rows {
+        for row in &self.code.program.relations.rows {
             let first = wanted.len();
             wanted.extend(row.quantity.iter().flat_map(|&(factor, quantity)| [factor, quantity]));
             let second = wanted.len();
             wanted.extend(row.by.iter().map(|b| b.1));
-            let state = |&(_, quantity): &(_, _)| match self.program.values.op(quantity) {
+            let state = |&(_, quantity): &(_, _)| match self.code.program.values.op(quantity) {
                 Op::State(i) => Some(i as usize),
                 _ => None,
             };
@@ -130,7 +130,7 @@ impl Model {
         let mut leaf = Leaf {
             routine,
             rows,
-            drives: self.program.relations.drives,
+            drives: self.code.program.relations.drives,
             size: vec![1.0; x.len()],
             constraints: self.constraints(),
         };
@@ -325,7 +325,7 @@ impl Model {
         for j in 0..n {
             self.place(t, x);
             self.still();
-            self.frame.d[self.layout.states as usize + j] = 1.0;
+            self.frame.d[self.code.layout.states as usize + j] = 1.0;
             self.frame.run_along(&leaf.routine).ok()?;
             for (i, row) in leaf.rows.iter().enumerate() {
                 for (at, state) in row.quantity.clone().step_by(2).zip(&row.state) {

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::system::What;
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, System as _};
 
 /// `x' = f + A dx + B du`, `y = g + C dx + D du` near a state: matrices row by row, in SI units.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -29,11 +29,14 @@ impl Model {
     /// # Errors
     /// As [`rates`](System::rates).
     pub fn linearise(&mut self, t: f64, x: &[f64], inputs: &[usize]) -> Result<Linearised, Failure> {
-        let mut linear =
-            Linearised { rates: vec![0.0; x.len()], values: vec![0.0; self.recorded.len()], ..Linearised::default() };
+        let mut linear = Linearised {
+            rates: vec![0.0; x.len()],
+            values: vec![0.0; self.recorded.chosen.len()],
+            ..Linearised::default()
+        };
         self.rates(t, x, &mut linear.rates)?;
         self.observe(t, x, &mut linear.values)?;
-        let (states, first) = (self.layout.states as usize, self.layout.inputs as usize);
+        let (states, first) = (self.code.layout.states as usize, self.code.layout.inputs as usize);
         let along_states = (0..x.len()).map(|i| states + i).collect();
         let along_inputs = inputs.iter().map(|i| first + i).collect();
         (linear.a, linear.c) = self.columns(t, x, along_states)?;
@@ -45,14 +48,14 @@ impl Model {
     #[allow(clippy::type_complexity, reason = "two matrices")]
     fn columns(&mut self, t: f64, x: &[f64], along: Vec<usize>) -> Result<(Vec<Vec<f64>>, Vec<Vec<f64>>), Failure> {
         let mut rates = vec![vec![0.0; along.len()]; x.len()];
-        let mut values = vec![vec![0.0; along.len()]; self.recorded.len()];
+        let mut values = vec![vec![0.0; along.len()]; self.recorded.chosen.len()];
         for (column, register) in along.into_iter().enumerate() {
             for (what, rows) in [(What::Rates, &mut rates), (What::Recorded, &mut values)] {
                 self.place(t, x);
                 self.still();
                 self.frame.d[register] = 1.0;
                 self.evaluate(what, true, t)?;
-                let routine = if matches!(what, What::Rates) { &self.rates } else { &self.observe };
+                let routine = if matches!(what, What::Rates) { &self.code.rates } else { &self.recorded.routine };
                 for (row, &out) in rows.iter_mut().zip(&routine.outputs) {
                     row[column] = self.frame.d[out as usize];
                     if !row[column].is_finite() {

@@ -67,6 +67,6 @@ impl Operations {
 impl Model {
     /// What one evaluation of the rates takes.
     pub fn operations(&self) -> Operations {
-        Operations::of(&self.rates)
+        Operations::of(&self.code.rates)
     }
 }

@@ -65,8 +65,8 @@ impl Model {
             return Err(StartError::Failure(failure));
         }
         self.check_asked()?;
-        let states = self.program.states.len();
-        let n = states + self.conserved.len();
+        let states = self.code.program.states.len();
+        let n = states + self.run.conserved.len();
         let mut z = vec![0.0; n];
         for _ in 0..20 {
             let mut unknowns = self.begin_search(t, n);
@@ -74,8 +74,8 @@ impl Model {
             self.solve_groups(t, &mut unknowns)?;
             let settled = z == unknowns.z;
             z = unknowns.z;
-            self.conserved.copy_from_slice(&z[states..]);
-            if self.held.is_empty() || settled {
+            self.run.conserved.copy_from_slice(&z[states..]);
+            if self.run.held.is_empty() || settled {
                 break;
             }
             // Held signals start with what the start makes of them.
@@ -83,7 +83,7 @@ impl Model {
         }
         z.truncate(states);
         if self.scaled {
-            self.scales = self.magnitudes(t, &z);
+            self.run.scales = self.magnitudes(t, &z);
         }
         Ok(z)
     }
@@ -92,7 +92,7 @@ impl Model {
     fn begin_search(&mut self, t: f64, n: usize) -> Unknowns {
         let mut z = vec![0.0; n];
         let mut guessed = vec![false; n];
-        for guess in self.program.guesses.clone() {
+        for guess in self.code.program.guesses.clone() {
             let unknown = guess.unknown as usize;
             let routine = self.routine_for(&[guess.residual]);
             guessed[unknown] = true;
@@ -103,15 +103,15 @@ impl Model {
             let place = z[unknown] - self.frame.r[out] / self.frame.d[out];
             z[unknown] = if place.is_finite() { place } else { z[unknown] };
         }
-        let met = vec![false; self.program.start.len()];
+        let met = vec![false; self.code.program.start.len()];
         Unknowns { z, guessed, known: vec![false; n], met }
     }
 
     /// That every start value is a number.
     fn check_asked(&self) -> Result<(), StartError> {
-        let value = |asked: &Value| self.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
-        let given = self.program.start.iter().map(|s| (&s.asked, &s.name, s.span));
-        for (asked, name, span) in given.chain(self.program.guesses.iter().map(|g| (&g.asked, &g.name, g.span))) {
+        let value = |asked: &Value| self.code.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
+        let given = self.code.program.start.iter().map(|s| (&s.asked, &s.name, s.span));
+        for (asked, name, span) in given.chain(self.code.program.guesses.iter().map(|g| (&g.asked, &g.name, g.span))) {
             if let Some(value) = value(asked).filter(|v| !v.is_finite()) {
                 return Err(StartError::NoNumber { name: name.clone(), value, span });
             }
@@ -150,7 +150,7 @@ impl Model {
     fn solve_direct(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
         for _ in 0..PASSES {
             let mut chosen: BTreeMap<u32, usize> = BTreeMap::new();
-            for (index, condition) in self.program.start.iter().enumerate() {
+            for (index, condition) in self.code.program.start.iter().enumerate() {
                 let mut open = condition.reads.iter().filter(|&&u| !unknowns.known[u as usize]);
                 if let (Some(&only), None) = (open.next(), open.next()) {
                     chosen.entry(only).or_insert(index);
@@ -168,7 +168,7 @@ impl Model {
 
     /// Newton for each of the chosen (unknown, condition) by itself; gives how many were found and marks them known.
     fn solve_each(&mut self, t: f64, unknowns: &mut Unknowns, chosen: &BTreeMap<u32, usize>) -> usize {
-        let wanted: Vec<Value> = chosen.values().map(|&c| self.program.start[c].residual).collect();
+        let wanted: Vec<Value> = chosen.values().map(|&c| self.code.program.start[c].residual).collect();
         let routine = self.routine_for(&wanted);
         let targets: Vec<usize> = chosen.keys().map(|&u| u as usize).collect();
         let begin: Vec<f64> = targets.iter().map(|&u| unknowns.z[u]).collect();
@@ -210,11 +210,11 @@ impl Model {
 
     /// Whatever is not met yet is solved together with all that shares unknowns with it.
     fn solve_groups(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
-        for group in self.program.start_groups() {
+        for group in self.code.program.start_groups() {
             if group.conditions.iter().all(|&c| unknowns.met[c]) {
                 continue;
             }
-            let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.program.start[c].residual).collect();
+            let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
             let routine = self.routine_for(&wanted);
             let known = group.unknowns.iter().all(|&u| unknowns.known[u as usize]);
             if known && self.is_met(t, &routine, &group, &unknowns.z) {
@@ -234,7 +234,7 @@ impl Model {
         group: &StartGroup,
         unknowns: &mut Unknowns,
     ) -> Result<(), StartError> {
-        let weak = |c: &usize| self.program.start[*c].weak;
+        let weak = |c: &usize| self.code.program.start[*c].weak;
         let (weak, given): (Vec<usize>, Vec<usize>) = group.conditions.iter().partition(|c| weak(c));
         let all = self.solve_group(t, routine, group, unknowns);
         if all.is_ok() || weak.is_empty() {
@@ -262,7 +262,7 @@ impl Model {
     }
 
     fn solve_part(&mut self, t: f64, group: &StartGroup, unknowns: &mut Unknowns) -> Result<(), StartError> {
-        let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.program.start[c].residual).collect();
+        let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
         let routine = self.routine_for(&wanted);
         self.solve_group(t, &routine, group, unknowns)
     }
@@ -276,7 +276,7 @@ impl Model {
     fn missed(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
         let n = group.unknowns.len();
         let asked = |i: usize| {
-            let register = self.layout.registers.get(&self.program.start[group.conditions[i]].asked);
+            let register = self.code.layout.registers.get(&self.code.program.start[group.conditions[i]].asked);
             register.map_or(0.0, |&r| self.frame.r[r as usize].abs())
         };
         let size = |i: usize| {
@@ -287,7 +287,7 @@ impl Model {
         // it does to the conditions.
         // Freedom that makes others grow without bounds is none, so its conditions are no rounding beside these.
         let own = |i: usize| jacobian[i * n..][..n].iter().fold(0.0f64, |most, j| most.max(j.abs()));
-        let weak = |i: usize| self.program.start[group.conditions[i]].weak;
+        let weak = |i: usize| self.code.program.start[group.conditions[i]].weak;
         let rows = greatest_of(jacobian, residual.len(), n).into_iter().enumerate();
         let rows: Vec<f64> = rows.map(|(i, size)| if weak(i) { own(i) } else { size }).collect();
         let share = |i: usize, j: usize| if rows[i] > 0.0 { jacobian[i * n + j].abs() / rows[i] } else { 0.0 };
@@ -306,7 +306,7 @@ impl Model {
         group: &StartGroup,
         all: &mut Unknowns,
     ) -> Result<(), StartError> {
-        let names: Vec<String> = group.conditions.iter().map(|&c| self.program.start[c].name.clone()).collect();
+        let names: Vec<String> = group.conditions.iter().map(|&c| self.code.program.start[c].name.clone()).collect();
         let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
         let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
         let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
@@ -346,7 +346,7 @@ impl Model {
             return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
         };
         // What is missed then is missed by as little as possible, with the weights as they are there.
-        let firm = |&c: &usize| if self.program.start[c].firm { FIRM } else { 1.0 };
+        let firm = |&c: &usize| if self.code.program.start[c].firm { FIRM } else { 1.0 };
         let weights = weights_of(&jacobian, residual.len(), group.unknowns.len());
         let weights: Vec<f64> = weights.iter().zip(group.conditions.iter().map(firm)).map(|(w, f)| w * f).collect();
         let movable = vec![true; open.len()];
@@ -368,7 +368,7 @@ impl Model {
 
     /// Names of unknowns: states, then conserved constants.
     fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
-        let (states, conserved) = (&self.program.states, &self.program.conserved);
+        let (states, conserved) = (&self.code.program.states, &self.code.program.conserved);
         let name = |u: usize| states.get(u).map_or_else(|| &conserved[u - states.len()], |s| &s.name).clone();
         unknowns.map(|u| name(u as usize)).collect()
     }
@@ -447,7 +447,7 @@ impl Model {
         }
         let mut involved: Vec<usize> = (0..residual.len()).filter(|&i| weighed[i].abs() > 1e-6 * most).collect();
         // Constraints stay: it is the start values that give way, unless there are none.
-        let firm = |i: &usize| self.program.start[group.conditions[*i]].firm;
+        let firm = |i: &usize| self.code.program.start[group.conditions[*i]].firm;
         if !involved.iter().all(firm) {
             involved.retain(|i| !firm(i));
         }
@@ -461,12 +461,12 @@ impl Model {
 
     /// The constraints on displacements.
     pub(super) fn constraints(&mut self) -> Vec<Constraint> {
-        let firm = |c: &usize| self.program.start[*c].firm;
-        let firm: Vec<usize> = (0..self.program.start.len()).filter(firm).collect();
+        let firm = |c: &usize| self.code.program.start[*c].firm;
+        let firm: Vec<usize> = (0..self.code.program.start.len()).filter(firm).collect();
         firm.into_iter()
             .map(|c| Constraint {
-                group: StartGroup { conditions: vec![c], unknowns: self.program.start[c].reads.clone() },
-                routine: self.routine_for(&[self.program.start[c].residual]),
+                group: StartGroup { conditions: vec![c], unknowns: self.code.program.start[c].reads.clone() },
+                routine: self.routine_for(&[self.code.program.start[c].residual]),
             })
             .collect()
     }
@@ -481,10 +481,10 @@ impl Model {
         size: &[f64],
         most: f64,
     ) -> Option<(String, f64)> {
-        let z: Vec<f64> = x.iter().chain(&self.conserved.clone()).copied().collect();
+        let z: Vec<f64> = x.iter().chain(&self.run.conserved.clone()).copied().collect();
         let mut worst: Option<(f64, String, f64)> = None;
         for Constraint { group, routine } in constraints {
-            let name = self.program.start[group.conditions[0]].name.clone();
+            let name = self.code.program.start[group.conditions[0]].name.clone();
             let Some((miss, slopes)) = self.linearised(t, routine, group, &z) else { return Some((name, f64::NAN)) };
             let moved = |u: u32| z[u as usize].abs().max(size.get(u as usize).copied().unwrap_or(0.0));
             let terms = group.unknowns.iter().zip(&slopes).map(|(&u, j)| j.abs() * moved(u));
@@ -497,8 +497,9 @@ impl Model {
     }
 
     fn start_value(&mut self, t: f64, condition: usize, z: &[f64], residual: f64) -> StartValue {
-        let start = self.program.start[condition].clone();
-        let observed = self.program.observed.iter().find(|o| o.name == start.name).and_then(|o| o.value.clone().ok());
+        let start = self.code.program.start[condition].clone();
+        let observed =
+            self.code.program.observed.iter().find(|o| o.name == start.name).and_then(|o| o.value.clone().ok());
         let mut wanted = vec![start.asked];
         wanted.extend(observed);
         let routine = self.routine_for(&wanted);
@@ -529,15 +530,16 @@ impl Model {
 
     /// Runs a routine at the start, with derivatives along the given unknowns together.
     fn residuals(&mut self, t: f64, routine: &Routine, z: &[f64], along: Option<&[usize]>) -> Result<(), Failure> {
-        let states = self.program.states.len();
-        self.conserved.copy_from_slice(&z[states..]);
+        let states = self.code.program.states.len();
+        self.run.conserved.copy_from_slice(&z[states..]);
         self.place(t, &z[..states]);
         let run = match along {
             None => self.frame.run(routine),
             Some(unknowns) => {
                 self.still();
                 for &u in unknowns {
-                    let base = if u < states { self.layout.states as usize } else { self.layout.conserved as usize };
+                    let base =
+                        if u < states { self.code.layout.states as usize } else { self.code.layout.conserved as usize };
                     self.frame.d[base + if u < states { u } else { u - states }] = 1.0;
                 }
                 self.frame.run_along(routine)
@@ -547,7 +549,7 @@ impl Model {
     }
 
     pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {
-        let routine = self.layout.routine(&self.program, wanted);
+        let routine = self.code.layout.routine(&self.code.program, wanted);
         self.frame.reserve(&routine);
         routine
     }

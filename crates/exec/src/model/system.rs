@@ -1,6 +1,6 @@
 //! The model as a system to integrate.
 
-use super::{Held, Model};
+use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Trouble};
 use halfarrow_sim::{Failure, Sparsity, System};
 
@@ -12,25 +12,25 @@ const BESIDE: f64 = 1e-8;
 pub(super) enum What {
     Rates,
     Recorded,
-    Switches,
-    /// Derivatives of the rates, if the model has them.
-    Slopes,
+    Indicators,
+    /// The Jacobian of the rates, if the model has its code.
+    Jacobian,
 }
 
 impl Model {
     fn once(&mut self, what: What, along: bool) -> Result<bool, Trouble> {
         let routine = match what {
-            What::Rates => &self.rates,
-            What::Recorded => &self.observe,
-            What::Switches => &self.switching,
-            What::Slopes => &self.slopes.as_ref().expect("asked for only where they are").routine,
+            What::Rates => &self.code.rates,
+            What::Recorded => &self.recorded.routine,
+            What::Indicators => &self.code.indicators,
+            What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
         };
         self.frame.begin(match what {
-            What::Rates => self.abreast.0.as_ref(),
-            What::Recorded => self.abreast.1.as_ref(),
-            What::Switches | What::Slopes => None,
+            What::Rates => self.code.abreast.as_ref(),
+            What::Recorded => self.recorded.abreast.as_ref(),
+            What::Indicators | What::Jacobian => None,
         });
-        match (self.codes.of(what, along), along) {
+        match (self.codes.of(&self.recorded, what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,
             (None, false) => self.frame.run(routine)?,
             (None, true) => self.frame.run_along(routine)?,
@@ -43,7 +43,7 @@ impl Model {
     /// conditions are followed instead.
     pub(super) fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
         let first = self.once(what, along);
-        let held = self.frame.conditions.state == Hold::Keep && !self.switches.is_empty();
+        let held = self.frame.conditions.state == Hold::Keep && !self.code.switching.is_empty();
         if !held || matches!(first, Ok(true)) {
             return first.map(|_| ()).map_err(|trouble| self.failure(t, trouble));
         }
@@ -68,126 +68,43 @@ impl Model {
         result
     }
 
-    /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
-    fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if self.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
-            let states = &self.frame.r[self.layout.states as usize..][..x.len()];
-            if self.rated != Some(t) || states != x {
-                self.rates_at(t, x)?;
-            }
-            self.rated = None;
-            let blocks = self.rates.solves.iter().map(|solve| solve.block);
-            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
-        }
-        if !self.shown_blocks.is_empty() {
-            self.place(t, x);
-            self.evaluate(What::Recorded, false, t)?;
-            let blocks = self.shown_blocks.iter();
-            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
-        }
-        Ok(())
-    }
-
-    /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
-    fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.rates_at(t, x)?;
-        self.still();
-        self.let_time_pass(t);
-        let Model { frame, layout, dx, .. } = self;
-        frame.d[layout.states as usize..][..dx.len()].copy_from_slice(dx);
-        let run = self.frame.run_along(&self.sources);
-        run.map_err(|trouble| self.failure(t, trouble))
-    }
-
     /// Sets the direction of derivatives to that of time: inputs and held signals move, states do not.
     pub(super) fn let_time_pass(&mut self, t: f64) {
-        let Model { frame, layout, inputs, held, crossed, .. } = self;
+        let Model { frame, code, setup, run, .. } = self;
+        let layout = &code.layout;
         frame.d[layout.time as usize] = 1.0;
-        inputs.iter().enumerate().for_each(|(i, s)| frame.d[layout.inputs as usize + i] = s.at(t).1);
-        for (i, held) in held.iter().enumerate() {
-            let slope = if let Held::Delay(delay) = held { delay.at(t, *crossed).1 } else { 0.0 };
+        for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
+            frame.d[layout.inputs as usize + i] = signal.at(t, *piece).1;
+        }
+        for (i, held) in run.held.iter().enumerate() {
+            let slope = if let DelayOrSample::Delay(delay) = held { delay.at(t, run.crossed).1 } else { 0.0 };
             frame.d[layout.held as usize + i] = slope;
         }
     }
 
-    fn source(&self, i: usize) -> (f64, f64) {
-        let register = self.sources.outputs[i] as usize;
-        (self.frame.r[register], self.frame.d[register])
-    }
-
-    /// Held signals at the start of a run. They may read each other: passes until nothing changes.
-    pub(super) fn begin_held(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        for _ in 0..self.held.len() {
-            self.place(t, x);
-            self.run_sources(t, x)?;
-            for i in 0..self.held.len() {
-                let (value, slope) = self.source(i);
-                match &mut self.held[i] {
-                    Held::Delay(delay) => delay.begin(t, value, slope),
-                    Held::Sample(sample) => sample.begin(t, value),
-                }
-            }
-        }
-        self.place(t, x);
-        Ok(())
-    }
-
-    /// Takes the samples that are due, in order: each sees those taken before it.
-    fn take_samples(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        for i in 0..self.held.len() {
-            if matches!(&self.held[i], Held::Sample(sample) if sample.is_due(t)) {
-                self.place(t, x);
-                self.run_sources(t, x)?;
-                let (value, _) = self.source(i);
-                if let Held::Sample(sample) = &mut self.held[i] {
-                    sample.value = value;
-                    sample.pass(t);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn take_sides(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.place(t, x);
-        if self.switches.is_empty() {
-            self.frame.conditions.state = Hold::Keep;
-            return Ok(());
-        }
-        self.frame.conditions.state = Hold::Take;
-        let run = self.frame.run(&self.switching);
-        let frame = &mut self.frame;
-        for (&condition, &register) in self.switches.iter().zip(&self.switching.outputs) {
-            frame.conditions.value(condition, frame.r[register as usize], &frame.tables);
-        }
-        frame.conditions.state = Hold::Keep;
-        self.sides_taken = Some(t);
-        run.map_err(|trouble| self.failure(t, trouble))
-    }
-
     /// Derivative of rates and residuals along a direction of the free rates, at what was placed last.
-    pub(super) fn tangent_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    pub(super) fn derivative_by_rates(&mut self, t: f64, y: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, y);
         self.still();
-        self.along(t, y, self.layout.rates, v, jv)
+        self.along(t, y, self.code.layout.rates, v, jv)
     }
 
     /// Derivative of rates and residuals along a direction in the fixed registers from `first` on.
     fn along(&mut self, t: f64, x: &[f64], first: u32, v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.frame.d[first as usize..][..v.len()].copy_from_slice(v);
-        self.slopes_along(t, x, jv)
+        self.derivative_along(t, x, jv)
     }
 
     /// Derivative of the rates along the direction that is set. Where the slope of a law is infinite it is that a little
     /// beside.
-    fn slopes_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn derivative_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;
-        if self.take_slopes(jv).is_none() {
+        if self.take_derivatives(jv).is_none() {
             return Ok(());
         }
         self.place_beside(t, x);
         self.evaluate(What::Rates, true, t)?;
-        match self.take_slopes(jv) {
+        match self.take_derivatives(jv) {
             None => Ok(()),
             Some(state) => {
                 let what = format!("the derivative of the rate of {}", self.state_name(state));
@@ -197,15 +114,15 @@ impl Model {
     }
 
     /// Writes the derivatives of the rates; the first state for whose rate there is none.
-    fn take_slopes(&self, jv: &mut [f64]) -> Option<usize> {
-        jv.iter_mut().zip(&self.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
+    fn take_derivatives(&self, jv: &mut [f64]) -> Option<usize> {
+        jv.iter_mut().zip(&self.code.rates.outputs).for_each(|(jv, &register)| *jv = self.frame.d[register as usize]);
         jv.iter().position(|slope| !slope.is_finite())
     }
 
     /// Puts states in their registers that are a little further on the way that the rates, evaluated last, lead.
     pub(super) fn place_beside(&mut self, t: f64, x: &[f64]) {
         let mut beside = std::mem::take(&mut self.beside);
-        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.rates.outputs) {
+        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.code.rates.outputs) {
             let rate = self.frame.r[register as usize];
             let rate = if rate.is_finite() { rate } else { 0.0 };
             let size = if rate < 0.0 { -x.abs() } else { x.abs() };
@@ -218,33 +135,21 @@ impl Model {
 
     /// Whether there are laws solved by Newton, whose last solution decides which one comes next.
     pub(super) fn follows_solutions_at_all(&self) -> bool {
-        !self.shown_blocks.is_empty() || self.rates.solves.iter().any(|solve| !solve.guess.is_empty())
-    }
-
-    pub(super) fn has_delays(&self) -> bool {
-        self.held.iter().any(|h| matches!(h, Held::Delay(_)))
+        !self.recorded.blocks.is_empty() || self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty())
     }
 }
 
 impl System for Model {
     fn states(&self) -> usize {
-        self.program.states.len()
+        self.code.program.states.len()
     }
 
     fn state_name(&self, state: usize) -> String {
-        self.program.states[state].name.clone()
-    }
-
-    fn switch_name(&self, switch: usize) -> String {
-        format!("condition {}", switch + 1)
-    }
-
-    fn observed_name(&self, value: usize) -> String {
-        self.program.observed[self.recorded[value]].name.clone()
+        self.code.program.states[state].name.clone()
     }
 
     fn scales(&self) -> &[f64] {
-        &self.scales
+        &self.run.scales
     }
 
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
@@ -253,7 +158,7 @@ impl System for Model {
         }
         self.place(t, x);
         self.evaluate(What::Rates, false, t)?;
-        for (state, (dx, &register)) in dx.iter_mut().zip(&self.rates.outputs).enumerate() {
+        for (state, (dx, &register)) in dx.iter_mut().zip(&self.code.rates.outputs).enumerate() {
             *dx = self.frame.r[register as usize];
             if !dx.is_finite() {
                 let what = format!("the rate of {}", self.state_name(state));
@@ -264,136 +169,24 @@ impl System for Model {
         Ok(())
     }
 
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
-        self.along(t, x, self.layout.states, v, jv)
+        self.along(t, x, self.code.layout.states, v, jv)
     }
 
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
         self.still();
         self.let_time_pass(t);
-        self.slopes_along(t, x, out)
+        self.derivative_along(t, x, out)
     }
 
     fn sparsity(&self) -> &Sparsity {
-        &self.sparsity
+        &self.code.sparsity
     }
 
     fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        self.slopes_at(t, x, values)
-    }
-
-    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.place(t, x);
-        self.evaluate(What::Recorded, false, t)?;
-        out.iter_mut().zip(&self.observe.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
-        match out.iter().position(|value| value.is_nan()).or(out.iter().position(|value| value.is_infinite())) {
-            // What a modeller computes for himself may be infinite, what a law gives may not.
-            Some(value) if out[value].is_infinite() => self.explain(t).map_or(Ok(()), Err)?,
-            Some(value) => {
-                let not_finite = Failure::NotFinite { time: t, what: self.observed_name(value) };
-                return Err(self.explain(t).unwrap_or(not_finite));
-            }
-            None => {}
-        }
-        Ok(())
-    }
-
-    fn observed(&self) -> usize {
-        self.recorded.len()
-    }
-
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        let inputs = self.inputs.iter().filter_map(|signal| signal.next_corner(t));
-        let held = self.held.iter().filter_map(|held| match held {
-            Held::Delay(delay) => delay.next_jump(t),
-            Held::Sample(sample) => Some(sample.next_time()),
-        });
-        inputs.chain(held).chain(self.clock.next).filter(|&next| next > t).reduce(f64::min)
-    }
-
-    fn is_corner(&mut self, t: f64) -> bool {
-        let held = self.held.iter().any(|held| match held {
-            Held::Delay(delay) => delay.next_jump(self.crossed) == Some(t),
-            Held::Sample(sample) => sample.is_due(t),
-        });
-        !held && self.clock.next != Some(t) && !self.inputs.iter().any(|signal| signal.jumps_at(t))
-    }
-
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        if t < self.crossed {
-            self.restart();
-        }
-        if let Some(failure) = self.broken().filter(|_| !self.begun) {
-            return Err(failure);
-        }
-        let sums = if self.begun { self.sums(t, x)? } else { Vec::new() };
-        self.crossed = t;
-        self.rated = None;
-        self.inputs.iter_mut().for_each(|signal| signal.hold(t));
-        self.frame.conditions.state = Hold::Follow;
-        // A solution may leap where something jumps.
-        self.frame.solvers.iter_mut().for_each(|s| s.newton.leave());
-        self.clock.cross(&mut self.frame, t);
-        if !self.begun {
-            self.begin_held(t, x)?;
-            self.begun = true;
-            self.take_sides(t, x)?;
-        } else {
-            self.keep_sums(t, x, &sums)?;
-            self.take_samples(t, x)?;
-            self.keep_sums(t, x, &sums)?;
-            self.take_sides(t, x)?;
-            if self.keep_sums(t, x, &sums)? {
-                self.take_sides(t, x)?;
-            }
-        }
-        if self.has_delays() {
-            self.run_sources(t, x)?;
-            for i in 0..self.held.len() {
-                let (value, slope) = self.source(i);
-                if let Held::Delay(delay) = &mut self.held[i] {
-                    delay.jump(t, value, slope);
-                }
-            }
-        }
-        self.follow_solutions(t, x)
-    }
-
-    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if self.has_delays() {
-            self.place(t, x);
-            self.run_sources(t, x)?;
-            for i in 0..self.held.len() {
-                let (value, slope) = self.source(i);
-                if let Held::Delay(delay) = &mut self.held[i] {
-                    delay.append(t, value, slope);
-                }
-            }
-        }
-        self.follow_solutions(t, x)
-    }
-
-    fn switches(&self) -> usize {
-        self.switches.iter().map(|&c| self.program.conditions[c].kind.switches()).sum()
-    }
-
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.place(t, x);
-        self.evaluate(What::Switches, false, t)?;
-        let frame = &self.frame;
-        let mut next = 0;
-        for (&condition, &register) in self.switches.iter().zip(&self.switching.outputs) {
-            let mut beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
-            if self.sides_taken == Some(t) {
-                frame.conditions.confirm(condition, &mut beyond);
-            }
-            let count = self.program.conditions[condition].kind.switches();
-            g[next..next + count].copy_from_slice(&beyond[..count]);
-            next += count;
-        }
-        Ok(())
+        self.jacobian_at(t, x, values)
     }
 }

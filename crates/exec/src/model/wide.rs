@@ -1,11 +1,14 @@
 //! Several sets of parameters at once.
 
 use super::Model;
+use super::compiled::Mode;
+use super::recorded::Recorded;
 use super::system::What;
 use crate::bytecode::Routine;
 use crate::bytecode::{Frame, Lane, Line, Packed, WideFrame};
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
-use halfarrow_sim::{Failure, System};
+use halfarrow_sim::{Events as _, Failure, HybridSystem, System as _};
+use std::sync::Arc;
 
 /// A model in as many copies as there are lanes, each with parameters, inputs, start and memory of its own, whose rates
 /// and recorded values are computed together.
@@ -15,8 +18,11 @@ use halfarrow_sim::{Failure, System};
 pub struct WideModel {
     models: Vec<Model>,
     frame: WideFrame<LANES>,
-    rates: (Routine, Packed),
-    observe: (Routine, Packed),
+    /// What they share: the code, and what is recorded, both packed for lanes.
+    code: Arc<Mode>,
+    recorded: Arc<Recorded>,
+    rates: Packed,
+    observe: Packed,
     /// State and values of one lane.
     state: Vec<f64>,
     values: Vec<f64>,
@@ -26,14 +32,17 @@ impl WideModel {
     /// The same model in every lane, recording what it records.
     pub fn new(model: &Model) -> WideModel {
         let mut frame = WideFrame::default();
-        let packed = |routine: &Routine| (routine.clone(), Packed::new(&model.layout, routine));
-        let (rates, observe) = (packed(&model.rates), packed(&model.observe));
-        frame.reserve(rates.1.slots.max(observe.1.slots).max(model.layout.size as usize));
+        let (code, recorded) = (model.code.clone(), model.recorded.clone());
+        let rates = Packed::new(&code.layout, &code.rates);
+        let observe = Packed::new(&code.layout, &recorded.routine);
+        frame.reserve(rates.slots.max(observe.slots).max(code.layout.size as usize));
         let mut lane = model.clone();
         lane.scaled = false;
         let mut wide = WideModel {
             models: vec![lane; LANES],
             frame,
+            code,
+            recorded,
             rates,
             observe,
             state: vec![0.0; model.states()],
@@ -51,16 +60,15 @@ impl WideModel {
 
     /// Takes up what the models of the lanes have been set to: parameters, constants and what follows from them.
     pub fn begin(&mut self) {
-        let first = &self.models[0];
-        for register in 0..first.layout.size as usize {
+        for register in 0..self.code.layout.size as usize {
             self.frame.r[register] = Line(std::array::from_fn(|lane| self.models[lane].frame.r[register]));
         }
     }
 
     /// Puts time, inputs, held signals, constants and states where routines read them.
     fn place(&mut self, t: &Wide, x: &[Wide]) {
-        let WideModel { models, frame, .. } = self;
-        let (states, time) = (models[0].layout.states as usize, models[0].layout.time as usize);
+        let WideModel { models, frame, code, .. } = self;
+        let (states, time) = (code.layout.states as usize, code.layout.time as usize);
         frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Line(*x));
         frame.r[time] = Line(*t);
         if states == time + 1 {
@@ -68,11 +76,11 @@ impl WideModel {
         }
         for (lane, model) in models.iter_mut().enumerate() {
             model.place_time(t[lane]);
-            let conserved = model.layout.conserved as usize;
+            let conserved = code.layout.conserved as usize;
             for register in time + 1..conserved {
                 frame.r[register][lane] = model.frame.r[register];
             }
-            for (i, value) in model.conserved.iter().enumerate() {
+            for (i, value) in model.run.conserved.iter().enumerate() {
                 frame.r[conserved + i][lane] = *value;
             }
         }
@@ -112,7 +120,10 @@ impl WideModel {
         self.place(t, x);
         let mut good: [bool; LANES] = std::array::from_fn(|lane| failures[lane].is_none());
         let wanted = good;
-        let (routine, packed) = if let What::Rates = what { &self.rates } else { &self.observe };
+        let (routine, packed) = match what {
+            What::Rates => (&self.code.rates, &self.rates),
+            _ => (&self.recorded.routine, &self.observe),
+        };
         self.frame.run(routine, packed, &mut self.models, &mut good);
         for (out, &slot) in out.iter_mut().zip(&packed.outputs) {
             *out = self.frame.r[slot as usize].0;
@@ -133,7 +144,7 @@ impl Lane for Model {
 }
 
 impl WideSystem for WideModel {
-    fn lane(&mut self, lane: usize) -> &mut dyn System {
+    fn lane(&mut self, lane: usize) -> &mut dyn HybridSystem {
         &mut self.models[lane]
     }
 
@@ -147,6 +158,6 @@ impl WideSystem for WideModel {
 
     fn remembers(&self) -> bool {
         let newton = |routine: &Routine| routine.solves.iter().any(|solve| !solve.guess.is_empty());
-        newton(&self.rates.0) || newton(&self.observe.0) || !self.models[0].held.is_empty()
+        newton(&self.code.rates) || newton(&self.recorded.routine) || !self.models[0].run.held.is_empty()
     }
 }

@@ -11,7 +11,7 @@ use halfarrow_compiler::program::{Unavailable, schedule};
 use halfarrow_compiler::{ast, bond_graph, causal_graph, equations};
 use halfarrow_exec::{Model, StartError};
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Failure, Method, Options, Sink, System, simulate};
+use halfarrow_sim::{Events, Failure, Method, Options, Sink, System, simulate};
 
 use crate::exact::{self, Count, float};
 use crate::forms::check_forms;
@@ -280,7 +280,7 @@ fn random_point(
     let model = &mut built.model;
     let mut x: Vec<f64> = x0.iter().map(|x| x + random.unit()).collect();
     let t = 0.0;
-    if let Err(failure) = model.cross_jump(t, &mut x) {
+    if let Err(failure) = model.handle_event(t, &mut x) {
         if graph.has_constant_structure() {
             return fault("crossing", failure.to_string());
         }
@@ -322,7 +322,7 @@ fn check_polynomial(
     for j in 0..n {
         let (mut v, mut jv) = (vec![0.0; n], vec![0.0; n]);
         v[j] = 1.0;
-        if let Err(failure) = built.model.tangent(t, x, &v, &mut jv) {
+        if let Err(failure) = built.model.directional_derivative(t, x, &v, &mut jv) {
             return fault("tangent", failure.to_string());
         }
         (0..n).for_each(|i| jacobian[i][j] = jv[i]);

@@ -4,7 +4,7 @@ use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::equations::{Form, derive_equations};
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_exec::{ImplicitModel, Model};
-use halfarrow_sim::{Failure, ImplicitSystem, System};
+use halfarrow_sim::{Events, Failure, ImplicitSystem};
 
 use crate::check::{Fault, Seen, fault};
 
@@ -69,9 +69,9 @@ fn compare(
         Err(failure) => return fault(what("start"), failure.to_string()),
     };
     let (mut ours, mut theirs) = (vec![0.0; common.len()], vec![0.0; common.len()]);
-    model.cross_jump(t, &mut x.to_vec()).or_else(|f| fault(what("minimal"), f.to_string()))?;
+    model.handle_event(t, &mut x.to_vec()).or_else(|f| fault(what("minimal"), f.to_string()))?;
     model.observe(t, x, &mut theirs).or_else(|f| fault(what("minimal"), f.to_string()))?;
-    other.observe(t, &y, &yp, &mut ours).or_else(|f| fault(what("values"), f.to_string()))?;
+    other.observe(t, &[&y[..], &yp].concat(), &mut ours).or_else(|f| fault(what("values"), f.to_string()))?;
     if std::env::var_os("SHOW").is_some() {
         for (n, (a, b)) in common.iter().zip(ours.iter().zip(&theirs)) {
             println!("{form:?} {n} {a} {b}");

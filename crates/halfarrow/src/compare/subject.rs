@@ -9,14 +9,14 @@ use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec::{self as exec, Operations};
 use halfarrow_sim::{
-    Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, System, simulate, simulate_implicit,
+    Events as _, Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
 };
 use halfarrow_trace::Trace;
 
 use crate::audited::{AuditReport, Audited};
 use crate::error::Error;
 use crate::model::Model;
-use crate::run::{Run, Start, connect, quicken};
+use crate::run::{Run, Start, connect, set_spring_rate};
 use crate::verdict::Made;
 
 /// A form at its start.
@@ -112,7 +112,7 @@ impl Model {
         let explicit = equations.residuals.is_empty();
         let mut system = self.implicit_system(&equations, run)?;
         let x = self.start(system.reference_mut(), Start::Given)?;
-        quicken(&mut system, &x)?;
+        set_spring_rate(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         let system = match explicit {
             true => Ready::Explicit(system.into_form(), y),
@@ -255,7 +255,7 @@ impl Subject<'_> {
     pub(super) fn rates(&self) -> Option<(f64, f64)> {
         let Ready::Explicit(mut system, mut x) = self.system.clone() else { return None };
         let _ = system.record(&[]);
-        system.cross_jump(0.0, &mut x).ok()?;
+        system.handle_event(0.0, &mut x).ok()?;
         let linear = system.linearise(0.0, &x, &[]).ok()?;
         let sizes: Vec<f64> =
             crate::linear_algebra::eigenvalues(&linear.a)?.iter().map(|z| libm::hypot(z[0], z[1])).collect();

@@ -13,7 +13,7 @@ use halfarrow_compiler::bond_graph::{BondGraph, Input, InputId, Kind, Meaning, V
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
-use halfarrow_sim::{Options, Sink, System, simulate};
+use halfarrow_sim::{Events as _, Nobody, Options, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
@@ -239,7 +239,7 @@ impl Model {
         let mut x = self.start(system, Start::Given)?;
         match at {
             Point::Start => {
-                system.cross_jump(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
+                system.handle_event(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
                 Ok(("start", 0.0, x))
             }
             Point::Equilibrium => {
@@ -248,7 +248,7 @@ impl Model {
                     error => Problem::NoEquilibrium { reason: error.to_string() }.into(),
                 })?;
                 x = found.x;
-                system.cross_jump(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
+                system.handle_event(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
                 if found.free > 0 {
                     notes.push(format!(
                         "the equilibrium is one of many: {} combinations of states are free",
@@ -285,22 +285,17 @@ impl Model {
             let names = program.conserved.join(", ");
             notes.push(format!("{names} keep their value: each stands for one more pole at 0"));
         }
-        if system.switches() > 0 {
-            notes
-                .push(format!("conditions of the state keep the side they have there ({} of them)", system.switches()));
+        if system.indicators() > 0 {
+            notes.push(format!(
+                "conditions of the state keep the side they have there ({} of them)",
+                system.indicators()
+            ));
         }
         if !program.held.is_empty() {
             notes.push("sampled signals keep their value: the matrices hold between two samples".into());
         }
         notes
     }
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 fn delay(name: &str) -> String {

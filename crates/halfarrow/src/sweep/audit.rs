@@ -1,6 +1,6 @@
 //! A sample of the sets of a sweep, run once more and audited.
 
-use halfarrow_sim::Sink;
+use halfarrow_sim::Nobody;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -37,13 +37,6 @@ pub struct SetMiss {
     pub verdict: Verdict,
     /// What is missed, where, when, and what to do about it.
     pub warnings: Vec<String>,
-}
-
-/// Takes no samples.
-struct Nobody;
-
-impl Sink for Nobody {
-    fn sample(&mut self, _: f64, _: &[f64]) {}
 }
 
 /// Audits some of the sets, on all cores. Sets that fail are told by their rows.

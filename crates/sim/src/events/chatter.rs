@@ -1,4 +1,4 @@
-//! Switching without end.
+//! Zero crossings without end.
 
 /// Crossings in a row that may lie within [`SHORT`] of the run.
 const MOST_CROSSINGS: usize = 200;

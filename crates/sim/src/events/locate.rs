@@ -1,43 +1,43 @@
-//! The first crossing inside a step.
+//! The first zero crossing inside a step.
 
-use super::Sides;
+use super::Signs;
 use crate::Failure;
 
-/// Parts of a step at whose ends the sides are looked at: a pulse as short as one part is not missed.
+/// Parts of a step at whose ends the signs are looked at: a pulse as short as one part is not missed.
 const PARTS: usize = 4;
 
 /// Halvings of the bracket of a crossing at most.
 const MOST_HALVINGS: usize = 80;
 
-/// The first time in `(start, end]` at which a switching function is on another side than that held, and which it is.
-/// `crossed` says for a time inside the step what [`Sides::crossed`] says of the state there. The time returned is just
+/// The first time in `(start, end]` at which an event indicator has another sign than that held, and which it is.
+/// `crossed` says for a time inside the step what [`Signs::crossed`] says of the state there. The time returned is just
 /// past the crossing, by a rounding error.
 ///
 /// Two crossings of one function inside one part of the step are found where its values bend towards 0 there.
 pub(crate) fn first_crossing(
-    sides: &mut Sides,
+    signs: &mut Signs,
     start: f64,
     end: f64,
-    mut crossed: impl FnMut(&mut Sides, f64) -> Result<Option<usize>, Failure>,
+    mut crossed: impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
 ) -> Result<Option<(f64, usize)>, Failure> {
-    if sides.is_empty() {
+    if signs.is_empty() {
         return Ok(None);
     }
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
-    crossed(sides, start)?;
-    let mut seen = vec![sides.values().to_vec()];
+    crossed(signs, start)?;
+    let mut seen = vec![signs.values().to_vec()];
     for part in 1..=PARTS {
-        let found = crossed(sides, time(part))?;
-        seen.push(sides.values().to_vec());
+        let found = crossed(signs, time(part))?;
+        seen.push(signs.values().to_vec());
         if found.is_some() {
-            return halve(sides, time(part - 1), time(part), found, &mut crossed);
+            return halve(signs, time(part - 1), time(part), found, &mut crossed);
         }
         for turn in turns(&seen) {
             let turning = start + (end - start) * turn / PARTS as f64;
-            let found = crossed(sides, turning)?;
+            let found = crossed(signs, turning)?;
             if found.is_some() {
                 let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
-                return halve(sides, before, turning, found, &mut crossed);
+                return halve(signs, before, turning, found, &mut crossed);
             }
         }
     }
@@ -57,23 +57,23 @@ fn turns(seen: &[Vec<f64>]) -> Vec<f64> {
 
 /// Halves the bracket until it is as short as times can be told apart.
 fn halve(
-    sides: &mut Sides,
+    signs: &mut Signs,
     mut before: f64,
     mut after: f64,
     mut found: Option<usize>,
-    crossed: &mut impl FnMut(&mut Sides, f64) -> Result<Option<usize>, Failure>,
+    crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
 ) -> Result<Option<(f64, usize)>, Failure> {
     for _ in 0..MOST_HALVINGS {
         let middle = before + 0.5 * (after - before);
         if middle <= before || middle >= after {
             break;
         }
-        match crossed(sides, middle)? {
+        match crossed(signs, middle)? {
             None => before = middle,
             there => (after, found) = (middle, there),
         }
     }
-    Ok(found.map(|switch| (after, switch)))
+    Ok(found.map(|indicator| (after, indicator)))
 }
 
 #[cfg(test)]
@@ -81,12 +81,12 @@ fn halve(
 mod tests {
     use super::*;
 
-    /// The first crossing of `g`, whose side is held from 0, in (0, 1].
+    /// The first zero crossing of `g`, whose sign is held from 0, in (0, 1].
     fn first(g: impl Fn(f64) -> f64) -> Option<f64> {
-        let mut sides = Sides { held: vec![g(0.0) > 0.0], values: vec![0.0] };
-        let crossing = first_crossing(&mut sides, 0.0, 1.0, |sides, t| {
-            sides.values[0] = g(t);
-            Ok((sides.held[0] != (g(t) > 0.0)).then_some(0))
+        let mut signs = Signs { held: vec![g(0.0) > 0.0], values: vec![0.0] };
+        let crossing = first_crossing(&mut signs, 0.0, 1.0, |signs, t| {
+            signs.values[0] = g(t);
+            Ok((signs.held[0] != (g(t) > 0.0)).then_some(0))
         });
         crossing.unwrap().map(|(time, _)| time)
     }

@@ -1,54 +1,92 @@
-//! Switching functions: which side they are on, and where they change it.
+//! Events: where a system is not smooth, and what happens there.
 
 mod chatter;
 mod locate;
+mod signs;
 
 pub(crate) use chatter::Chatter;
 pub(crate) use locate::first_crossing;
+pub(crate) use signs::Signs;
 
 use crate::Failure;
-use crate::scene::Scene;
 
-/// The side of each switching function during the present mode.
-pub(crate) struct Sides {
-    held: Vec<bool>,
-    values: Vec<f64>,
-}
+/// The events of a system, and what can be seen of it where a run stands.
+///
+/// A *point* is what a run moves: the states of a [`System`](crate::System); all unknowns, then all their rates, of an
+/// [`ImplicitSystem`](crate::ImplicitSystem).
+///
+/// # Between events
+///
+/// Between two events every function of the system is smooth, so that a step may evaluate it anywhere, slightly beyond the
+/// step included. A system therefore holds a *mode*, which only [`handle_event`](Events::handle_event) changes:
+///
+/// - the *current interval* of time, from the time event handled last to the one that
+///   [`next_time_event`](Events::next_time_event) announces. Conditions on time alone, corners of tables and held samples
+///   are evaluated as in the inside of this interval, whatever `t` they are asked at. So `if t < 0.3 then a else b` gives
+///   `a` in a step that ends at 0.3, and `b` at the same instant after `handle_event(0.3, …)`.
+/// - the *sign* of each event indicator: `true` while it is `> 0`, `false` while it is `<= 0` (a condition `x >= 0` is the
+///   negation of the sign of `-x`). Both branches must be evaluable a little beyond the zero crossing.
+///
+/// An integration starts with `handle_event(from, point)`: the start counts as an event. It stops exactly at each time
+/// event and each located zero crossing, calls `handle_event` and goes on from there.
+///
+/// All slices have the documented lengths; times are in s, everything else in the unit of its variable.
+pub trait Events {
+    /// The first time event after `t`, known in advance: a jump of a source, a corner of an input table, the next sample or
+    /// the arrival of a delayed jump. `None`: there are no more. The integration stops exactly there, to the last bit.
+    /// Between two calls of [`handle_event`](Events::handle_event) the answer stays the same.
+    fn next_time_event(&mut self, t: f64) -> Option<f64>;
 
-impl Sides {
-    pub(crate) fn new(switches: usize) -> Sides {
-        Sides { held: vec![false; switches], values: vec![0.0; switches] }
+    /// Whether the time event announced at `t` is a mere corner, as between rows of an input table: neither values nor
+    /// rates jump there, only slopes. Asked before it is handled.
+    fn is_corner(&mut self, t: f64) -> bool {
+        let _ = t;
+        false
     }
 
-    /// Whether there is nothing to watch.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.held.is_empty()
+    /// Number of event indicators, functions of the state whose zero crossings are events (`if x > 0`); 0 if there are none.
+    fn indicators(&self) -> usize;
+
+    /// How messages name an event indicator, as in `the condition of valve`. Called only when a run fails.
+    fn indicator_name(&self, indicator: usize) -> String {
+        format!("condition {}", indicator + 1)
     }
 
-    /// Values of the switching functions where they were asked for last.
-    pub(crate) fn values(&self) -> &[f64] {
-        &self.values
+    /// Event indicators at `(t, point)`, [`indicators`](Events::indicators) of them, in the present mode, each continuous in
+    /// time and point.
+    ///
+    /// # Errors
+    /// A failure names time and element, as everywhere here.
+    fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure>;
+
+    /// The integration stands at `t`: at its start, exactly at an announced time event, or just past a located zero
+    /// crossing. Up to here the old mode was used. Moves the current interval if `t` has reached the time event, takes the
+    /// signs of all event indicators from their values at `(t, point)`, and may change the point. That of an implicit system
+    /// it leaves consistent with the new mode: `F = 0`, and the hidden constraints of a higher index hold as well; the rate
+    /// of an algebraic unknown may be anything finite.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators).
+    fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure>;
+
+    /// The step that ends at `(t, point)` is accepted, or the run starts there: Newton starting points and delay buffers,
+    /// which belong to the model's memory, move on. Times never decrease from call to call.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators).
+    fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure>;
+
+    /// Number of values that [`observe`](Events::observe) writes.
+    fn observed(&self) -> usize;
+
+    /// How messages name a recorded value, as in `R1.e`. Called only when a run fails.
+    fn observed_name(&self, value: usize) -> String {
+        format!("recorded value {}", value + 1)
     }
 
-    /// Takes the sides at `(t, x)`, as the system does in `cross_jump`.
-    pub(crate) fn take(&mut self, scene: &mut dyn Scene, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if self.is_empty() {
-            return Ok(());
-        }
-        scene.switch_values(t, x, &mut self.values)?;
-        self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
-        Ok(())
-    }
-
-    /// The first switching function that at `(t, x)` is on another side than that held; `None` if all keep theirs.
-    pub(crate) fn crossed(&mut self, scene: &mut dyn Scene, t: f64, x: &[f64]) -> Result<Option<usize>, Failure> {
-        if self.is_empty() {
-            return Ok(None);
-        }
-        scene.switch_values(t, x, &mut self.values)?;
-        if let Some(switch) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: scene.switch_name(switch) });
-        }
-        Ok(self.held.iter().zip(&self.values).position(|(&held, &value)| held != (value > 0.0)))
-    }
+    /// Values recorded at `(t, point)`, [`observed`](Events::observed) of them.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators).
+    fn observe(&mut self, t: f64, point: &[f64], out: &mut [f64]) -> Result<(), Failure>;
 }

@@ -1,16 +1,18 @@
 //! Methods with a step of fixed length, for reproducible runs and real time. A step only computes.
 //!
-//! Announced jumps are met exactly, by a shorter step. Switches of the state are not located: the step in which one is
-//! crossed is finished on the old side, beyond the switch, and the new side holds from its end on. That costs at most an
-//! error of the order of the step where the rates jump, of its square where they only bend.
+//! Time events are met exactly, by a shorter step. Zero crossings are not located: the step in which one lies is finished in
+//! the old mode, and the new one holds from its end on. That costs at most an error of the order of the step where the rates
+//! jump, of its square where they only bend.
 
 mod implicit_midpoint;
 mod matrix;
 mod rosenbrock;
+mod ticks;
 
 use crate::{Failure, Sparsity, System};
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
+pub(crate) use ticks::{Ticks, target};
 
 /// A method of fixed step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,12 +114,24 @@ impl FixedStep {
         }
     }
 
-    /// Moves `x` from `t` to `t + h`, in the system's present mode. No jump may lie inside the step. Does not allocate
+    /// Moves `x` from `t` to `t + h`, in the system's present mode. No event may lie inside the step. Does not allocate
     /// unless it fails.
     ///
     /// # Errors
     /// What the system reports, a state that is no longer finite, or Newton without convergence. `x` is then unchanged.
     pub fn step(&mut self, system: &mut dyn System, t: f64, h: f64, x: &mut [f64]) -> Result<(), Failure> {
+        self.advance(system, t, h, x)?;
+        x.copy_from_slice(self.advanced());
+        Ok(())
+    }
+
+    /// The state where the last step ended.
+    pub(crate) fn advanced(&self) -> &[f64] {
+        &self.trial
+    }
+
+    /// As [`step`](FixedStep::step), but leaves the state to [`advanced`](FixedStep::advanced).
+    pub(crate) fn advance(&mut self, system: &mut dyn System, t: f64, h: f64, x: &[f64]) -> Result<(), Failure> {
         match (self.tableau, &mut self.implicit) {
             (Some(tableau), _) => self.explicit(tableau, system, t, h, x)?,
             (None, Some(Implicit::Midpoint(midpoint))) => midpoint.step(system, t, h, x, &mut self.trial)?,
@@ -127,7 +141,6 @@ impl FixedStep {
         if let Some(state) = self.trial.iter().position(|value| !value.is_finite()) {
             return Err(Failure::NotFinite { time: t + h, what: system.state_name(state) });
         }
-        x.copy_from_slice(&self.trial);
         Ok(())
     }
 

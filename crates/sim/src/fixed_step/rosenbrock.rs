@@ -55,7 +55,7 @@ pub(super) struct LinearlyImplicit {
     /// The stages, one vector after the other.
     stages: Vec<f64>,
     rates: Vec<f64>,
-    drift: Vec<f64>,
+    time_derivative: Vec<f64>,
 }
 
 impl LinearlyImplicit {
@@ -66,7 +66,7 @@ impl LinearlyImplicit {
             matrix: StepMatrix::new(sparsity),
             stages: vec![0.0; method.nodes.len() * states],
             rates: vec![0.0; states],
-            drift: vec![0.0; states],
+            time_derivative: vec![0.0; states],
         }
     }
 
@@ -81,7 +81,7 @@ impl LinearlyImplicit {
     ) -> Result<(), Failure> {
         let (method, n) = (self.method, x.len());
         let scale = h * method.gamma;
-        system.drift(t, x, &mut self.drift)?;
+        system.time_derivative(t, x, &mut self.time_derivative)?;
         self.matrix.factor(system, t, x, scale)?;
         for stage in 0..method.nodes.len() {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
@@ -93,7 +93,7 @@ impl LinearlyImplicit {
             for (i, own) in own.iter_mut().enumerate() {
                 let weights = method.right[stage].iter().enumerate();
                 let sum: f64 = weights.map(|(j, c)| c * earlier[j * n + i]).sum();
-                let drift = method.drifts[stage] * h * self.drift[i];
+                let drift = method.drifts[stage] * h * self.time_derivative[i];
                 *own = scale * (self.rates[i] + drift) + method.gamma * sum;
             }
             self.matrix.solve(own);

@@ -1,11 +1,10 @@
 //! A semi-explicit system as one of states, some of which are algebraic.
 
-use crate::scene::halves;
-use crate::{Failure, ImplicitSystem, Sparsity, System};
+use crate::{Events, Failure, HybridImplicitSystem, Sparsity, System, halves, halves_mut};
 
 /// `M y' = f(t, y)` with ones and zeros in `M`: the rates are `f`, which is 0 for algebraic unknowns.
 pub(super) struct SemiExplicit<'a> {
-    system: &'a mut dyn ImplicitSystem,
+    system: &'a mut dyn HybridImplicitSystem,
     differential: Vec<bool>,
     scales: Vec<f64>,
     /// Rates that the residual is asked at, always 0, so that it is `-f`.
@@ -20,7 +19,7 @@ pub(super) struct SemiExplicit<'a> {
 
 impl<'a> SemiExplicit<'a> {
     pub(super) fn new(
-        system: &'a mut dyn ImplicitSystem,
+        system: &'a mut dyn HybridImplicitSystem,
         differential: Vec<bool>,
         scales: Vec<f64>,
     ) -> SemiExplicit<'a> {
@@ -72,12 +71,6 @@ impl System for SemiExplicit<'_> {
     fn state_name(&self, state: usize) -> String {
         self.system.unknown_name(state)
     }
-    fn switch_name(&self, switch: usize) -> String {
-        self.system.switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.system.observed_name(value)
-    }
     fn scales(&self) -> &[f64] {
         &self.scales
     }
@@ -86,50 +79,58 @@ impl System for SemiExplicit<'_> {
         dx.iter_mut().for_each(|rate| *rate = -*rate);
         Ok(())
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.linearise(t, x)?;
         jv.fill(0.0);
         let entries = self.system.sparsity().entries().zip(&self.dy);
         entries.for_each(|((row, column), dy)| jv[row] -= dy * v[column]);
         Ok(())
     }
-    fn drift(&mut self, t: f64, _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
         // Only methods of fixed step ask for it, which no implicit form has.
         Err(Failure::NotFinite { time: t, what: "the derivative by time of an implicit form".into() })
     }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }
-    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.complete(t, x)?;
-        let (y, yp) = halves(&self.point);
-        self.system.observe(t, y, yp, out)
-    }
-    fn observed(&self) -> usize {
-        self.system.observed()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.system.next_jump(t)
+}
+
+impl Events for SemiExplicit<'_> {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        self.system.next_time_event(t)
     }
     fn is_corner(&mut self, t: f64) -> bool {
         self.system.is_corner(t)
     }
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+    fn indicators(&self) -> usize {
+        self.system.indicators()
+    }
+    fn indicator_name(&self, indicator: usize) -> String {
+        self.system.indicator_name(indicator)
+    }
+    fn event_indicators(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.complete(t, x)?;
+        self.system.event_indicators(t, &self.point, g)
+    }
+    fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.taken = None;
-        let yp = &mut self.point[x.len()..];
-        self.system.cross_jump(t, x, yp)
+        halves_mut(&mut self.point).0.copy_from_slice(x);
+        self.system.handle_event(t, &mut self.point)?;
+        x.copy_from_slice(halves(&self.point).0);
+        Ok(())
     }
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.complete(t, x)?;
-        let (y, yp) = halves(&self.point);
-        self.system.accept(t, y, yp)
+        self.system.accept(t, &self.point)
     }
-    fn switches(&self) -> usize {
-        self.system.switches()
+    fn observed(&self) -> usize {
+        self.system.observed()
     }
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+    fn observed_name(&self, value: usize) -> String {
+        self.system.observed_name(value)
+    }
+    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.complete(t, x)?;
-        let (y, yp) = halves(&self.point);
-        self.system.switch_values(t, y, yp, g)
+        self.system.observe(t, &self.point, out)
     }
 }

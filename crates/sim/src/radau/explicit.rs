@@ -51,12 +51,6 @@ impl ImplicitSystem for Explicit<'_> {
     fn equation_name(&self, equation: usize) -> String {
         format!("the rate of {}", self.unknown_name(equation))
     }
-    fn switch_name(&self, switch: usize) -> String {
-        self.shared.system().switch_name(switch)
-    }
-    fn observed_name(&self, value: usize) -> String {
-        self.shared.system().observed_name(value)
-    }
     fn scales(&mut self, _: f64, _: f64) -> Result<Vec<f64>, Failure> {
         Ok(self.scales.clone())
     }
@@ -81,31 +75,5 @@ impl ImplicitSystem for Explicit<'_> {
     }
     fn semi_explicit(&self) -> Option<&[bool]> {
         Some(&self.differential)
-    }
-    fn observe(&mut self, t: f64, y: &[f64], _: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.shared.system().observe(t, y, out)
-    }
-    fn observed(&self) -> usize {
-        self.shared.system().observed()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
-        self.shared.system().next_jump(t)
-    }
-    fn is_corner(&mut self, t: f64) -> bool {
-        self.shared.system().is_corner(t)
-    }
-    fn cross_jump(&mut self, t: f64, y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
-        let mut system = self.shared.system();
-        system.cross_jump(t, y)?;
-        system.rates(t, y, yp)
-    }
-    fn accept(&mut self, t: f64, y: &[f64], _: &[f64]) -> Result<(), Failure> {
-        self.shared.system().accept(t, y)
-    }
-    fn switches(&self) -> usize {
-        self.shared.system().switches()
-    }
-    fn switch_values(&mut self, t: f64, y: &[f64], _: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        self.shared.system().switch_values(t, y, g)
     }
 }

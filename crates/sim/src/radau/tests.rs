@@ -55,27 +55,6 @@ impl ImplicitSystem for Dense {
     fn semi_explicit(&self) -> Option<&[bool]> {
         Some(&[])
     }
-    fn observe(&mut self, _: f64, _: &[f64], _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
-        Ok(())
-    }
-    fn observed(&self) -> usize {
-        0
-    }
-    fn next_jump(&mut self, _: f64) -> Option<f64> {
-        None
-    }
-    fn cross_jump(&mut self, _: f64, _: &mut [f64], _: &mut [f64]) -> Result<(), Failure> {
-        Ok(())
-    }
-    fn accept(&mut self, _: f64, _: &[f64], _: &[f64]) -> Result<(), Failure> {
-        Ok(())
-    }
-    fn switches(&self) -> usize {
-        0
-    }
-    fn switch_values(&mut self, _: f64, _: &[f64], _: &[f64], _: &mut [f64]) -> Result<(), Failure> {
-        Ok(())
-    }
 }
 
 /// Runs from 0 to `to`.

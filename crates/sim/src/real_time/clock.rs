@@ -1,6 +1,4 @@
-//! The clock of a run in real time.
-
-use std::time::{Duration, Instant};
+//! The clock of a run in real time, which the caller has.
 
 /// A clock in s, whose zero is anywhere.
 pub trait Clock {
@@ -12,40 +10,5 @@ pub trait Clock {
     fn wait_busily(&mut self, until: f64, offer: &mut dyn FnMut(f64)) {
         let _ = offer;
         self.wait(until);
-    }
-}
-
-/// The clock on the wall. It sleeps while there is time, and spins before a tick is due, since sleepers wake late.
-#[derive(Clone, Copy, Debug)]
-pub struct WallClock {
-    zero: Instant,
-    spin: Duration,
-}
-
-impl WallClock {
-    /// A clock that spins for the last `spin` before a tick.
-    pub fn new(spin: Duration) -> WallClock {
-        WallClock { zero: Instant::now(), spin }
-    }
-}
-
-impl Clock for WallClock {
-    fn now(&mut self) -> f64 {
-        self.zero.elapsed().as_secs_f64()
-    }
-
-    fn wait(&mut self, until: f64) {
-        self.wait_busily(until, &mut |_| ());
-    }
-
-    fn wait_busily(&mut self, until: f64, offer: &mut dyn FnMut(f64)) {
-        let Ok(until) = Duration::try_from_secs_f64(until) else { return };
-        if let Some(pause) = until.checked_sub(self.zero.elapsed() + self.spin) {
-            std::thread::sleep(pause);
-        }
-        while let Some(left) = until.checked_sub(self.zero.elapsed()).filter(|left| !left.is_zero()) {
-            offer(left.as_secs_f64());
-            std::hint::spin_loop();
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! Magnitudes of states of which nothing is known but the system itself: most machines start at rest.
 
 use crate::jacobian::Jacobian;
-use crate::{Failure, System};
+use crate::{Failure, HybridSystem, System};
 
 /// Times the system is looked at: at the start, then where the states known so far will have moved.
 const LOOKS: usize = 4;
@@ -30,8 +30,8 @@ type Entry = (usize, usize, f64);
 ///
 /// # Errors
 /// What the system reports at `(t, x)`.
-pub fn magnitudes(system: &mut dyn System, (t, x): (f64, &[f64]), span: f64) -> Result<Vec<f64>, Failure> {
-    let interval = system.next_jump(t).map_or(span, |jump| span.min(jump - t));
+pub fn magnitudes(system: &mut dyn HybridSystem, (t, x): (f64, &[f64]), span: f64) -> Result<Vec<f64>, Failure> {
+    let interval = system.next_time_event(t).map_or(span, |event| span.min(event - t));
     let mut magnitudes: Vec<f64> = x.iter().zip(system.scales()).map(|(x, scale)| scale.max(x.abs())).collect();
     let before = magnitudes.clone();
     guess_magnitudes(system, (t, x), interval, &mut magnitudes)?;

@@ -54,7 +54,7 @@ impl Stiffness {
 
     /// Growth of the vector under the Jacobian; `None` where that cannot be had.
     fn radius(&mut self, system: &mut dyn System, tolerances: &Tolerances, t: f64, x: &[f64]) -> Option<f64> {
-        system.tangent(t, x, &self.vector, &mut self.product).ok()?;
+        system.directional_derivative(t, x, &self.vector, &mut self.product).ok()?;
         let size = |v: &[f64]| {
             let parts = v.iter().zip(tolerances.magnitudes()).map(|(v, magnitude)| v / magnitude);
             parts.map(|part| part * part).sum::<f64>().sqrt()

@@ -2,18 +2,18 @@
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 #![allow(dead_code)]
 
-use halfarrow_sim::{Failure, Options, Sink, Sparsity, Stopped, Summary, System, simulate};
+use halfarrow_sim::{Events, Failure, Options, Sink, Sparsity, Stopped, Summary, System, simulate};
 
-/// Rates, and values of the switching functions: `(t, x, mode, out)`.
+/// Rates, and event indicators: `(t, x, mode, out)`.
 type Function = fn(f64, &[f64], &Mode, &mut [f64]);
 
-/// Between which jumps, and on which sides of the switches, the system is.
+/// Between which time events, and with which signs of its event indicators, the system is.
 #[derive(Clone, Debug, Default)]
 pub struct Mode {
     /// Jumps crossed so far.
     pub interval: usize,
-    /// Side of each switching function.
-    pub sides: Vec<bool>,
+    /// Sign of each event indicator.
+    pub signs: Vec<bool>,
 }
 
 /// A system with a known solution.
@@ -29,7 +29,7 @@ pub struct Known {
     pub drift: fn(f64, &[f64], &mut [f64]),
     pub solution: fn(f64) -> Vec<f64>,
     pub jumps: Vec<f64>,
-    pub switches: Function,
+    pub indicators: Function,
     /// Changes the state at a jump or crossing: `(t, mode before, x)`.
     pub reset: fn(f64, &Mode, &mut [f64]),
     pub mode: Mode,
@@ -55,7 +55,7 @@ impl Known {
             drift: |_, _, out| out.fill(0.0),
             solution,
             jumps: vec![],
-            switches: |_, _, _, _| {},
+            indicators: |_, _, _, _| {},
             reset: |_, _, _| {},
             mode: Mode::default(),
             latest: f64::NEG_INFINITY,
@@ -63,10 +63,10 @@ impl Known {
         }
     }
 
-    /// With switching functions, `count` of them.
-    pub fn with_switches(mut self, count: usize, switches: Function) -> Known {
-        self.mode.sides = vec![false; count];
-        self.switches = switches;
+    /// With event indicators, `count` of them.
+    pub fn with_indicators(mut self, count: usize, indicators: Function) -> Known {
+        self.mode.signs = vec![false; count];
+        self.indicators = indicators;
         self
     }
 
@@ -106,33 +106,36 @@ impl System for Known {
             false => Err(Failure::NotFinite { time: t, what: "a rate".into() }),
         }
     }
-    fn tangent(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
+    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         (self.tangent)(t, x, v, &self.mode, jv);
         Ok(())
     }
-    fn drift(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         (self.drift)(t, x, out);
         Ok(())
     }
     fn sparsity(&self) -> &Sparsity {
         &self.sparsity
     }
-    fn observe(&mut self, _: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        out.copy_from_slice(x);
-        Ok(())
-    }
-    fn observed(&self) -> usize {
-        self.start.len()
-    }
-    fn next_jump(&mut self, t: f64) -> Option<f64> {
+}
+
+impl Events for Known {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
         self.jumps.iter().copied().find(|&jump| jump > t)
     }
-    fn cross_jump(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+    fn indicators(&self) -> usize {
+        self.mode.signs.len()
+    }
+    fn event_indicators(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        (self.indicators)(t, x, &self.mode, g);
+        Ok(())
+    }
+    fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         (self.reset)(t, &self.mode, x);
         self.mode.interval = self.jumps.iter().filter(|&&jump| jump <= t).count();
-        let mut values = vec![0.0; self.mode.sides.len()];
-        (self.switches)(t, x, &self.mode, &mut values);
-        self.mode.sides = values.iter().map(|&value| value > 0.0).collect();
+        let mut values = vec![0.0; self.mode.signs.len()];
+        (self.indicators)(t, x, &self.mode, &mut values);
+        self.mode.signs = values.iter().map(|&value| value > 0.0).collect();
         self.latest = t;
         Ok(())
     }
@@ -141,11 +144,11 @@ impl System for Known {
         self.accepted.push(t);
         Ok(())
     }
-    fn switches(&self) -> usize {
-        self.mode.sides.len()
+    fn observed(&self) -> usize {
+        self.start.len()
     }
-    fn switch_values(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        (self.switches)(t, x, &self.mode, g);
+    fn observe(&mut self, _: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        out.copy_from_slice(x);
         Ok(())
     }
 }
@@ -315,9 +318,9 @@ pub fn ball() -> Known {
         |_, _, v, _, jv| (jv[0], jv[1]) = (v[1], 0.0),
         |_| vec![],
     )
-    .with_switches(1, |_, x, _, g| g[0] = x[0]);
+    .with_indicators(1, |_, x, _, g| g[0] = x[0]);
     system.reset = |t, mode, x| {
-        if mode.sides[0] && x[0] <= 0.0 && t > 0.0 {
+        if mode.signs[0] && x[0] <= 0.0 && t > 0.0 {
             (x[0], x[1]) = (f64::MIN_POSITIVE, -0.5 * x[1]);
         }
     };
@@ -328,8 +331,8 @@ pub fn ball() -> Known {
 pub fn lopsided() -> Known {
     let mut system = Known::new(
         &[0.0, 1.0],
-        |_, x, mode, dx| (dx[0], dx[1]) = (x[1], if mode.sides[0] { -4.0 * x[0] } else { -x[0] }),
-        |_, _, v, mode, jv| (jv[0], jv[1]) = (v[1], if mode.sides[0] { -4.0 * v[0] } else { -v[0] }),
+        |_, x, mode, dx| (dx[0], dx[1]) = (x[1], if mode.signs[0] { -4.0 * x[0] } else { -x[0] }),
+        |_, _, v, mode, jv| (jv[0], jv[1]) = (v[1], if mode.signs[0] { -4.0 * v[0] } else { -v[0] }),
         |t| {
             let (half, period) = (0.5 * std::f64::consts::PI, 1.5 * std::f64::consts::PI);
             let phase = t.rem_euclid(period);
@@ -341,8 +344,8 @@ pub fn lopsided() -> Known {
             }
         },
     )
-    .with_switches(1, |_, x, _, g| g[0] = x[0]);
-    system.mode.sides = vec![true];
+    .with_indicators(1, |_, x, _, g| g[0] = x[0]);
+    system.mode.signs = vec![true];
     system
 }
 
@@ -350,11 +353,11 @@ pub fn lopsided() -> Known {
 pub fn relay() -> Known {
     Known::new(
         &[1.0],
-        |_, _, mode, dx| dx[0] = if mode.sides[0] { -1.0 } else { 1.0 },
+        |_, _, mode, dx| dx[0] = if mode.signs[0] { -1.0 } else { 1.0 },
         |_, _, _, _, jv| jv[0] = 0.0,
         |t| vec![1.0 - t],
     )
-    .with_switches(1, |_, x, _, g| g[0] = x[0])
+    .with_indicators(1, |_, x, _, g| g[0] = x[0])
 }
 
 /// `x' = -2 √x`, which has no rate for `x < 0`: `(1 - t)²` until 1 s.
@@ -382,7 +385,7 @@ pub fn pulse() -> Known {
 /// Two signals of 1 rad/s, and a count of how often their difference to 0.999 has changed its sign: twice a period,
 /// 0.09 s apart.
 pub fn grazing() -> Known {
-    let mut system = oscillator().with_switches(1, |_, x, _, g| g[0] = x[1] - 0.999);
+    let mut system = oscillator().with_indicators(1, |_, x, _, g| g[0] = x[1] - 0.999);
     system.reset = |_, _, _| {};
     system
 }

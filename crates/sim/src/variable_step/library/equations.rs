@@ -119,7 +119,7 @@ impl<M: Matrix<T = f64>> NonLinearOp for Equations<'_, M> {
 impl<M: Matrix<T = f64>> NonLinearOpJacobian for Equations<'_, M> {
     fn jac_mul_inplace(&self, x: &M::V, t: f64, v: &M::V, y: &mut M::V) {
         y.for_each_batch_host([x, v], |jv, [x, v], _| {
-            self.guard(t, x, jv, |system, jv| system.tangent(t, x, v, jv));
+            self.guard(t, x, jv, |system, jv| system.directional_derivative(t, x, v, jv));
         });
     }
 

@@ -1,0 +1,217 @@
+//! Events of a model: what is held between them, and what happens where one is handled.
+
+use super::system::What;
+use super::{DelayOrSample, Model};
+use crate::bytecode::Hold;
+use halfarrow_sim::{Events, Failure};
+
+impl Model {
+    /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
+    fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
+            let states = &self.frame.r[self.code.layout.states as usize..][..x.len()];
+            if self.rated != Some(t) || states != x {
+                self.rates_at(t, x)?;
+            }
+            self.rated = None;
+            let blocks = self.code.rates.solves.iter().map(|solve| solve.block);
+            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+        }
+        if !self.recorded.blocks.is_empty() {
+            self.place(t, x);
+            self.evaluate(What::Recorded, false, t)?;
+            let blocks = self.recorded.blocks.iter();
+            blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+        }
+        Ok(())
+    }
+
+    /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
+    fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.rates_at(t, x)?;
+        self.still();
+        self.let_time_pass(t);
+        let Model { frame, code, dx, .. } = self;
+        frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
+        let run = self.frame.run_along(&self.code.sources);
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    fn source(&self, i: usize) -> (f64, f64) {
+        let register = self.code.sources.outputs[i] as usize;
+        (self.frame.r[register], self.frame.d[register])
+    }
+
+    /// Held signals at the start of a run. They may read each other: passes until nothing changes.
+    pub(super) fn begin_held(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        for _ in 0..self.run.held.len() {
+            self.place(t, x);
+            self.run_sources(t, x)?;
+            for i in 0..self.run.held.len() {
+                let (value, slope) = self.source(i);
+                match &mut self.run.held[i] {
+                    DelayOrSample::Delay(delay) => delay.begin(t, value, slope),
+                    DelayOrSample::Sample(sample) => sample.begin(t, value),
+                }
+            }
+        }
+        self.place(t, x);
+        Ok(())
+    }
+
+    /// Takes the samples that are due, in order: each sees those taken before it.
+    fn take_samples(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        for i in 0..self.run.held.len() {
+            if matches!(&self.run.held[i], DelayOrSample::Sample(sample) if sample.is_due(t)) {
+                self.place(t, x);
+                self.run_sources(t, x)?;
+                let (value, _) = self.source(i);
+                if let DelayOrSample::Sample(sample) = &mut self.run.held[i] {
+                    sample.value = value;
+                    sample.pass(t);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take_signs(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        if self.code.switching.is_empty() {
+            self.frame.conditions.state = Hold::Keep;
+            return Ok(());
+        }
+        self.frame.conditions.state = Hold::Take;
+        let run = self.frame.run(&self.code.indicators);
+        let frame = &mut self.frame;
+        for (&condition, &register) in self.code.switching.iter().zip(&self.code.indicators.outputs) {
+            frame.conditions.value(condition, frame.r[register as usize], &frame.tables);
+        }
+        frame.conditions.state = Hold::Keep;
+        self.run.signs_taken = Some(t);
+        run.map_err(|trouble| self.failure(t, trouble))
+    }
+
+    pub(super) fn has_delays(&self) -> bool {
+        self.run.held.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
+    }
+}
+
+impl Events for Model {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
+        let held = self.run.held.iter().filter_map(|held| match held {
+            DelayOrSample::Delay(delay) => delay.next_time_event(t),
+            DelayOrSample::Sample(sample) => Some(sample.next_time()),
+        });
+        inputs.chain(held).chain(self.run.clock_event).filter(|&next| next > t).reduce(f64::min)
+    }
+
+    fn is_corner(&mut self, t: f64) -> bool {
+        let held = self.run.held.iter().any(|held| match held {
+            DelayOrSample::Delay(delay) => delay.next_time_event(self.run.crossed) == Some(t),
+            DelayOrSample::Sample(sample) => sample.is_due(t),
+        });
+        !held && self.run.clock_event != Some(t) && !self.inputs().iter().any(|signal| signal.jumps_at(t))
+    }
+
+    fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        if t < self.run.crossed {
+            self.restart();
+        }
+        if let Some(failure) = self.broken().filter(|_| !self.run.begun) {
+            return Err(failure);
+        }
+        let sums = if self.run.begun { self.sums(t, x)? } else { Vec::new() };
+        self.run.crossed = t;
+        self.rated = None;
+        let inputs = &self.setup.given(self.run.mode).inputs;
+        self.run.pieces.iter_mut().zip(inputs).for_each(|(piece, signal)| *piece = signal.piece(t));
+        self.frame.conditions.state = Hold::Follow;
+        // A solution may leap where something jumps.
+        self.leave_solutions();
+        self.code.clock.cross(&mut self.frame, t, &mut self.run.clock_event);
+        if !self.run.begun {
+            self.begin_held(t, x)?;
+            self.run.begun = true;
+            self.take_signs(t, x)?;
+        } else {
+            self.keep_sums(t, x, &sums)?;
+            self.take_samples(t, x)?;
+            self.keep_sums(t, x, &sums)?;
+            self.take_signs(t, x)?;
+            if self.keep_sums(t, x, &sums)? {
+                self.take_signs(t, x)?;
+            }
+        }
+        if self.has_delays() {
+            self.run_sources(t, x)?;
+            for i in 0..self.run.held.len() {
+                let (value, slope) = self.source(i);
+                if let DelayOrSample::Delay(delay) = &mut self.run.held[i] {
+                    delay.jump(t, value, slope);
+                }
+            }
+        }
+        self.follow_solutions(t, x)
+    }
+
+    fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.has_delays() {
+            self.place(t, x);
+            self.run_sources(t, x)?;
+            for i in 0..self.run.held.len() {
+                let (value, slope) = self.source(i);
+                if let DelayOrSample::Delay(delay) = &mut self.run.held[i] {
+                    delay.append(t, value, slope);
+                }
+            }
+        }
+        self.follow_solutions(t, x)
+    }
+
+    fn indicators(&self) -> usize {
+        self.code.switching.iter().map(|&c| self.code.program.conditions[c].kind.switches()).sum()
+    }
+
+    fn event_indicators(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.evaluate(What::Indicators, false, t)?;
+        let frame = &self.frame;
+        let mut next = 0;
+        for (&condition, &register) in self.code.switching.iter().zip(&self.code.indicators.outputs) {
+            let mut beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
+            if self.run.signs_taken == Some(t) {
+                frame.conditions.confirm(condition, &mut beyond);
+            }
+            let count = self.code.program.conditions[condition].kind.switches();
+            g[next..next + count].copy_from_slice(&beyond[..count]);
+            next += count;
+        }
+        Ok(())
+    }
+
+    fn observed(&self) -> usize {
+        self.recorded.chosen.len()
+    }
+
+    fn observed_name(&self, value: usize) -> String {
+        self.code.program.observed[self.recorded.chosen[value]].name.clone()
+    }
+
+    fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.place(t, x);
+        self.evaluate(What::Recorded, false, t)?;
+        out.iter_mut().zip(&self.recorded.routine.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
+        match out.iter().position(|value| value.is_nan()).or(out.iter().position(|value| value.is_infinite())) {
+            // What a modeller computes for himself may be infinite, what a law gives may not.
+            Some(value) if out[value].is_infinite() => self.explain(t).map_or(Ok(()), Err)?,
+            Some(value) => {
+                let not_finite = Failure::NotFinite { time: t, what: self.observed_name(value) };
+                return Err(self.explain(t).unwrap_or(not_finite));
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}

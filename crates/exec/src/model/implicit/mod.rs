@@ -1,0 +1,217 @@
+//! Any form of a graph as a system `F(t, y, y') = 0`, with the minimal form beside it: that knows what is consistent.
+
+mod consistent;
+mod state_map;
+mod system;
+
+use super::{InputError, Memory, Model, Operations, ParameterError, RecordError, StartError};
+use halfarrow_compiler::program::Program;
+use halfarrow_sim::{Events as _, Failure, ImplicitSystem as _, System};
+use state_map::{StateMap, without_rates_of_inputs};
+use std::sync::Arc;
+
+/// A form of a graph as a system in implicit form.
+///
+/// The same bytecode and the same exact derivatives serve every form: explicit ones are `y' - f(t, y)`. Consistent values
+/// come from the minimal form of the same graph, the `reference`: the forms share the variables of the graph, so that
+/// each unknown, multipliers and break variables included, is evaluated there.
+#[derive(Debug, Clone)]
+pub struct ImplicitModel {
+    form: Model,
+    reference: Model,
+    map: Arc<StateMap>,
+    /// The state of the reference.
+    x: Vec<f64>,
+    begun: bool,
+}
+
+/// What a run of a form remembers, and the minimal form beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImplicitMemory {
+    form: Memory,
+    reference: Memory,
+    x: Vec<f64>,
+    begun: bool,
+}
+
+impl ImplicitModel {
+    /// Makes a form ready to run. `reference` is the minimal form of the same graph.
+    ///
+    /// # Errors
+    /// Equations of parameters alone that have no solution.
+    pub fn new(mut program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
+        without_rates_of_inputs(&mut program, reference.program());
+        let mut form = Model::new(program)?;
+        let map = Arc::new(StateMap::new(&mut form, &mut reference));
+        let x = vec![0.0; reference.states()];
+        form.restart();
+        Ok(ImplicitModel { form, reference, map, x, begun: false })
+    }
+
+    /// The program of the form.
+    pub fn program(&self) -> &Program {
+        self.form.program()
+    }
+
+    /// What one evaluation of the residuals takes.
+    pub fn operations(&self) -> Operations {
+        let mut counted = self.form.operations();
+        counted.additions += self.map.equations.explicit.iter().filter(|explicit| **explicit).count();
+        counted
+    }
+
+    /// As [`Model::floating`].
+    pub fn floating(&self) -> Vec<String> {
+        self.form.floating()
+    }
+
+    /// The minimal form beside it.
+    pub fn reference(&self) -> &Model {
+        &self.reference
+    }
+
+    /// The minimal form beside it, to start it: [`start_at`](ImplicitModel::start_at) goes on from its state.
+    pub fn reference_mut(&mut self) -> &mut Model {
+        &mut self.reference
+    }
+
+    /// The fastest rate of the minimal form linearised at the state `x`, in 1/s: of one state by itself, or of two that
+    /// exchange energy. `None` where it has none.
+    pub fn fastest_rate(&mut self, t: f64, x: &[f64]) -> Option<f64> {
+        let n = x.len();
+        let (_, jacobian) = self.reference.at_rest(t, x).ok()?;
+        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+        let fastest =
+            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
+        (fastest > 0.0 && fastest.is_finite()).then_some(fastest)
+    }
+
+    /// The form alone, as it stands. A form with explicit equations is a [`System`]; others are not.
+    pub fn into_form(self) -> Model {
+        self.form
+    }
+
+    /// As [`Model::set_parameter`], for both forms. A parameter that only the form has is set there.
+    ///
+    /// # Errors
+    /// As [`Model::set_parameter`].
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        self.begun = false;
+        match self.reference.set_parameter(name, value) {
+            Ok(()) | Err(ParameterError::Unknown(_)) => self.form.set_parameter(name, value),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// As [`Model::set_parameter`], for a parameter that the form alone has; the minimal form keeps its state.
+    ///
+    /// # Errors
+    /// As [`Model::set_parameter`].
+    pub fn set_form_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        self.begun = false;
+        self.form.set_parameter(name, value)
+    }
+
+    /// The present value of a parameter of the form, by its number.
+    pub fn parameter(&self, index: usize) -> Option<f64> {
+        let name = &self.form.program().parameters.get(index)?.name;
+        self.form.parameter(name)
+    }
+
+    /// As [`Model::connect`], for both forms.
+    ///
+    /// # Errors
+    /// As [`Model::connect`].
+    pub fn connect(&mut self, input: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
+        self.begun = false;
+        self.reference.connect(input, times, values)?;
+        self.form.connect(input, times, values)
+    }
+
+    /// As [`Model::record`].
+    ///
+    /// # Errors
+    /// As [`Model::record`].
+    pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
+        self.form.record(names)
+    }
+
+    /// As [`Model::record_all`].
+    pub fn record_all(&mut self) {
+        self.form.record_all();
+    }
+
+    /// Indices into [`Program::observed`] of what is recorded.
+    pub fn recorded(&self) -> &[usize] {
+        self.form.recorded()
+    }
+
+    /// What the run remembers, as [`Model::memory`].
+    pub fn memory(&self) -> ImplicitMemory {
+        let ImplicitModel { form, reference, x, begun, .. } = self;
+        ImplicitMemory { form: form.memory(), reference: reference.memory(), x: x.clone(), begun: *begun }
+    }
+
+    /// Goes on from it, as [`Model::restore`].
+    ///
+    /// # Panics
+    /// If it is the memory of another model.
+    pub fn restore(&mut self, memory: &ImplicitMemory) {
+        self.form.restore(&memory.form);
+        self.reference.restore(&memory.reference);
+        self.x.copy_from_slice(&memory.x);
+        self.begun = memory.begun;
+    }
+
+    /// Unknowns and their rates at the start of a run at `t`, those of the minimal form. Unknowns that it does not know (a
+    /// reaction to an input whose rate nobody gives) are 0.
+    ///
+    /// # Errors
+    /// As [`Model::initialise`].
+    pub fn initialise(&mut self, t: f64) -> Result<(Vec<f64>, Vec<f64>), StartError> {
+        let x = self.reference.initialise(t)?;
+        self.start_at(t, &x).map_err(StartError::Failure)
+    }
+
+    /// Unknowns and their rates where the minimal form has the state `x` at the start of a run.
+    ///
+    /// # Errors
+    /// As [`Model::rates`](System::rates).
+    pub fn start_at(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        self.form.restart();
+        if let Some(failure) = self.form.broken() {
+            return Err(failure);
+        }
+        self.begun = false;
+        self.x.copy_from_slice(x);
+        let n = self.unknowns();
+        let (mut y, mut yp) = (vec![0.0; n], vec![0.0; n]);
+        if self.map.twin {
+            self.form.run.conserved.copy_from_slice(&self.reference.run.conserved);
+        }
+        self.reference.handle_event(t, &mut self.x)?;
+        self.guess(t)?;
+        self.take_over(t, &mut y)?;
+        self.form.handle_event(t, &mut y)?;
+        self.take_rates(t, &y, &mut yp)?;
+        self.settle(t, &mut y, &mut yp)?;
+        self.begun = true;
+        Ok((y, yp))
+    }
+
+    /// Unknowns and their rates where the minimal form has the state `x`, in the present mode of both.
+    ///
+    /// # Errors
+    /// As [`Model::rates`](System::rates).
+    pub fn at(&mut self, t: f64, x: &[f64], y: &mut [f64], yp: &mut [f64]) -> Result<(), Failure> {
+        self.x.copy_from_slice(x);
+        // The state may be far from the last one.
+        for model in [&mut self.reference, &mut self.form] {
+            model.leave_solutions();
+        }
+        self.guess(t)?;
+        self.take_over(t, y)?;
+        self.take_rates(t, y, yp)?;
+        self.settle(t, y, yp)
+    }
+}

@@ -1,0 +1,160 @@
+//! A form as a system to integrate.
+
+use super::ImplicitModel;
+use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System as _, halves, halves_mut};
+
+impl ImplicitSystem for ImplicitModel {
+    fn unknowns(&self) -> usize {
+        self.form.code.program.states.len()
+    }
+
+    fn unknown_name(&self, unknown: usize) -> String {
+        self.form.code.program.states[unknown].name.clone()
+    }
+
+    fn equation_name(&self, equation: usize) -> String {
+        let name = &self.form.code.program.states[equation].name;
+        if self.map.equations.explicit[equation] {
+            format!("the rate of {name}")
+        } else {
+            format!("the equation of {name}")
+        }
+    }
+
+    /// Those of the minimal form where it has the same unknown.
+    fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
+        let ImplicitModel { reference, form, x, .. } = self;
+        let known = halfarrow_sim::magnitudes(reference, (t, x), span)?;
+        let tracked = &reference.code.program.tracked;
+        let of = |symbol| tracked.iter().position(|tracked| tracked == symbol).map_or(0.0, |k| known[k]);
+        Ok(form.code.program.tracked.iter().map(of).collect())
+    }
+
+    fn index(&self, unknown: usize) -> u8 {
+        self.map.equations.indices[unknown].clamp(1, 3)
+    }
+
+    fn residual(&mut self, t: f64, y: &[f64], yp: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        self.run_rates(t, y, yp, out)?;
+        for (i, out) in out.iter_mut().enumerate() {
+            if self.map.equations.explicit[i] {
+                *out = yp[i] - *out;
+            }
+        }
+        Ok(())
+    }
+
+    fn sparsity(&self) -> &Sparsity {
+        &self.map.sparsity
+    }
+
+    fn jacobian(&mut self, t: f64, y: &[f64], yp: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
+        let n = y.len();
+        let (mut along, mut product) = (vec![0.0; n], vec![0.0; n]);
+        self.place_rates(yp);
+        for group in &self.map.groups {
+            along.fill(0.0);
+            group.iter().for_each(|&column| along[column] = 1.0);
+            self.form.directional_derivative(t, y, &along, &mut product)?;
+            for &column in group {
+                for (place, &row) in self.map.sparsity.places(column).zip(self.map.sparsity.column(column)) {
+                    let explicit = self.map.equations.explicit[row];
+                    dy[place] = if explicit { -product[row] } else { product[row] };
+                    dyp[place] = f64::from(u8::from(explicit && row == column));
+                }
+            }
+            let free = |c: &&usize| self.map.equations.differential[**c] && !self.map.equations.explicit[**c];
+            if group.iter().any(|c| free(&c)) {
+                along.iter_mut().enumerate().for_each(|(c, a)| *a = if free(&&c) { *a } else { 0.0 });
+                self.form.derivative_by_rates(t, y, &along, &mut product)?;
+                for &column in group.iter().filter(free) {
+                    for (place, &row) in self.map.sparsity.places(column).zip(self.map.sparsity.column(column)) {
+                        let explicit = self.map.equations.explicit[row];
+                        dyp[place] += if explicit { -product[row] } else { product[row] };
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn semi_explicit(&self) -> Option<&[bool]> {
+        let free = |(explicit, differential): (&bool, &bool)| *differential && !explicit;
+        let none = !self.map.equations.explicit.iter().zip(&self.map.equations.differential).any(free);
+        none.then_some(&self.map.equations.explicit[..])
+    }
+}
+
+impl Events for ImplicitModel {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        self.form.next_time_event(t)
+    }
+
+    fn is_corner(&mut self, t: f64) -> bool {
+        self.form.is_corner(t)
+    }
+
+    fn indicators(&self) -> usize {
+        self.form.indicators()
+    }
+
+    fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
+        self.place_rates(yp);
+        self.form.event_indicators(t, y, g)
+    }
+
+    fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves_mut(point);
+        let implicit = self.form.code.program.implicit.is_some();
+        if !self.begun || !implicit {
+            self.begun = true;
+            self.place_rates(yp);
+            self.form.handle_event(t, y)?;
+            if !implicit {
+                return self.take_rates(t, y, yp);
+            }
+            self.reference.handle_event(t, &mut self.x)?;
+        } else {
+            // What is sampled at an event, and the sign of a condition, are those of the unknowns after it.
+            self.follow_back(t, y, yp)?;
+            self.reference.handle_event(t, &mut self.x)?;
+            self.take_over(t, y)?;
+            self.form.handle_event(t, y)?;
+        }
+        self.take_over(t, y)?;
+        self.take_rates(t, y, yp)?;
+        self.settle(t, y, yp)
+    }
+
+    fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
+        self.place_rates(yp);
+        self.form.accept(t, y)?;
+        let observed = !self.map.uncontrolled.is_empty() && !self.form.recorded().is_empty();
+        if self.reference.has_delays() || observed && self.reference.follows_solutions_at_all() {
+            self.follow_back(t, y, yp)?;
+            self.reference.accept(t, &self.x)?;
+        }
+        Ok(())
+    }
+
+    fn observed(&self) -> usize {
+        self.form.observed()
+    }
+
+    fn observed_name(&self, value: usize) -> String {
+        self.form.observed_name(value)
+    }
+
+    fn observe(&mut self, t: f64, point: &[f64], out: &mut [f64]) -> Result<(), Failure> {
+        let (y, yp) = halves(point);
+        let (y, yp) = match (self.form.recorded().is_empty(), self.map.uncontrolled.is_empty()) {
+            (true, _) => (y.to_vec(), yp.to_vec()),
+            (false, true) => self.consistent(t, y, yp)?,
+            (false, false) => self.controlled(t, y, yp)?,
+        };
+        self.place_rates(&yp);
+        self.form.observe(t, &y, out)
+    }
+}

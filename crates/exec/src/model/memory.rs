@@ -1,0 +1,115 @@
+//! What a run remembers.
+
+use super::Model;
+use super::compiled::ModeId;
+use super::history::{Delay, Sample};
+use super::inputs::Piece;
+use crate::bytecode::{Followed, HeldConditions};
+use halfarrow_compiler::bond_graph::HeldKind;
+
+/// What a run remembers beside its state: which signs conditions have, which of several solutions laws follow, what delays
+/// and samples hold, which piece of an input table it is on, the constants that its start has fixed.
+///
+/// A model with the same setup goes on from it with the same bits, in the run that it was taken from or in another one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Memory {
+    /// What the model keeps by itself.
+    run: Remembered,
+    /// What the code keeps.
+    conditions: HeldConditions,
+    solutions: Vec<Followed>,
+}
+
+impl Memory {
+    /// The mode that the run is in.
+    pub fn mode(&self) -> ModeId {
+        self.run.mode
+    }
+}
+
+/// What a run remembers, but for what the code keeps at hand.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Remembered {
+    pub mode: ModeId,
+    /// Whether the run has begun: conditions are held.
+    pub begun: bool,
+    /// When the last event was handled, in s.
+    pub crossed: f64,
+    /// When the signs of event indicators were taken last.
+    pub signs_taken: Option<f64>,
+    /// When time moves a condition next, in s.
+    pub clock_event: Option<f64>,
+    /// Values of the conserved constants.
+    pub conserved: Vec<f64>,
+    /// Typical magnitudes of the states.
+    pub scales: Vec<f64>,
+    pub held: Vec<DelayOrSample>,
+    /// The piece of each input that holds.
+    pub pieces: Vec<Option<Piece>>,
+}
+
+/// What a held signal remembers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum DelayOrSample {
+    Delay(Delay),
+    Sample(Sample),
+}
+
+impl Model {
+    /// What the run remembers, to go on from later: see [`restore`](Model::restore).
+    pub fn memory(&self) -> Memory {
+        Memory {
+            run: self.run.clone(),
+            conditions: self.frame.conditions.held(),
+            solutions: self.frame.solvers.iter().map(|solver| solver.newton.followed()).collect(),
+        }
+    }
+
+    /// Goes on from what a run of this model remembered. Parameters, inputs and what is recorded stay as they are.
+    ///
+    /// # Panics
+    /// If it is the memory of another model.
+    pub fn restore(&mut self, memory: &Memory) {
+        let same = self.run.mode == memory.run.mode && self.frame.solvers.len() == memory.solutions.len();
+        assert!(same, "the memory of another model");
+        self.run.clone_from(&memory.run);
+        self.frame.conditions.hold_again(&memory.conditions);
+        self.frame.solvers.iter_mut().zip(&memory.solutions).for_each(|(solver, from)| solver.newton.follow_from(from));
+        self.rated = None;
+        self.place_constant_inputs();
+    }
+
+    /// Any solution of laws may come next.
+    pub(super) fn leave_solutions(&mut self) {
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.leave());
+    }
+
+    /// Forgets the solutions of laws.
+    pub(super) fn forget_solutions(&mut self) {
+        self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
+    }
+
+    /// The next solution of a block of laws starts where its unknown `i` has this value.
+    pub(super) fn start_solution(&mut self, block: usize, i: usize, value: f64) {
+        self.frame.solvers[block].newton.start_at(i, value);
+    }
+
+    /// Whether a block is solved by Newton and has an unknown `i`.
+    pub(super) fn is_unknown(&self, block: usize, i: usize) -> bool {
+        self.frame.solvers[block].newton.memory.len() > i
+    }
+
+    /// Delays and samples as they are before a run.
+    pub(super) fn empty_held(&self) -> Vec<DelayOrSample> {
+        let code = &self.code;
+        let time = |i: usize| code.layout.registers.get(&code.program.held[i].time).map(|&r| self.frame.r[r as usize]);
+        let held = code.program.held.iter().enumerate().map(|(i, h)| {
+            let time = time(i).unwrap_or(f64::NAN);
+            match h.kind {
+                HeldKind::Delay => DelayOrSample::Delay(Delay::new(time)),
+                HeldKind::Sample => DelayOrSample::Sample(Sample::new(time)),
+            }
+        });
+        held.collect()
+    }
+}

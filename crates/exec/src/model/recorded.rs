@@ -1,0 +1,92 @@
+//! What a run records, and the code for it.
+
+use super::compiled::Mode;
+use super::{Model, RecordError};
+use crate::bytecode::{Abreast, Routine};
+use crate::machine::Code;
+use halfarrow_compiler::program::{BlockId, Value};
+use std::sync::Arc;
+
+/// A choice of what is recorded. Never changed; shared by copies of a model.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Recorded {
+    /// Indices into the program's observed values.
+    pub chosen: Vec<usize>,
+    pub routine: Routine,
+    /// Newton blocks of it that are solved together.
+    pub abreast: Option<Arc<Abreast>>,
+    /// Newton blocks that it needs and no rate does.
+    pub blocks: Vec<BlockId>,
+    /// Its machine code, where it has been made.
+    pub code: Option<Arc<Code>>,
+}
+
+impl Recorded {
+    pub fn new(mode: &Mode, chosen: Vec<usize>) -> Recorded {
+        let value = |&i: &usize| mode.program.observed[i].value.clone().ok();
+        let wanted: Vec<Value> = chosen.iter().filter_map(value).collect();
+        let routine = mode.layout.watched_routine(&mode.program, &wanted);
+        let of_rates = |block: &BlockId| mode.rates.solves.iter().any(|s| s.block == *block);
+        let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
+        let blocks = newton.filter(|block| !of_rates(block)).collect();
+        let abreast = Abreast::of(&mode.program, &mode.layout, &routine).map(Arc::new);
+        Recorded { chosen, routine, abreast, blocks, code: None }
+    }
+
+    /// What is recorded where nothing is asked for.
+    pub fn by_default(mode: &Mode) -> Recorded {
+        let defaults = mode.program.observed.iter().enumerate().filter(|(_, o)| o.default && o.value.is_ok());
+        Recorded::new(mode, defaults.map(|(i, _)| i).collect())
+    }
+}
+
+impl Model {
+    /// Chooses what is recorded, in this order.
+    ///
+    /// # Errors
+    /// The first name that is unknown or has no value.
+    pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
+        let observed = &self.code.program.observed;
+        let mut chosen = Vec::with_capacity(names.len());
+        for &name in names {
+            let found = observed.iter().position(|o| o.name == name);
+            let index = found.ok_or_else(|| RecordError::Unknown(name.to_string()))?;
+            if let Err(why) = &observed[index].value {
+                return Err(RecordError::Unavailable(name.to_string(), why.clone()));
+            }
+            chosen.push(index);
+        }
+        self.take_recorded(Recorded::new(&self.code, chosen));
+        Ok(())
+    }
+
+    /// Everything that has a value, in the order of the program.
+    pub fn record_all(&mut self) {
+        let available = self.code.program.observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
+        let chosen = available.map(|(i, _)| i).collect();
+        self.take_recorded(Recorded::new(&self.code, chosen));
+    }
+
+    /// Indices into [`Program::observed`](halfarrow_compiler::program::Program) of what is recorded.
+    pub fn recorded(&self) -> &[usize] {
+        &self.recorded.chosen
+    }
+
+    /// Makes room for it; what ran as machine code does so again.
+    fn take_recorded(&mut self, recorded: Recorded) {
+        let machine = self.recorded.code.is_some();
+        self.recorded = Arc::new(recorded);
+        self.reserve_recorded();
+        if machine {
+            // Without it the bytecode goes on recording.
+            let _ = self.compile_recorded();
+        }
+    }
+
+    pub(super) fn reserve_recorded(&mut self) {
+        self.frame.reserve(&self.recorded.routine);
+        for abreast in [&self.code.abreast, &self.recorded.abreast].into_iter().flatten() {
+            self.frame.reserve_abreast(abreast);
+        }
+    }
+}

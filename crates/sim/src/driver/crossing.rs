@@ -1,0 +1,79 @@
+//! Zero crossings of event indicators in a step.
+
+use super::{Run, Stepper};
+use crate::Failure;
+use crate::events::{Events, first_crossing};
+
+/// Parts of a step by which it is made to go beyond a zero crossing.
+const MARGINS: [f64; 2] = [1e-3, 1e-6];
+
+impl Run<'_> {
+    /// Writes the point that the step has led to: its end, or a zero crossing before it. Gives when that is, and whether an
+    /// event indicator has changed its sign there.
+    pub(super) fn accept_step<S: Stepper>(
+        &mut self,
+        stepper: &mut S,
+        end: f64,
+        point: &mut [f64],
+    ) -> Result<(f64, bool), Failure> {
+        if !S::DENSE {
+            stepper.accept(end, point);
+            let crossed = self.signs.crossed(&mut *stepper.events(), end, point)?;
+            return Ok((end, crossed.is_some()));
+        }
+        self.inside.resize(point.len(), 0.0);
+        match self.exact_crossing(stepper, end)? {
+            (end, None) => {
+                stepper.accept(end, point);
+                Ok((end, false))
+            }
+            (_, Some((time, indicator))) => {
+                if self.chatter.is_one(time) {
+                    let what = stepper.events().indicator_name(indicator);
+                    return Err(Failure::Chattering { time, what });
+                }
+                stepper.land(time, point);
+                Ok((time, true))
+            }
+        }
+    }
+
+    /// The first zero crossing in the step that ends at `end`, which it is, and where the step ends now: where its end is
+    /// more exact than its inside, it is made again to just beyond the crossing.
+    fn exact_crossing<S: Stepper>(
+        &mut self,
+        stepper: &mut S,
+        mut end: f64,
+    ) -> Result<(f64, Option<(f64, usize)>), Failure> {
+        let mut crossing = self.crossing(stepper, end)?;
+        for margin in MARGINS {
+            let Some((time, _)) = crossing else { break };
+            let beyond = time + margin * (time - self.time);
+            if beyond >= end || !stepper.shorten(beyond) {
+                break;
+            }
+            end = beyond;
+            crossing = self.crossing(stepper, end)?;
+        }
+        Ok((end, crossing))
+    }
+
+    /// The first zero crossing in the step that ends at `end`, by its dense output, and which it is.
+    fn crossing<S: Stepper>(&mut self, stepper: &mut S, end: f64) -> Result<Option<(f64, usize)>, Failure> {
+        let Run { signs, inside, time, .. } = self;
+        first_crossing(signs, *time, end, |signs, t| {
+            stepper.interpolate(t, inside);
+            signs.crossed(&mut *stepper.events(), t, inside)
+        })
+    }
+
+    /// Whether there are event indicators.
+    pub(crate) fn has_indicators(&self) -> bool {
+        !self.signs.is_empty()
+    }
+
+    /// Whether an event indicator has another sign at `(t, point)` than that held.
+    pub(crate) fn has_crossed(&mut self, events: &mut dyn Events, t: f64, point: &[f64]) -> Result<bool, Failure> {
+        self.signs.crossed(events, t, point).map(|crossed| crossed.is_some())
+    }
+}

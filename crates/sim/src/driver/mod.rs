@@ -1,0 +1,234 @@
+//! The driver: takes a run from event to event, whatever the method, and hands what it computes to a [`Sink`].
+
+mod crossing;
+mod grid;
+mod position;
+mod recording;
+mod sink;
+mod stepper;
+
+pub(crate) use grid::Grid;
+pub use position::Position;
+pub use sink::{Crawl, Nobody, Sink, Stopped, Summary};
+pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
+
+use std::ops::ControlFlow;
+
+use crate::events::{Chatter, Events, Signs};
+use crate::{Failure, Options};
+use recording::Samples;
+
+/// Why the driver looks up at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StopReason {
+    /// Nothing happens there.
+    StepEnd,
+    /// A time event, or a mere corner.
+    TimeEvent {
+        /// Neither values nor rates jump.
+        corner: bool,
+    },
+    /// The sign of an event indicator has changed, with or without a time event.
+    ZeroCrossing,
+}
+
+/// A run on its way: where it stands, the signs of its event indicators, what it has taken so far.
+pub(crate) struct Run<'a> {
+    pub(crate) options: &'a Options,
+    /// How far the run has come: its point belongs to this time.
+    pub(crate) time: f64,
+    /// Where it ends.
+    pub(crate) to: f64,
+    pub(crate) counts: Summary,
+    signs: Signs,
+    chatter: Chatter,
+    sink: &'a mut dyn Sink,
+    /// Whether the sink wants to see every step.
+    watched: bool,
+    /// When it saw the last one.
+    seen: Option<f64>,
+    samples: Samples,
+    values: Vec<f64>,
+    /// A point inside a step.
+    inside: Vec<f64>,
+}
+
+impl<'a> Run<'a> {
+    /// A run that stands at its start.
+    pub(crate) fn new(options: &'a Options, sink: &'a mut dyn Sink, events: &dyn Events) -> Run<'a> {
+        Run {
+            options,
+            time: options.from,
+            to: options.to,
+            counts: Summary::default(),
+            signs: Signs::new(events.indicators()),
+            chatter: Chatter::new(options.to - options.from),
+            watched: sink.watches(),
+            seen: None,
+            sink,
+            samples: options.every.map_or(Samples::EveryStep, |every| Samples::Grid(Grid::new(options.from, every))),
+            values: vec![0.0; events.observed()],
+            inside: Vec::new(),
+        }
+    }
+
+    /// A run of which nobody takes samples, from where it stands.
+    pub(crate) fn unsampled(options: &'a Options, sink: &'a mut dyn Sink, position: Position) -> Run<'a> {
+        let Position { time, signs, counts } = position;
+        let chatter = Chatter::new(options.to - options.from);
+        let (values, inside) = (Vec::new(), Vec::new());
+        let (samples, watched, seen) = (Samples::Nowhere, false, None);
+        Run { options, time, to: options.to, counts, signs, chatter, sink, watched, seen, samples, values, inside }
+    }
+
+    /// Where it stands.
+    pub(crate) fn into_position(self) -> Position {
+        Position { time: self.time, signs: self.signs, counts: self.counts }
+    }
+
+    /// The start counts as an event.
+    pub(crate) fn start(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
+        self.handle(events, point)?;
+        self.accept(events, point)?;
+        self.settle(events, point)
+    }
+
+    /// Integrates to the end, or until the stepper hands over.
+    pub(crate) fn drive<S: Stepper>(&mut self, stepper: &mut S, point: &mut [f64]) -> Result<Flow, Failure> {
+        while self.time < self.to {
+            let stop = self.next_stop(&mut *stepper.events());
+            if S::DENSE && is_at(self.time, stop.time, self.time) {
+                self.skip_to(stepper, stop, point)?;
+            } else if self.piece(stepper, stop, point)? == Flow::HandOver {
+                return Ok(Flow::HandOver);
+            }
+        }
+        Ok(Flow::GoOn)
+    }
+
+    /// The next time event, or the end of the run.
+    pub(crate) fn next_stop(&self, events: &mut dyn Events) -> Stop {
+        let event = events.next_time_event(self.time).filter(|&event| event <= self.to);
+        Stop { time: event.unwrap_or(self.to), is_event: event.is_some() }
+    }
+
+    /// Over to a stop that is where the run stands, to rounding.
+    fn skip_to<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<(), Failure> {
+        let reason = self.reach(&mut *stepper.events(), stop.time, stop, false, point)?;
+        self.report_progress()?;
+        stepper.forget();
+        self.go_over(&mut *stepper.events(), reason, point)
+    }
+
+    /// From here to the stop, or to a zero crossing before it.
+    fn piece<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<Flow, Failure> {
+        if stepper.set_off(self, stop.time, point)? == Flow::HandOver {
+            return Ok(Flow::HandOver);
+        }
+        while self.time < stop.time {
+            match self.step(stepper, stop, point)? {
+                StopReason::ZeroCrossing => break,
+                _ => {
+                    if stepper.supervise(self, stop.time, point)? == Flow::HandOver {
+                        return Ok(Flow::HandOver);
+                    }
+                }
+            }
+        }
+        Ok(Flow::GoOn)
+    }
+
+    /// One step, with what happens at its end.
+    fn step<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<StopReason, Failure> {
+        let end = stepper.step(self.time, self.next_sample(), stop.time, point)?;
+        self.counts.steps += 1;
+        let (end, crossed) = self.accept_step(stepper, end, point)?;
+        let reason = self.reach(&mut *stepper.events(), end, stop, crossed, point)?;
+        self.report_progress()?;
+        if S::DENSE {
+            self.samples_before(stepper, end)?;
+        }
+        if let StopReason::TimeEvent { corner } = reason {
+            stepper.before_event(corner)?;
+        }
+        self.go_over(&mut *stepper.events(), reason, point)?;
+        if let StopReason::TimeEvent { corner } = reason {
+            stepper.after_event(corner, point);
+        }
+        Ok(reason)
+    }
+
+    /// A step to `(end, point)` is accepted; what happens there.
+    pub(crate) fn reach(
+        &mut self,
+        events: &mut dyn Events,
+        end: f64,
+        stop: Stop,
+        crossed: bool,
+        point: &[f64],
+    ) -> Result<StopReason, Failure> {
+        self.time = end;
+        let at_event = stop.is_event && end == stop.time;
+        let corner = at_event && events.is_corner(end);
+        self.accept(events, point)?;
+        self.counts.crossings += usize::from(crossed);
+        self.counts.corners += usize::from(corner);
+        self.counts.jumps += usize::from(at_event && !corner);
+        Ok(match (crossed, at_event) {
+            (true, _) => StopReason::ZeroCrossing,
+            (false, true) => StopReason::TimeEvent { corner },
+            (false, false) => StopReason::StepEnd,
+        })
+    }
+
+    /// Goes over what happens where the run stands, and samples: on a grid what is true after it, else both.
+    pub(crate) fn go_over(
+        &mut self,
+        events: &mut dyn Events,
+        reason: StopReason,
+        point: &mut [f64],
+    ) -> Result<(), Failure> {
+        if reason != StopReason::StepEnd {
+            if matches!(self.samples, Samples::EveryStep) {
+                self.record(events, self.time, self.time, point)?;
+            }
+            self.handle(events, point)?;
+        }
+        self.settle(events, point)
+    }
+
+    fn handle(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
+        events.handle_event(self.time, point)?;
+        self.show(events, point)?;
+        self.signs.take(events, self.time, point)
+    }
+
+    fn accept(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
+        events.accept(self.time, point)?;
+        if self.seen == Some(self.time) { Ok(()) } else { self.show(events, point) }
+    }
+
+    fn report_progress(&mut self) -> Result<(), Failure> {
+        match self.sink.progress(self.time) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Failure::Interrupted { time: self.time }),
+        }
+    }
+
+    /// Says how exact each state is kept.
+    pub(crate) fn tell_tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        self.sink.tolerances(magnitudes, absolute);
+    }
+
+    /// Says that the run crawls.
+    pub(crate) fn tell_crawl(&mut self, crawl: &Crawl) {
+        self.sink.crawls(crawl);
+    }
+
+    /// What came of it.
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub(crate) fn ended<T>(&self, end: Result<T, Failure>) -> Result<Summary, Stopped> {
+        let (time, summary) = (self.time, self.counts);
+        end.map(|_| summary).map_err(|failure| Stopped { failure, time, summary, without_rates: None })
+    }
+}

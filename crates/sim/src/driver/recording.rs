@@ -1,0 +1,86 @@
+//! When a run is sampled and shown.
+
+use super::{Grid, Run, Stepper};
+use crate::Failure;
+use crate::events::Events;
+
+/// Where samples are taken.
+pub(super) enum Samples {
+    /// At the end of every step, and on both sides of every event.
+    EveryStep,
+    /// At these times.
+    Grid(Grid),
+    /// Nowhere: somebody else does.
+    Nowhere,
+}
+
+impl Run<'_> {
+    /// Shows the sink where the run stands, if it wants to see every step.
+    pub(super) fn show(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
+        if !self.watched {
+            return Ok(());
+        }
+        self.seen = Some(self.time);
+        events.observe(self.time, point, &mut self.values)?;
+        self.sink.watch(self.time, &self.values)
+    }
+
+    /// As which time a sample is due where the run stands, if it is. On a grid the sample bears the time of the grid, from
+    /// which the run may be a rounding error away.
+    pub(crate) fn due(&self) -> Option<f64> {
+        let due = match &self.samples {
+            Samples::Nowhere => return None,
+            Samples::EveryStep => Some(self.time),
+            Samples::Grid(grid) => grid.is_due(self.time).then(|| grid.next()),
+        };
+        (self.time >= self.to).then_some(self.to).or(due)
+    }
+
+    /// Samples where the run stands, if that is due.
+    pub(super) fn settle(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
+        self.due().map_or(Ok(()), |label| self.record(events, label, self.time, point))
+    }
+
+    /// The next time of the grid.
+    pub(crate) fn next_sample(&self) -> f64 {
+        if let Samples::Grid(grid) = &self.samples { grid.next() } else { f64::INFINITY }
+    }
+
+    /// Samples of the grid inside the last step, clearly before `end`.
+    pub(super) fn samples_before<S: Stepper>(&mut self, stepper: &mut S, end: f64) -> Result<(), Failure> {
+        while let Samples::Grid(grid) = &self.samples
+            && grid.next() + grid.slack() < end
+        {
+            let t = grid.next();
+            let mut inside = std::mem::take(&mut self.inside);
+            stepper.sample(t, &mut inside);
+            let recorded = self.record(&mut *stepper.events(), t, t, &inside);
+            self.inside = inside;
+            recorded?;
+        }
+        Ok(())
+    }
+
+    /// Hands over the values at `(t, point)` as the sample of time `label`.
+    pub(super) fn record(&mut self, events: &mut dyn Events, label: f64, t: f64, point: &[f64]) -> Result<(), Failure> {
+        events.observe(t, point, &mut self.values)?;
+        if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
+            return Err(Failure::NotFinite { time: t, what: events.observed_name(value) });
+        }
+        self.hand_over(label);
+        Ok(())
+    }
+
+    /// Hands over values that were observed elsewhere, as the sample that is due.
+    pub(crate) fn record_values(&mut self, label: f64, values: impl Iterator<Item = f64>) {
+        self.values.iter_mut().zip(values).for_each(|(own, value)| *own = value);
+        self.hand_over(label);
+    }
+
+    fn hand_over(&mut self, label: f64) {
+        self.sink.sample(label, &self.values);
+        if let Samples::Grid(grid) = &mut self.samples {
+            grid.pass(label);
+        }
+    }
+}

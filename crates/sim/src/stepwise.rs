@@ -1,0 +1,95 @@
+//! A run that the caller takes from one time to the next.
+
+use crate::driver::{Nobody, Position, Run};
+use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
+use crate::shared::Counted;
+use crate::simulate::check_start;
+use crate::{Failure, HybridSystem, Method, Options, Stopped, Summary};
+
+/// A run by a method of fixed step that goes no further than the caller says: a step to there, shorter ones where events
+/// come before. Between two steps the system may be read and set.
+///
+/// What the run remembers beside the state and the memory of the system is its [`Position`]: all three together saved and
+/// restored, it goes on with the same bits. No step takes memory.
+pub struct Stepwise {
+    method: FixedStep,
+    options: Options,
+    position: Position,
+}
+
+impl Stepwise {
+    /// A run of `system` that stands at `from`, in s.
+    pub fn new(method: FixedMethod, from: f64, system: &dyn HybridSystem) -> Stepwise {
+        let options = Options { method: Method::Fixed(method), from, to: f64::INFINITY, ..Options::default() };
+        Stepwise {
+            method: FixedStep::new(method, system.sparsity()),
+            position: Position::new(from, system.indicators()),
+            options,
+        }
+    }
+
+    /// The start, which counts as an event.
+    ///
+    /// # Errors
+    /// What the system reports, or a state that is not finite.
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub fn start(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Stopped> {
+        let checked = check_start(system, self.position.time(), x);
+        self.run(|run, _| checked.and_then(|()| run.start(system, x)))
+    }
+
+    /// Goes on to `to`, in s, and leaves the state there in `x`.
+    ///
+    /// # Errors
+    /// What the system reports: the run has stopped there, and `x` holds the last state reached.
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub fn advance(&mut self, system: &mut dyn HybridSystem, to: f64, x: &mut [f64]) -> Result<(), Stopped> {
+        self.run(|run, method| {
+            run.to = to;
+            run.drive(&mut Ticks::one(method, Counted::new(system)), x).map(|_| ())
+        })
+    }
+
+    /// A step of length `h` in s from where the run stands, which moves nothing but `x`.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub(crate) fn try_step(&mut self, system: &mut dyn HybridSystem, h: f64, x: &mut [f64]) -> Result<(), Failure> {
+        self.method.step(system, self.position.time(), h, x)
+    }
+
+    /// How far the run has come, in s.
+    pub fn time(&self) -> f64 {
+        self.position.time()
+    }
+
+    /// What it took so far, without evaluations.
+    pub fn summary(&self) -> Summary {
+        self.position.summary()
+    }
+
+    /// Where the run stands, to go on from later.
+    pub fn position(&self) -> &Position {
+        &self.position
+    }
+
+    /// Goes on from there.
+    pub fn restore(&mut self, position: &Position) {
+        self.position.clone_from(position);
+    }
+
+    /// A failure where the run stands.
+    pub(crate) fn stopped(&self, failure: Failure) -> Stopped {
+        Stopped { failure, time: self.time(), summary: self.summary(), without_rates: None }
+    }
+
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    fn run(&mut self, work: impl FnOnce(&mut Run<'_>, &mut FixedStep) -> Result<(), Failure>) -> Result<(), Stopped> {
+        let mut nobody = Nobody;
+        let mut run = Run::unsampled(&self.options, &mut nobody, std::mem::take(&mut self.position));
+        let done = work(&mut run, &mut self.method);
+        let done = run.ended(done).map(|_| ());
+        self.position = run.into_position();
+        done
+    }
+}
