@@ -11,8 +11,12 @@ mod packed;
 mod wide;
 
 pub(crate) use abreast::Abreast;
-pub(crate) use conditions::{Hold, piece_of, table_on};
-pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble, slope_of_power};
+#[cfg(feature = "machine")]
+pub(crate) use conditions::table_on;
+pub(crate) use conditions::{Hold, piece_of};
+pub(crate) use frame::{Frame, Trouble};
+#[cfg(feature = "machine")]
+pub(crate) use frame::{InnerCode, PIVOT_BELOW, slope_of_power};
 pub(crate) use lu::Lu;
 #[cfg(feature = "machine")]
 pub(crate) use operands::{reads, written};
