@@ -119,6 +119,9 @@ pub struct FileArguments {
     /// Print one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+    /// Let the model import and read tables from this folder too, beside that of its file; may be repeated
+    #[arg(long, value_name = "FOLDER")]
+    pub allow: Vec<PathBuf>,
 }
 
 /// A model, perhaps with other parameters.

@@ -23,20 +23,25 @@ pub use report::report;
 pub use run::simulate;
 pub use sweep::sweep;
 
-use halfarrow::{Error, FixedMethod, Form, Model, Override, Start};
+use halfarrow::{Error, FixedMethod, Form, Model, Override, Problem, Source, Start};
 
-use crate::arguments::ModelArguments;
+use crate::arguments::{FileArguments, ModelArguments};
 use crate::screen;
 
 /// Loads a model, shows what was noticed, and goes on; on an error gives its exit status.
 fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u8, Error>) -> u8 {
     let set = overrides(arguments);
-    let loaded = Model::load(&arguments.model.file, &set);
+    let loaded = source(&arguments.model).map_err(Error::from).and_then(|source| Model::new(source, &set));
     let outcome = loaded.and_then(|model| {
         screen::warn(model.warnings());
         go_on(&model)
     });
     outcome.unwrap_or_else(|error| screen::fail(&error, arguments.model.json))
+}
+
+/// The model that is asked for, and what it may read.
+fn source(arguments: &FileArguments) -> Result<Source, Problem> {
+    Source::open_allowing(&arguments.file, &arguments.allow)
 }
 
 /// Says, before anything is done with it, if a fixed step is too long for what the model does at its start; gives what was said.

@@ -379,3 +379,19 @@ fn tables_and_equations_fit_the_page() {
     let refused = halfarrow(&here, &["loops", &model("slider_crank"), "--width", "none"]);
     assert_eq!(status(&refused), 2);
 }
+
+#[test]
+fn a_model_reads_only_what_is_allowed() {
+    let folder = folder("allow");
+    std::fs::create_dir_all(folder.join("lib")).expect("a folder");
+    std::fs::create_dir_all(folder.join("car")).expect("a folder");
+    std::fs::write(folder.join("lib/push.csv"), "0,1\n1,2\n").expect("a file");
+    let text = "model T\nSe:push(table(\"../lib/push.csv\", t)) -> I:mass(2)\n";
+    std::fs::write(folder.join("car/model.bond"), text).expect("a file");
+    let refused = halfarrow(&folder, &["check", "car/model.bond"]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{said}");
+    assert!(said.contains("allow its folder: `--allow lib`"), "{said}");
+    let allowed = halfarrow(&folder, &["check", "car/model.bond", "--allow", "lib"]);
+    assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
+}

@@ -1,5 +1,5 @@
 //! What the parser makes of texts: `tests/ast/*.bond` and beside each a `.txt` with its tree and its faults.
-//! `UPDATE=1 cargo test -p halfarrow-compiler --test ast` rewrites them.
+//! `UPDATE=1 cargo test --test all ast` rewrites them.
 
 use halfarrow_compiler::ast::{MAX_DIAGNOSTICS, Parsed, format, parse};
 use halfarrow_compiler::diagnostic::{Diagnostics, Label, Sources, render};

@@ -590,7 +590,7 @@ fn rotation_shows_its_units() {
     assert_eq!((unit(bond.effort), unit(bond.flow)), ("N.m".to_string(), "rad/s".to_string()));
 }
 
-/// Prints how long a ladder of 10,000 sections takes: `cargo test --release --test bond_graph -- --ignored --nocapture`.
+/// Prints how long a ladder of 10,000 sections takes: `cargo test --release --test all bond_graph -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement, to be run in release"]
 fn time_of_a_long_ladder() {

@@ -1,4 +1,4 @@
-//! `docs/diagnostics.md` lists every code; `UPDATE=1 cargo test -p halfarrow-compiler --test diagnostics` rewrites it.
+//! `docs/diagnostics.md` lists every code; `UPDATE=1 cargo test --test all diagnostics` rewrites it.
 
 use halfarrow_compiler::diagnostic::codes::ALL;
 use std::path::Path;
@@ -45,8 +45,5 @@ fn the_documentation_lists_every_code() {
         std::fs::write(&path, listed()).expect("a file that can be written");
     }
     let written = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        written == listed(),
-        "run `UPDATE=1 cargo test -p halfarrow-compiler --test diagnostics` and look at the change"
-    );
+    assert!(written == listed(), "run `UPDATE=1 cargo test --test all diagnostics` and look at the change");
 }

@@ -1,6 +1,6 @@
 //! Faulty models: every fault stands as a comment on its line, and what the modeller reads stands beside the model.
 //!
-//! `UPDATE=1 cargo test --test faulty` rewrites both.
+//! `UPDATE=1 cargo test --test all faulty` rewrites both.
 
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{self, FileError, Files};

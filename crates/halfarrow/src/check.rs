@@ -1,13 +1,12 @@
 //! Everything that is wrong or odd in a model.
 
-use std::path::Path;
-
 use halfarrow_compiler::compile::Found;
 use halfarrow_compiler::diagnostic::to_json;
 use serde_json::{Value, json};
 
 use crate::error::Error;
 use crate::model::Model;
+use crate::source::Source;
 
 /// What `halfarrow check` tells.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,12 +20,12 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
-    /// Checks a file through all stages, as far as its errors allow.
+    /// Checks a model through all stages, as far as its errors allow.
     ///
     /// # Errors
-    /// The file cannot be read, or the equations have no value at the start.
-    pub fn of(path: &Path) -> Result<CheckReport, Error> {
-        let found = match Model::load(path, &[]).and_then(|model| model.check()) {
+    /// The equations have no value at the start.
+    pub fn of(source: Source) -> Result<CheckReport, Error> {
+        let found = match Model::new(source, &[]).and_then(|model| model.check()) {
             Ok(found) | Err(Error::Model(found)) => found,
             Err(other) => return Err(other),
         };

@@ -101,6 +101,13 @@ pub enum Problem {
         /// Why.
         reason: String,
     },
+    /// Something that this build was made without.
+    NotBuilt {
+        /// What it cannot do, as in `write FMUs`.
+        what: &'static str,
+        /// The Cargo feature that it lacks.
+        feature: &'static str,
+    },
     /// A start at rest where there is none.
     NoEquilibrium {
         /// Why there is none.
@@ -205,6 +212,9 @@ impl fmt::Display for Problem {
                 )
             }
             Problem::NoMatrices { reason } => write!(f, "the model cannot be linearised: {reason}"),
+            Problem::NotBuilt { what, feature } => {
+                write!(f, "this build cannot {what}: it was made without the feature `{feature}`")
+            }
             Problem::NoEquilibrium { reason } => write!(f, "no start at rest: {reason}"),
             Problem::NoStep => f.write_str("this solver has a fixed step: give it with --step, as in `--step 1e-3`"),
         }

@@ -1,10 +1,13 @@
 //! The model as code for elsewhere.
+#![cfg_attr(not(feature = "fmu"), allow(dead_code, reason = "only FMUs look ahead"))]
 
 use std::ops::ControlFlow;
 
 use halfarrow_compiler::equations::{Form, show};
 use halfarrow_compiler::program::Program;
-use halfarrow_emit::fmu::{self, Version};
+#[cfg(feature = "fmu")]
+use halfarrow_emit::fmu;
+use halfarrow_emit::fmu::Version;
 use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
@@ -12,6 +15,7 @@ use halfarrow_sim::{Events as _, Options, Sink, System as _, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
+#[cfg(feature = "fmu")]
 use crate::library::library;
 use crate::model::Model;
 use crate::run::Start;
@@ -187,6 +191,7 @@ impl Model {
         Ok(Exported { report: code.report(&w.name, &w.cost, code.recorded.clone(), names), files })
     }
 
+    #[cfg(feature = "fmu")]
     fn export_fmu(&self, export: &Export, version: Version) -> Result<Exported, Error> {
         let mut code = Code::new(self, export)?;
         code.start.grown = grown(&mut code.system, &code.start, export);
@@ -197,6 +202,11 @@ impl Model {
         let file = File { path: format!("{}.fmu", written.name), bytes: fmu::package(&written, binary) };
         let report = code.report(&written.name, &written.cost, written.recorded, names);
         Ok(Exported { files: vec![file], report })
+    }
+
+    #[cfg(not(feature = "fmu"))]
+    fn export_fmu(&self, _: &Export, _: Version) -> Result<Exported, Error> {
+        Err(Problem::NotBuilt { what: "write FMUs", feature: "fmu" }.into())
     }
 }
 

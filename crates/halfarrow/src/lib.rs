@@ -1,48 +1,66 @@
 //! Bond graphs from text to trajectory: load a model, ask it for its causal loops, its equations, its picture, its motion.
 //!
 //! ```
-//! use halfarrow::{Model, Run};
-//! let model = Model::from_text("drop.bond", "model Drop\nSe:weight(9.81 N) -> I:mass(1 kg)\n", &[])?;
-//! let run = Run { to: 2.0, ..Run::default() };
-//! let result = model.simulate(&run, &mut |_| true)?;
+//! use halfarrow::{Form, Input, Model, Run, Source};
+//! // A model from memory; `Source::open` takes a file, and what lies beside it.
+//! let text = "model Cart\ninput push : N = 0\nSe:hand(push) -> 1:axis -> I:cart(2 kg)\naxis -> R:drag(1 N.s/m)\n";
+//! let cart = Model::new(Source::text("cart.bond", text), &[])?;
+//! assert!(cart.check()?.diagnostics.0.is_empty());
+//! // Equations are derived once, and run as often as wanted.
+//! let cart = cart.compile(Form::Minimal)?;
+//! let push = Input::sampled(4.0, 0.5, |t| if t < 2.0 { 3.0 } else { 0.0 });
+//! let run = Run { to: 4.0, inputs: vec![("push".into(), push)], ..Run::default() };
+//! let result = cart.simulate(&run, &mut |_| true)?;
+//! // Columns in memory, with names and units.
 //! let speed = result.trace.columns[0].values.last().unwrap();
-//! assert!((speed - 9.81 * 2.0).abs() < 1e-6);
+//! assert!(*speed > 0.0 && *speed < 3.0);
 //! # Ok::<(), halfarrow::Error>(())
 //! ```
+//!
+//! What is heavy is a feature, all of them on by default: `machine` (machine code), `parquet`, `png`, `fmu`, `real_time`.
+//! Without them the library builds for `wasm32-unknown-unknown`; what a build lacks it says where it is asked for.
 #![forbid(unsafe_code)]
 
 mod advice;
 mod audited;
 mod check;
+mod clock;
 mod compare;
+mod compiled;
 mod cost;
-mod disk;
 mod draw;
 mod equations;
 mod error;
 mod export;
+mod input;
+#[cfg(feature = "fmu")]
 mod library;
 mod linear_algebra;
 mod linearize;
 mod loops;
 mod model;
+mod quantity;
+#[cfg(feature = "real_time")]
 mod real_time;
 mod report;
 mod run;
+mod source;
 mod stage;
 mod sweep;
 mod table_file;
 mod verdict;
+#[cfg(feature = "real_time")]
 mod wall_clock;
 
 pub use audited::{AuditReport, Miss};
 pub use check::CheckReport;
 pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
+pub use compiled::Compiled;
 pub use draw::{NamedRuns, Picture};
 pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
 pub use error::{Error, Problem};
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
-pub use halfarrow_compiler::bond_graph::Override;
+pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;
 pub use halfarrow_compiler::equations::Form;
 pub use halfarrow_draw::{DrawOptions, DrawnPaths, positions};
@@ -51,15 +69,19 @@ pub use halfarrow_sim::fixed_step::FixedMethod;
 pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
 pub use halfarrow_trace::{Column, PlotOptions, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
+pub use input::Input;
 pub use linearize::{
     Linearize, LinearizeReport, Mode, Point, ReachReport, Response, Stability, StateAt, SymbolicReport, Terminal,
     TransferFunction,
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};
-pub use real_time::{Durations, RealTimeReport, RealTimeRun, Source, duration, frequency};
+pub use quantity::{duration, frequency};
+#[cfg(feature = "real_time")]
+pub use real_time::{Durations, Feed, RealTimeReport, RealTimeRun};
 pub use report::{Page, Report};
 pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance, Stopped, Timings};
+pub use source::{Disk, Source};
 pub use stage::Stage;
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
 pub use table_file::read_trace;

@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use halfarrow_compiler::ast;
-use halfarrow_compiler::bond_graph::{BondGraph, Files, Override};
+use halfarrow_compiler::bond_graph::{BondGraph, Override};
 use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
 use halfarrow_compiler::compile::{Found, Reached, Text, to_bond_graph};
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Equations, Form, derive_equations};
 
-use crate::disk::Disk;
 use crate::error::{Error, Problem};
+use crate::source::{Remembered, Source};
 
 /// A model without errors in its text, its names, its units and its bonds, and what was noticed in it.
 #[derive(Debug, Clone)]
@@ -22,46 +22,71 @@ pub struct Model {
 }
 
 /// What a model was made of.
-#[derive(Debug)]
 struct Origin {
-    name: String,
-    text: String,
+    source: Source,
+    files: Arc<Remembered>,
     overrides: Vec<Override>,
 }
 
+impl std::fmt::Debug for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?} with {:?}", self.source, self.overrides)
+    }
+}
+
 impl Model {
-    /// Reads a model from disk; `set` replaces values of parameters.
+    /// A model from its source; `set` replaces values of parameters.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn new(source: Source, set: &[Override]) -> Result<Model, Error> {
+        let (source, files) = source.remembering();
+        Model::read(source, files, set.to_vec())
+    }
+
+    /// Reads a model from disk, with what it imports from the folder of the file and below; `set` replaces values of
+    /// parameters.
     ///
     /// # Errors
     /// The file cannot be read, or the model has errors.
     pub fn load(path: &Path, set: &[Override]) -> Result<Model, Error> {
-        let text = read_text(path)?;
-        Model::read(&path.to_string_lossy(), &text, &Disk, set)
+        Model::new(Source::open(path)?, set)
     }
 
-    /// A model from its text; it may import files from disk, beside `name`.
+    /// A model from its text, which stands alone. `name` is for messages.
     ///
     /// # Errors
     /// The model has errors.
     pub fn from_text(name: &str, text: &str, set: &[Override]) -> Result<Model, Error> {
-        Model::read(name, text, &Disk, set)
+        Model::new(Source::text(name, text), set)
     }
 
-    fn read(name: &str, text: &str, files: &dyn Files, overrides: &[Override]) -> Result<Model, Error> {
-        let Reached { ir: graph, found } = to_bond_graph(Text { name, text, files, overrides })?;
-        let origin = Origin { name: name.to_string(), text: text.to_string(), overrides: overrides.to_vec() };
-        Ok(Model { graph, found, origin: Arc::new(origin) })
+    fn read(source: Source, files: Arc<Remembered>, overrides: Vec<Override>) -> Result<Model, Error> {
+        let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides: &overrides };
+        let Reached { ir: graph, found } = to_bond_graph(text)?;
+        Ok(Model { graph, found, origin: Arc::new(Origin { source, files, overrides }) })
     }
 
-    /// The same model with other values of parameters in the place of those that it has.
+    /// The same model with other values of parameters in the place of those that it has. Files are not read again.
     ///
     /// # Errors
     /// The model has errors with these values.
     pub fn with(&self, set: &[Override]) -> Result<Model, Error> {
-        let Origin { name, text, overrides } = &*self.origin;
+        let Origin { source, files, overrides } = &*self.origin;
         let kept = overrides.iter().filter(|o| !set.iter().any(|s| s.name == o.name));
         let all: Vec<Override> = kept.chain(set).cloned().collect();
-        Model::read(name, text, &Disk, &all)
+        Model::read(source.clone(), Arc::clone(files), all)
+    }
+
+    /// Its text, and the files that it read: the same model can be made of them elsewhere.
+    pub fn source(&self) -> Source {
+        let Origin { source, files, .. } = &*self.origin;
+        Source::text(source.name(), source.content()).with_files(files.texts())
+    }
+
+    /// The values of parameters that were replaced.
+    pub fn overrides(&self) -> &[Override] {
+        &self.origin.overrides
     }
 
     /// Its name, as the text says.

@@ -19,8 +19,9 @@ use serde::Serialize;
 use crate::audited::{AuditReport, Audited};
 use crate::cost;
 use crate::error::{Error, Problem};
+use crate::input::{Input, connect};
 use crate::model::Model;
-use crate::run::{Record, Run, Start, choose, connect, units};
+use crate::run::{Record, Run, Start, choose, units};
 use crate::verdict::Made;
 use crate::wall_clock::WallClock;
 
@@ -45,7 +46,7 @@ pub struct RealTimeRun {
     /// The method.
     pub method: FixedMethod,
     /// Where inputs come from. What none of these gives keeps its default.
-    pub inputs: Vec<Source>,
+    pub inputs: Vec<Feed>,
     /// Where recorded values are sent after every tick: one datagram of text, `t` and the values with commas between.
     pub output: Option<SocketAddr>,
     /// What is recorded.
@@ -60,7 +61,7 @@ pub struct RealTimeRun {
 
 /// Where inputs come from.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Source {
+pub enum Feed {
     /// Datagrams of text: values in the order of the model's inputs, or `name=value`, with commas between. The last one
     /// before a tick counts.
     Udp(SocketAddr),
@@ -225,41 +226,6 @@ impl Model {
     }
 }
 
-/// A frequency in Hz from text such as `1kHz`, `500 Hz` or `500`; `None` if it is none.
-///
-/// ```
-/// assert_eq!(halfarrow::frequency("1kHz"), Some(1000.0));
-/// assert_eq!(halfarrow::frequency("2.5"), Some(2.5));
-/// assert_eq!(halfarrow::frequency("3 m"), None);
-/// ```
-pub fn frequency(text: &str) -> Option<f64> {
-    number_in(text, "Hz")
-}
-
-/// A time in s from text such as `10ms`, `2 min` or `0.5`; `None` if it is none.
-///
-/// ```
-/// assert_eq!(halfarrow::duration("10ms"), Some(0.01));
-/// assert_eq!(halfarrow::duration("1e-3"), Some(1e-3));
-/// assert_eq!(halfarrow::duration("3 m"), None);
-/// ```
-pub fn duration(text: &str) -> Option<f64> {
-    number_in(text, "s")
-}
-
-/// A number with a unit of that dimension, or in `si` if none is written.
-fn number_in(text: &str, si: &str) -> Option<f64> {
-    let text = text.trim();
-    let end = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
-    let number: f64 = text[..end].trim().parse().ok()?;
-    let unit = text[end..].trim();
-    if unit.is_empty() {
-        return Some(number);
-    }
-    let unit = Unit::parse(unit).ok()?;
-    (unit.dimension == Unit::parse(si).ok()?.dimension).then(|| unit.to_si_f64(number))
-}
-
 fn pace(run: &RealTimeRun) -> Result<Pace, Problem> {
     let bad = |reason: String| Err(Problem::BadOption { reason });
     if !(run.rate.is_finite() && run.rate > 0.0) {
@@ -273,12 +239,12 @@ fn pace(run: &RealTimeRun) -> Result<Pace, Problem> {
 }
 
 /// The files among the sources, an input each.
-fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Run, Problem> {
+fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Vec<(String, Input)>, Problem> {
     let mut inputs = Vec::new();
     for source in &run.inputs {
         match source {
-            Source::File(name, path) => inputs.push((name.clone(), path.clone())),
-            Source::Table(path) => {
+            Feed::File(name, path) => inputs.push((name.clone(), path.clone().into())),
+            Feed::Table(path) => {
                 let bad = |faults| Problem::BadInput { path: path.clone(), faults };
                 let columns = ReadTable::open(path)?.columns;
                 let known = |name: &String| system.program().inputs.iter().any(|i| i.name == *name);
@@ -286,12 +252,12 @@ fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Run, Problem> {
                 if found.is_empty() {
                     return Err(bad(vec!["no column is called as an input of the model".into()]));
                 }
-                inputs.extend(found.into_iter().map(|name| (name, path.clone())));
+                inputs.extend(found.into_iter().map(|name| (name, path.clone().into())));
             }
-            Source::Udp(_) | Source::Stdin => {}
+            Feed::Udp(_) | Feed::Stdin => {}
         }
     }
-    Ok(Run { inputs, ..Run::default() })
+    Ok(inputs)
 }
 
 /// A number in a declared unit, to SI or back: `factor · value + offset`.
@@ -345,7 +311,7 @@ impl<'s> Ports<'s> {
     fn open(run: &RealTimeRun, system: &exec::Model, stop: &'s AtomicBool) -> Result<Ports<'s>, Problem> {
         let program = system.program();
         let names: Vec<String> = program.inputs.iter().map(|i| i.name.clone()).collect();
-        let wants = |wanted: &Source| matches!(wanted, Source::Udp(_) | Source::Stdin);
+        let wants = |wanted: &Feed| matches!(wanted, Feed::Udp(_) | Feed::Stdin);
         if names.is_empty() && run.inputs.iter().any(wants) {
             return Err(Problem::BadOption { reason: "the model has no inputs to feed".into() });
         }
@@ -369,12 +335,12 @@ impl<'s> Ports<'s> {
         };
         for source in &run.inputs {
             match *source {
-                Source::Udp(at) => {
+                Feed::Udp(at) => {
                     let socket = UdpSocket::bind(at).map_err(|why| refused("the input", at, why))?;
                     socket.set_nonblocking(true).map_err(|why| refused("the input", at, why))?;
                     ports.from = Some(socket);
                 }
-                Source::Stdin => ports.stdin = Some(Lines::read(ports.names.clone())),
+                Feed::Stdin => ports.stdin = Some(Lines::read(ports.names.clone())),
                 _ => {}
             }
         }

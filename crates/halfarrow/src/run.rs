@@ -3,14 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
-use std::time::Instant;
 
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::Kind;
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
-use halfarrow_compiler::program::{Input, Program, schedule};
+use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
 use halfarrow_sim::{
@@ -21,10 +19,12 @@ use serde::Serialize;
 
 use crate::advice::advice;
 use crate::audited::{AuditReport, Audited};
+use crate::clock::Moment;
+use crate::compiled::Ready;
 use crate::cost;
 use crate::error::{Error, Problem};
+use crate::input::{Input, connect};
 use crate::model::Model;
-use crate::table_file::ReadTable;
 use crate::verdict::Made;
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
@@ -49,8 +49,8 @@ pub struct Run {
     pub rtol: f64,
     /// Absolute error allowed in a step, in the unit of each state; `None`: scaled to each state.
     pub atol: Option<f64>,
-    /// Inputs given by CSV files: their names and the files.
-    pub inputs: Vec<(String, PathBuf)>,
+    /// Inputs that are given: their names and what they are over time. The others keep their defaults.
+    pub inputs: Vec<(String, Input)>,
     /// Where to start.
     pub start: Start,
     /// What to record.
@@ -232,55 +232,76 @@ fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, E
 
 impl Model {
     /// Computes a trajectory. `progress` is told the time reached after every step, and what is to be known as soon as it is,
-    /// and says whether to go on.
+    /// and says whether to go on. For many runs of one model see [`compile`](Model::compile).
     ///
     /// # Errors
     /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
     pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
-        let begun = Instant::now();
-        let equations = self.equations_in(run.form)?;
-        let mut timings = Timings { equations: begun.elapsed().as_secs_f64(), ..Timings::default() };
-        let done = self.simulate_with(&equations, run, &mut timings, progress);
-        timings.run = begun.elapsed().as_secs_f64() - timings.equations - timings.start;
-        let done = match done {
-            Ok(mut done) => {
-                done.report.timings = timings;
-                Ok(done)
-            }
-            Err(Error::Run(mut stopped)) => {
-                stopped.report.timings = timings;
-                Err(Error::Run(stopped))
-            }
-            other => other,
+        let begun = Moment::now();
+        let compiled = self.compile(run.form)?;
+        let equations = begun.elapsed().as_secs_f64();
+        let mut done = compiled.simulate(run, progress);
+        match &mut done {
+            Ok(done) => done.report.timings.equations = equations,
+            Err(Error::Run(stopped)) => stopped.report.timings.equations = equations,
+            Err(_) => {}
+        }
+        done
+    }
+
+    /// A trajectory of a system that is ready; it is used up.
+    pub(crate) fn simulate_with(
+        &self,
+        system: Ready,
+        run: &Run,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
+    ) -> Result<Simulated, Error> {
+        let begun = Moment::now();
+        let mut timings = Timings::default();
+        let mut done = match system {
+            Ready::Explicit(system) => self.run_explicit(system, run, &mut timings, progress),
+            Ready::Form { system, explicit } => self.run_form((*system, explicit), run, &mut timings, progress),
         };
+        timings.run = begun.elapsed().as_secs_f64() - timings.start;
+        match &mut done {
+            Ok(done) => done.report.timings = timings,
+            Err(Error::Run(stopped)) => stopped.report.timings = timings,
+            Err(_) => {}
+        }
         judged(done, &Made::by(run))
     }
 
-    fn simulate_with(
+    fn run_explicit(
         &self,
-        equations: &Equations,
+        mut system: exec::Model,
         run: &Run,
         timings: &mut Timings,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
-        let begun = Instant::now();
-        if run.form == Form::Minimal {
-            let mut system = self.system(equations)?;
-            connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
-            let mut notes = choose(&mut system, &run.record)?;
-            let start = self.start(&mut system, run.start)?;
-            timings.start = begun.elapsed().as_secs_f64();
-            let options = options(run)?;
-            if options.check(start.len()).is_ok() {
-                cost::check(&system, &start, &options, system.observed())?;
-            }
-            if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
-                notes.extend(advice(&system, &start, method, step));
-            }
-            return self.integrate(&mut system, start, &options, notes, progress);
+        let begun = Moment::now();
+        connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
+        let mut notes = choose(&mut system, &run.record)?;
+        let start = self.start(&mut system, run.start)?;
+        timings.start = begun.elapsed().as_secs_f64();
+        let options = options(run)?;
+        if options.check(start.len()).is_ok() {
+            cost::check(&system, &start, &options, system.observed())?;
         }
-        let explicit = equations.residuals.is_empty();
-        let mut system = self.implicit_system(equations, run)?;
+        if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
+            notes.extend(advice(&system, &start, method, step));
+        }
+        self.integrate(&mut system, start, &options, notes, progress)
+    }
+
+    fn run_form(
+        &self,
+        (mut system, explicit): (exec::ImplicitModel, bool),
+        run: &Run,
+        timings: &mut Timings,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
+    ) -> Result<Simulated, Error> {
+        let begun = Moment::now();
+        set_up(&mut system, run)?;
         let notes = choose(&mut system, &run.record)?;
         let x = self.start(system.reference_mut(), run.start)?;
         set_spring_rate(&mut system, &x)?;
@@ -366,25 +387,15 @@ impl Model {
 
     /// A form beside the minimal one, with inputs connected and springs as asked.
     pub(crate) fn implicit_system(&self, equations: &Equations, run: &Run) -> Result<exec::ImplicitModel, Error> {
-        let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
-        let made = exec::ImplicitModel::new(schedule(equations), minimal);
-        let mut system = made.map_err(|failure| self.stopped(failure))?;
-        connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
-        for (name, value) in [("form.stiffness", run.stiffness), ("form.damping", run.damping)] {
-            let Some(value) = value else { continue };
-            let known = system.program().parameters.iter().any(|p| p.name == name);
-            let below = if name == "form.stiffness" { value <= 0.0 } else { value < 0.0 };
-            if !known || below || !value.is_finite() {
-                let option = name.trim_start_matches("form.");
-                let reason = match known {
-                    true => format!("{option} is {value}: it has to be a finite number above zero"),
-                    false => format!("{option} is an option of the form stiff"),
-                };
-                return Err(Problem::BadOption { reason }.into());
-            }
-            system.set_parameter(name, value).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
-        }
+        let mut system = self.form_system(equations)?;
+        set_up(&mut system, run)?;
         Ok(system)
+    }
+
+    /// A form beside the minimal one.
+    pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
+        let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
+        exec::ImplicitModel::new(schedule(equations), minimal).map_err(|failure| self.stopped(failure))
     }
 
     fn run_report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
@@ -687,6 +698,26 @@ pub(crate) fn set_spring_rate(system: &mut exec::ImplicitModel, x: &[f64]) -> Re
     system.set_form_parameter("form.rate", fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
 }
 
+/// Connects the inputs of a run, and sets the springs that it asks for.
+fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
+    connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
+    for (name, value) in [("form.stiffness", run.stiffness), ("form.damping", run.damping)] {
+        let Some(value) = value else { continue };
+        let known = system.program().parameters.iter().any(|p| p.name == name);
+        let below = if name == "form.stiffness" { value <= 0.0 } else { value < 0.0 };
+        if !known || below || !value.is_finite() {
+            let option = name.trim_start_matches("form.");
+            let reason = match known {
+                true => format!("{option} is {value}: it has to be a finite number above zero"),
+                false => format!("{option} is an option of the form stiff"),
+            };
+            return Err(Problem::BadOption { reason });
+        }
+        system.set_parameter(name, value).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+    }
+    Ok(())
+}
+
 /// A form with algebraic unknowns or free rates is integrated by one method only.
 fn implicit_options(run: &Run) -> Result<Options, Problem> {
     let options = options(run)?;
@@ -698,31 +729,6 @@ fn implicit_options(run: &Run) -> Result<Options, Problem> {
             Err(Problem::BadOption { reason })
         }
     }
-}
-
-/// Connects the files of a run to the inputs.
-pub(crate) fn connect(
-    inputs: &[Input],
-    run: &Run,
-    mut put: impl FnMut(&str, &[f64], &[f64]) -> Result<(), exec::InputError>,
-) -> Result<(), Problem> {
-    for (name, path) in &run.inputs {
-        let known: Vec<String> = inputs.iter().map(|i| i.name.clone()).collect();
-        if !known.contains(name) {
-            return Err(Problem::UnknownInput { name: name.clone(), known });
-        }
-        let bad = |faults| Problem::BadInput { path: path.clone(), faults };
-        let mut table = ReadTable::open(path)?;
-        let columns: Vec<String> = table.columns.keys().cloned().collect();
-        let found = if columns.len() == 1 { &columns[0] } else { name };
-        let missing = || bad(vec![format!("no column is called `{name}`: there are {}", columns.join(", "))]);
-        let column = table.columns.remove(found).ok_or_else(missing)?;
-        let declared = inputs.iter().find(|i| i.name == *name);
-        let unit = declared.and_then(|i| i.unit.as_ref().or(i.deduced.as_ref()));
-        let values = column.in_si(found, unit).map_err(|fault| bad(vec![fault]))?;
-        put(name, &table.times, &values).map_err(|e| bad(vec![e.to_string()]))?;
-    }
-    Ok(())
 }
 
 /// Chooses what is recorded; tells what was left out.

@@ -1,7 +1,5 @@
 //! The stages as text.
 
-use std::path::Path;
-
 use halfarrow_compiler::ast;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::compile::Found;
@@ -11,7 +9,8 @@ use halfarrow_compiler::program::schedule;
 
 use crate::Override;
 use crate::error::Error;
-use crate::model::{Model, read_text};
+use crate::model::Model;
+use crate::source::Source;
 
 /// A stage of the compiler whose result can be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,17 +46,15 @@ impl Stage {
         }
     }
 
-    /// What it makes of a file, as text.
+    /// What it makes of a source, as text.
     ///
     /// # Errors
-    /// The file cannot be read, or the model has errors; the syntax tree is shown only of a text without errors.
-    pub fn show(self, path: &Path, set: &[Override]) -> Result<String, Error> {
+    /// The model has errors; the syntax tree is shown only of a text without errors.
+    pub fn show(self, source: Source, set: &[Override]) -> Result<String, Error> {
         match self {
             Stage::Ast => {
-                let name = path.to_string_lossy();
-                let text = read_text(path)?;
                 let mut sources = Sources::new();
-                let file = sources.add(name, text);
+                let file = sources.add(source.name(), source.content());
                 let parsed = ast::parse(sources.text(file), file);
                 let diagnostics = Diagnostics(parsed.diagnostics);
                 match diagnostics.has_errors() {
@@ -65,7 +62,7 @@ impl Stage {
                     false => Ok(parsed.ast.to_string()),
                 }
             }
-            _ => self.show_model(&Model::load(path, set)?),
+            _ => self.show_model(&Model::new(source, set)?),
         }
     }
 

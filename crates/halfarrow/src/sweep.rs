@@ -25,8 +25,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
+use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Record, Run, choose, connect, options, units};
+use crate::run::{Record, Run, choose, options, units};
 use journal::{Entry, Journal};
 use plan::Plan;
 use reduce::Reducers;
@@ -103,7 +104,7 @@ impl Model {
     ) -> Result<SweepReport, Error> {
         let kind = Kind::of(out)?;
         let mut system = self.system(&self.equations_in(sweep.run.form)?)?;
-        connect(&system.program().inputs.clone(), &sweep.run, |name, t, v| system.connect(name, t, v))?;
+        connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
         let plan = Plan::new(sweep, &system)?;
         let reducers = reducers(sweep, &mut system)?;
         let options = options(&sweep.run)?;
@@ -368,7 +369,8 @@ impl Kind {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         match extension.as_str() {
             "csv" => Ok(Kind::Csv),
-            "parquet" => Ok(Kind::Parquet),
+            "parquet" if cfg!(feature = "parquet") => Ok(Kind::Parquet),
+            "parquet" => Err(Problem::NotBuilt { what: "write Parquet", feature: "parquet" }),
             _ => Err(Problem::UnknownKind { path: path.into(), known: vec!["csv", "parquet"] }),
         }
     }
@@ -418,7 +420,7 @@ impl Kind {
 }
 
 /// That a model has this parameter, and that it can be set.
-fn known_parameter(system: &exec::Model, name: &str) -> Result<(), Problem> {
+pub(crate) fn known_parameter(system: &exec::Model, name: &str) -> Result<(), Problem> {
     let parameters = &system.program().parameters;
     match parameters.iter().find(|p| p.name == name) {
         Some(parameter) if parameter.constant => {

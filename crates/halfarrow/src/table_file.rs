@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use halfarrow_compiler::unit::{Dimension, Unit};
-use halfarrow_trace::{Column, InputColumn, Trace, read_inputs};
+use halfarrow_trace::{Column, InputColumn, InputError, InputTable, Trace, parse_inputs, read_inputs};
 
 use crate::error::Problem;
 
@@ -30,8 +30,20 @@ impl ReadTable {
     /// # Errors
     /// It cannot be read, its lines have faults, or a unit is none.
     pub fn open(path: &Path) -> Result<ReadTable, Problem> {
+        ReadTable::of(path, read_inputs(path))
+    }
+
+    /// Reads the text of a file. `path` is for messages.
+    ///
+    /// # Errors
+    /// Its lines have faults, or a unit is none.
+    pub fn parse(path: &Path, text: &str) -> Result<ReadTable, Problem> {
+        ReadTable::of(path, parse_inputs(text))
+    }
+
+    fn of(path: &Path, table: Result<InputTable, Vec<InputError>>) -> Result<ReadTable, Problem> {
         let bad = |faults| Problem::BadInput { path: path.to_path_buf(), faults };
-        let table = read_inputs(path).map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
+        let table = table.map_err(|e| bad(e.iter().map(ToString::to_string).collect()))?;
         let time = unit_of("t", table.time_unit.as_deref()).map_err(|fault| bad(vec![fault]))?;
         if let Some(unit) = time.as_ref().filter(|unit| unit.dimension != Dimension::SECOND) {
             return Err(bad(vec![format!(

@@ -88,6 +88,25 @@ fn every_dependency_has_its_reason_beside_it() {
 }
 
 #[test]
+fn no_file_of_tests_is_forgotten() {
+    let mut forgotten = Vec::new();
+    for folder in allowed().keys().map(|folder| root().join(folder)) {
+        let manifest = read(&folder.join("Cargo.toml"));
+        if !manifest.contains("autotests = false") {
+            continue;
+        }
+        let all = read(&folder.join("tests/all.rs"));
+        for path in entries(&folder.join("tests")).iter().filter(|path| path.extension().is_some_and(|e| e == "rs")) {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            if !all.contains(&format!("\nmod {name};")) && !manifest.contains(&format!("[[test]]\nname = \"{name}\"")) {
+                forgotten.push(path.display().to_string());
+            }
+        }
+    }
+    assert!(forgotten.is_empty(), "tests that nobody runs: name them in all.rs beside them:\n{}", forgotten.join("\n"));
+}
+
+#[test]
 fn unsafe_code_stays_in_exec() {
     for folder in allowed().keys().filter(|f| f.starts_with("crates/") && **f != "crates/exec") {
         let lib = read(&root().join(folder).join("src/lib.rs"));

@@ -25,7 +25,7 @@ fn run_of(method: Method) -> Run {
 
 /// A sweep of these parameters, and its rows.
 fn sweep(model: &Model, vary: &[&str], kept: &str, method: Method) -> (SweepReport, Vec<Vec<f64>>) {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     let out = folder.path().join("r.csv");
     let sweep = Sweep {
         run: run_of(method),

@@ -194,7 +194,7 @@ fn what_comes_to_rest_raises_no_alarm() {
 
 #[test]
 fn sweeps_audit_a_sample_of_their_sets() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     let out = folder.path().join("r.csv");
     let of = |vary: &str| Sweep {
         run: Run { to: 2.0, method: Method::Fixed(FixedMethod::Heun), step: Some(5e-3), ..Run::default() },

@@ -34,7 +34,7 @@ fn model(text: &str) -> Model {
 }
 
 fn run_with(model: &Model, path: &Path) -> Result<Simulated, Error> {
-    let inputs = vec![("road".to_string(), path.to_path_buf())];
+    let inputs = vec![("road".to_string(), path.into())];
     model.simulate(&Run { to: 0.4, every: Some(0.02), inputs, ..Run::default() }, &mut |_| true)
 }
 

@@ -1,9 +1,9 @@
 //! Small models on which forms, laws of vanishing or infinite slope, and nodes that float went wrong.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use halfarrow::{Error, Export, FixedMethod, Form, Method, Model, Record, Run, Simulated, Target};
+use halfarrow::{Error, Export, FixedMethod, Form, Input, Method, Model, Record, Run, Simulated, Target};
 
 const FORMS: [Form; 6] = [Form::Minimal, Form::Kane, Form::Inverted, Form::Break, Form::Relaxed, Form::Lagrange];
 
@@ -73,8 +73,8 @@ fn every_kind_of_jump_is_the_same_in_every_form() {
             "model Jump\n{before}Sf:s({source}) -> 0:n\nn -> 1:a -> I:la(1)\na -> R:ra(0.5)\nn -> 1:b -> I:lb(3)\nb -> R:rb(0.2)\n"
         );
         let model = text(&graph);
-        let inputs: Vec<(String, PathBuf)> =
-            if source == "u" { vec![("u".to_string(), csv.clone())] } else { Vec::new() };
+        let inputs: Vec<(String, Input)> =
+            if source == "u" { vec![("u".to_string(), csv.clone().into())] } else { Vec::new() };
         let of = |form| {
             let run = Run { inputs: inputs.clone(), ..run(form, 1.0, &["la.f", "lb.f"]) };
             ends(&model, &run)

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Error, FixedMethod, Form, Method, Model, Record, Run, Simulated, Start};
+use halfarrow::{Error, FixedMethod, Form, Input, Method, Model, Record, Run, Simulated, Start};
 
 fn fault(name: &str) -> Model {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(format!("{name}.bond"));
@@ -119,8 +119,8 @@ fn work_faults(folder: &Path) -> Vec<String> {
     let times = reference["t"].as_array().expect("times");
     let last: f64 = times.last().and_then(|t| t.as_str()?.parse().ok()).expect("a time");
     let inputs = reference["inputs"].as_object().cloned().unwrap_or_default();
-    let inputs: Vec<(String, PathBuf)> =
-        inputs.iter().map(|(name, file)| (name.clone(), folder.join(file.as_str().expect("a file")))).collect();
+    let inputs: Vec<(String, Input)> =
+        inputs.iter().map(|(name, file)| (name.clone(), folder.join(file.as_str().expect("a file")).into())).collect();
     let mut faults = Vec::new();
     for method in [Method::Explicit, Method::Bdf, Method::Radau] {
         let steps: Vec<usize> = (6..=12)
@@ -211,7 +211,7 @@ fn rows_of_an_input_are_corners_and_no_jumps() {
     .unwrap_or_else(|e| panic!("{}", e.render(false)));
     let run = |road: &str, method: Method, step: Option<f64>| {
         std::fs::write(&path, road).expect("a file");
-        let inputs = vec![("road".to_string(), path.clone())];
+        let inputs = vec![("road".to_string(), path.clone().into())];
         let run = Run { to: 10.0, every: Some(0.5), method, step, inputs, ..Run::default() };
         model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
     };

@@ -255,7 +255,7 @@ output v = a.e : V
 fn matrices_along_a_run_and_what_is_refused() {
     let folder = folders().into_iter().find(|f| f.ends_with("quarter_car")).expect("the model");
     let car = Model::load(&folder.join("model.bond"), &[]).expect("a model");
-    let series = vec![("road".to_string(), folder.join("input.csv"))];
+    let series = vec![("road".to_string(), folder.join("input.csv").into())];
     let moving = linearized(&car, &Linearize { at: Point::Time(0.6), series, ..Linearize::default() });
     assert!(moving.states.iter().any(|s| s.rate.abs() > 1e-3));
     assert!(moving.notes.iter().any(|n| n.contains("not at rest")), "{:?}", moving.notes);

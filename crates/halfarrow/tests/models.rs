@@ -122,7 +122,7 @@ impl Reference {
             to: times.last().copied().expect("a time"),
             every: Some(common_step(&self.times)),
             rtol: 1e-12,
-            inputs: self.inputs.iter().map(|(name, file)| (name.clone(), folder.join(file))).collect(),
+            inputs: self.inputs.iter().map(|(name, file)| (name.clone(), folder.join(file).into())).collect(),
             record: Record::Names(self.values.keys().cloned().collect()),
             ..Run::default()
         }

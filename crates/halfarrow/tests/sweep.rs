@@ -35,7 +35,7 @@ fn rows(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 
 #[test]
 fn rows_are_those_of_runs_alone() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     for method in [Method::Fixed(FixedMethod::Rk4), Method::Fixed(FixedMethod::ImplicitMidpoint), Method::Auto] {
         let (model, sweep, out) = (model(), sweep(method), folder.path().join("r.csv"));
         let report = run(&model, &sweep, &out);
@@ -62,7 +62,7 @@ fn rows_are_those_of_runs_alone() {
 
 #[test]
 fn an_interrupted_sweep_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     let (model, sweep) = (model(), sweep(Method::Fixed(FixedMethod::Heun)));
     let (whole, parts) = (folder.path().join("whole.parquet"), folder.path().join("parts.parquet"));
     run(&model, &sweep, &whole);
@@ -77,7 +77,7 @@ fn an_interrupted_sweep_goes_on() {
 
 #[test]
 fn sets_that_fail_are_told_by_row() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     let (model, out) = (model(), folder.path().join("r.csv"));
     let table = folder.path().join("sets.csv");
     std::fs::write(&table, "load,k\n1 kg,4\n0,4\n500 g,-4\n").unwrap();
@@ -94,7 +94,7 @@ fn sets_that_fail_are_told_by_row() {
 
 #[test]
 fn what_makes_no_sense_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temp_dir::TempDir::new().unwrap();
     let (model, out) = (model(), folder.path().join("r.csv"));
     let with = |vary: &str| Sweep { vary: vec![Vary::parse(vary).unwrap()], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
     for (sweep, says) in [

@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn the_file_holds_the_text() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let path = folder.path().join("x.csv");
         let mut trace = Trace::new([("x", "m")]);
         trace.sample(0.5, &[2.0]);

@@ -7,8 +7,14 @@ mod csv;
 mod input;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(not(feature = "parquet"))]
+#[path = "parquet/absent.rs"]
+mod parquet;
 mod plot;
 #[cfg(feature = "png")]
+mod png;
+#[cfg(not(feature = "png"))]
+#[path = "png/absent.rs"]
 mod png;
 mod svg;
 mod trace;
@@ -17,10 +23,8 @@ mod whole;
 pub use chart::{Chart, Curve, Guide, Panel, Scale, ScaleKind, chart};
 pub use csv::{CsvTable, csv_text, write_csv};
 pub use input::{InputColumn, InputError, InputTable, parse_inputs, read_inputs};
-#[cfg(feature = "parquet")]
 pub use parquet::{ParquetTable, write_parquet};
 pub use plot::{PlotOptions, plot, plot_runs};
-#[cfg(feature = "png")]
 pub use png::{PngError, png};
 pub use trace::{Column, Trace};
 pub use whole::{WriteError, write_whole};

@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn every_number_comes_back_with_its_unit() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let path = folder.path().join("x.parquet");
         let mut trace = Trace::new([("spring.q", "m"), ("max(a, b)", "")]);
         let numbers = [0.1 + 0.2, -0.0, 5e-324, f64::MAX, f64::NAN, f64::INFINITY];
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_trace_without_samples_is_a_file() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let path = folder.path().join("empty.parquet");
         write_parquet(&Trace::new([("x", "m")]), &path).unwrap();
         let file = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();

@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_failed_write_leaves_what_was_there() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let path = folder.path().join("x.csv");
         write_whole(&path, |out| out.write_all(b"old")).unwrap();
         let failed = write_whole(&path, |out| {
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn a_missing_folder_is_named() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let error = write_whole(&folder.path().join("no/x.csv"), |_| Ok(())).unwrap_err().to_string();
         assert!(error.ends_with("no does not exist; make it first"), "{error}");
     }

@@ -1,18 +1,16 @@
 //! `check`, `show`, `loops`, `equations`.
 
-use std::path::Path;
-
 use halfarrow::{CheckReport, EquationsReport, Error, Form, LoopsReport, Model, Stage};
 use serde_json::json;
 
-use super::{overrides, with_model};
+use super::{overrides, source, with_model};
 use crate::arguments::{self, FileArguments, Format};
 use crate::page::Page;
 use crate::screen;
 
 /// All diagnostics.
 pub fn check(arguments: &FileArguments) -> u8 {
-    let report = match CheckReport::of(&arguments.file) {
+    let report = match source(arguments).map_err(Error::from).and_then(CheckReport::of) {
         Ok(report) => report,
         Err(error) => return screen::fail(&error, arguments.json),
     };
@@ -45,8 +43,8 @@ pub fn show(arguments: &arguments::Show) -> u8 {
         arguments::Stage::Equations => Stage::Equations,
         arguments::Stage::Program => Stage::Program,
     };
-    let file: &Path = &arguments.model.model.file;
-    let printed = match stage.show(file, &overrides(&arguments.model)) {
+    let shown = source(&arguments.model.model).map_err(Error::from);
+    let printed = match shown.and_then(|source| stage.show(source, &overrides(&arguments.model))) {
         Ok(text) if arguments.model.model.json => screen::print_json(&json!({"stage": stage.name(), "text": text})),
         Ok(text) => screen::print(&text),
         Err(error) => return screen::fail(&error, arguments.model.model.json),

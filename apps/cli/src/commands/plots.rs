@@ -4,7 +4,6 @@ use std::path::Path;
 
 use halfarrow::{Error, Model, Override, PlotOptions, Problem, Record, Run, Simulated, Trace, read_trace};
 
-use super::overrides;
 use super::picture::write_picture;
 use crate::arguments::{PlotLog, Simulate};
 
@@ -39,8 +38,7 @@ pub fn write_plots(arguments: &Simulate, model: &Model, run: &Run, done: &Simula
     let picture = if options.is_plain() && arguments.overlay.is_empty() {
         model.plot(&done.trace)
     } else {
-        let others =
-            arguments.overlay.iter().map(|what| Ok((what.as_str(), other(arguments, run, &done.trace, what)?)));
+        let others = arguments.overlay.iter().map(|what| Ok((what.as_str(), other(model, run, &done.trace, what)?)));
         let others = others.collect::<Result<Vec<(&str, Trace)>, Error>>()?;
         let own = if others.is_empty() { "" } else { "as given" };
         let further = others.iter().map(|(name, trace)| (*name, trace));
@@ -51,7 +49,7 @@ pub fn write_plots(arguments: &Simulate, model: &Model, run: &Run, done: &Simula
 }
 
 /// A run to lie over the one that was asked for: of a file, or with other parameters.
-fn other(arguments: &Simulate, run: &Run, own: &Trace, what: &str) -> Result<Trace, Error> {
+fn other(model: &Model, run: &Run, own: &Trace, what: &str) -> Result<Trace, Error> {
     if Path::new(what).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         return Ok(read_trace(Path::new(what), own)?);
     }
@@ -64,7 +62,5 @@ fn other(arguments: &Simulate, run: &Run, own: &Trace, what: &str) -> Result<Tra
         Ok(Override { name, value })
     };
     let set = what.split(',').map(pair).collect::<Result<Vec<Override>, Error>>()?;
-    let all = [overrides(&arguments.model), set].concat();
-    let model = Model::load(&arguments.model.model.file, &all)?;
-    Ok(model.simulate(run, &mut |_| true)?.trace)
+    Ok(model.with(&set)?.simulate(run, &mut |_| true)?.trace)
 }

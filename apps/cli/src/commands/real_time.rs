@@ -5,7 +5,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
-use halfarrow::{Durations, Form, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Source, Statistics, frequency};
+use halfarrow::{Durations, Feed, Form, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Statistics, frequency};
 use serde_json::json;
 
 use super::run::{method, record, start};
@@ -73,12 +73,12 @@ fn asked(arguments: &RunArguments) -> Result<RealTimeRun, Problem> {
     })
 }
 
-fn source(text: &str) -> Result<Source, Problem> {
+fn source(text: &str) -> Result<Feed, Problem> {
     match text.split_once('=') {
-        _ if text == "stdin" || text == "-" => Ok(Source::Stdin),
-        _ if text.contains("://") => address(text).map(Source::Udp),
-        Some((name, path)) => Ok(Source::File(name.trim().to_string(), path.trim().into())),
-        None => Ok(Source::Table(text.into())),
+        _ if text == "stdin" || text == "-" => Ok(Feed::Stdin),
+        _ if text.contains("://") => address(text).map(Feed::Udp),
+        Some((name, path)) => Ok(Feed::File(name.trim().to_string(), path.trim().into())),
+        None => Ok(Feed::Table(text.into())),
     }
 }
 

@@ -4,7 +4,7 @@ use super::exprs::Exprs;
 use super::math;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::rational::Rational;
-use astro_float::{BigFloat, Consts, Radix, RoundingMode, Sign};
+use astro_float_num::{BigFloat, Consts, Radix, RoundingMode, Sign};
 use rustc_hash::FxHashMap;
 
 /// Real numbers of some precision.

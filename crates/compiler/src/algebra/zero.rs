@@ -6,7 +6,7 @@ use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::{Expr, Node};
 use super::precise::{Point, Verdict};
-use astro_float::{BigFloat, Consts};
+use astro_float_num::{BigFloat, Consts};
 
 /// Points that have to agree before an expression counts as zero by its values.
 const POINTS: usize = 12;

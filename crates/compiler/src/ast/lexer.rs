@@ -1,83 +1,52 @@
-//! Model text to tokens.
+//! Model text to tokens: one pass, one character of foresight but for what is written between marks.
 
-use logos::Logos;
+use unicode_ident::{is_xid_continue, is_xid_start};
 
 /// The kinds of tokens. Words are all [`Ident`](TokenKind::Ident): what is a keyword depends on where it stands.
-#[derive(Logos, Debug, Clone, Copy, PartialEq, Eq)]
-#[logos(skip r"[ \t\r\u{feff}\u{a0}]+")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TokenKind {
-    #[regex(r"[\p{XID_Start}_][\p{XID_Continue}--·]*")]
+    /// A letter of any script or `_`, then letters, digits and `_`.
     Ident,
-    #[regex(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")]
+    /// Digits, perhaps a fraction, perhaps a power of ten.
     Number,
-    #[regex(r#""([^"\\\n]|\\[^\n])*""#)]
+    /// `"..."` within a line; a backslash takes the next character along.
     Text,
-    #[regex(r#""([^"\\\n]|\\[^\n])*\\?"#)]
+    /// The same without its end.
     OpenText,
-    #[token("->")]
     Arrow,
-    #[token("(")]
     LParen,
-    #[token(")")]
     RParen,
-    #[token("[")]
     LBracket,
-    #[token("]")]
     RBracket,
-    #[token("{")]
     LBrace,
-    #[token("}")]
     RBrace,
-    #[token(",")]
     Comma,
-    #[token(";")]
     Semicolon,
-    #[token(":")]
     Colon,
-    #[token(".")]
     Dot,
-    #[token("..")]
     DotDot,
-    #[token("=")]
     Assign,
-    #[token("==")]
     EqEq,
-    #[token("!=")]
     NotEq,
-    #[token("<")]
     Less,
-    #[token("<=")]
     LessEq,
-    #[token(">")]
     Greater,
-    #[token(">=")]
     GreaterEq,
-    #[token("+")]
     Plus,
-    #[token("-")]
     Minus,
-    #[token("*")]
     Star,
-    #[token("/")]
     Slash,
-    #[token("^")]
     Caret,
-    #[token("'")]
     Prime,
-    #[token("%")]
     Percent,
-    #[token("°")]
     Degree,
-    #[token("·")]
     MiddleDot,
-    #[regex("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")]
+    /// Raised digits and signs.
     Superscript,
-    #[token("\n")]
     Newline,
-    #[regex(r"//[^\n]*", allow_greedy = true)]
+    /// `// ...` to the end of the line.
     Comment,
     /// `/* ... */`, which other languages have.
-    #[regex(r"/\*([^*]|\*+[^*/])*\*+/")]
     BlockComment,
     /// Characters without a meaning.
     Unknown,
@@ -100,10 +69,12 @@ pub(super) struct Token {
 /// The text must be shorter than 4 GiB.
 pub(super) fn lex(text: &str) -> Vec<Token> {
     let mut tokens: Vec<Token> = Vec::with_capacity(text.len() / 3 + 1);
-    let mut newlines = 0;
-    for (kind, range) in TokenKind::lexer(text).spanned() {
-        let kind = kind.unwrap_or(TokenKind::Unknown);
-        let (start, end) = (range.start as u32, range.end as u32);
+    let (mut newlines, mut at) = (0, 0);
+    loop {
+        at += leading(&text[at..], is_blank);
+        let (kind, length) = first(&text[at..]);
+        let (start, end) = (at as u32, (at + length) as u32);
+        at += length;
         match tokens.last_mut() {
             _ if kind == TokenKind::Newline => newlines = (newlines + 1).min(2),
             Some(last) if kind == TokenKind::Unknown && last.kind == kind && last.end == start => last.end = end,
@@ -112,10 +83,114 @@ pub(super) fn lex(text: &str) -> Vec<Token> {
                 newlines = 0;
             }
         }
+        if kind == TokenKind::End {
+            return tokens;
+        }
     }
-    let end = text.len() as u32;
-    tokens.push(Token { kind: TokenKind::End, newlines, start: end, end });
-    tokens
+}
+
+/// The token that a text begins with, and its length in bytes.
+fn first(text: &str) -> (TokenKind, usize) {
+    let mut chars = text.chars();
+    let Some(c) = chars.next() else { return (TokenKind::End, 0) };
+    match (c, chars.next()) {
+        ('"', _) => quoted(text),
+        ('/', Some('/')) => (TokenKind::Comment, leading(text, |c| c != '\n')),
+        ('/', Some('*')) => match text[2..].find("*/") {
+            Some(inside) => (TokenKind::BlockComment, inside + 4),
+            None => (TokenKind::Slash, 1),
+        },
+        ('0'..='9', _) => (TokenKind::Number, number(text)),
+        (c, _) if c == '_' || is_xid_start(c) => (TokenKind::Ident, leading(text, is_of_name)),
+        (c, _) if is_raised(c) => (TokenKind::Superscript, leading(text, is_raised)),
+        (c, next) => sign(c, next),
+    }
+}
+
+/// A text between quotation marks, or what of it stands in its line.
+fn quoted(text: &str) -> (TokenKind, usize) {
+    let mut chars = text.char_indices().skip(1);
+    while let Some((at, c)) = chars.next() {
+        match c {
+            '"' => return (TokenKind::Text, at + 1),
+            '\n' => return (TokenKind::OpenText, at),
+            '\\' if text[at + 1..].starts_with('\n') => return (TokenKind::OpenText, at + 1),
+            '\\' => _ = chars.next(),
+            _ => {}
+        }
+    }
+    (TokenKind::OpenText, text.len())
+}
+
+/// The length of the number that a text begins with. A fraction or a power without digits is not part of it.
+fn number(text: &str) -> usize {
+    let digits = |at: usize| leading(&text[at..], |c| c.is_ascii_digit());
+    let mut length = digits(0);
+    if text[length..].starts_with('.') && digits(length + 1) > 0 {
+        length += 1 + digits(length + 1);
+    }
+    if text[length..].starts_with(['e', 'E']) {
+        let exponent = length + 1 + usize::from(text[length + 1..].starts_with(['+', '-']));
+        if digits(exponent) > 0 {
+            length = exponent + digits(exponent);
+        }
+    }
+    length
+}
+
+/// Signs, of which some are two characters long.
+fn sign(c: char, next: Option<char>) -> (TokenKind, usize) {
+    use TokenKind::*;
+    match (c, next) {
+        ('-', Some('>')) => (Arrow, 2),
+        ('.', Some('.')) => (DotDot, 2),
+        ('=', Some('=')) => (EqEq, 2),
+        ('!', Some('=')) => (NotEq, 2),
+        ('<', Some('=')) => (LessEq, 2),
+        ('>', Some('=')) => (GreaterEq, 2),
+        ('\n', _) => (Newline, 1),
+        ('(', _) => (LParen, 1),
+        (')', _) => (RParen, 1),
+        ('[', _) => (LBracket, 1),
+        (']', _) => (RBracket, 1),
+        ('{', _) => (LBrace, 1),
+        ('}', _) => (RBrace, 1),
+        (',', _) => (Comma, 1),
+        (';', _) => (Semicolon, 1),
+        (':', _) => (Colon, 1),
+        ('.', _) => (Dot, 1),
+        ('=', _) => (Assign, 1),
+        ('<', _) => (Less, 1),
+        ('>', _) => (Greater, 1),
+        ('+', _) => (Plus, 1),
+        ('-', _) => (Minus, 1),
+        ('*', _) => (Star, 1),
+        ('/', _) => (Slash, 1),
+        ('^', _) => (Caret, 1),
+        ('\'', _) => (Prime, 1),
+        ('%', _) => (Percent, 1),
+        ('°', _) => (Degree, 2),
+        ('·', _) => (MiddleDot, 2),
+        (c, _) => (Unknown, c.len_utf8()),
+    }
+}
+
+/// The length of the part of a text before the first character that is not of a kind.
+fn leading(text: &str, of_kind: impl Fn(char) -> bool) -> usize {
+    text.find(|c| !of_kind(c)).unwrap_or(text.len())
+}
+
+fn is_blank(c: char) -> bool {
+    matches!(c, ' ' | '\t' | '\r' | '\u{feff}' | '\u{a0}')
+}
+
+/// Whether a character may stand within a name. The middle dot, which Unicode allows there, multiplies units.
+fn is_of_name(c: char) -> bool {
+    is_xid_continue(c) && c != '·'
+}
+
+fn is_raised(c: char) -> bool {
+    matches!(c, '⁰' | '¹' | '²' | '³' | '⁴'..='⁹' | '⁻')
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::builder::{BlockInput, Builder, OpenBlock, Value};
 use super::csv;
 use super::dimension::Quantity;
-use super::files::read_beside;
+use super::files::{FileError, read_beside};
 use super::value::{Reading, known_of};
 use super::{Held, HeldKind, Meaning, Signal, SignalId};
 use crate::algebra::{Expr, Facts, Interpolation, Outside, Symbol, Table1d, TableError};
@@ -359,8 +359,9 @@ impl<'a> Builder<'a, '_> {
         if let Some(known) = self.csv.get(&key) {
             return known.clone();
         }
-        let read = read_beside(self.files, &from, path).map_err(|why| why.to_string());
-        let columns = match read.and_then(|(_, text)| csv::parse(&text).map_err(|why| why.to_string())) {
+        let read = read_beside(self.files, &from, path).map_err(|why| (why.to_string(), why.remedy().to_string()));
+        let parse = |text: &str| csv::parse(text).map_err(|why| (why.to_string(), FileError::NotFound.remedy().into()));
+        let columns = match read.and_then(|(_, text)| parse(&text)) {
             Ok(columns) if columns.columns.len() > 1 => Some(columns),
             Ok(_) => {
                 let d = Diagnostic::error(
@@ -372,9 +373,9 @@ impl<'a> Builder<'a, '_> {
                 self.fault(d.hint("give pairs of numbers: argument and value"));
                 None
             }
-            Err(why) => {
+            Err((why, remedy)) => {
                 let d = Diagnostic::error(codes::N020, format!("`{path}` cannot be read"), span, why);
-                self.fault(d.hint("paths are seen from the folder of the file that names them"));
+                self.fault(d.hint(remedy));
                 None
             }
         };

@@ -19,13 +19,32 @@ pub enum FileError {
     NotFound,
     /// It is there, but cannot be read as text; the system says why.
     Unreadable(String),
+    /// It lies where the model may read nothing.
+    Refused {
+        /// Why.
+        why: String,
+        /// What can be done about it.
+        remedy: String,
+    },
+}
+
+impl FileError {
+    /// What can be done about it.
+    pub(super) fn remedy(&self) -> &str {
+        match self {
+            FileError::NotFound | FileError::Unreadable(_) => {
+                "paths are seen from the folder of the file that names them"
+            }
+            FileError::Refused { remedy, .. } => remedy,
+        }
+    }
 }
 
 impl std::fmt::Display for FileError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             FileError::NotFound => f.write_str("there is no such file"),
-            FileError::Unreadable(why) => f.write_str(why),
+            FileError::Unreadable(why) | FileError::Refused { why, .. } => f.write_str(why),
         }
     }
 }

@@ -133,5 +133,5 @@ fn imports(tree: &Ast) -> Vec<(String, Span)> {
 
 fn unreadable(path: &str, near: &str, why: &FileError, span: Span) -> Diagnostic {
     let d = Diagnostic::error(codes::N010, format!("`{path}` cannot be read"), span, why.to_string());
-    d.note(format!("looked for at `{near}`")).hint("paths are seen from the folder of the file that names them")
+    d.note(format!("looked for at `{near}`")).hint(why.remedy())
 }

@@ -1,6 +1,6 @@
 //! Points at which functions are tried, and their values to 320 bits and more.
 
-use astro_float::{BigFloat, Consts, RoundingMode};
+use astro_float_num::{BigFloat, Consts, RoundingMode};
 use halfarrow_compiler::algebra::{Function, math};
 
 /// A function to try.

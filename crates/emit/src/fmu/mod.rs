@@ -6,6 +6,7 @@
 
 mod dependence;
 mod description;
+#[cfg(feature = "fmu")]
 mod package;
 mod units;
 mod variables;
@@ -102,6 +103,7 @@ pub fn headers(version: Version) -> Vec<File> {
 /// The file of an FMU, with a binary for a platform if there is one.
 ///
 /// `binary`: its path within the FMU, such as `binaries/x86_64-linux/name.so`, and its bytes.
+#[cfg(feature = "fmu")]
 pub fn package(written: &Written, binary: Option<File>) -> Vec<u8> {
     let mut files = written.files.clone();
     files.extend(binary);

@@ -12,8 +12,12 @@ mod registers;
 mod wide;
 
 pub(crate) use abreast::Abreast;
-pub(crate) use conditions::{HeldConditions, Hold, piece_of, table_on};
-pub(crate) use frame::{Frame, InnerCode, PIVOT_BELOW, Trouble};
+#[cfg(feature = "machine")]
+pub(crate) use conditions::table_on;
+pub(crate) use conditions::{HeldConditions, Hold, piece_of};
+pub(crate) use frame::{Frame, Trouble};
+#[cfg(feature = "machine")]
+pub(crate) use frame::{InnerCode, PIVOT_BELOW};
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
 pub(crate) use instruction::{Instruction, Operation, Routine, Solve};

@@ -1,7 +1,7 @@
 //! Random programs, each made by a recipe.
 #![allow(dead_code)]
 
-use crate::common::Sketch;
+use super::common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
 use halfarrow_compiler::equations::Step;
 use proptest::prelude::*;

@@ -1,11 +1,12 @@
 //! Runs of one form at tighter and tighter tolerances: what an error costs.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use halfarrow_sim::Method;
 
 use super::reference::Reference;
 use super::subject::{Settings, Subject, is_over};
+use crate::clock::Moment;
 
 /// Loosest and tightest power of ten of the tolerances.
 const RTOLS: std::ops::RangeInclusive<i32> = 2..=12;
@@ -41,7 +42,7 @@ pub(super) struct Effort {
     /// A run that takes longer ends its ladder.
     pub patience: Duration,
     /// When measuring this form ends.
-    pub until: Option<Instant>,
+    pub until: Option<Moment>,
 }
 
 /// The ladder of a form with a method, timed once. `go_on` is asked before every run.
@@ -90,7 +91,7 @@ pub(super) fn time(
     rungs: &mut [(Rung, &Subject)],
     to: f64,
     repeats: usize,
-    until: Option<Instant>,
+    until: Option<Moment>,
     go_on: &mut dyn FnMut(f64) -> bool,
 ) {
     let mut times: Vec<Vec<f64>> = vec![Vec::with_capacity(repeats); rungs.len()];

@@ -5,8 +5,7 @@ mod picture;
 mod reference;
 mod subject;
 
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
 use halfarrow_compiler::equations::{Form, Step};
@@ -14,7 +13,9 @@ use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
 use crate::audited::AuditReport;
+use crate::clock::Moment;
 use crate::error::{Error, Problem};
+use crate::input::Input;
 use crate::model::Model;
 use crate::run::{Run, Start};
 use crate::verdict::Verdict;
@@ -44,8 +45,8 @@ pub struct Compare {
     pub to: Option<f64>,
     /// Error of the motion at which times are compared, relative to the greatest magnitude of each variable.
     pub error: f64,
-    /// Inputs given by CSV files: their names and the files.
-    pub inputs: Vec<(String, PathBuf)>,
+    /// Inputs that are given: their names and what they are over time.
+    pub inputs: Vec<(String, Input)>,
     /// Runs whose median counts as the time.
     pub repeats: usize,
     /// Processor time of a run, in s, beyond which no tighter tolerance is tried.
@@ -373,23 +374,23 @@ struct Measured<'m> {
 /// The time that comparing may take.
 #[derive(Clone, Copy)]
 struct Budget {
-    begun: Instant,
+    begun: Moment,
     whole: Option<Duration>,
 }
 
 impl Budget {
     fn new(seconds: Option<f64>) -> Budget {
         let whole = seconds.map(|s| Duration::from_secs_f64(s.clamp(0.0, 1e7)));
-        Budget { begun: Instant::now(), whole }
+        Budget { begun: Moment::now(), whole }
     }
     /// When this part of it is over.
-    fn part(&self, part: f64) -> Option<Instant> {
+    fn part(&self, part: f64) -> Option<Moment> {
         self.whole.map(|whole| self.begun + whole.mul_f64(part))
     }
     /// When one of so many that share what is left until then has had its time.
-    fn share(&self, part: f64, among: usize) -> Option<Instant> {
-        let now = Instant::now();
-        self.part(part).map(|end| now + end.saturating_duration_since(now) / among.max(1) as u32)
+    fn share(&self, part: f64, among: usize) -> Option<Moment> {
+        let now = Moment::now();
+        self.part(part).map(|end| now + end.since(now) / among.max(1) as u32)
     }
     /// That it does not even suffice for the reference.
     fn too_short(&self) -> Error {
@@ -410,13 +411,7 @@ impl Budget {
 }
 
 /// Times the runs of all forms.
-fn measure(
-    forms: &mut [Measured],
-    to: f64,
-    repeats: usize,
-    until: Option<Instant>,
-    go_on: &mut dyn FnMut(f64) -> bool,
-) {
+fn measure(forms: &mut [Measured], to: f64, repeats: usize, until: Option<Moment>, go_on: &mut dyn FnMut(f64) -> bool) {
     let of = |form: &Measured| form.rungs.len();
     let counts: Vec<usize> = forms.iter().map(of).collect();
     let all = forms.iter().flat_map(|form| form.rungs.iter().map(|(rung, at)| (rung.clone(), &form.subjects[*at])));
@@ -473,7 +468,7 @@ impl Measured<'_> {
 }
 
 /// How far all variables are off at a tight tolerance.
-fn agreement(row: &mut Row, subject: &Subject, reference: &Reference, until: Option<Instant>) {
+fn agreement(row: &mut Row, subject: &Subject, reference: &Reference, until: Option<Moment>) {
     let variables = subject.variables();
     let names = reference.common(&variables);
     let tried = [Method::Radau, Method::Auto].into_iter().take(if subject.methods().len() > 2 { 2 } else { 1 });

@@ -1,13 +1,13 @@
 //! What a run is measured against: the same motion at the tightest tolerance, confirmed by another form.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use halfarrow_compiler::equations::Form;
 use halfarrow_sim::{Method, Stopped};
 use halfarrow_trace::Trace;
 
 use super::subject::{Settings, Subject, is_over};
+use crate::clock::Moment;
 
 /// Tolerance of the reference.
 const TIGHTEST: f64 = 1e-12;
@@ -48,7 +48,7 @@ impl Reference {
         others: &[(Form, &Subject)],
         motion: &[String],
         to: f64,
-        until: Option<Instant>,
+        until: Option<Moment>,
     ) -> Result<Reference, Box<Stopped>> {
         let known = minimal.variables();
         let names: Vec<&str> = known.iter().map(|v| v.0.as_str()).collect();

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use cpu_time::ThreadTime;
 use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_compiler::equations::Form;
 use halfarrow_exec::{self as exec, Operations};
@@ -14,9 +13,11 @@ use halfarrow_sim::{
 use halfarrow_trace::Trace;
 
 use crate::audited::{AuditReport, Audited};
+use crate::clock::{Moment, ProcessorTime};
 use crate::error::Error;
+use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Run, Start, connect, set_spring_rate};
+use crate::run::{Run, Start, set_spring_rate};
 use crate::verdict::Made;
 
 /// A form at its start.
@@ -44,7 +45,7 @@ pub(super) struct Settings {
     pub rtol: f64,
     pub to: f64,
     /// When the run is given up, if at all.
-    pub until: Option<Instant>,
+    pub until: Option<Moment>,
 }
 
 impl Settings {
@@ -54,8 +55,8 @@ impl Settings {
 }
 
 /// Whether the time for something is over.
-pub(super) fn is_over(until: Option<Instant>) -> bool {
-    until.is_some_and(|until| Instant::now() >= until)
+pub(super) fn is_over(until: Option<Moment>) -> bool {
+    until.is_some_and(|until| Moment::now() >= until)
 }
 
 /// Steps between two looks at the clock.
@@ -64,7 +65,7 @@ const LOOK: usize = 32;
 /// Takes samples if somebody wants them, and gives up when the time is over.
 struct Patient<'t> {
     trace: Option<&'t mut Trace>,
-    until: Option<Instant>,
+    until: Option<Moment>,
     steps: usize,
 }
 
@@ -105,7 +106,7 @@ impl Model {
         let graph = &self.graph;
         if run.form == Form::Minimal {
             let mut system = self.system(&equations)?;
-            connect(&system.program().inputs.clone(), run, |name, t, v| system.connect(name, t, v))?;
+            connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
             let x = self.start(&mut system, run.start)?;
             return Ok(Subject { graph, form: run.form, system: Ready::Explicit(system, x) });
         }
@@ -202,13 +203,13 @@ impl Subject<'_> {
         match self.system.clone() {
             Ready::Explicit(mut system, mut x) => {
                 let _ = system.record(&[]);
-                let begun = ThreadTime::now();
+                let begun = ProcessorTime::now();
                 let summary = simulate(&mut system, &options, &mut x, &mut Patient::new(None, settings))?;
                 Ok((begun.elapsed(), summary))
             }
             Ready::Implicit(mut system, mut y, mut yp) => {
                 let _ = system.record(&[]);
-                let begun = ThreadTime::now();
+                let begun = ProcessorTime::now();
                 let summary =
                     simulate_implicit(&mut system, &options, &mut y, &mut yp, &mut Patient::new(None, settings))?;
                 Ok((begun.elapsed(), summary))

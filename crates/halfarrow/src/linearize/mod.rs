@@ -7,9 +7,7 @@ mod structure;
 mod symbolic;
 mod zeros;
 
-use std::path::PathBuf;
-
-use halfarrow_compiler::bond_graph::{BondGraph, Input, InputId, Kind, Meaning, Variable};
+use halfarrow_compiler::bond_graph::{self, BondGraph, InputId, Kind, Meaning, Variable};
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
@@ -17,9 +15,10 @@ use halfarrow_sim::{Events as _, Nobody, Options, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
+use crate::input::{Input, connect};
 use crate::linear_algebra::{Complex, eigenvalues};
 use crate::model::Model;
-use crate::run::{Run, Start, connect};
+use crate::run::Start;
 
 pub use response::Response;
 pub use stability::Stability;
@@ -41,8 +40,8 @@ pub struct Linearize {
     pub outputs: Option<Vec<String>>,
     /// Whether matrices and transfer functions are to be told as expressions too.
     pub symbolic: bool,
-    /// Inputs given by CSV files: their names and the files.
-    pub series: Vec<(String, PathBuf)>,
+    /// Inputs that are given: their names and what they are over time.
+    pub series: Vec<(String, Input)>,
 }
 
 impl Default for Linearize {
@@ -183,8 +182,7 @@ impl Model {
     fn linearize_between(&self, wanted: &Linearize, inputs: &[String]) -> Result<LinearizeReport, Error> {
         let equations = self.equations_in(Form::Minimal)?;
         let mut system = self.system(&equations)?;
-        let run = Run { inputs: wanted.series.clone(), ..Run::default() };
-        connect(&system.program().inputs.clone(), &run, |name, t, v| system.connect(name, t, v))?;
+        connect(&system.program().inputs.clone(), &wanted.series, |name, t, v| system.connect(name, t, v))?;
         let outputs = wanted.outputs.clone().unwrap_or_else(|| default_outputs(&self.graph, system.program()));
         let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
         system.record(&names).map_err(|error| crate::run::refused(&system, error))?;
@@ -331,7 +329,7 @@ fn add_input(graph: &mut BondGraph, name: &str) -> bool {
         _ => return false,
     };
     let unit = graph.variables.get(&conjugate).and_then(|v| v.unit.clone());
-    let id: InputId = graph.inputs.push(Input {
+    let id: InputId = graph.inputs.push(bond_graph::Input {
         name: name.to_string(),
         symbol,
         default,

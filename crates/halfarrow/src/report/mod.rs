@@ -4,8 +4,6 @@ mod causality;
 mod curves;
 mod page;
 
-use std::path::PathBuf;
-
 use halfarrow_compiler::algebra::{PlainNames, mathml};
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::find_paths;
@@ -16,6 +14,7 @@ use halfarrow_draw::DrawOptions;
 
 use crate::compare::{Compare, CompareReport};
 use crate::error::Error;
+use crate::input::Input;
 use crate::model::Model;
 use crate::run::{Run, Simulated};
 use causality::Decided;
@@ -28,8 +27,8 @@ const MOST: usize = 80;
 pub struct Report {
     /// End of the run that is plotted and audited, in s; `None`: as `compare` chooses it.
     pub to: Option<f64>,
-    /// Inputs given by CSV files: their names and the files.
-    pub inputs: Vec<(String, PathBuf)>,
+    /// Inputs that are given: their names and what they are over time.
+    pub inputs: Vec<(String, Input)>,
     /// Whether forms are run beside each other, which takes time.
     pub compare: bool,
     /// The error at which they are compared.

@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn what_is_whole_survives_and_what_is_torn_is_cut_off() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let out = folder.path().join("r.csv");
         let mut journal = open(&out);
         journal.add(&entry(3)).unwrap();
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn two_sweeps_do_not_write_one_file() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let out = folder.path().join("r.csv");
         let mut first = open(&out);
         first.add(&entry(0)).unwrap();
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn another_sweep_is_not_taken_for_this_one() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = temp_dir::TempDir::new().unwrap();
         let out = folder.path().join("r.csv");
         open(&out).add(&entry(0)).unwrap();
         assert!(Journal::open(&out, "another", 2, false).is_err());

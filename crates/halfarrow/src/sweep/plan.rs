@@ -10,7 +10,7 @@ use super::{Sweep, known_parameter};
 use crate::error::Problem;
 
 /// More sets than this are a mistake.
-const MOST_SETS: usize = 1 << 40;
+const MOST_SETS: u64 = 1 << 40;
 
 /// Values of one parameter, in SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -164,7 +164,7 @@ impl Plan {
         };
         let sets = plan.vary.iter().try_fold(plan.rows.len(), |n, values| n.checked_mul(values.len()));
         match sets {
-            Some(sets) if sets <= MOST_SETS => Ok(plan),
+            Some(sets) if sets as u64 <= MOST_SETS => Ok(plan),
             _ => Err(bad("there are more sets than can be counted")),
         }
     }

@@ -11,8 +11,9 @@ use halfarrow_sim::Options;
 use super::Sweep;
 use super::plan::Plan;
 use crate::error::Error;
+use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Record, choose, connect, options};
+use crate::run::{Record, choose, options};
 
 /// A model whose equations hold for some of the sets.
 pub(super) struct Structure {
@@ -74,7 +75,7 @@ impl Structures {
 fn derived(first: &Structure, sweep: &Sweep, plan: &Plan, set: usize) -> Result<Structure, Error> {
     let model = first.model.with(&overrides(plan, set))?;
     let mut system = model.system(&model.equations_in(sweep.run.form)?)?;
-    connect(&system.program().inputs.clone(), &sweep.run, |name, t, v| system.connect(name, t, v))?;
+    connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
     let observed = &first.system.program().observed;
     let recorded = first.system.recorded().iter().map(|&i| observed[i].name.clone()).collect();
     choose(&mut system, &Record::Names(recorded))?;

@@ -1,0 +1,10 @@
+//! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
+
+#[path = "c.rs"]
+mod c;
+#[path = "fmu.rs"]
+mod fmu;
+#[path = "obligations.rs"]
+mod obligations;
+#[path = "single.rs"]
+mod single;

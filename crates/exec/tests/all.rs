@@ -1,0 +1,21 @@
+//! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
+
+#[path = "evaluation.rs"]
+mod evaluation;
+#[path = "forms.rs"]
+mod forms;
+#[path = "jacobian.rs"]
+mod jacobian;
+#[cfg(feature = "machine")]
+#[path = "machine.rs"]
+mod machine;
+#[path = "random.rs"]
+mod random;
+#[path = "start.rs"]
+mod start;
+#[path = "stops.rs"]
+mod stops;
+#[path = "time.rs"]
+mod time;
+#[path = "wide.rs"]
+mod wide;

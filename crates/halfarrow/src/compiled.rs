@@ -1,0 +1,150 @@
+//! A model that is ready to run, kept for many runs.
+
+use std::collections::BTreeMap;
+
+use halfarrow_compiler::bond_graph::Override;
+use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::unit::Unit;
+use halfarrow_exec as exec;
+
+use crate::error::{Error, Problem};
+use crate::model::Model;
+use crate::run::{Progress, Run, Simulated};
+use crate::sweep::known_parameter;
+
+/// A model whose equations are derived: it runs again and again, with other parameters and inputs, and nothing is derived
+/// anew but where parameters break what the equations rest on.
+///
+/// ```
+/// use halfarrow::{Form, Model, Run};
+/// let text = "model Drop\nparam m = 1 kg\nSe:weight(9.81 N) -> I:mass(m)\n";
+/// let mut drop = Model::from_text("drop.bond", text, &[])?.compile(Form::Minimal)?;
+/// for mass in [1.0, 2.0] {
+///     drop.set("m", mass)?;
+///     let fallen = drop.simulate(&Run { to: 2.0, ..Run::default() }, &mut |_| true)?;
+///     let speed = fallen.trace.columns[0].values.last().unwrap();
+///     assert!((speed - 9.81 * 2.0 / mass).abs() < 1e-6);
+/// }
+/// # Ok::<(), halfarrow::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Compiled {
+    model: Model,
+    form: Form,
+    ready: Ready,
+    /// What was set, in SI units.
+    set: BTreeMap<String, f64>,
+}
+
+/// What runs.
+#[derive(Debug, Clone)]
+pub(crate) enum Ready {
+    /// The minimal form.
+    Explicit(exec::Model),
+    /// Another one, beside the minimal form.
+    Form {
+        system: Box<exec::ImplicitModel>,
+        /// Whether its equations give the rates, with nothing that vanishes.
+        explicit: bool,
+    },
+}
+
+impl Model {
+    /// Derives the equations of a form and makes them ready to run.
+    ///
+    /// # Errors
+    /// The model has errors that only later stages find.
+    pub fn compile(&self, form: Form) -> Result<Compiled, Error> {
+        let equations = self.equations_in(form)?;
+        let ready = match form {
+            Form::Minimal => Ready::Explicit(self.system(&equations)?),
+            _ => {
+                let system = Box::new(self.form_system(&equations)?);
+                Ready::Form { system, explicit: equations.residuals.is_empty() }
+            }
+        };
+        Ok(Compiled { model: self.clone(), form, ready, set: BTreeMap::new() })
+    }
+}
+
+impl Compiled {
+    /// The model, with the parameters that its equations were derived for.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The form of its equations.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// The value of a parameter or constant, in SI units; `None` if there is none of that name.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        self.minimal().parameter(name)
+    }
+
+    /// Sets a parameter, in SI units. If it breaks what the equations rest on they are derived anew.
+    ///
+    /// # Errors
+    /// There is no such parameter, or the model has errors with this value; then it stays as it was.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), Error> {
+        self.set_all([(name, value)])
+    }
+
+    /// Sets several parameters at once: what the values on the way would break counts for nothing.
+    ///
+    /// # Errors
+    /// As [`set`](Compiled::set).
+    pub fn set_all<'a>(&mut self, values: impl IntoIterator<Item = (&'a str, f64)>) -> Result<(), Error> {
+        let mut set = self.set.clone();
+        for (name, value) in values {
+            known_parameter(self.minimal(), name)?;
+            if !value.is_finite() {
+                return Err(Problem::BadOption { reason: format!("`{name}` is {value}: it has to be finite") }.into());
+            }
+            set.insert(name.to_string(), value);
+        }
+        if let Ready::Explicit(system) = &self.ready {
+            let mut changed = system.clone();
+            let placed = changed.set_parameters(set.iter().map(|(name, value)| (name.as_str(), *value)));
+            if placed.is_ok() && changed.broken().is_none() {
+                (self.ready, self.set) = (Ready::Explicit(changed), set);
+                return Ok(());
+            }
+        }
+        let derived = self.model.with(&self.overrides(&set))?.compile(self.form)?;
+        *self = Compiled { set, ..derived };
+        Ok(())
+    }
+
+    /// Computes a trajectory from the start, as [`Model::simulate`] does.
+    ///
+    /// # Errors
+    /// Something is asked that cannot be, or the run stops; what was computed so far is kept.
+    pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
+        if run.form != self.form {
+            let reason = format!("the model was compiled in the form {}, not {}", self.form.name(), run.form.name());
+            return Err(Problem::BadOption { reason }.into());
+        }
+        self.model.simulate_with(self.ready.clone(), run, progress)
+    }
+
+    /// The equations in minimal form, which every form has beside it.
+    pub(crate) fn minimal(&self) -> &exec::Model {
+        match &self.ready {
+            Ready::Explicit(system) => system,
+            Ready::Form { system, .. } => system.reference(),
+        }
+    }
+
+    /// Values as they would be given to the model itself.
+    fn overrides(&self, set: &BTreeMap<String, f64>) -> Vec<Override> {
+        let parameters = &self.minimal().program().parameters;
+        let unit = |name: &String| parameters.iter().find(|p| p.name == *name).and_then(|p| p.unit.as_ref());
+        let text = |name: &String, value: f64| match unit(name).map(Unit::to_si_unit) {
+            Some(unit) => format!("{value:?} {unit}").trim_end().to_string(),
+            None => format!("{value:?}"),
+        };
+        set.iter().map(|(name, &value)| Override { name: name.clone(), value: text(name, value) }).collect()
+    }
+}

@@ -1,0 +1,36 @@
+//! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
+
+#[path = "api.rs"]
+mod api;
+#[path = "compare.rs"]
+mod compare;
+#[path = "faults_assumptions.rs"]
+mod faults_assumptions;
+#[path = "faults_audit.rs"]
+mod faults_audit;
+#[path = "faults_files.rs"]
+mod faults_files;
+#[path = "faults_forms.rs"]
+mod faults_forms;
+#[path = "faults_guess.rs"]
+mod faults_guess;
+#[path = "faults_numbers.rs"]
+mod faults_numbers;
+#[path = "faults_pictures.rs"]
+mod faults_pictures;
+#[path = "faults_print.rs"]
+mod faults_print;
+#[path = "faults_start.rs"]
+mod faults_start;
+#[path = "faults_steps.rs"]
+mod faults_steps;
+#[path = "faults_strokes.rs"]
+mod faults_strokes;
+#[path = "forms.rs"]
+mod forms;
+#[path = "linearize.rs"]
+mod linearize;
+#[path = "report.rs"]
+mod report;
+#[path = "sweep.rs"]
+mod sweep;

@@ -1,0 +1,10 @@
+//! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
+
+#[path = "fixed_step.rs"]
+mod fixed_step;
+#[path = "implicit.rs"]
+mod implicit;
+#[path = "real_time.rs"]
+mod real_time;
+#[path = "variable_step.rs"]
+mod variable_step;
