@@ -227,17 +227,22 @@ impl Solve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bond_graph::NoFiles;
-    use crate::compile::{Text, compile};
-    use crate::equations::Form;
-    use crate::program::{Bits, Local};
+    use crate::ast::parse;
+    use crate::bond_graph::{NoFiles, elaborate};
+    use crate::causal_graph::assign_causality;
+    use crate::diagnostic::Sources;
+    use crate::equations::{Form, derive_equations};
+    use crate::program::{Bits, Local, schedule};
 
     /// A Newton block between two capacitors, with a table of time.
     fn bridge() -> Program {
         let text = "model Bridge\nparam r = 2, b = 3\nSf:source(sin(t)) -> 0:n1 -> C:C1(1)\nn1 -> R:R1(r) \n\
                     n1 -> 1:s -> 0:n2 -> R:D(f = b*(e + e^3))\ns -> R:G(f = b*(e + e^3))\nn2 -> R:E(f = e + e^5)\n";
-        let text = Text { name: "bridge.bond", text, files: &NoFiles, overrides: &[] };
-        compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir
+        let mut sources = Sources::new();
+        let file = sources.add("bridge.bond", text);
+        let graph = elaborate(parse(text, file).ast, sources, &NoFiles, &[]).graph.expect("a bond graph");
+        let causal = assign_causality(&graph).expect("causality");
+        schedule(&derive_equations(&causal, Form::Minimal).expect("equations"))
     }
 
     fn newton(p: &Program) -> BlockId {
