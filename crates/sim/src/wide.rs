@@ -174,7 +174,7 @@ impl<'a> Batch<'a> {
         lane.run.counts.steps += 1;
         lane.settled = false;
         let at_event = lane.stop.is_event && lane.stop.time == target;
-        if at_event || self.remembers || lane.run.has_indicators() {
+        if at_event || self.remembers || lane.run.looks_at_every_step() {
             self.alone(i, x, Lane::arrive);
         } else {
             lane.run.time = target;

@@ -67,9 +67,9 @@ impl Run<'_> {
         })
     }
 
-    /// Whether there are event indicators.
-    pub(crate) fn has_indicators(&self) -> bool {
-        !self.signs.is_empty()
+    /// Whether there is something to look at where a step ends: event indicators, or a sink that watches.
+    pub(crate) fn looks_at_every_step(&self) -> bool {
+        !self.signs.is_empty() || self.watched
     }
 
     /// Whether an event indicator has another sign at `(t, point)` than that held.
