@@ -1,5 +1,7 @@
 //! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
 
+mod support;
+
 #[path = "ast.rs"]
 mod ast;
 #[path = "bond_graph.rs"]

@@ -1,6 +1,6 @@
 //! Causal paths of the worked examples of the paper: lists, classes, gains, break variables, counts.
 
-mod support;
+use crate::support;
 
 use std::collections::BTreeSet;
 

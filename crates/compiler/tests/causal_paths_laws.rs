@@ -1,6 +1,6 @@
 //! Laws of causal paths on small made graphs and on random ones.
 
-mod support;
+use crate::support;
 
 use std::collections::BTreeSet;
 

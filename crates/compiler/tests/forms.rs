@@ -1,6 +1,6 @@
 //! The formulations of the worked examples: the equations of the paper up to arrangement, counts and indices.
 
-mod support;
+use crate::support;
 
 use std::collections::BTreeMap;
 

@@ -2,7 +2,7 @@
 //!
 //! All of them are compiled in one go, with every warning an error, and run as one program.
 
-mod common;
+use crate::common;
 
 use common::{Exported, Rows, build, build_with, export, models, own};
 use halfarrow_compiler::algebra::math;

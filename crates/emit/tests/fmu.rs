@@ -1,6 +1,6 @@
 //! What stands in an FMU: the rules that importers trip over, checked on every model.
 
-mod common;
+use crate::common;
 
 use common::{Exported, export_program, models, own, read_program};
 use halfarrow_emit::Method;

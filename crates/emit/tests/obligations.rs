@@ -1,6 +1,6 @@
 //! What stands at the head of exported C is true, line by line, of every kind of model.
 
-mod common;
+use crate::common;
 
 use common::{Exported, FLAGS, export, export_single, own};
 use halfarrow_emit::Method;

@@ -1,6 +1,6 @@
 //! Models in C with real numbers of single precision: the trajectory of the interpreter, to what they hold.
 
-mod common;
+use crate::common;
 
 use common::{Exported, FLAGS, Rows, build_with, export_as, export_single, models, own, read_program};
 use halfarrow_compiler::algebra::math;

@@ -1,5 +1,8 @@
 //! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
 
+mod common;
+mod recipes;
+
 #[path = "evaluation.rs"]
 mod evaluation;
 #[path = "forms.rs"]
@@ -9,6 +12,8 @@ mod jacobian;
 #[cfg(feature = "machine")]
 #[path = "machine.rs"]
 mod machine;
+#[path = "memory.rs"]
+mod memory;
 #[path = "random.rs"]
 mod random;
 #[path = "start.rs"]

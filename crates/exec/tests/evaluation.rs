@@ -1,6 +1,6 @@
 //! Rates, solve blocks and their failures: known values.
 
-mod common;
+use crate::common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};

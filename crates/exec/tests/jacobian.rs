@@ -1,6 +1,6 @@
 //! All derivatives at once are those along directions: every model, along a run.
 
-mod common;
+use crate::common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;

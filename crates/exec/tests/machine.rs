@@ -1,9 +1,8 @@
 //! Machine code gives what the bytecode gives, to the last bit: every model along a run, and random programs; and it
 //! gives its memory back.
 
-mod common;
-#[path = "recipes/mod.rs"]
-mod recipes;
+use crate::common;
+use crate::recipes;
 
 use halfarrow_compiler::program::Program;
 use halfarrow_exec::Model;

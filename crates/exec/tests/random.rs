@@ -1,7 +1,6 @@
 //! Random programs: values against the expressions, derivatives against differences.
 
-mod common;
-mod recipes;
+use crate::recipes;
 
 use halfarrow_sim::{Events, System};
 use proptest::prelude::*;

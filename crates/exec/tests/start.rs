@@ -1,6 +1,6 @@
 //! Start values and equilibria.
 
-mod common;
+use crate::common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};

@@ -1,7 +1,7 @@
 //! Jumps in time, switches of the state, inputs, delays and samples, run by the integrators.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-mod common;
+use crate::common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Comparison, Function};

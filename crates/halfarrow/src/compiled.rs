@@ -40,7 +40,7 @@ pub struct Compiled {
 #[derive(Debug, Clone)]
 pub(crate) enum Ready {
     /// The minimal form.
-    Explicit(exec::Model),
+    Explicit(Box<exec::Model>),
     /// Another one, beside the minimal form.
     Form {
         system: Box<exec::ImplicitModel>,
@@ -57,7 +57,7 @@ impl Model {
     pub fn compile(&self, form: Form) -> Result<Compiled, Error> {
         let equations = self.equations_in(form)?;
         let ready = match form {
-            Form::Minimal => Ready::Explicit(self.system(&equations)?),
+            Form::Minimal => Ready::Explicit(Box::new(self.system(&equations)?)),
             _ => {
                 let system = Box::new(self.form_system(&equations)?);
                 Ready::Form { system, explicit: equations.residuals.is_empty() }

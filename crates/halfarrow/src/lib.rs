@@ -39,6 +39,7 @@ mod linear_algebra;
 mod linearize;
 mod loops;
 mod model;
+mod names;
 mod quantity;
 #[cfg(feature = "real_time")]
 mod real_time;
@@ -46,6 +47,7 @@ mod report;
 mod run;
 mod source;
 mod stage;
+mod stepper;
 mod sweep;
 mod table_file;
 mod verdict;
@@ -76,6 +78,7 @@ pub use linearize::{
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};
+pub use names::{Name, NameKind, Place};
 pub use quantity::{duration, frequency};
 #[cfg(feature = "real_time")]
 pub use real_time::{Durations, Feed, RealTimeReport, RealTimeRun};
@@ -83,6 +86,7 @@ pub use report::{Page, Report};
 pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance, Stopped, Timings};
 pub use source::{Disk, Source};
 pub use stage::Stage;
+pub use stepper::{Snapshot, Stepper};
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
 pub use table_file::read_trace;
 pub use verdict::Verdict;

@@ -259,7 +259,7 @@ impl Model {
         let begun = Moment::now();
         let mut timings = Timings::default();
         let mut done = match system {
-            Ready::Explicit(system) => self.run_explicit(system, run, &mut timings, progress),
+            Ready::Explicit(system) => self.run_explicit(*system, run, &mut timings, progress),
             Ready::Form { system, explicit } => self.run_form((*system, explicit), run, &mut timings, progress),
         };
         timings.run = begun.elapsed().as_secs_f64() - timings.start;

@@ -20,7 +20,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
 use halfarrow_sim::{Options, simulate};
-use halfarrow_trace::{CsvTable, ParquetTable, write_whole};
+use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -103,6 +103,61 @@ impl Model {
         progress: &mut dyn FnMut(usize, usize) -> bool,
     ) -> Result<SweepReport, Error> {
         let kind = Kind::of(out)?;
+        let prepared = self.prepare(sweep)?;
+        let Prepared { plan, columns, .. } = &prepared;
+        let identity = self.identity(sweep, plan, columns);
+        let unwritable = |why: io::Error| Error::from(Problem::Unwritable { path: out.into(), why: why.to_string() });
+        let mut journal = Journal::open(out, &identity, columns.len(), sweep.restart)?;
+        let resumed = journal.sets();
+        let open = plan.chunks().filter(|chunk| !journal.has(*chunk)).collect();
+        let work = prepared.work();
+        let add = &mut |entry: Entry| journal.add(&entry);
+        if !compute(&work, sweep.run.start, (open, resumed), add, progress).map_err(unwritable)? {
+            return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
+        }
+        let audit = audit::sample_of(&work, &sweep.run);
+        let failures = kind.write(out, columns, sweep.units, &mut journal).map_err(unwritable)?;
+        journal.remove();
+        Ok(self.sweep_report(&prepared, resumed, failures, audit))
+    }
+
+    /// Runs a sweep on all cores and keeps its rows in memory: the columns that [`sweep`](Model::sweep) writes.
+    ///
+    /// # Errors
+    /// The model has errors, something is asked that cannot be, or `progress` stops it. Sets that fail are no error.
+    pub fn sweep_columns(
+        &self,
+        sweep: &Sweep,
+        progress: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> Result<(Vec<Column>, SweepReport), Error> {
+        let prepared = self.prepare(sweep)?;
+        let Prepared { plan, columns, .. } = &prepared;
+        let mut entries: BTreeMap<usize, Entry> = BTreeMap::new();
+        let work = prepared.work();
+        let add = &mut |entry: Entry| {
+            entries.insert(entry.chunk, entry);
+            Ok(())
+        };
+        let kept = compute(&work, sweep.run.start, (plan.chunks().collect(), 0), add, progress);
+        // Memory takes whatever comes.
+        if !kept.unwrap_or(false) {
+            return Err(Error::Interrupted { done: entries.values().map(|e| e.rows).sum(), sets: plan.sets() });
+        }
+        let audit = audit::sample_of(&work, &sweep.run);
+        let mut failures = Failures::default();
+        entries.values().for_each(|entry| failures.note(entry));
+        let width = columns.len();
+        let values = |c: usize| entries.values().flat_map(move |e| e.values.iter().skip(c).step_by(width)).copied();
+        let column = |(c, (name, unit)): (usize, &(String, String))| Column {
+            name: name.clone(),
+            unit: unit.clone(),
+            values: values(c).collect(),
+        };
+        Ok((columns.iter().enumerate().map(column).collect(), self.sweep_report(&prepared, 0, failures, audit)))
+    }
+
+    /// All that a sweep needs before its first run.
+    fn prepare(&self, sweep: &Sweep) -> Result<Prepared, Error> {
         let mut system = self.system(&self.equations_in(sweep.run.form)?)?;
         connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
         let plan = Plan::new(sweep, &system)?;
@@ -111,27 +166,20 @@ impl Model {
         options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
         crate::cost::check_stops(&system, &options)?;
         let columns = columns(&plan, &reducers, &system);
-        let identity = self.identity(sweep, &plan, &columns);
-        let unwritable = |why: io::Error| Error::from(Problem::Unwritable { path: out.into(), why: why.to_string() });
-        let mut journal = Journal::open(out, &identity, columns.len(), sweep.restart)?;
-        let resumed = journal.sets();
         let structures = Structures::of(self, &system, sweep, &plan);
-        let work = Work { plan: &plan, reducers: &reducers, options: &options, structures: &structures };
-        if !compute(&work, sweep.run.start, &mut journal, progress).map_err(unwritable)? {
-            return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
-        }
-        let audit = audit::sample_of(&work, &sweep.run);
-        let failures = kind.write(out, &columns, sweep.units, &mut journal).map_err(unwritable)?;
-        journal.remove();
-        Ok(SweepReport {
+        Ok(Prepared { plan, reducers, options, columns, structures })
+    }
+
+    fn sweep_report(&self, prepared: &Prepared, resumed: usize, failures: Failures, audit: SweepAudit) -> SweepReport {
+        SweepReport {
             model: self.name().to_string(),
-            sets: plan.sets(),
+            sets: prepared.plan.sets(),
             resumed,
-            columns: columns.into_iter().map(|c| c.0).collect(),
-            failed: failures.0,
-            failures: failures.1,
+            columns: prepared.columns.iter().map(|c| c.0.clone()).collect(),
+            failed: failures.count,
+            failures: failures.first,
             audit,
-        })
+        }
     }
 
     /// What tells one sweep from another.
@@ -142,20 +190,66 @@ impl Model {
     }
 }
 
-/// Computes what is not done yet; false if it was stopped.
+/// What a sweep needs before its first run.
+struct Prepared {
+    plan: Plan,
+    reducers: Vec<Reducers>,
+    options: Options,
+    /// Names and units.
+    columns: Vec<(String, String)>,
+    structures: Structures,
+}
+
+impl Prepared {
+    fn work(&self) -> Work<'_> {
+        let Prepared { plan, reducers, options, structures, .. } = self;
+        Work { plan, reducers, options, structures }
+    }
+}
+
+/// Sets that came to no end.
+#[derive(Default)]
+struct Failures {
+    count: usize,
+    /// The first of them.
+    first: Vec<SetFailure>,
+}
+
+impl Failures {
+    fn note(&mut self, entry: &Entry) {
+        self.count += entry.failures.len();
+        let room = TOLD.saturating_sub(self.first.len());
+        self.first.extend(entry.failures.iter().take(room).cloned());
+    }
+}
+
+/// Computes the chunks that are open, where so many sets are done already; false if it was stopped.
 fn compute(
     work: &Work<'_>,
     start: crate::run::Start,
-    journal: &mut Journal,
+    (open, mut done): (Vec<usize>, usize),
+    keep: &mut dyn FnMut(Entry) -> io::Result<()>,
     progress: &mut dyn FnMut(usize, usize) -> bool,
 ) -> io::Result<bool> {
-    let chunks = work.plan.sets().div_ceil(CHUNK);
-    let open: Vec<usize> = (0..chunks).filter(|chunk| !journal.has(*chunk)).collect();
-    let mut done = journal.sets();
     if open.is_empty() || !progress(done, work.plan.sets()) {
         return Ok(open.is_empty());
     }
-    // Few results wait to be written: memory stays bounded however many sets there are.
+    let mut take = |entry: Entry| -> io::Result<bool> {
+        done += entry.rows;
+        keep(entry)?;
+        Ok(progress(done, work.plan.sets()))
+    };
+    if cfg!(target_family = "wasm") {
+        // There are no threads.
+        let mut worker = Worker::new(work);
+        for chunk in open {
+            if !take(worker.chunk(chunk, start))? {
+                return Ok(false);
+            }
+        }
+        return Ok(true);
+    }
+    // Few results wait to be kept: memory stays bounded however many sets there are.
     let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
     std::thread::scope(|scope| {
         scope.spawn(move || {
@@ -166,9 +260,7 @@ fn compute(
             );
         });
         for entry in receiver {
-            done += entry.rows;
-            journal.add(&entry)?;
-            if !progress(done, work.plan.sets()) {
+            if !take(entry)? {
                 return Ok(false);
             }
         }
@@ -382,13 +474,8 @@ impl Kind {
         columns: &[(String, String)],
         units: bool,
         journal: &mut Journal,
-    ) -> io::Result<(usize, Vec<SetFailure>)> {
-        let mut failures = (0, Vec::new());
-        let mut note = |entry: &Entry| {
-            failures.0 += entry.failures.len();
-            let room = TOLD.saturating_sub(failures.1.len());
-            failures.1.extend(entry.failures.iter().take(room).cloned());
-        };
+    ) -> io::Result<Failures> {
+        let mut failures = Failures::default();
         let names: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), unit.as_str())).collect();
         let written = write_whole(path, |out| {
             let mut table = match self {
@@ -400,7 +487,7 @@ impl Kind {
             }
             for chunk in 0..journal.chunks() {
                 let entry = journal.entry(chunk)?;
-                note(&entry);
+                failures.note(&entry);
                 let column = |c: usize| entry.values.iter().skip(c).step_by(names.len()).copied().collect();
                 let columns: Vec<Vec<f64>> = (0..names.len()).map(column).collect();
                 let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();

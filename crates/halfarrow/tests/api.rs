@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Compiled, Disk, Form, Input, Model, Override, Record, Run, Simulated, Source};
+use halfarrow::{
+    Compiled, Disk, FixedMethod, Form, Input, Method, Model, NameKind, Override, Record, Run, Simulated, Source, Start,
+    Stepper,
+};
 
 const PARTS: &str = "component Load(port p) { p -> 1:axis -> I:mass(2 kg) }\n";
 const LOADED: &str = "model Loaded\nimport \"parts.bond\"\nSe:weight(9.81 N) -> 1:axis\naxis -> Load:load\n";
@@ -136,4 +139,103 @@ fn a_compiled_model_runs_as_a_new_one_with_whatever_parameters() {
         assert!(kept.set("c", 1.0).is_err() && kept.set("a", f64::NAN).is_err());
         assert_eq!(kept.parameter("a"), Some(1.0));
     }
+}
+
+/// Steps, a jump of time, a switch, a delay and a law that is solved: all that a run remembers.
+const CRANE: &str = "model Crane
+param m = 2 kg, k = 40 N/m
+input pull : kN = 0
+Se:drive(if t < 0.31 then 2 N else 5 N) -> 1:axis -> I:mass(m)
+Se:hand(pull) -> axis
+axis -> C:rope(e = if q > 0.01 m then k*q else 0.1*k*q)
+axis -> R:drag(f = (1 m/s)*((e/(1 N))^3 + e/(1 N)))
+output force = delay(rope.e, 53 ms) : N
+output speed = mass.f
+";
+
+fn crane() -> Compiled {
+    Model::from_text("crane.bond", CRANE, &[])
+        .and_then(|m| m.compile(Form::Minimal))
+        .unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+#[test]
+fn step_by_step_a_run_has_the_bits_of_a_whole_one() {
+    let crane = crane();
+    for method in [FixedMethod::Heun, FixedMethod::Rk4, FixedMethod::Rosenbrock] {
+        let whole =
+            run(&crane, &Run { method: Method::Fixed(method), step: Some(1e-2), every: Some(1.0), ..Run::default() });
+        let mut steps = crane.stepper(method, 1e-2, Start::Given).expect("a start");
+        for part in [1, 9, 40, 50] {
+            steps.advance(part).expect("steps");
+        }
+        assert_eq!(steps.time(), 1.0);
+        for name in ["speed", "force"] {
+            let wanted = whole.trace.column(name).and_then(|c| c.values.last().copied()).expect("a value");
+            assert_eq!(steps.read(name).expect("a value").to_bits(), wanted.to_bits(), "{method:?} {name}");
+        }
+    }
+}
+
+#[test]
+fn what_is_saved_goes_on_with_the_same_bits() {
+    let crane = crane();
+    let mut one = crane.stepper(FixedMethod::Rk4, 1e-2, Start::Given).expect("a start");
+    one.set_input("pull", 0.001).expect("an input");
+    one.advance(20).expect("steps");
+    one.set_parameter("k", 60.0).expect("a parameter");
+    one.advance(3).expect("steps");
+    let saved = one.save();
+    let go_on = |run: &mut Stepper| {
+        run.advance(30).expect("steps");
+        run.set_input("pull", -0.002).expect("an input");
+        run.advance(30).expect("steps");
+        ["speed", "force", "rope.q", "mass.f"].map(|name| run.read(name).expect("a value").to_bits())
+    };
+    let first = go_on(&mut one);
+    one.set_parameter("m", 7.0).expect("a parameter");
+    let mut other = crane.stepper(FixedMethod::Rk4, 1e-2, Start::Given).expect("a start");
+    for run in [&mut one, &mut other] {
+        run.restore(&saved).expect("what was saved");
+        assert_eq!((run.parameter("k"), run.parameter("m")), (Some(60.0), Some(2.0)));
+        assert_eq!(go_on(run), first);
+    }
+}
+
+#[test]
+fn a_stepper_refuses_what_there_is_not() {
+    let crane = crane();
+    let mut run = crane.stepper(FixedMethod::Rk4, 1e-2, Start::Given).expect("a start");
+    run.advance(5).expect("steps");
+    let before = run.read("speed").expect("a value").to_bits();
+    for (name, value) in [("push", 1.0), ("pull", f64::NAN)] {
+        assert!(run.set_input(name, value).is_err());
+    }
+    assert!(run.set_parameter("kk", 1.0).expect_err("no such").to_string().contains("no parameter `kk`"));
+    assert!(run.set_parameter("m", f64::INFINITY).is_err());
+    let unknown = run.read("sped").expect_err("no such").to_string();
+    assert!(unknown.contains("did you mean `speed`?"), "{unknown}");
+    assert_eq!(run.read("speed").expect("a value").to_bits(), before);
+    assert!(crane.stepper(FixedMethod::Rk4, 0.0, Start::Given).is_err());
+    assert!(run.readable().any(|(name, _)| name == "speed"));
+}
+
+#[test]
+fn names_tell_where_they_are_declared_and_who_reads_them() {
+    let model = Model::from_text("crane.bond", CRANE, &[]).expect("a model");
+    let names = model.names();
+    let of = |name: &str| names.iter().find(|n| n.name == name).unwrap_or_else(|| panic!("{name} is not there"));
+    let m = of("m");
+    assert_eq!(
+        (m.kind, m.declared.file.as_str(), m.declared.line, m.declared.column),
+        (NameKind::Parameter, "crane.bond", 2, 7)
+    );
+    assert_eq!(&CRANE[m.declared.start..m.declared.end], "m");
+    assert_eq!(m.read_by, ["mass"]);
+    assert_eq!(of("k").read_by, ["rope"]);
+    assert_eq!((of("pull").kind, of("pull").read_by.as_slice()), (NameKind::Input, ["hand".to_string()].as_slice()));
+    assert_eq!(of("mass").declared.line, 4);
+    assert_eq!((of("mass").kind, of("speed").kind), (NameKind::Element, NameKind::Output));
+    assert!(of("mass").read_by.contains(&"speed".to_string()), "{:?}", of("mass"));
+    assert!(of("speed").read_by.is_empty());
 }

@@ -108,3 +108,17 @@ fn what_makes_no_sense_is_refused() {
         assert!(error.contains(says), "{error}");
     }
 }
+
+#[test]
+fn columns_in_memory_are_those_of_the_file() {
+    let folder = temp_dir::TempDir::new().unwrap();
+    let (model, sweep, out) = (model(), sweep(Method::Fixed(FixedMethod::Rk4)), folder.path().join("r.csv"));
+    let written = run(&model, &sweep, &out);
+    let (columns, report) = model.sweep_columns(&sweep, &mut |_, _| true).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(report, written);
+    let (header, rows) = rows(&out);
+    assert_eq!(columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), header);
+    for (i, row) in rows.iter().enumerate() {
+        assert!(columns.iter().zip(row).all(|(column, value)| column.values[i].to_bits() == value.to_bits()));
+    }
+}

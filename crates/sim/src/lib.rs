@@ -23,7 +23,7 @@ mod system;
 mod variable_step;
 pub mod wide;
 
-pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary};
+pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary, tick};
 pub use events::Events;
 pub use failure::{Failure, Leap};
 pub use implicit::simulate_implicit;

@@ -1,7 +1,7 @@
 //! The fixed-step methods: order, work, invariants, jumps, no allocation.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-mod systems;
+use crate::systems;
 
 use halfarrow_sim::fixed_step::{FixedMethod, FixedStep};
 use halfarrow_sim::{Failure, Method, Options, Stepwise, Summary, System, simulate};

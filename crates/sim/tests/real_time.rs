@@ -1,7 +1,7 @@
 //! Runs against a clock, here one that the test moves.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-mod systems;
+use crate::systems;
 
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::real_time::{Clock, Exchange, OnMiss, Pace, Statistics, run_real_time};

@@ -1,7 +1,7 @@
 //! The variable-step methods: work and error on known solutions, jumps, switches, failures.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-mod systems;
+use crate::systems;
 
 use std::ops::ControlFlow;
 

@@ -6,7 +6,7 @@ use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 
-use super::{Sweep, known_parameter};
+use super::{CHUNK, Sweep, known_parameter};
 use crate::error::Problem;
 
 /// More sets than this are a mistake.
@@ -171,6 +171,11 @@ impl Plan {
 
     pub fn sets(&self) -> usize {
         self.vary.iter().map(Vec::len).product::<usize>() * self.rows.len()
+    }
+
+    /// Numbers of the chunks that the sets are computed in.
+    pub fn chunks(&self) -> std::ops::Range<usize> {
+        0..self.sets().div_ceil(CHUNK)
     }
 
     pub fn names(&self) -> &[String] {

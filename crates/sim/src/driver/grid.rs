@@ -3,22 +3,24 @@
 /// Distances this small, relative to the spacing, are taken for rounding.
 const SLACK: f64 = 1e-9;
 
-/// The times `from + i · every`, walked through in order. Each is the nearest number to what is meant where `1 / every`
-/// is whole: 7 · 0.01 is 0.07.
+/// The time `from + index · every`: the nearest number to what is meant where `1 / every` is whole, so that 7 · 0.01 is 0.07.
+pub fn tick(from: f64, every: f64, index: f64) -> f64 {
+    let per_second = (1.0 / every).round();
+    let whole = per_second >= 1.0 && 1.0 / per_second == every;
+    from + if whole { index / per_second } else { index * every }
+}
+
+/// The [`tick`]s, walked through in order.
 pub(crate) struct Grid {
     from: f64,
     every: f64,
-    /// `1 / every` where that is whole.
-    per_second: Option<f64>,
     next: f64,
     index: f64,
 }
 
 impl Grid {
     pub(crate) fn new(from: f64, every: f64) -> Grid {
-        let per_second = (1.0 / every).round();
-        let per_second = (per_second >= 1.0 && 1.0 / per_second == every).then_some(per_second);
-        Grid { from, every, per_second, next: from, index: 0.0 }
+        Grid { from, every, next: from, index: 0.0 }
     }
 
     /// The first time not yet passed.
@@ -40,7 +42,7 @@ impl Grid {
     pub(crate) fn pass(&mut self, t: f64) {
         while self.is_due(t) {
             self.index = (self.index + 1.0).max(((t - self.from) / self.every).floor());
-            self.next = self.from + self.per_second.map_or(self.index * self.every, |rate| self.index / rate);
+            self.next = tick(self.from, self.every, self.index);
         }
     }
 }

@@ -8,6 +8,7 @@ mod sink;
 mod stepper;
 
 pub(crate) use grid::Grid;
+pub use grid::tick;
 pub use position::Position;
 pub use sink::{Crawl, Nobody, Sink, Stopped, Summary};
 pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
