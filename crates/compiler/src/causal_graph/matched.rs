@@ -14,13 +14,16 @@ use petgraph::graph::DiGraph;
 use super::ports::settled;
 use crate::algebra::{Elimination, Expr, Exprs, ONE, SparseRow, eliminate};
 
+/// A column, and the others that it is the sum of, with their coefficients.
+pub(super) type Row = (usize, Vec<(usize, Expr)>);
+
 /// What each pivot column of an elimination is in terms of other columns, from the rows that went into it. `None` if
 /// something would have to be divided by that is not known to be nonzero and was not divided by before.
 pub(super) fn matched_rows(
     x: &mut Exprs,
     rows: &[SparseRow],
     done: &Elimination,
-) -> Option<Vec<(usize, Vec<(usize, Expr)>)>> {
+) -> Option<Vec<Row>> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done)?;
     let mut graph = DiGraph::<usize, ()>::new();
@@ -49,7 +52,7 @@ fn circle_solved(
     rows: Vec<SparseRow>,
     mut columns: Vec<usize>,
     done: &Elimination,
-) -> Option<Vec<(usize, Vec<(usize, Expr)>)>> {
+) -> Option<Vec<Row>> {
     columns.sort_unstable();
     let own = eliminate(x, rows, &[columns.clone()]);
     let as_before = own.watched.iter().all(|e| done.watched.contains(e));

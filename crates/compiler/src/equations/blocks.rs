@@ -129,8 +129,7 @@ fn block(
     ordered.named.extend(&named);
     ordered.assign(named);
     let x = &mut d.x;
-    let matrix = shortened(x, rows.iter().map(|r| &r.0[..]));
-    let right: Vec<Expr> = rows.iter().map(|r| x.neg(r.1)).collect();
+    let (matrix, right) = shortened(x, rows);
     if is_singular(x, &matrix) {
         return Err(Insoluble { unknowns: torn, members: symbols, elements });
     }
@@ -154,6 +153,9 @@ fn block(
     Ok(())
 }
 
+/// Coefficients of all unknowns, and the rest.
+type DenseRow = (Vec<Expr>, Expr);
+
 /// The residuals of a loop as linear forms in its unknowns, coefficients and rest, with names for parts of them; `None` if
 /// they are none, be it that terms which are no linear forms cancel.
 fn linear(
@@ -161,7 +163,7 @@ fn linear(
     torn: &[Symbol],
     body: &[(Symbol, Expr)],
     residuals: &[Expr],
-) -> Option<(Vec<(Symbol, Expr)>, Vec<(Vec<Expr>, Expr)>)> {
+) -> Option<(Vec<(Symbol, Expr)>, Vec<DenseRow>)> {
     let Some(forms) = LinearForms::new(x, torn, body) else {
         if body.len() > WRITTEN_OUT {
             return None;
@@ -179,23 +181,30 @@ fn linear(
     Some((forms.named, rows))
 }
 
-/// A matrix with its entries in their short forms, as far as the work for each entry goes.
-fn shortened<'a>(x: &mut Exprs, rows: impl ExactSizeIterator<Item = &'a [Expr]>) -> Vec<Vec<Expr>> {
+/// Rows of coefficients with their right sides, each in its short form, as far as the work for each goes.
+fn shortened(x: &mut Exprs, rows: Vec<DenseRow>) -> (Vec<Vec<Expr>>, Vec<Expr>) {
     let size = rows.len() as u64;
-    let short = |x: &mut Exprs, e: Expr| {
-        x.bound_search(WORK / (size * size));
-        let own = x.simplify(e);
-        if x.written_length(own) > LONGEST {
-            return own;
-        }
-        let flat = x.expand(e);
-        let flat = x.simplify(flat);
-        let cost = |e| (!x.nonzero(e), x.written_length(e));
-        if cost(flat) < cost(own) { flat } else { own }
-    };
-    let matrix = rows.map(|row| row.iter().map(|&e| short(x, e)).collect()).collect();
+    let (mut matrix, mut right) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
+    for (row, rest) in rows {
+        matrix.push(row.into_iter().map(|e| short(x, e, WORK / (size * size))).collect());
+        let minus = x.neg(rest);
+        right.push(short(x, minus, WORK / (size * size)));
+    }
     x.bound_search(u64::MAX);
-    matrix
+    (matrix, right)
+}
+
+/// The expression as it came about or multiplied out, whichever is shorter; rather one that is known to be nonzero.
+fn short(x: &mut Exprs, e: Expr, work: u64) -> Expr {
+    x.bound_search(work);
+    let own = x.simplify(e);
+    if x.written_length(own) > LONGEST {
+        return own;
+    }
+    let flat = x.expand(e);
+    let flat = x.simplify(flat);
+    let cost = |e| (!x.nonzero(e), x.written_length(e));
+    if cost(flat) < cost(own) { flat } else { own }
 }
 
 impl Ordered {

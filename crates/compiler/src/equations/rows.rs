@@ -3,7 +3,7 @@
 //!
 //! Definitions stay triangular, as elimination leaves them, so that what is evaluated grows with the graph. Written out
 //! are only those in which terms cancel once the variables that they read are put in: added up while running such terms
-//! leave rounding.
+//! leave rounding; and those that have no more terms then.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,6 +13,8 @@ use crate::ids::Map;
 
 /// Terms that may be formed in the search for terms that cancel.
 const WORK: usize = 1_000_000;
+/// A coefficient that is written longer than this is no short one.
+const SHORT: u64 = 40;
 
 /// The rows of a graph, worked out when they are asked for.
 pub struct Rows<'a> {
@@ -59,12 +61,14 @@ impl<'a> Rows<'a> {
     /// but others give way to these.
     pub fn definitions(&mut self, x: &mut Exprs) -> Vec<(Symbol, Combination)> {
         let Some(ports) = self.ports else { return Vec::new() };
-        let written_out = cancelling(x, ports);
+        let WrittenOut { needed, as_short } = written_out(x, ports);
         let mut all: Map<Symbol, Combination> = Map::new();
         for (&symbol, row) in &ports.definitions {
-            let row = match written_out.contains(&symbol) {
-                true => self.of(x, symbol).expect("it is defined").clone(),
-                false => Combination(row.0.iter().filter(|t| !self.zero.contains(&t.0)).copied().collect()),
+            let own = Combination(row.0.iter().filter(|t| !self.zero.contains(&t.0)).copied().collect());
+            let row = match (needed.contains(&symbol), as_short.contains(&symbol)) {
+                (true, _) => self.of(x, symbol).expect("it is defined").clone(),
+                (_, true) => self.of(x, symbol).filter(|row| is_short(x, row)).cloned().unwrap_or(own),
+                _ => own,
             };
             all.insert(symbol, row);
         }
@@ -100,10 +104,25 @@ fn for_junctions(all: &mut Map<Symbol, Combination>, outputs: &BTreeSet<Symbol>)
 /// A row with its coefficients in a prime field; `None` where one has no value there.
 type Row = Vec<(Symbol, Option<Residue>)>;
 
-/// The variables in whose definitions terms cancel once all that they read is put in, and those that read what nothing
-/// determines: their share in it may vanish. Within a bound of work.
-fn cancelling(x: &Exprs, ports: &Ports) -> BTreeSet<Symbol> {
-    let mut found = BTreeSet::new();
+/// Definitions that are written out over what elements give.
+#[derive(Default)]
+struct WrittenOut {
+    /// Terms cancel in them once all that they read is put in, or they read what nothing determines: their share in it may
+    /// vanish.
+    needed: BTreeSet<Symbol>,
+    /// They have no more terms then. None where coefficients vanish at the given parameters only: which of them do is told
+    /// by elimination alone.
+    as_short: BTreeSet<Symbol>,
+}
+
+/// Whether all coefficients are written shortly.
+fn is_short(x: &mut Exprs, row: &Combination) -> bool {
+    row.0.iter().all(|t| x.written_length(t.1) <= SHORT)
+}
+
+/// What of the definitions is written out, as far as a bound of work goes.
+fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
+    let mut found = WrittenOut::default();
     let mut known: Map<Symbol, Row> = Map::new();
     let mut work = 0;
     for &first in ports.definitions.keys() {
@@ -119,16 +138,20 @@ fn cancelling(x: &Exprs, ports: &Ports) -> BTreeSet<Symbol> {
             if stack.len() > before {
                 continue;
             }
-            let row = put_in(x, definition, &known);
+            let mut row = put_in(x, definition, &known);
             let undetermined = row.iter().any(|t| ports.undetermined.contains(&t.0));
             if undetermined || row.iter().any(|t| t.1.is_some_and(Residue::vanishes)) {
-                found.insert(top);
+                found.needed.insert(top);
+            }
+            row.retain(|t| !t.1.is_some_and(Residue::vanishes));
+            if row.len() <= definition.0.len() && ports.degenerate.is_empty() {
+                found.as_short.insert(top);
             }
             work += row.len();
             if work > WORK && ports.undetermined.is_empty() {
                 return found;
             }
-            known.insert(top, row.into_iter().filter(|t| !t.1.is_some_and(Residue::vanishes)).collect());
+            known.insert(top, row);
         }
     }
     found
