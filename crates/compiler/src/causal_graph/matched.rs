@@ -19,11 +19,7 @@ pub(super) type Row = (usize, Vec<(usize, Expr)>);
 
 /// What each pivot column of an elimination is in terms of other columns, from the rows that went into it. `None` if
 /// something would have to be divided by that is not known to be nonzero and was not divided by before.
-pub(super) fn matched_rows(
-    x: &mut Exprs,
-    rows: &[SparseRow],
-    done: &Elimination,
-) -> Option<Vec<Row>> {
+pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination) -> Option<Vec<Row>> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done)?;
     let mut graph = DiGraph::<usize, ()>::new();
@@ -47,12 +43,7 @@ pub(super) fn matched_rows(
 }
 
 /// The columns of a circle, each by later ones and by columns outside.
-fn circle_solved(
-    x: &mut Exprs,
-    rows: Vec<SparseRow>,
-    mut columns: Vec<usize>,
-    done: &Elimination,
-) -> Option<Vec<Row>> {
+fn circle_solved(x: &mut Exprs, rows: Vec<SparseRow>, mut columns: Vec<usize>, done: &Elimination) -> Option<Vec<Row>> {
     columns.sort_unstable();
     let own = eliminate(x, rows, &[columns.clone()]);
     let as_before = own.watched.iter().all(|e| done.watched.contains(e));

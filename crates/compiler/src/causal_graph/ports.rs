@@ -365,7 +365,7 @@ impl Net {
         let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
         let regular = regular_rows(x, &done);
         let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
-        if all && regular.is_none() {
+        if all && regular.is_none() && done.degenerate.is_empty() {
             solved.short = matched_rows(x, &self.rows, &done).map(|rows| rows.into_iter().map(named).collect());
         }
         solved.definitions.extend(reduced_rows(x, &done, regular.as_ref()).into_iter().map(named));

@@ -237,6 +237,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         domains,
         definitions: d.of,
         rows: ordered.rows,
+        of_loops: ordered.named.iter().map(|n| n.0).collect(),
         dependent,
         meanings,
         index,

@@ -8,8 +8,12 @@ use std::collections::BTreeMap;
 
 use crate::algebra::{Expr, Exprs, Symbol, ZERO};
 
-/// A part that is written longer than this keeps a name.
+/// A part that is written longer than this keeps a name,
 const NAMED: u64 = 120;
+/// and in loops with at least this many unknowns
+const MANY: usize = 6;
+/// one that is longer than this: such loops are not read as a whole.
+const NAMED_OF_MANY: u64 = 24;
 
 /// `Σ coefficient · unknown + rest`, coefficients by the number of the unknown.
 #[derive(Debug, Clone)]
@@ -64,13 +68,14 @@ impl LinearForms {
 
     fn with_names(&mut self, x: &mut Exprs, symbol: Symbol, unknowns: &[Symbol], mut form: LinearForm) -> LinearForm {
         let variable = x.name(symbol).to_string();
+        let longest = if unknowns.len() < MANY { NAMED } else { NAMED_OF_MANY };
         for (&k, coefficient) in &mut form.coefficients {
-            if x.written_length(*coefficient) > NAMED {
+            if x.written_length(*coefficient) > longest {
                 let name = format!("{variable}.by.{}", x.name(unknowns[k]));
                 *coefficient = self.name(x, &name, *coefficient);
             }
         }
-        if x.written_length(form.rest) > NAMED {
+        if x.written_length(form.rest) > longest {
             form.rest = self.name(x, &format!("{variable}.bias"), form.rest);
         }
         form

@@ -87,6 +87,8 @@ pub struct Equations {
     pub definitions: Map<Symbol, Definition>,
     /// The rows of all linear loops.
     pub rows: Vec<LinearRow>,
+    /// Names for parts of these rows: what the unknowns of a loop do to its variables.
+    pub of_loops: BTreeSet<Symbol>,
     /// Co-energy variables of the storages that depend on others.
     pub dependent: Vec<Symbol>,
     /// What a state is that is no variable of its own (`pi = X + S^T X_d`), in stored quantities.

@@ -24,13 +24,13 @@ const SHORT: u64 = 12;
 pub fn named_page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
     let named = named_sources(d);
     let drafts = Drafts::of(d, equations, ordered, &named);
-    let Kept { known, mut definitions } = kept(d, equations, &drafts);
+    let mut names = FreshNames::of(d);
+    let Kept { known, mut definitions } = kept(d, equations, &drafts, &mut names);
     let aliases = aliases(d, &equations.states, &known);
     let mut exprs: Vec<Expr> = drafts.exprs();
     exprs.extend(definitions.iter().map(|d| d.1));
     let exprs = d.x.substitute_all(&exprs, &known);
     let share = WORK / (exprs.len() as u64 + 1);
-    let mut names = FreshNames::of(d);
     let Shared { roots, definitions: parts } =
         d.x.share(&exprs, &mut |x| names.next(x), &mut |x, e| shortened(x, e, share));
     let (roots, values) = roots.split_at(drafts.exprs().len());
@@ -277,9 +277,9 @@ struct Kept {
     definitions: Vec<(Symbol, Expr)>,
 }
 
-/// What is read once, or is short, gives way to its value; the rest keeps its name where one can record it by that, else
-/// it is left to [`Exprs::share`].
-fn kept(d: &mut Definitions, equations: &Equations, drafts: &Drafts) -> Kept {
+/// What is read once, or is short, gives way to its value; the rest keeps its name where one can record it by that; parts
+/// of linear loops get a name of their own, else it is left to [`Exprs::share`].
+fn kept(d: &mut Definitions, equations: &Equations, drafts: &Drafts, names: &mut FreshNames) -> Kept {
     let recorded = recorded(d, equations);
     let mut all = drafts.exprs();
     all.extend(drafts.values.iter().map(|v| v.1));
@@ -294,8 +294,13 @@ fn kept(d: &mut Definitions, equations: &Equations, drafts: &Drafts) -> Kept {
             value = put_in(&mut d.x, value, &BTreeMap::new());
         }
         let often = uses.get(&symbol).is_some_and(|&n| n > 1);
-        if often && recorded.contains(&symbol) && d.x.printed_length(value) > SHORT {
+        let named = often && d.x.printed_length(value) > SHORT;
+        if named && recorded.contains(&symbol) {
             definitions.push((symbol, value));
+        } else if named && equations.of_loops.contains(&symbol) {
+            let name = names.next(&mut d.x);
+            definitions.push((name, value));
+            known.insert(symbol, d.x.sym(name));
         } else {
             known.insert(symbol, value);
         }

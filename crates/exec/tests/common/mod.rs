@@ -167,6 +167,7 @@ impl Sketch {
             domains: Vec::new(),
             definitions: Map::new(),
             rows: Vec::new(),
+            of_loops: Default::default(),
             dependent: Vec::new(),
             meanings: Vec::new(),
             algebraic: Vec::new(),
