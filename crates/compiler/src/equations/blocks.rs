@@ -153,6 +153,8 @@ fn block(
     Ok(())
 }
 
+/// Names for parts, each with its value.
+type Named = Vec<(Symbol, Expr)>;
 /// Coefficients of all unknowns, and the rest.
 type DenseRow = (Vec<Expr>, Expr);
 
@@ -163,7 +165,7 @@ fn linear(
     torn: &[Symbol],
     body: &[(Symbol, Expr)],
     residuals: &[Expr],
-) -> Option<(Vec<(Symbol, Expr)>, Vec<DenseRow>)> {
+) -> Option<(Named, Vec<DenseRow>)> {
     let Some(forms) = LinearForms::new(x, torn, body) else {
         if body.len() > WRITTEN_OUT {
             return None;
