@@ -13,7 +13,7 @@ use crate::simulate::{check_start, counted_in};
 use crate::{Failure, HybridImplicitSystem, ImplicitSystem, Method, Options, Sink, Stopped, Summary, halves};
 
 /// Integrates `system` in implicit form from the unknowns `y` and their rates `yp` at `options.from` to `options.to`, and
-/// leaves the last ones reached in `y` and `yp`. The method is [`Method::Radau`], or [`Method::Bdf`] for semi-explicit
+/// leaves the last ones reached in `y` and `yp`. The method is [`Method::Radau`](crate::Method::Radau), or [`Method::Bdf`] for semi-explicit
 /// systems of index 1.
 ///
 /// Start values may be rough: [`handle_event`](crate::Events::handle_event), which is called at the start, makes them

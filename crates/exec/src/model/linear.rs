@@ -27,7 +27,7 @@ impl Model {
     /// outputs is what is recorded.
     ///
     /// # Errors
-    /// As [`rates`](System::rates).
+    /// As [`rates`](halfarrow_sim::System::rates).
     pub fn linearise(&mut self, t: f64, x: &[f64], inputs: &[usize]) -> Result<Linearised, Failure> {
         let mut linear = Linearised {
             rates: vec![0.0; x.len()],

@@ -74,11 +74,11 @@ pub struct Summary {
     pub rates: usize,
     /// Directional derivatives of the rates.
     pub tangents: usize,
-    /// Jacobians of a system in implicit form, or by [`Method::Radau`].
+    /// Jacobians of a system in implicit form, or by [`Method::Radau`](crate::Method::Radau).
     pub jacobians: usize,
-    /// Factorisations of matrices; for [`Method::Radau`] a real and a complex one count as one.
+    /// Factorisations of matrices; for [`Method::Radau`](crate::Method::Radau) a real and a complex one count as one.
     pub factorisations: usize,
-    /// Newton iterations of [`Method::Radau`], each the solution of a real and a complex system.
+    /// Newton iterations of [`Method::Radau`](crate::Method::Radau), each the solution of a real and a complex system.
     pub iterations: usize,
     /// Time events, the start and mere corners not counted.
     pub jumps: usize,
