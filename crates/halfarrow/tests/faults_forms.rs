@@ -309,3 +309,10 @@ fn no_form_of_a_random_graph_panics() {
     }
     assert!(derived > count, "{derived} of {count} graphs");
 }
+
+/// A source of value zero leaves the rows of all that reads it, near or far: what nothing moves is a constant.
+#[test]
+fn a_constraint_at_rest_moves_nothing() {
+    let report = fault("constraint_at_rest").equations(Form::Minimal).expect("equations");
+    assert!(report.states.is_empty() && report.legend.join(" ").contains("K1 = q_C12"), "{:?}", report.legend);
+}

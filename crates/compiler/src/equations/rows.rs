@@ -34,7 +34,8 @@ impl<'a> Rows<'a> {
         let givers = ports.ports.iter().map(|p| (p.input, p)).collect();
         // Where two elements share a bond, what one gives is what the other takes.
         let shared = ports.ports.iter().map(|p| p.output).filter(|s| !ports.definitions.contains_key(s));
-        let known = shared.map(|s| (s, Combination(vec![(s, ONE)]))).collect();
+        let mut known: Map<Symbol, Combination> = shared.map(|s| (s, Combination(vec![(s, ONE)]))).collect();
+        known.extend(zero.iter().map(|&s| (s, Combination::default())));
         Rows { ports: Some(ports), givers, zero, known }
     }
 
@@ -52,7 +53,6 @@ impl<'a> Rows<'a> {
     pub fn of(&mut self, x: &mut Exprs, symbol: Symbol) -> Option<&Combination> {
         if !self.known.contains_key(&symbol) {
             self.ports?.resolve_into(x, symbol, &mut self.known);
-            self.known.get_mut(&symbol)?.0.retain(|t| !self.zero.contains(&t.0));
         }
         self.known.get(&symbol)
     }
