@@ -141,22 +141,34 @@ impl Ports {
     /// Works a variable out as a combination of inputs alone, with all that it reads, into `known`; nothing if it is an
     /// input.
     pub fn resolve_into(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) {
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = self.next_to_resolve(&mut open, |s| known.contains_key(s)) {
+            let flat = definition.substitute(x, known, &self.undetermined);
+            known.insert(next, flat);
+        }
+    }
+
+    /// Of the open variables and those that they read, near or far, one that is not known although all that it reads is;
+    /// `None` if there are no more.
+    pub(crate) fn next_to_resolve(
+        &self,
+        open: &mut Vec<Symbol>,
+        known: impl Fn(&Symbol) -> bool,
+    ) -> Option<(Symbol, &Combination)> {
         // Depth can equal the length of a chain of bonds, so the recursion keeps its own stack.
-        let mut stack = vec![symbol];
-        while let Some(&top) = stack.last() {
-            let Some(definition) = self.definitions.get(&top).filter(|_| !known.contains_key(&top)) else {
-                stack.pop();
+        while let Some(&top) = open.last() {
+            let Some(definition) = self.definitions.get(&top).filter(|_| !known(&top)) else {
+                open.pop();
                 continue;
             };
-            let before = stack.len();
-            let open = |s: &Symbol| self.definitions.contains_key(s) && !known.contains_key(s);
-            stack.extend(definition.0.iter().map(|t| t.0).filter(open));
-            if stack.len() == before {
-                let flat = definition.substitute(x, known, &self.undetermined);
-                known.insert(top, flat);
-                stack.pop();
+            let before = open.len();
+            let missing = |s: &Symbol| self.definitions.contains_key(s) && !known(s);
+            open.extend(definition.0.iter().map(|t| t.0).filter(missing));
+            if open.len() == before {
+                return Some((top, definition));
             }
         }
+        None
     }
 }
 

@@ -166,14 +166,25 @@ fn linear(
     body: &[(Symbol, Expr)],
     residuals: &[Expr],
 ) -> Option<(Named, Vec<DenseRow>)> {
-    let Some(forms) = LinearForms::new(x, torn, body) else {
-        if body.len() > WRITTEN_OUT {
-            return None;
-        }
-        let flat = substituted(x, body, residuals);
-        let rows: Option<Vec<_>> = flat.iter().map(|&r| x.linear_in(r, torn)).collect();
-        return Some((Vec::new(), rows?));
-    };
+    if let Some(found) = as_forms(x, torn, body, residuals) {
+        return Some(found);
+    }
+    if body.len() > WRITTEN_OUT {
+        return None;
+    }
+    let flat = substituted(x, body, residuals);
+    let rows: Option<Vec<_>> = flat.iter().map(|&r| x.linear_in(r, torn)).collect();
+    Some((Vec::new(), rows?))
+}
+
+/// The same where every variable of the loop is a linear form.
+fn as_forms(
+    x: &mut Exprs,
+    torn: &[Symbol],
+    body: &[(Symbol, Expr)],
+    residuals: &[Expr],
+) -> Option<(Named, Vec<DenseRow>)> {
+    let forms = LinearForms::new(x, torn, body)?;
     let mut rows = Vec::with_capacity(residuals.len());
     for &residual in residuals {
         let form = forms.of_expr(x, residual)?;

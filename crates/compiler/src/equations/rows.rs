@@ -126,18 +126,8 @@ fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
     let mut known: Map<Symbol, Row> = Map::new();
     let mut work = 0;
     for &first in ports.definitions.keys() {
-        let mut stack = vec![first];
-        while let Some(&top) = stack.last() {
-            let Some(definition) = ports.definitions.get(&top).filter(|_| !known.contains_key(&top)) else {
-                stack.pop();
-                continue;
-            };
-            let before = stack.len();
-            let open = |s: &Symbol| ports.definitions.contains_key(s) && !known.contains_key(s);
-            stack.extend(definition.0.iter().map(|t| t.0).filter(open));
-            if stack.len() > before {
-                continue;
-            }
+        let mut open = vec![first];
+        while let Some((top, definition)) = ports.next_to_resolve(&mut open, |s| known.contains_key(s)) {
             let mut row = put_in(x, definition, &known);
             let undetermined = row.iter().any(|t| ports.undetermined.contains(&t.0));
             if undetermined || row.iter().any(|t| t.1.is_some_and(Residue::vanishes)) {
