@@ -14,4 +14,5 @@ pub mod equations;
 pub mod ids;
 pub mod program;
 pub mod span;
+pub mod sparse;
 pub mod unit;

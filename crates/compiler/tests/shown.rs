@@ -54,10 +54,9 @@ fn values(equations: &Equations, (first, step): (f64, f64)) -> BTreeMap<Symbol, 
                 known.insert(*symbol, value);
             }
             Step::Linear { unknowns, matrix, right, .. } => {
-                let row = |(row, &r): (&Vec<Expr>, &Expr)| {
-                    row.iter().chain([&r]).map(|&e| at(x, e, &known)).collect::<Vec<f64>>()
-                };
-                let solution = solved(matrix.iter().zip(right).map(row).collect());
+                let (full, right) = (matrix.map(|&e| at(x, e, &known)).dense(0.0), right.iter());
+                let row = |(row, &r): (&[f64], &Expr)| [row, &[at(x, r, &known)]].concat();
+                let solution = solved(full.chunks(unknowns.len()).zip(right).map(row).collect());
                 known.extend(unknowns.iter().copied().zip(solution));
             }
             // What is shown holds for any value of what stays implicit.

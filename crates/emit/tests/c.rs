@@ -126,7 +126,7 @@ fn unknowns_that_are_rounding_hide_no_solution() {
 /// No undefined behaviour, nothing read that was not written; clang sees no warning and gives the same bits.
 #[test]
 fn c_is_clean() {
-    let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh"]
+    let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh", "net", "net_cubic"]
         .iter()
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
         .collect();

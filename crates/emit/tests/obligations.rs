@@ -18,11 +18,12 @@ const LIBRARY: [&str; 17] = [
 fn models() -> Vec<Exported> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
     let of = |name: &str| root.join(name).join("model.bond");
-    let mut all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "sampled", "mesh", "links", "clock"]
-        .iter()
-        .zip(Method::ALL.iter().cycle())
-        .map(|(name, &method)| export(&own(name), method, 1e-3))
-        .collect();
+    let mut all: Vec<Exported> =
+        ["contact", "bridge", "tables", "delay", "sampled", "mesh", "net", "net_cubic", "links", "clock"]
+            .iter()
+            .zip(Method::ALL.iter().cycle())
+            .map(|(name, &method)| export(&own(name), method, 1e-3))
+            .collect();
     for (name, method) in [
         ("slider_crank", Method::Rk4),
         ("chain_of_pendulums", Method::Heun),

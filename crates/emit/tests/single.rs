@@ -79,7 +79,7 @@ fn floats_follow_the_interpreter() {
             all.push(export_single(path, Method::ALL[i % Method::ALL.len()], step));
         }
     }
-    for name in ["bridge", "delay", "tables", "closure", "mesh"] {
+    for name in ["bridge", "delay", "tables", "closure", "mesh", "net_cubic"] {
         all.push(export_single(&own(name), Method::ImplicitMidpoint, 0.9e-3));
     }
     assert!(all.len() >= 50, "{} models", all.len());
@@ -256,7 +256,7 @@ fn elementary_functions_keep_their_bounds() {
 /// No undefined behaviour, nothing read that was not written; clang sees no warning and gives the same bits.
 #[test]
 fn floats_are_clean() {
-    let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh"]
+    let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh", "net", "net_cubic"]
         .iter()
         .zip([Method::ImplicitMidpoint, Method::Rosenbrock].into_iter().cycle())
         .map(|(name, method)| export_single(&own(name), method, 1e-3))

@@ -5,6 +5,7 @@ mod common;
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::equations::Step;
+use halfarrow_compiler::sparse::SparseMatrix;
 use halfarrow_sim::{Events, System};
 use std::alloc::{GlobalAlloc, Layout, System as Memory};
 use std::cell::Cell;
@@ -41,7 +42,12 @@ fn a_step_takes_no_memory() {
     let x = s.state("x");
     let (u, ue) = s.symbol("u");
     let (three, one) = (s.number(3.0), s.number(1.0));
-    s.step(Step::Linear { unknowns: vec![u], matrix: vec![vec![three]], right: vec![x], elements: vec![] });
+    s.step(Step::Linear {
+        unknowns: vec![u],
+        matrix: SparseMatrix::full(vec![vec![three]]),
+        right: vec![x],
+        elements: vec![],
+    });
     let (e, ee) = s.symbol("e");
     let exp = s.call(Function::Exp, ee);
     let terms = [exp, ee, ue];

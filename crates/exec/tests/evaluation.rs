@@ -1,6 +1,7 @@
 //! Rates, solve blocks and their failures: known values.
 
 use crate::common;
+use halfarrow_compiler::sparse::SparseMatrix;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
@@ -75,7 +76,7 @@ fn linear(singular: bool) -> Model {
     let (one, two, nine) = (s.number(1.0), s.number(2.0), s.number(9.0));
     s.step(Step::Linear {
         unknowns: vec![u, v],
-        matrix: vec![vec![a, three], vec![other, nine]],
+        matrix: SparseMatrix::full(vec![vec![a, three], vec![other, nine]]),
         right: vec![one, two],
         elements,
     });

@@ -1,6 +1,7 @@
 //! All derivatives at once are those along directions: every model, along a run.
 
 use crate::common;
+use halfarrow_compiler::sparse::SparseMatrix;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
@@ -78,7 +79,7 @@ fn blocks_are_differentiated_by_inputs_time_and_parameters() {
     let (k, u, t) = (s.parameter("k", three), s.input("u", 0.5), s.t);
     let ((a, ae), (b, be)) = (s.symbol("a"), s.symbol("b"));
     let one = s.number(1.0);
-    let matrix = vec![vec![k, x], vec![one, u]];
+    let matrix = SparseMatrix::full(vec![vec![k, x], vec![one, u]]);
     let sine = s.call(Function::Sin, t);
     s.step(Step::Linear { unknowns: vec![a, b], matrix, right: vec![sine, x], elements: vec![] });
     let (c, ce) = s.symbol("c");

@@ -13,6 +13,7 @@ use petgraph::graph::DiGraph;
 
 use super::ports::settled;
 use crate::algebra::{Elimination, Expr, Exprs, ONE, SparseRow, eliminate};
+use crate::sparse::Matching;
 
 /// A column, and the others that it is the sum of, with their coefficients.
 pub(super) type Row = (usize, Vec<(usize, Expr)>);
@@ -82,7 +83,7 @@ fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination) -> Option<BTreeM
         &|edge| constant(edge.coefficient) && x.nonzero(edge.coefficient),
     ];
     let mut allowed: Vec<Vec<usize>> = vec![Vec::new(); rows.len()];
-    let mut found = Matching { row_of: vec![None; rows.len()], column_of: vec![None; rows.len()] };
+    let mut found = Matching::new(rows.len());
     for level in levels {
         for (row, entries) in rows.iter().enumerate() {
             for &(column, coefficient) in &entries.0 {
@@ -99,49 +100,4 @@ fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination) -> Option<BTreeM
     }
     let all: Option<Vec<usize>> = found.row_of.into_iter().collect();
     Some(done.pivots.iter().map(|p| p.column).zip(all?).collect())
-}
-
-/// Rows and columns, joined in pairs.
-struct Matching {
-    row_of: Vec<Option<usize>>,
-    column_of: Vec<Option<usize>>,
-}
-
-impl Matching {
-    fn join(&mut self, row: usize, column: usize) {
-        (self.row_of[column], self.column_of[row]) = (Some(row), Some(column));
-    }
-
-    /// Finds a column for a row that has none, if rows that have one can move over: the shortest such exchange.
-    fn augment(&mut self, row: usize, edges: &[Vec<usize>]) {
-        if self.column_of[row].is_some() {
-            return;
-        }
-        let mut reached_by: BTreeMap<usize, usize> = BTreeMap::new();
-        let mut queue = std::collections::VecDeque::from([row]);
-        while let Some(from) = queue.pop_front() {
-            for &column in &edges[from] {
-                if reached_by.contains_key(&column) {
-                    continue;
-                }
-                reached_by.insert(column, from);
-                match self.row_of[column] {
-                    Some(holder) => queue.push_back(holder),
-                    None => return self.exchange(column, &reached_by),
-                }
-            }
-        }
-    }
-
-    fn exchange(&mut self, mut column: usize, reached_by: &BTreeMap<usize, usize>) {
-        loop {
-            let row = reached_by[&column];
-            let before = self.column_of[row];
-            self.join(row, column);
-            match before {
-                Some(next) => column = next,
-                None => return,
-            }
-        }
-    }
 }

@@ -9,14 +9,21 @@ use rustc_hash::FxHashMap;
 use super::Step;
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
+use super::supports::Supports;
 use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
+use crate::sparse::SparseMatrix;
 
 /// Terms that may be formed in the search for short forms of the entries of a matrix.
 const WORK: u64 = 1_000_000;
 /// Entries that are written longer than this stay products of sums, as they come about.
 const LONGEST: u64 = 600;
+
+/// Loops with at most so many unknowns are left as they are torn.
+const FEW: usize = 32;
+/// What is tried for the number of unknowns that a variable may read in a larger loop.
+const LONGEST_ROWS: [usize; 5] = [usize::MAX, 16, 8, 4, 2];
 
 /// Loops with more variables than this are not written out to see whether terms that are no linear forms cancel.
 const WRITTEN_OUT: usize = 64;
@@ -120,6 +127,7 @@ fn block(
             Definition::Implicit(e) => e,
         });
     }
+    let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     let Some((named, rows)) = linear(&mut d.x, &torn, &body, &residuals) else {
         let inner = body.clone();
         ordered.steps.push(Step::Newton { unknowns: torn, body: inner, residuals, elements });
@@ -133,18 +141,17 @@ fn block(
     if is_singular(x, &matrix) {
         return Err(Insoluble { unknowns: torn, members: symbols, elements });
     }
-    for (row, &right) in matrix.iter().zip(&right) {
-        let terms = torn.iter().copied().zip(row.iter().copied());
-        let left = terms.filter(|(_, e)| !x.is_zero(*e)).collect();
+    for (row, &right) in matrix.rows().zip(&right) {
+        let left = row.map(|(k, &e)| (torn[k], e)).collect();
         ordered.rows.push(LinearRow { left, right });
     }
-    match (&matrix[..], &right[..], &torn[..]) {
-        ([row], [right], [unknown]) => {
-            if !x.nonzero(row[0]) {
-                ordered.steps.push(Step::Watch { pivot: row[0], elements });
-                x.assume_nonzero(row[0]);
+    match (matrix.entries(), &right[..], &torn[..]) {
+        (&[pivot], [right], [unknown]) => {
+            if !x.nonzero(pivot) {
+                ordered.steps.push(Step::Watch { pivot, elements });
+                x.assume_nonzero(pivot);
             }
-            let value = x.div(*right, row[0]);
+            let value = x.div(*right, pivot);
             ordered.steps.push(Step::Assign { symbol: *unknown, value });
         }
         _ => ordered.steps.push(Step::Linear { unknowns: torn, matrix, right, elements }),
@@ -153,19 +160,38 @@ fn block(
     Ok(())
 }
 
+/// Unknowns, definitions of other variables in order, and residuals.
+type Loop = (Vec<Symbol>, Vec<(Symbol, Expr)>, Vec<Expr>);
+
+/// Few unknowns make a full matrix: where a loop has many, variables that read too many of them become unknowns too, as far
+/// as that takes fewer operations.
+fn kept_sparse(x: &mut Exprs, torn: Vec<Symbol>, body: Vec<(Symbol, Expr)>, residuals: Vec<Expr>) -> Loop {
+    if torn.len() <= FEW {
+        return (torn, body, residuals);
+    }
+    let plans = LONGEST_ROWS.map(|longest| Supports::of(x, &torn, &body, &residuals, longest));
+    let best = plans.into_iter().min_by_key(Supports::operations).expect("there are several");
+    let mut whole = (torn, Vec::with_capacity(body.len()), residuals);
+    for (symbol, value) in body {
+        if best.unknown.contains_key(&symbol) {
+            let own = x.sym(symbol);
+            whole.0.push(symbol);
+            whole.2.push(x.sub(own, value));
+        } else {
+            whole.1.push((symbol, value));
+        }
+    }
+    whole
+}
+
 /// Names for parts, each with its value.
 type Named = Vec<(Symbol, Expr)>;
-/// Coefficients of all unknowns, and the rest.
-type DenseRow = (Vec<Expr>, Expr);
+/// The coefficients of unknowns that are not 0, and the rest.
+type Row = (Vec<(usize, Expr)>, Expr);
 
 /// The residuals of a loop as linear forms in its unknowns, coefficients and rest, with names for parts of them; `None` if
 /// they are none, be it that terms which are no linear forms cancel.
-fn linear(
-    x: &mut Exprs,
-    torn: &[Symbol],
-    body: &[(Symbol, Expr)],
-    residuals: &[Expr],
-) -> Option<(Named, Vec<DenseRow>)> {
+fn linear(x: &mut Exprs, torn: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr]) -> Option<(Named, Vec<Row>)> {
     if let Some(found) = as_forms(x, torn, body, residuals) {
         return Some(found);
     }
@@ -173,38 +199,35 @@ fn linear(
         return None;
     }
     let flat = substituted(x, body, residuals);
-    let rows: Option<Vec<_>> = flat.iter().map(|&r| x.linear_in(r, torn)).collect();
+    let row = |(terms, rest): (BTreeMap<usize, Expr>, Expr)| (terms.into_iter().collect(), rest);
+    let rows: Option<Vec<Row>> = flat.iter().map(|&r| x.sparse_linear_in(r, torn).map(row)).collect();
     Some((Vec::new(), rows?))
 }
 
 /// The same where every variable of the loop is a linear form.
-fn as_forms(
-    x: &mut Exprs,
-    torn: &[Symbol],
-    body: &[(Symbol, Expr)],
-    residuals: &[Expr],
-) -> Option<(Named, Vec<DenseRow>)> {
+fn as_forms(x: &mut Exprs, torn: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr]) -> Option<(Named, Vec<Row>)> {
     let forms = LinearForms::new(x, torn, body)?;
     let mut rows = Vec::with_capacity(residuals.len());
     for &residual in residuals {
         let form = forms.of_expr(x, residual)?;
-        let coefficients = (0..torn.len()).map(|k| form.coefficients.get(&k).copied().unwrap_or(ZERO)).collect();
-        rows.push((coefficients, form.rest));
+        rows.push((form.coefficients.into_iter().collect(), form.rest));
     }
     Some((forms.named, rows))
 }
 
 /// Rows of coefficients with their right sides, each in its short form, as far as the work for each goes.
-fn shortened(x: &mut Exprs, rows: Vec<DenseRow>) -> (Vec<Vec<Expr>>, Vec<Expr>) {
-    let size = rows.len() as u64;
+fn shortened(x: &mut Exprs, rows: Vec<Row>) -> (SparseMatrix<Expr>, Vec<Expr>) {
+    let work = WORK / rows.iter().map(|row| row.0.len() as u64).sum::<u64>().max(1);
     let (mut matrix, mut right) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
     for (row, rest) in rows {
-        matrix.push(row.into_iter().map(|e| short(x, e, WORK / (size * size))).collect());
+        let row = row.into_iter().map(|(k, e)| (k, short(x, e, work)));
+        matrix.push(row.collect::<Vec<_>>());
         let minus = x.neg(rest);
-        right.push(short(x, minus, WORK / (size * size)));
+        right.push(short(x, minus, work));
     }
     x.bound_search(u64::MAX);
-    (matrix, right)
+    matrix.iter_mut().for_each(|row| row.retain(|e| !x.is_zero(e.1)));
+    (SparseMatrix::new(matrix), right)
 }
 
 /// The expression as it came about or multiplied out, whichever is shorter; rather one that is known to be nonzero.
@@ -271,16 +294,18 @@ pub fn substituted(x: &mut Exprs, body: &[(Symbol, Expr)], exprs: &[Expr]) -> Ve
 }
 
 /// Whether the determinant vanishes for all values or at the given parameters.
-pub fn is_singular(x: &mut Exprs, matrix: &[Vec<Expr>]) -> bool {
-    if matrix.len() > 8 {
+pub fn is_singular(x: &mut Exprs, matrix: &SparseMatrix<Expr>) -> bool {
+    let n = matrix.size();
+    if n > 8 {
         return false; // left to the pivots of the run
     }
-    if x.is_regular_given(matrix) {
+    let full: Vec<Vec<Expr>> = matrix.dense(ZERO).chunks(n).map(<[Expr]>::to_vec).collect();
+    if x.is_regular_given(&full) {
         return false;
     }
-    let entries = |row: &Vec<Expr>| row.iter().copied().enumerate().filter(|(_, e)| !x.is_zero_given(*e)).collect();
-    let rows: Vec<SparseRow> = matrix.iter().map(entries).map(SparseRow).collect();
-    rank_given(x, matrix.len(), rows) < matrix.len()
+    let rows = matrix.rows().map(|row| row.map(|(k, &e)| (k, e)).filter(|e| !x.is_zero_given(e.1)).collect());
+    let rows: Vec<SparseRow> = rows.map(SparseRow).collect();
+    rank_given(x, n, rows) < n
 }
 
 /// The elements whose efforts, flows or stored quantities these are, junctions left out.

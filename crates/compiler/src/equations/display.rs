@@ -308,8 +308,8 @@ fn equations(
             Step::Linear { unknowns, matrix, right, .. }
                 if unknowns.len() > CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
             {
-                for (row, &right) in matrix.iter().zip(right) {
-                    let left = unknowns.iter().copied().zip(row.iter().copied()).collect();
+                for (row, &right) in matrix.rows().zip(right) {
+                    let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
                     implicit.push(from_row(&mut d.x, &LinearRow { left, right }, known));
                 }
             }
@@ -454,8 +454,8 @@ pub fn expansions(
             Step::Linear { unknowns, matrix, right, .. }
                 if unknowns.len() <= CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
             {
-                let matrix: Vec<Vec<Expr>> =
-                    matrix.iter().map(|r| r.iter().map(|&e| put_in(&mut d.x, e, &known)).collect()).collect();
+                let matrix = matrix.map(|&e| put_in(&mut d.x, e, &known)).dense(crate::algebra::ZERO);
+                let matrix: Vec<Vec<Expr>> = matrix.chunks(unknowns.len()).map(<[Expr]>::to_vec).collect();
                 let right: Vec<Expr> = right.iter().map(|&e| put_in(&mut d.x, e, &known)).collect();
                 let values = cramer(&mut d.x, &matrix, &right);
                 known.extend(unknowns.iter().copied().zip(values));

@@ -216,7 +216,9 @@ impl<'d, 'a> Linearised<'d, 'a> {
                 self.gradients.insert(*symbol, gradient);
             }
             Step::Linear { unknowns, matrix, right, .. } => {
-                let a: Vec<Vec<f64>> = matrix.iter().map(|r| r.iter().map(|&e| self.value(e)).collect()).collect();
+                let n = unknowns.len().max(1);
+                let dense = matrix.map(|&e| self.value(e)).dense(0.0);
+                let a: Vec<Vec<f64>> = dense.chunks(n).map(<[f64]>::to_vec).collect();
                 let b: Vec<f64> = right.iter().map(|&e| self.value(e)).collect();
                 let Some(inverse) = inverse(&a) else {
                     self.good = false;
@@ -226,9 +228,9 @@ impl<'d, 'a> Linearised<'d, 'a> {
                     self.values.insert(u, row.iter().zip(&b).map(|(m, b)| m * b).sum());
                 }
                 let mut moved = Vec::new();
-                for (row, &right) in matrix.iter().zip(right) {
+                for (row, &right) in matrix.rows().zip(right) {
                     let mut gradient = self.gradient(right, &[]);
-                    for (&e, u) in row.iter().zip(unknowns) {
+                    for (u, &e) in row.map(|(k, e)| (&unknowns[k], e)) {
                         let entry = self.gradient(e, &[]);
                         gradient.add(&entry, -self.values[u]);
                     }

@@ -22,6 +22,7 @@ mod places;
 mod relations;
 mod rows;
 mod stiff;
+mod supports;
 mod text;
 mod verify;
 
@@ -32,6 +33,7 @@ use crate::bond_graph::{BondGraph, ElementId, Kind, PortRef};
 pub use crate::causal_paths::{Certificate, Count};
 use crate::ids::Map;
 use crate::span::Span;
+use crate::sparse::SparseMatrix;
 use crate::unit::Unit;
 
 pub use blocks::LinearRow;
@@ -230,8 +232,8 @@ pub enum Step {
     Linear {
         /// What is defined.
         unknowns: Vec<Symbol>,
-        /// Row by row.
-        matrix: Vec<Vec<Expr>>,
+        /// The matrix.
+        matrix: SparseMatrix<Expr>,
         /// Right-hand side.
         right: Vec<Expr>,
         /// The elements concerned, for messages.

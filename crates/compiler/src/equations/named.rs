@@ -204,9 +204,8 @@ impl Drafts {
     fn add_block(&mut self, step: &Step) {
         match step {
             Step::Linear { unknowns, matrix, right, .. } => {
-                for (row, &right) in matrix.iter().zip(right) {
-                    let left = unknowns.iter().copied().zip(row.iter().copied());
-                    let left = left.filter(|t| t.1 != crate::algebra::ZERO).collect();
+                for (row, &right) in matrix.rows().zip(right) {
+                    let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
                     self.rows.push(Draft::of_row(&LinearRow { left, right }));
                 }
             }

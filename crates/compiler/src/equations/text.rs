@@ -12,6 +12,9 @@ use crate::algebra::{
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
 use crate::causal_paths::Refusal;
 
+/// Rows of larger systems of equations are written entry by entry.
+const FULL: usize = 32;
+
 /// A way of writing equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
@@ -314,8 +317,15 @@ impl Display for Shown {
                 Step::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
                 Step::Linear { unknowns, matrix, right, .. } => {
                     writeln!(f, "  solve for {}", list(unknowns, &names))?;
-                    for (row, &right) in matrix.iter().zip(right) {
-                        let row: Vec<String> = row.iter().map(|&e| text(e)).collect();
+                    for (row, &right) in matrix.rows().zip(right) {
+                        let named = |(k, &e): (usize, &Expr)| format!("{}: {}", names.ascii(unknowns[k]), text(e));
+                        let mut full = vec!["0".to_string(); unknowns.len().min(FULL)];
+                        let row: Vec<String> = if unknowns.len() > FULL {
+                            row.map(named).collect()
+                        } else {
+                            row.for_each(|(k, &e)| full[k] = text(e));
+                            full
+                        };
                         writeln!(f, "    [{}] = {}", row.join(", "), text(right))?;
                     }
                 }

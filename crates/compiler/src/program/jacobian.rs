@@ -3,10 +3,11 @@
 
 use super::op::Op;
 use super::values::{Reads, Values};
-use super::{Block, BlockId, Program, Value, verify};
+use super::{Block, BlockId, Matrix, Program, Value, verify};
 use crate::ids::{Id, Table};
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// A derivative that is not zero whatever the values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +137,7 @@ impl Work {
             }
             Block::Newton { residuals, jacobian, .. } => {
                 let (matrix, right) = self.right_of_newton(block, &residuals, &jacobian);
-                (matrix, right, None)
+                (Arc::new(matrix), right, None)
             }
         };
         self.solved(block, &matrix, &right, shared)
@@ -149,12 +150,11 @@ impl Work {
     }
 
     /// `A u = b` gives `A u' = b' - A' u`: the right-hand side for each column, one slope list a row.
-    fn right_of_linear(&mut self, matrix: &[Value], right: &[Value], unknowns: &[Value]) -> Vec<Slopes> {
-        let n = right.len();
-        let mut rows = Vec::with_capacity(n);
-        for (row, b) in right.iter().enumerate() {
+    fn right_of_linear(&mut self, matrix: &Matrix, right: &[Value], unknowns: &[Value]) -> Vec<Slopes> {
+        let mut rows = Vec::with_capacity(right.len());
+        for (row, b) in matrix.values.rows().zip(right) {
             let mut sum: Vec<(u32, Value)> = self.slopes.get(b).map(|s| s.to_vec()).unwrap_or_default();
-            for (k, entry) in matrix[row * n..][..n].iter().enumerate() {
+            for (k, entry) in row {
                 let Some(slopes) = self.slopes.get(entry).cloned() else { continue };
                 for &(column, slope) in slopes.iter() {
                     let term = self.values.times(slope, unknowns[k]);
@@ -167,12 +167,7 @@ impl Work {
     }
 
     /// `F(u, x) = 0` gives `(∂F/∂u) u' = -(∂F/∂x) x'`, at the solution: the matrix, and the right-hand side.
-    fn right_of_newton(
-        &mut self,
-        block: BlockId,
-        residuals: &[Value],
-        jacobian: &[Value],
-    ) -> (Vec<Value>, Vec<Slopes>) {
+    fn right_of_newton(&mut self, block: BlockId, residuals: &[Value], jacobian: &Matrix) -> (Matrix, Vec<Slopes>) {
         let n = residuals.len();
         let mut there: FxHashMap<Value, Value> = FxHashMap::default();
         for unknown in 0..n {
@@ -181,7 +176,7 @@ impl Work {
                 there.insert(guess, solution);
             }
         }
-        let matrix: Vec<Value> = jacobian.iter().map(|&v| self.at_solution(v, &mut there)).collect();
+        let matrix = jacobian.map(|&v| self.at_solution(v, &mut there));
         let mut inner: FxHashMap<Value, Slopes> = FxHashMap::default();
         there.values().for_each(|&v| {
             inner.insert(v, Rc::from([]));
@@ -240,14 +235,14 @@ impl Work {
     }
 
     /// Solves for the slopes of all unknowns, column by column, with one factorisation.
-    fn solved(&mut self, block: BlockId, matrix: &[Value], right: &[Slopes], shared: Option<Value>) -> Vec<Slopes> {
+    fn solved(&mut self, block: BlockId, matrix: &Arc<Matrix>, right: &[Slopes], shared: Option<Value>) -> Vec<Slopes> {
         let elements = self.blocks[block].elements().to_string();
         let zero = self.values.number(0.0);
         let mut slopes: Vec<Vec<(u32, Value)>> = vec![Vec::new(); right.len()];
         let mut shared = shared;
         for column in columns_of(right.iter()) {
             let right = right.iter().map(|s| at(s, column).unwrap_or(zero)).collect();
-            let (matrix, elements) = (matrix.to_vec(), elements.clone());
+            let (matrix, elements) = (Arc::clone(matrix), elements.clone());
             let solving = self.blocks.push(Block::Linear { matrix, right, shared, elements });
             for (unknown, slopes) in slopes.iter_mut().enumerate() {
                 slopes.push((column, self.solution(solving, unknown)));

@@ -40,6 +40,7 @@ pub use values::{Reads, Values};
 pub use verify::verify;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
@@ -47,6 +48,7 @@ use crate::bond_graph::HeldKind;
 pub use crate::equations::{DomainKind, Unavailable};
 use crate::ids::{Table, id};
 use crate::span::Span;
+use crate::sparse::{SparseMatrix, SymbolicFactors};
 use crate::unit::Unit;
 
 id!(
@@ -365,8 +367,8 @@ pub enum Cause {
 pub enum Block {
     /// `matrix · unknowns = right`.
     Linear {
-        /// Row by row.
-        matrix: Vec<Value>,
+        /// The matrix.
+        matrix: Arc<Matrix>,
         /// Right-hand side.
         right: Vec<Value>,
         /// A solution of an earlier block with the same matrix, whose factors serve.
@@ -378,13 +380,35 @@ pub enum Block {
     Newton {
         /// The residuals at the guess, as many as unknowns.
         residuals: Vec<Value>,
-        /// Their exact derivatives by the guess, row by row.
-        jacobian: Vec<Value>,
+        /// Their exact derivatives by the guess.
+        jacobian: Arc<Matrix>,
         /// Names of the unknowns, for messages.
         unknowns: Vec<String>,
         /// The elements concerned, for messages.
         elements: String,
     },
+}
+
+/// The matrix of a solve block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    /// What of it may differ from 0.
+    pub values: SparseMatrix<Value>,
+    /// How it is eliminated if it is large and sparse; if not, as a full one.
+    pub factors: Option<Arc<SymbolicFactors>>,
+}
+
+impl Matrix {
+    /// A matrix with these values.
+    pub fn new(values: SparseMatrix<Value>) -> Matrix {
+        let factors = SymbolicFactors::of_large(values.pattern()).map(Arc::new);
+        Matrix { values, factors }
+    }
+
+    /// The matrix with other values in the same places.
+    pub fn map(&self, to: impl FnMut(&Value) -> Value) -> Matrix {
+        Matrix { values: self.values.map(to), factors: self.factors.clone() }
+    }
 }
 
 impl Program {
@@ -404,19 +428,22 @@ impl Block {
             Block::Newton { residuals, .. } => residuals.len(),
         }
     }
+    /// Its matrix, or that of the derivatives of its residuals.
+    pub fn matrix(&self) -> &Arc<Matrix> {
+        let (Block::Linear { matrix, .. } | Block::Newton { jacobian: matrix, .. }) = self;
+        matrix
+    }
     /// Whether its matrix is symmetric whatever the values.
     pub fn is_symmetric(&self) -> bool {
-        let (Block::Linear { matrix, .. } | Block::Newton { jacobian: matrix, .. }) = self;
-        let n = self.size();
-        (0..n).all(|i| (0..i).all(|j| matrix[i * n + j] == matrix[j * n + i]))
+        self.matrix().values.is_symmetric()
     }
     /// What it reads.
     pub fn reads(&self) -> impl Iterator<Item = Value> + '_ {
-        let (matrix, right, shared) = match self {
-            Block::Linear { matrix, right, shared, .. } => (matrix, right, *shared),
-            Block::Newton { residuals, jacobian, .. } => (jacobian, residuals, None),
+        let (right, shared) = match self {
+            Block::Linear { right, shared, .. } => (right, *shared),
+            Block::Newton { residuals, .. } => (residuals, None),
         };
-        matrix.iter().chain(right).copied().chain(shared)
+        self.matrix().values.entries().iter().chain(right).copied().chain(shared)
     }
     /// The name of an unknown, for messages; empty in a linear block.
     pub fn unknown(&self, index: usize) -> &str {

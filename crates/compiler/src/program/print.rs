@@ -147,7 +147,7 @@ impl Program {
             Block::Newton { .. } => "newton",
         };
         writeln!(f, "    {out} = {kind} block of {}", self.blocks[solve.block].elements())?;
-        let (inside, right, matrix) = match &solve.method {
+        let (inside, right_sides, matrix) = match &solve.method {
             Method::Linear { matrix, right, .. } => (None, &right[..], &matrix[..]),
             Method::Newton { outer, code } => {
                 let outer = Some(outer.iter().map(|&a| names.name(a)).collect());
@@ -158,11 +158,25 @@ impl Program {
             }
         };
         let inside = inside.as_ref().unwrap_or(names);
-        for (row, &right) in matrix.chunks(right.len().max(1)).zip(right) {
-            writeln!(f, "        [{}] | {}", inside.list(row.iter().copied()), inside.name(right))?;
+        for (row, &right) in right_sides.iter().enumerate() {
+            // Of shared factors the matrix stands where they are made.
+            let entries = solve.pattern.row(row).filter(|_| !matrix.is_empty());
+            let entries = entries.map(|entry| (solve.pattern.columns()[entry], inside.name(matrix[entry])));
+            let row = match self.blocks[solve.block].matrix().factors {
+                Some(_) => entries.map(|(column, name)| format!("{column}: {name}")).collect(),
+                None => full_row(entries, right_sides.len()),
+            };
+            writeln!(f, "        [{}] | {}", row.join(", "), inside.name(right))?;
         }
         Ok(())
     }
+}
+
+/// A row of a matrix with zeros where no entry stands.
+fn full_row(entries: impl Iterator<Item = (u32, String)>, size: usize) -> Vec<String> {
+    let mut row = vec!["0".to_string(); size];
+    entries.for_each(|(column, name)| row[column as usize] = name);
+    row
 }
 
 /// What a step reads, under its name.

@@ -4,7 +4,9 @@ use super::op::Op;
 use super::values::Reads;
 use super::{Block, BlockId, Program, Value};
 use crate::ids::{Id, id};
+use crate::sparse::Pattern;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::sync::Arc;
 
 id!(
     /// A value within a routine, numbered in the order in which they are defined.
@@ -64,8 +66,8 @@ pub struct Solve {
     pub block: BlockId,
     /// Its unknowns, which it defines.
     pub unknowns: Vec<Local>,
-    /// The places of the matrix, row by row, that are not 0 whatever happens.
-    pub entries: Vec<u32>,
+    /// Where the matrix may differ from 0.
+    pub pattern: Arc<Pattern>,
     /// How it is solved.
     pub method: Method,
 }
@@ -77,7 +79,7 @@ pub enum Method {
     Linear {
         /// The block that has factored the same matrix, if there is one.
         shared: Option<BlockId>,
-        /// Row by row.
+        /// The entries of the matrix; none where factors are shared.
         matrix: Vec<Arg>,
         /// The right-hand side.
         right: Vec<Arg>,
@@ -86,7 +88,7 @@ pub enum Method {
     Newton {
         /// What varies outside and is read by `code`, in the order of the values; the same in every routine.
         outer: Vec<Arg>,
-        /// Computes the residuals, then the Jacobian row by row, at the guess; it holds no solve blocks.
+        /// Computes the residuals, then the entries of the Jacobian, at the guess; it holds no solve blocks.
         code: Code,
     },
 }
@@ -420,16 +422,18 @@ impl<'a> Builder<'a> {
     fn close(&mut self, block: BlockId) {
         let program = self.program;
         let of = |this: &Self, values: &[Value]| values.iter().map(|&v| this.arg(v)).collect::<Vec<Arg>>();
-        let (matrix, method) = match &program.blocks[block] {
-            Block::Linear { matrix, right, .. } => {
+        let matrix = &program.blocks[block].matrix().values;
+        let method = match &program.blocks[block] {
+            Block::Linear { right, .. } => {
                 let (shared, right) = (program.shared(block), of(self, right));
-                (matrix, Method::Linear { shared, matrix: of(self, matrix), right })
+                let own = if shared.is_none() { matrix.entries() } else { &[] };
+                Method::Linear { shared, matrix: of(self, own), right }
             }
-            Block::Newton { jacobian, residuals, .. } => {
-                let outputs = residuals.iter().chain(jacobian).map(|&v| self.inner_arg(v)).collect();
+            Block::Newton { residuals, .. } => {
+                let outputs = residuals.iter().chain(matrix.entries()).map(|&v| self.inner_arg(v)).collect();
                 let Inner { outer, code, .. } = std::mem::take(&mut self.inner);
                 let code = Code { outputs, ..code };
-                (jacobian, Method::Newton { outer: of(self, &outer), code })
+                Method::Newton { outer: of(self, &outer), code }
             }
         };
         let unknowns = (0..program.blocks[block].size()).map(|i| {
@@ -439,9 +443,8 @@ impl<'a> Builder<'a> {
             local
         });
         let unknowns = unknowns.collect();
-        let entries = (0u32..).zip(matrix).filter(|(_, v)| program.values.constant(**v) != Some(0.0));
-        let entries = entries.map(|(place, _)| place).collect();
-        self.code.steps.push(Step::Solve(Solve { block, unknowns, entries, method }));
+        let pattern = Arc::clone(matrix.pattern());
+        self.code.steps.push(Step::Solve(Solve { block, unknowns, pattern, method }));
     }
 
     fn arg(&self, v: Value) -> Arg {

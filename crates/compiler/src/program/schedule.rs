@@ -7,13 +7,16 @@ use super::sharing::share;
 use super::values::Reads;
 use super::{
     Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
-    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of, verify,
+    Matrix, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
+    verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
 use crate::equations::{Equations, Momentum, Step};
 use crate::ids::{Id, Table};
+use crate::sparse::SparseMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::sync::Arc;
 
 /// The program that evaluates the equations.
 ///
@@ -61,7 +64,7 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
             let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
             match &equations.steps[i] {
                 Step::Assign { value, .. } => roots.push(*value),
-                Step::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
+                Step::Linear { matrix, right, .. } => roots.extend(matrix.entries().iter().chain(right)),
                 Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
                 Step::Watch { .. } => {}
             }
@@ -156,8 +159,8 @@ impl Schedule<'_> {
         }
     }
 
-    fn linear(&mut self, unknowns: &[Symbol], matrix: &[Vec<Expr>], right: &[Expr], elements: &[ElementId]) {
-        let matrix = matrix.iter().flatten().map(|&e| self.lower.value(e)).collect();
+    fn linear(&mut self, unknowns: &[Symbol], matrix: &SparseMatrix<Expr>, right: &[Expr], elements: &[ElementId]) {
+        let matrix = Arc::new(Matrix::new(matrix.map(|&e| self.lower.value(e))));
         let right = right.iter().map(|&e| self.lower.value(e)).collect();
         let elements = self.concerned(elements, unknowns);
         let block = self.blocks.push(Block::Linear { matrix, right, shared: None, elements });
@@ -174,7 +177,11 @@ impl Schedule<'_> {
         }
         let values: Vec<Value> = residuals.iter().map(|&e| self.lower.value(e)).collect();
         let columns = self.lower.values.derivatives(&values, &guesses, from);
-        let jacobian = (0..values.len()).flat_map(|row| columns.iter().map(move |c| c[row])).collect();
+        let entry = |row: usize, column: usize| (column, columns[column][row]);
+        let zero = self.lower.values.number(0.0);
+        let moves = |e: &(usize, Value)| e.1 != zero;
+        let rows = (0..values.len()).map(|row| (0..columns.len()).map(move |column| entry(row, column)).filter(moves));
+        let jacobian = Arc::new(Matrix::new(SparseMatrix::new(rows)));
         let piecewise = self.lower.end_newton();
         let (unknown_names, elements) = (self.names_of(unknowns), self.concerned(elements, unknowns));
         self.blocks.push(Block::Newton { residuals: values, jacobian, unknowns: unknown_names, elements });

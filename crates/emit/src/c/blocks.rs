@@ -6,6 +6,7 @@ use halfarrow_compiler::program::elimination::Definite;
 use halfarrow_compiler::program::{Block, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
 
+use super::patterns::FULL_AT_MOST;
 use super::slopes::Expressions;
 use super::write::{Body, Reading, Writer};
 use crate::Real;
@@ -13,10 +14,17 @@ use crate::Real;
 /// Symmetric linear equations of up to this many unknowns are written out.
 const WRITTEN_OUT: usize = 6;
 
-/// Numbers that `lu.c` takes for a matrix: twice the matrix, scales of rows, work, what is left, and in single precision the
-/// magnitudes of columns.
-pub(super) fn elimination_room(n: usize, real: Real) -> usize {
-    2 * n * n + if real == Real::Double { 3 * n } else { 4 * n }
+/// Numbers that `lu.c` takes for a matrix: twice the full matrix, scales of rows, work, what is left, and in single
+/// precision the magnitudes of columns. For a sparse one its entries and factors, weights, inverse pivots and a row, and
+/// a full matrix where it may be treated as one.
+pub(super) fn elimination_room(block: &Block, real: Real) -> usize {
+    let n = block.size();
+    let lines = if real == Real::Double { 3 * n } else { 4 * n };
+    let full = if n <= FULL_AT_MOST { 2 * n * n } else { 0 };
+    match &block.matrix().factors {
+        None => 2 * n * n + lines,
+        Some(f) => f.matrix.len() + f.lower.len() + f.upper.len() + 3 * n + lines + full,
+    }
 }
 
 /// Where linear blocks with a constant matrix keep their factors.
@@ -37,11 +45,11 @@ impl Factored {
         for (id, block) in program.blocks.iter() {
             let Block::Linear { matrix, .. } = block else { continue };
             let n = block.size();
-            if n > 1 && matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
+            if n > 1 && matrix.values.entries().iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
                 let number = factored.places.len();
                 factored.places.insert(id.0, (number, factored.size, factored.orders));
-                factored.size += elimination_room(n, real);
-                factored.orders += n;
+                factored.size += elimination_room(block, real);
+                factored.orders += n + usize::from(matrix.factors.is_some());
             }
         }
         factored
@@ -69,10 +77,16 @@ impl Writer<'_> {
             });
             return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
         }
-        let (matrix, right) = a.split_at(n * n);
+        let (matrix, right) = a.split_at(solve.pattern.len());
+        let (pattern, entries) = self.patterns.of_block(self.program, solve.block);
         let symmetric = self.program.blocks[solve.block].is_symmetric();
         if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
-            definite(&mut f.text, (matrix, right), (number, self.real.epsilon()), &fail);
+            let zero = || "0.0".to_string();
+            let mut full = vec![zero(); n * n];
+            solve.pattern.places().zip(matrix).for_each(|((i, j), entry)| full[i * n + j] = entry.clone());
+            let call = format!("!ha_linear(m, {pattern}, a, b, s{number})");
+            let written = Written { number, rounding: self.real.epsilon() * n as f64, call: &call, fail: &fail };
+            written.definite(&mut f.text, &full, matrix, right);
             return self.solved(f, solve, number);
         }
         let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
@@ -80,19 +94,21 @@ impl Writer<'_> {
         let _ = writeln!(f.text, "    double s{number}[{n}];");
         let lu = match self.factored.places.get(&block) {
             Some((which, place, order)) => {
-                let call =
-                    format!("ha_linear_constant(m, {which}, {place}, {order}, {n}, a{number}, b{number}, s{number})");
+                let call = format!(
+                    "ha_linear_constant(m, {which}, {place}, {order}, {pattern}, a{number}, b{number}, s{number})"
+                );
                 let _ = writeln!(f.text, "    if (!{call}) {{\n{fail}");
-                format!("ha_lu_at(m->factors + {place}, m->factors_order + {order}, {n})")
+                format!("m->factors + {place}, m->factors_order + {order}, {pattern}")
             }
             None => {
-                let _ = writeln!(f.text, "    if (!ha_linear(m, {n}, a{number}, b{number}, s{number})) {{\n{fail}");
-                format!("ha_lu_at(m->work, m->order, {n})")
+                let _ =
+                    writeln!(f.text, "    if (!ha_linear(m, {pattern}, a{number}, b{number}, s{number})) {{\n{fail}");
+                format!("m->work, m->order, {pattern}")
             }
         };
         if moves {
             let zero = |d: &Option<String>| d.clone().unwrap_or_else(|| "0.0".into());
-            let (matrix, right) = d.split_at(n * n);
+            let (matrix, right) = d.split_at(entries);
             let (matrix, right): (Vec<_>, Vec<_>) =
                 (matrix.iter().map(zero).collect(), right.iter().map(zero).collect());
             let _ = writeln!(f.text, "    const double da{number}[] = {{{}}};", matrix.join(", "));
@@ -139,29 +155,42 @@ impl Writer<'_> {
     }
 }
 
-/// Symmetric linear equations, solved as `lu.c` does where the matrix is definite; else by it. Solution in `s<number>`.
-fn definite(text: &mut String, (matrix, right): (&[String], &[String]), (number, epsilon): (usize, f64), fail: &str) {
-    let n = right.len();
-    let _ = writeln!(text, "    double s{number}[{n}];\n    {{");
-    let mut k = Expressions::new(text, "e".into(), false);
-    k.indent = "        ";
-    let entries: Vec<_> = matrix.iter().map(|entry| k.whole(entry)).collect();
-    let factors = Definite::factor(&mut k, &entries, n, epsilon * n as f64);
-    let asked = std::mem::take(&mut k.asked).join(" && ");
-    k.line(&format!("if ({asked}) {{"));
-    k.indent = "            ";
-    let mut solution: Vec<_> = right.iter().map(|b| k.whole(b)).collect();
-    factors.solve(&mut k, &mut solution);
-    for (i, x) in solution.into_iter().enumerate() {
-        let x = k.text(x);
-        k.line(&format!("s{number}[{i}] = {x};"));
+/// Symmetric linear equations that are written out; the solution stands in `s<number>`.
+struct Written<'a> {
+    number: usize,
+    /// Pivots below this fraction of the entry that they come from are rounding.
+    rounding: f64,
+    /// The call for matrices that are not definite, with their entries in `a` and right side in `b`, and what is done
+    /// where it fails.
+    call: &'a str,
+    fail: &'a str,
+}
+
+impl Written<'_> {
+    /// As `lu.c` does where the matrix, given row by row and by its entries, is definite; else by it.
+    fn definite(&self, text: &mut String, full: &[String], entries: &[String], right: &[String]) {
+        let (n, number) = (right.len(), self.number);
+        let _ = writeln!(text, "    double s{number}[{n}];\n    {{");
+        let mut k = Expressions::new(text, "e".into(), false);
+        k.indent = "        ";
+        let matrix: Vec<_> = full.iter().map(|entry| k.whole(entry)).collect();
+        let factors = Definite::factor(&mut k, &matrix, n, self.rounding);
+        let asked = std::mem::take(&mut k.asked).join(" && ");
+        k.line(&format!("if ({asked}) {{"));
+        k.indent = "            ";
+        let mut solution: Vec<_> = right.iter().map(|b| k.whole(b)).collect();
+        factors.solve(&mut k, &mut solution);
+        for (i, x) in solution.into_iter().enumerate() {
+            let x = k.text(x);
+            k.line(&format!("s{number}[{i}] = {x};"));
+        }
+        k.indent = "        ";
+        k.line("} else {");
+        k.line(&format!("    const double a[] = {{{}}};", entries.join(", ")));
+        k.line(&format!("    const double b[] = {{{}}};", right.join(", ")));
+        k.line(&format!("    if ({}) {{", self.call));
+        self.fail.lines().for_each(|l| k.line(l));
+        k.line("}");
+        text.push_str("    }\n");
     }
-    k.indent = "        ";
-    k.line("} else {");
-    k.line(&format!("    const double a[] = {{{}}};", matrix.join(", ")));
-    k.line(&format!("    const double b[] = {{{}}};", right.join(", ")));
-    k.line(&format!("    if (!ha_linear(m, {n}, a, b, s{number})) {{"));
-    fail.lines().for_each(|l| k.line(l));
-    k.line("}");
-    text.push_str("    }\n");
 }

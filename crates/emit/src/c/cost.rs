@@ -3,8 +3,9 @@
 use std::ops::{Add, Mul};
 
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{self, Arg, BlockId, Code, Method, Op, Program, Solve, Step};
+use halfarrow_compiler::program::{self, Arg, Block, BlockId, Code, Method, Op, Program, Solve, Step};
 
+use super::patterns::FULL_AT_MOST;
 use super::plan::Plan;
 
 /// Jumps within one step at most; more of them are an error.
@@ -59,12 +60,12 @@ impl Work {
         match &solve.method {
             Method::Linear { .. } => {
                 self.solves += 1;
-                self.operations += elimination(n);
+                self.operations += elimination(&program.blocks[solve.block]);
             }
             Method::Newton { code, .. } => {
                 let one = Work::of(program, code);
                 let one = one.operations + one.divisions + one.calls;
-                self.newton.push((solve.block, 1, one + elimination(n) + 20 * n as u64));
+                self.newton.push((solve.block, 1, one + elimination(&program.blocks[solve.block]) + 20 * n as u64));
             }
         }
     }
@@ -85,12 +86,14 @@ impl Work {
     }
 }
 
-/// Factoring, first as a symmetric matrix, two solutions and a refinement.
-fn elimination(n: usize) -> u64 {
-    let n = n as u64;
-    match n {
-        0 | 1 => n,
-        n => n * n * n + n * n * n / 3 + 10 * n * n,
+/// Factoring, first as a symmetric or sparse matrix, two solutions and a refinement.
+fn elimination(block: &Block) -> u64 {
+    let n = block.size() as u64;
+    let full = if n < 2 { n } else { n * n * n + n * n * n / 3 + 10 * n * n };
+    match &block.matrix().factors {
+        Some(factors) if block.size() > FULL_AT_MOST => factors.operations(),
+        Some(factors) => factors.operations() + full,
+        None => full,
     }
 }
 

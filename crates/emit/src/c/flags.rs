@@ -50,6 +50,8 @@ flags! {
     only_samples
     /// Newton blocks.
     newton
+    /// Large sparse solve blocks.
+    sparse
     /// Such of one unknown.
     newton_single
     /// Newton blocks in rates or outputs.

@@ -10,6 +10,7 @@ mod givens;
 mod header;
 mod messages;
 mod obligations;
+mod patterns;
 mod plan;
 mod project;
 mod range;

@@ -11,6 +11,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::blocks::Factored;
 use super::givens::Givens;
 use super::header::comment;
+use super::patterns::Patterns;
 use super::slopes::{Expressions, expression, power};
 use super::variables::Variables;
 use crate::Real;
@@ -62,6 +63,7 @@ pub(super) struct Writer<'a> {
     pub wide_crossing: usize,
     /// The Newton blocks in use, by which they are numbered.
     pub newton: &'a [BlockId],
+    pub patterns: &'a Patterns,
 }
 
 /// A number as C reads it back to the bit.
@@ -88,11 +90,11 @@ pub(super) fn numbers(values: &[f64]) -> String {
 }
 
 impl<'a> Writer<'a> {
-    pub fn new(program: &'a Program, newton: &'a [BlockId], real: Real) -> Writer<'a> {
+    pub fn new(program: &'a Program, newton: &'a [BlockId], patterns: &'a Patterns, real: Real) -> Writer<'a> {
         let factored = Factored::of(program, real);
         let givens = Givens::new(program, real);
         let variables = Variables::of(program, &givens);
-        Writer { program, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton }
+        Writer { program, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton, patterns }
     }
 
     /// Which locals are in double precision whatever real numbers are: those that follow from time and parameters alone,

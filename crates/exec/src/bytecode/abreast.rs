@@ -11,7 +11,9 @@ use super::packed::Packed;
 use super::registers::Layout;
 use super::wide::{self, WideFrame};
 use halfarrow_compiler::program::{self, Arg, Code, Method, Program, Step};
+use halfarrow_compiler::sparse::Pattern;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Blocks that are solved at once: as many as it takes to keep the processor busy, since each step of an elimination
 /// waits for the one before.
@@ -45,8 +47,8 @@ struct Group {
     first: usize,
     /// The inner code of all of them: guesses, then what is read from outside, then what is computed.
     packed: Packed,
-    /// The places of the matrix that are not 0, row by row, in the order of the first outputs; residuals follow.
-    entries: Vec<u32>,
+    /// Where the entries of the matrix stand, which are the first outputs; residuals follow.
+    pattern: Arc<Pattern>,
     rows: Vec<Row>,
 }
 
@@ -77,7 +79,7 @@ struct Shape {
     size: usize,
     /// The code, with inputs for all that it reads from outside.
     code: Code,
-    entries: Vec<u32>,
+    pattern: Arc<Pattern>,
 }
 
 impl Abreast {
@@ -136,7 +138,7 @@ impl Shape {
         let size = solve.unknowns.len();
         let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
         let conditions = code.steps.iter().any(|step| matches!(step, Step::Op { op, .. } if op.is_held()));
-        if !symmetric || size > LARGEST || conditions {
+        if !symmetric || size > LARGEST || program.blocks[solve.block].matrix().factors.is_some() || conditions {
             return None;
         }
         let mut read: Vec<Arg> = Vec::new();
@@ -157,14 +159,13 @@ impl Shape {
         let steps = steps.collect();
         // The entries of the matrix, then the residuals.
         let (right, matrix) = code.outputs.split_at(size);
-        let outputs = solve.entries.iter().map(|&place| matrix[place as usize]).chain(right.iter().copied());
-        let outputs = outputs.map(named).collect();
+        let outputs = matrix.iter().chain(right).map(|&a| named(a)).collect();
         let code = Code { steps, outputs, values: vec![None; code.values.len()] };
-        Some((Shape { size, code, entries: solve.entries.clone() }, read))
+        Some((Shape { size, code, pattern: Arc::clone(&solve.pattern) }, read))
     }
 
     fn is(&self, other: &Shape) -> bool {
-        self.size == other.size && self.entries == other.entries && self.code == other.code
+        self.size == other.size && self.pattern == other.pattern && self.code == other.code
     }
 }
 
@@ -179,7 +180,7 @@ impl Group {
             Arg::Given(_) => unreachable!("inputs stand for what is given"),
         };
         let packed = Packed::of(&shape.code, fixed, &[], slot);
-        let entry = |i: usize, j: usize| shape.entries.iter().position(|&place| place as usize == i * n + j);
+        let entry = |i: usize, j: usize| shape.pattern.entry(i, j);
         // What elimination fills.
         let mut full: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| entry(i, j).is_some()).collect()).collect();
         for k in 0..n {
@@ -198,7 +199,7 @@ impl Group {
             Row { diagonal: entry(i, i), start: starts[i], right, below }
         };
         let rows = (0..n).map(row).collect();
-        Group { size: n, members, first, packed, entries: shape.entries, rows }
+        Group { size: n, members, first, packed, pattern: shape.pattern, rows }
     }
 }
 
@@ -241,7 +242,7 @@ impl Space {
     /// Makes room for the groups of a routine.
     pub fn reserve(&mut self, abreast: &Abreast) {
         let most = |of: &dyn Fn(&Group) -> usize| abreast.groups.iter().map(of).max().unwrap_or(0);
-        let (n, entries) = (most(&|g| g.size), most(&|g| g.entries.len()));
+        let (n, entries) = (most(&|g| g.size), most(&|g| g.pattern.len()));
         let upper = most(&|g| g.rows.iter().map(|row| row.right.len()).sum());
         self.registers.reserve(most(&|g| g.packed.slots.max(g.size + g.members[0].inputs.len())));
         for line in [
@@ -312,8 +313,8 @@ impl Space {
             if memory.of[lane] != present {
                 memory.of[lane] = present;
                 (0..n).for_each(|i| memory.kept[i][lane] = newton.memory[i]);
-                for (base, &place) in memory.base.iter_mut().zip(&group.entries) {
-                    base[lane] = newton.jacobian_memory[place as usize];
+                for (base, &kept) in memory.base.iter_mut().zip(&newton.jacobian_memory) {
+                    base[lane] = kept;
                 }
             }
         }
@@ -325,8 +326,8 @@ impl Space {
         for (lane, member) in members.iter().enumerate().filter(|(lane, _)| good[*lane]) {
             let newton = &mut solvers[member.block].newton;
             (0..n).for_each(|i| newton.x[i] = self.found[i][lane]);
-            for (jacobian, &place) in self.jacobian.iter().zip(&group.entries) {
-                newton.jacobian[place as usize] = jacobian[lane];
+            for (own, jacobian) in newton.jacobian.iter_mut().zip(&self.jacobian) {
+                *own = jacobian[lane];
             }
             newton.outer.iter_mut().zip(&member.outer).for_each(|(value, &outer)| *value = r[outer as usize]);
             newton.fresh = true;
@@ -475,7 +476,7 @@ impl Space {
         for (found, x) in self.found.iter_mut().zip(&self.x[..group.size]) {
             *found = each(|l| if there[l] != 0.0 { x[l] } else { found[l] });
         }
-        for (jacobian, &slot) in self.jacobian.iter_mut().zip(&group.packed.outputs[..group.entries.len()]) {
+        for (jacobian, &slot) in self.jacobian.iter_mut().zip(&group.packed.outputs[..group.pattern.len()]) {
             let value = &self.registers.r[slot as usize];
             *jacobian = each(|l| if there[l] != 0.0 { value[l] } else { jacobian[l] });
         }
@@ -497,7 +498,7 @@ impl Space {
     /// Greatest residual.
     #[inline(always)]
     fn residual(&self, group: &Group) -> Line {
-        let slots = &group.packed.outputs[group.entries.len()..];
+        let slots = &group.packed.outputs[group.pattern.len()..];
         slots.iter().fold(NONE, |most, &slot| {
             let value = &self.registers.r[slot as usize];
             greater(&most, &each(|l| value[l].abs()))
@@ -507,7 +508,7 @@ impl Space {
     /// Puts the right-hand side of the Newton step into `next`.
     #[inline(always)]
     fn right(&mut self, group: &Group) {
-        let slots = &group.packed.outputs[group.entries.len()..];
+        let slots = &group.packed.outputs[group.pattern.len()..];
         for (next, &slot) in self.next.iter_mut().zip(slots) {
             let value = &self.registers.r[slot as usize];
             *next = each(|l| 0.0 - value[l]);
@@ -614,8 +615,7 @@ impl Space {
             self.widen(n, &mut off, good);
         }
         self.next[..n].fill(wide::Line([-0.0; LANES]));
-        for (base, &place) in self.memories[self.memory].base.iter().zip(&group.entries) {
-            let (row, column) = (place as usize / n, place as usize % n);
+        for (base, (row, column)) in self.memories[self.memory].base.iter().zip(group.pattern.places()) {
             let lead = &self.lead[column];
             self.next[row] = each(|l| self.next[row][l] + base[l] * lead[l]);
         }

@@ -4,7 +4,7 @@
 //! A residual at the rounding of its terms is a solution. What the equations tell of the unknowns is solved for, of the
 //! rest the shortest change is taken: it stays where it was.
 
-use super::frame::Frame;
+use super::frame::{Frame, entries};
 use super::instruction::{Operation, Solve};
 use super::newton::SETTLED;
 use halfarrow_compiler::program::Op;
@@ -219,7 +219,7 @@ impl Frame {
         for (j, &right) in solve.right.iter().enumerate() {
             newton.next.fill(0.0);
             newton.next[j] = ROUNDING * terms[right as usize];
-            solver.lu.solve(&mut newton.next);
+            solver.factors.solve(&mut newton.next);
             newton.floor.iter_mut().zip(&newton.next).for_each(|(floor, part)| *floor += part.abs());
         }
         let mut hidden = false;
@@ -259,10 +259,8 @@ impl Frame {
             floating.terms[i] = if rounding > 0.0 { rounding } else { f64::MIN_POSITIVE };
             floating.right[i] = (newton.offset[i] - r[right as usize]) / floating.terms[i];
         }
-        for &place in &solve.entries {
-            let (i, j) = (place as usize / n, place as usize % n);
-            let entry = r[solve.matrix[place as usize] as usize];
-            floating.matrix[place as usize] = entry * floating.size[j] / floating.terms[i];
+        for ((i, j), entry) in solve.pattern.places().zip(entries(solve, r)) {
+            floating.matrix[i * n + j] = entry * floating.size[j] / floating.terms[i];
         }
     }
 

@@ -2,8 +2,8 @@
 
 use super::abreast::{Abreast, Space};
 use super::conditions::{Conditions, table_on};
+use super::elimination::Factors;
 use super::instruction::{Instruction, Operation, Register, Routine, Solve};
-use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
 use super::registers::Layout;
@@ -65,7 +65,7 @@ pub(crate) struct Frame {
 /// What a solve block needs.
 #[derive(Debug, Clone)]
 pub(crate) struct Solver {
-    pub lu: Lu,
+    pub factors: Factors,
     /// Right-hand side and solution.
     x: Vec<f64>,
     rate: Vec<f64>,
@@ -80,12 +80,15 @@ impl Frame {
         let solver = |block: &Block| {
             let n = block.size();
             let constant = matches!(block, Block::Linear { matrix, .. }
-                if matrix.iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS));
-            let newton = Newton::new(if matches!(block, Block::Newton { .. }) { n } else { 0 });
+                if matrix.values.entries().iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS));
+            let newton = match block {
+                Block::Newton { jacobian, .. } => Newton::new(n, jacobian.values.pattern().len()),
+                Block::Linear { .. } => Newton::new(0, 0),
+            };
             // Factors that another block has made need no place here.
             let shared = matches!(block, Block::Linear { shared: Some(_), .. });
             Solver {
-                lu: Lu::new(if shared { 0 } else { n }, block.is_symmetric()),
+                factors: if shared { Factors::none() } else { Factors::new(block) },
                 x: vec![0.0; n],
                 rate: vec![0.0; n],
                 constant,
@@ -209,22 +212,21 @@ impl Frame {
         let Frame { r, d, solvers, .. } = self;
         let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
         if solve.shared.is_none() && !(solver.constant && solver.factored) {
-            put_entries(solver.lu.matrix(), solve, r);
-            solver.factored = solver.lu.factor().is_ok();
+            solver.factored = solver.factors.factor(entries(solve, r)).is_ok();
         }
         solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
         if !solver.factored {
             return Err(Trouble::Singular { block: solve.block.0 });
         }
-        solver.lu.solve(&mut solver.x);
+        solver.factors.solve(&mut solver.x);
         if ALONG {
-            let n = solver.x.len();
+            assert!(solve.shared.is_none(), "what shares factors is itself a derivative");
             for (i, rate) in solver.rate.iter_mut().enumerate() {
-                let row = &solve.matrix[i * n..][..n];
-                let moved: f64 = row.iter().zip(&solver.x).map(|(&m, x)| d[m as usize] * x).sum();
+                let row = solve.pattern.row(i).map(|e| (solve.matrix[e], solve.pattern.columns()[e]));
+                let moved: f64 = row.map(|(m, column)| d[m as usize] * solver.x[column as usize]).sum();
                 *rate = d[solve.right[i] as usize] - moved;
             }
-            solver.lu.solve(&mut solver.rate);
+            solver.factors.solve(&mut solver.rate);
             solve.unknowns.iter().zip(&solver.rate).for_each(|(&out, &rate)| d[out as usize] = rate);
         }
         solve.unknowns.iter().zip(&solver.x).for_each(|(&out, &x)| r[out as usize] = x);
@@ -239,12 +241,11 @@ impl Frame {
             self.inner::<true>(solve);
             let Frame { r, d, solvers, .. } = self;
             let solver = &mut solvers[solve.block.0 as usize];
-            put_entries(solver.lu.matrix(), solve, r);
-            if solver.lu.factor().is_err() {
+            if solver.factors.factor(entries(solve, r)).is_err() {
                 return Err(Trouble::Singular { block: solve.block.0 });
             }
             (0..size).for_each(|i| solver.rate[i] = -d[solve.right[i] as usize]);
-            solver.lu.solve(&mut solver.rate);
+            solver.factors.solve(&mut solver.rate);
             solve.unknowns.iter().zip(&solver.rate).for_each(|(&out, &rate)| d[out as usize] = rate);
         }
         let root = &self.solvers[solve.block.0 as usize].newton.x;
@@ -347,9 +348,7 @@ impl Lane for Frame {
     }
 }
 
-/// Puts the entries of a solve block into a matrix whose other places are 0.
-pub(super) fn put_entries(matrix: &mut [f64], solve: &Solve, r: &[f64]) {
-    for &place in &solve.entries {
-        matrix[place as usize] = r[solve.matrix[place as usize] as usize];
-    }
+/// The entries of the matrix of a solve block.
+pub(super) fn entries(solve: &Solve, r: &[f64]) -> impl Iterator<Item = f64> {
+    solve.matrix.iter().map(|&entry| r[entry as usize])
 }

@@ -1,6 +1,8 @@
 //! The bytecode: operations on registers, and the code that they make.
 
 use halfarrow_compiler::program::{self, BlockId, Op};
+use halfarrow_compiler::sparse::Pattern;
+use std::sync::Arc;
 
 /// A place for one number.
 pub(crate) type Register = u32;
@@ -40,10 +42,10 @@ pub(crate) struct Solve {
     pub outer: Vec<Register>,
     /// Newton: computes right side and matrix at the guess.
     pub code: Vec<Operation>,
-    /// Matrix of a linear block, Jacobian of a Newton block, row by row.
+    /// The entries of the matrix of a linear block (none where factors are shared), of the Jacobian of a Newton block.
     pub matrix: Vec<Register>,
-    /// The places of the matrix that are not 0 whatever happens.
-    pub entries: Vec<u32>,
+    /// Where they stand.
+    pub pattern: Arc<Pattern>,
     /// Right-hand side of a linear block, residuals of a Newton block.
     pub right: Vec<Register>,
 }

@@ -2,10 +2,10 @@
 
 mod abreast;
 mod conditions;
+mod elimination;
 mod floating;
 mod frame;
 mod instruction;
-mod lu;
 mod newton;
 mod packed;
 mod registers;
@@ -15,13 +15,13 @@ pub(crate) use abreast::Abreast;
 #[cfg(feature = "machine")]
 pub(crate) use conditions::table_on;
 pub(crate) use conditions::{HeldConditions, Hold, piece_of};
+pub(crate) use elimination::Lu;
 pub(crate) use frame::{Frame, Trouble};
 #[cfg(feature = "machine")]
 pub(crate) use frame::{InnerCode, PIVOT_BELOW};
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
 pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
-pub(crate) use lu::Lu;
 pub(crate) use newton::Followed;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;

@@ -10,7 +10,7 @@
 //! Evaluations are bounded.
 
 use super::floating::Floating;
-use super::frame::{Frame, Trouble, put_entries};
+use super::frame::{Frame, Trouble, entries};
 use super::instruction::Solve;
 
 /// Iterations of one attempt.
@@ -68,7 +68,7 @@ pub(crate) struct Newton {
     pub following: bool,
     /// Counts the changes of the memory, from 1 on.
     pub(super) version: u64,
-    /// What the block read there, and its Jacobian, row by row: part of the model's state too.
+    /// What the block read there, and the entries of its Jacobian, row by row: part of the model's state too.
     outer_memory: Vec<f64>,
     pub(super) jacobian_memory: Vec<f64>,
     /// The last solution found, what the block read there, and its Jacobian.
@@ -121,8 +121,9 @@ pub(crate) struct Followed {
 }
 
 impl Newton {
-    pub fn new(size: usize) -> Newton {
-        let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
+    /// Room for so many unknowns and entries of the Jacobian.
+    pub fn new(size: usize, entries: usize) -> Newton {
+        let (line, square) = (vec![0.0; size], vec![0.0; entries]);
         Newton {
             memory: line.clone(),
             version: 1,
@@ -223,11 +224,14 @@ impl Newton {
                 continue;
             }
             let mut least = f64::INFINITY;
-            for row in solve.matrix.chunks_exact(n) {
-                let own = r[row[j] as usize].abs();
-                let mut others = 0.0;
-                for k in (0..n).filter(|&k| k != j) {
-                    others += r[row[k] as usize].abs() * self.size[k].max(self.step[k].abs());
+            for row in 0..n {
+                let (mut own, mut others) = (0.0, 0.0);
+                for e in solve.pattern.row(row) {
+                    let (k, entry) = (solve.pattern.columns()[e] as usize, r[solve.matrix[e] as usize].abs());
+                    match k == j {
+                        true => own = entry,
+                        false => others += entry * self.size[k].max(self.step[k].abs()),
+                    }
                 }
                 if own > 0.0 && others > 0.0 {
                     least = least.min(others / own);
@@ -337,7 +341,7 @@ impl Frame {
     fn keep_jacobian(&mut self, solve: &Solve) {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        put_entries(&mut newton.jacobian, solve, r);
+        newton.jacobian.iter_mut().zip(entries(solve, r)).for_each(|(j, entry)| *j = entry);
     }
 
     /// Why there is no root to go on with.
@@ -423,8 +427,9 @@ impl Frame {
         for i in 0..n {
             let Frame { r, solvers, .. } = &mut *self;
             let newton = &mut solvers[solve.block.0 as usize].newton;
-            let entries = solve.matrix[i * n..][..n].iter().zip(&newton.memory);
-            let terms = entries.fold(0.0, |sum, (&m, x)| sum + (r[m as usize] * x).abs());
+            let row =
+                solve.pattern.row(i).map(|e| (solve.matrix[e], newton.memory[solve.pattern.columns()[e] as usize]));
+            let terms = row.fold(0.0, |sum, (m, x)| sum + (r[m as usize] * x).abs());
             newton.first[i] = r[solve.right[i] as usize];
             newton.span[i] = ROUNDING * terms;
         }
@@ -552,16 +557,17 @@ impl Frame {
         let off = newton.off_the_lead();
         // What the first step would have been with the last Jacobian.
         newton.next.copy_from_slice(&newton.opening);
-        solver.lu.solve(&mut newton.next);
+        solver.factors.solve(&mut newton.next);
         let off = off.max(newton.off_the_lead());
         if !newton.following {
             return off <= 0.5 * most;
         }
         // And that of the Jacobian at the root where it began.
         for i in 0..n {
-            newton.next[i] = newton.base[i * n..][..n].iter().zip(&newton.lead).map(|(j, lead)| j * lead).sum();
+            let row = solve.pattern.row(i).map(|e| (newton.base[e], newton.lead[solve.pattern.columns()[e] as usize]));
+            newton.next[i] = row.map(|(j, lead)| j * lead).sum();
         }
-        solver.lu.solve(&mut newton.next);
+        solver.factors.solve(&mut newton.next);
         off.max(newton.off_the_lead()) <= 0.5 * most
     }
 
@@ -599,7 +605,7 @@ impl Frame {
             let good = self.look(solve, look as f64 / looks as f64);
             // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there.
             if good && self.factor(solve) {
-                let here = self.solvers[solve.block.0 as usize].lu.is_positive();
+                let here = self.solvers[solve.block.0 as usize].factors.is_positive();
                 if *orientation.get_or_insert(here) != here {
                     return false;
                 }
@@ -611,8 +617,8 @@ impl Frame {
     /// The orientation of the Jacobian at the root from which the way leads, where that is followed and regular.
     fn orientation_followed(&mut self, solve: &Solve) -> Option<bool> {
         let solver = &mut self.solvers[solve.block.0 as usize];
-        solver.lu.matrix().copy_from_slice(&solver.newton.base);
-        (solver.newton.following && solver.lu.factor().is_ok()).then(|| solver.lu.is_positive())
+        let base = solver.newton.base.iter().copied();
+        (solver.newton.following && solver.factors.factor(base).is_ok()).then(|| solver.factors.is_positive())
     }
 
     /// Whether the root found is without doubt the only one near the way to it. Ends with an evaluation at the root.
@@ -630,11 +636,12 @@ impl Frame {
             let Frame { r, solvers, .. } = self;
             let newton = &mut solvers[solve.block.0 as usize].newton;
             if look == 0 {
-                newton.jacobian.iter_mut().zip(&solve.matrix).for_each(|(j, &m)| *j = r[m as usize]);
+                newton.jacobian.iter_mut().zip(entries(solve, r)).for_each(|(j, entry)| *j = entry);
             }
-            for (row, entries) in newton.jacobian.chunks(n).zip(solve.matrix.chunks(n)) {
-                let most = row.iter().fold(0.0f64, |most, j| most.max(j.abs()));
-                same &= row.iter().zip(entries).all(|(j, &m)| (r[m as usize] - j).abs() <= LINEAR * most);
+            for row in (0..n).map(|i| solve.pattern.row(i)) {
+                let (before, now) = (&newton.jacobian[row.clone()], &solve.matrix[row]);
+                let most = before.iter().fold(0.0f64, |most, j| most.max(j.abs()));
+                same &= before.iter().zip(now).all(|(j, &m)| (r[m as usize] - j).abs() <= LINEAR * most);
             }
         }
         same
@@ -813,9 +820,10 @@ impl Frame {
         let n = solve.right.len();
         let kept = &self.solvers[solve.block.0 as usize].newton.jacobian;
         let mut change: f64 = 0.0;
-        for (row, entries) in kept.chunks(n).zip(solve.matrix.chunks(n)) {
-            let most = row.iter().fold(f64::MIN_POSITIVE, |most, j| most.max(j.abs()));
-            row.iter().zip(entries).for_each(|(j, &m)| change = change.max((self.r[m as usize] - j).abs() / most));
+        for row in (0..n).map(|i| solve.pattern.row(i)) {
+            let (before, now) = (&kept[row.clone()], &solve.matrix[row]);
+            let most = before.iter().fold(f64::MIN_POSITIVE, |most, j| most.max(j.abs()));
+            before.iter().zip(now).for_each(|(j, &m)| change = change.max((self.r[m as usize] - j).abs() / most));
         }
         change
     }
@@ -859,8 +867,7 @@ impl Frame {
         let point = if trial { &newton.trial } else { &newton.x };
         solve.guess.iter().zip(point).for_each(|(&g, &x)| self.r[g as usize] = x);
         self.inner::<false>(solve);
-        let entries = solve.entries.iter().map(|&place| solve.matrix[place as usize]);
-        entries.chain(solve.right.iter().copied()).all(|v| self.r[v as usize].is_finite())
+        solve.matrix.iter().chain(&solve.right).all(|&v| self.r[v as usize].is_finite())
     }
 
     /// Greatest residual at the point evaluated last.
@@ -872,9 +879,7 @@ impl Frame {
 
     pub(super) fn factor(&mut self, solve: &Solve) -> bool {
         let Frame { r, solvers, .. } = self;
-        let lu = &mut solvers[solve.block.0 as usize].lu;
-        put_entries(lu.matrix(), solve, r);
-        lu.factor().is_ok()
+        solvers[solve.block.0 as usize].factors.factor(entries(solve, r)).is_ok()
     }
 
     /// The Newton step at the point evaluated last.
@@ -885,7 +890,7 @@ impl Frame {
         for (i, &right) in solve.right.iter().enumerate() {
             newton.step[i] = newton.offset[i] - r[right as usize];
         }
-        solver.lu.solve(&mut newton.step);
+        solver.factors.solve(&mut newton.step);
     }
 
     /// Greatest component of the step against its unknown.
@@ -910,7 +915,7 @@ impl Frame {
         for (i, &right) in solve.right.iter().enumerate() {
             newton.next[i] = newton.offset[i] - r[right as usize];
         }
-        solver.lu.solve(&mut newton.next);
+        solver.factors.solve(&mut newton.next);
         let mut most: f64 = 0.0;
         for i in 0..newton.next.len() {
             let size = newton.size[i].max(newton.step[i].abs()).max(f64::MIN_POSITIVE);

@@ -5,6 +5,7 @@ use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::program::{self, Arg, Code, Method, Op, Program, Step, Value};
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// Registers that keep their contents between routines: parameters, constants and what is computed from them; time,
 /// inputs, held signals, conserved constants, states, each group in order.
@@ -223,7 +224,7 @@ impl<'a> Allocator<'a> {
             outer: inside.outer,
             code: operations,
             matrix,
-            entries: solve.entries.clone(),
+            pattern: Arc::clone(&solve.pattern),
             right,
         }
     }

@@ -501,7 +501,10 @@ impl Chunk<'_, '_> {
             self.single_pivot(pivot);
             right[0] = self.w.div(right[0], pivot);
         } else {
-            let matrix: Vec<Value> = solve.matrix.iter().map(|&r| self.value(r)).collect();
+            let mut matrix = vec![self.zero(); n * n];
+            for ((i, j), &entry) in solve.pattern.places().zip(&solve.matrix) {
+                matrix[i * n + j] = self.value(entry);
+            }
             let factors = Definite::factor(self, &matrix, n, f64::EPSILON * n as f64);
             factors.solve(self, &mut right);
         }

@@ -4,6 +4,7 @@
 use super::common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
 use halfarrow_compiler::equations::Step;
+use halfarrow_compiler::sparse::SparseMatrix;
 use proptest::prelude::*;
 
 /// States of each of them.
@@ -53,7 +54,7 @@ pub fn build(recipe: &Recipe) -> (Sketch, Vec<Expr>) {
                 let (u, e) = s.symbol(&format!("u{number}"));
                 let (v, _) = s.symbol(&format!("v{number}"));
                 let (three, one) = (s.number(3.0), s.number(1.0));
-                let matrix = vec![vec![three, bounded], vec![one, three]];
+                let matrix = SparseMatrix::full(vec![vec![three, bounded], vec![one, three]]);
                 s.step(Step::Linear { unknowns: vec![u, v], matrix, right: vec![b, a], elements: vec![] });
                 e
             }

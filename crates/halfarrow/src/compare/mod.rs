@@ -286,7 +286,7 @@ impl Model {
         let reads = |e: Expr| x.symbols_of(e).contains(&stiffness);
         Ok(equations.steps.iter().any(|step| match step {
             Step::Assign { value, .. } => reads(*value),
-            Step::Linear { matrix, right, .. } => matrix.iter().flatten().chain(right).any(|&e| reads(e)),
+            Step::Linear { matrix, right, .. } => matrix.entries().iter().chain(right).any(|&e| reads(e)),
             Step::Newton { body, residuals, .. } => {
                 body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
             }

@@ -116,9 +116,9 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
                 }
                 let n = unknowns.len();
                 let mut rows = Vec::with_capacity(n);
-                for (row, &right) in matrix.iter().zip(right) {
+                for (row, &right) in matrix.rows().zip(right) {
                     let mut entries: Vec<(usize, Expr)> = Vec::new();
-                    for (column, &e) in row.iter().enumerate() {
+                    for (column, &e) in row {
                         let e = x.substitute(e, &known);
                         if e != ZERO {
                             entries.push((column, e));

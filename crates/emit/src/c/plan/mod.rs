@@ -3,6 +3,8 @@
 mod routines;
 mod words;
 
+use std::rc::Rc;
+
 use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program;
@@ -14,6 +16,7 @@ use halfarrow_compiler::program::{
 use super::blocks::elimination_room;
 use super::cost::{Cost, Work};
 use super::flags::Flags;
+use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
 use super::terms;
 use super::write::{Moving, Shape, Writer, number};
@@ -61,6 +64,8 @@ pub(super) struct Plan<'a> {
     pub samples: Vec<usize>,
     /// Newton blocks in use.
     pub newton: Vec<BlockId>,
+    /// Where the matrices of solve blocks have entries.
+    pub patterns: Rc<Patterns>,
     reads: Vec<usize>,
     rates_blocks: Vec<BlockId>,
     shown_blocks: Vec<BlockId>,
@@ -131,6 +136,7 @@ impl<'a> Plan<'a> {
             delays: delays(export)?,
             samples: held(program, HeldKind::Sample),
             newton: Vec::new(),
+            patterns: Rc::new(Patterns::of(program)),
             reads: Vec::new(),
             rates_blocks: Vec::new(),
             shown_blocks: Vec::new(),
@@ -149,7 +155,8 @@ impl<'a> Plan<'a> {
         let routines = Routines::of(self);
         let blocks = routines.newton();
         let used: Vec<BlockId> = blocks.keys().copied().collect();
-        let mut writer = Writer::new(program, &used, self.export.real);
+        let patterns = Rc::clone(&self.patterns);
+        let mut writer = Writer::new(program, &used, &patterns, self.export.real);
         let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
@@ -236,7 +243,7 @@ impl<'a> Plan<'a> {
             wide: false,
         };
         let right = (0..n).map(|i| format!("right[{i}]"));
-        let values: Vec<String> = right.chain((0..n * n).map(|i| format!("matrix[{i}]"))).collect();
+        let values: Vec<String> = right.chain((n..code.outputs.len()).map(|i| format!("matrix[{}]", i - n))).collect();
         let mut text = writer.function(&format!("ha_block_{number}"), shape, (code, &[]), (&values, &[]));
         let terms = Shape {
             parameters: "ha_model *m, const double *o, const double *g, double *terms",
@@ -307,20 +314,24 @@ impl<'a> Plan<'a> {
 
     fn find_sizes(&mut self, writer: &Writer) {
         let program = self.program;
-        let linear = program.blocks.values().filter(|b| matches!(b, Block::Linear { .. })).map(Block::size);
-        let most_linear = linear.max().unwrap_or(0);
-        let newton: Vec<(usize, usize)> =
-            self.newton.iter().zip(&self.reads).map(|(b, &reads)| (program.blocks[*b].size(), reads)).collect();
-        let lu = |n: usize| elimination_room(n, self.export.real);
-        let work = |&(n, reads): &(usize, usize)| 17 * n + reads + 4 * n * n + lu(n);
+        let lu = |b: &Block| elimination_room(b, self.export.real);
+        let order = |b: &Block| b.size() + usize::from(b.matrix().factors.is_some());
+        let linear: Vec<&Block> = program.blocks.values().filter(|b| matches!(b, Block::Linear { .. })).collect();
+        let newton: Vec<(&Block, usize)> =
+            self.newton.iter().zip(&self.reads).map(|(b, &reads)| (&program.blocks[*b], reads)).collect();
+        let entries = |b: &Block| b.matrix().values.pattern().len();
+        let memory = |&(b, reads): &(&Block, usize)| 2 * (b.size() + reads + entries(b));
+        let work =
+            |&(b, reads): &(&Block, usize)| 17 * b.size() + reads + 2 * entries(b) + 2 * b.size() * b.size() + lu(b);
+        let all = linear.iter().copied().chain(newton.iter().map(|b| b.0));
         self.sizes = Sizes {
             derived: writer.givens.derived(),
             exact: writer.givens.exact(),
             wide: writer.wide_crossing,
             crossing: writer.crossing,
-            memory: newton.iter().map(|(n, reads)| 2 * (n + reads + n * n)).sum(),
-            work: newton.iter().map(work).max().unwrap_or(0).max(lu(most_linear)),
-            order: newton.iter().map(|b| b.0).max().unwrap_or(0).max(most_linear),
+            memory: newton.iter().map(memory).sum(),
+            work: newton.iter().map(work).chain(linear.iter().map(|b| lu(b))).max().unwrap_or(0),
+            order: all.map(order).max().unwrap_or(0),
             factors: writer.factored.size,
             factors_order: writer.factored.orders,
             factored: writer.factored.places.len(),
@@ -420,6 +431,7 @@ impl<'a> Plan<'a> {
             samples: !self.samples.is_empty(),
             only_samples: held && self.delays.is_empty(),
             newton: !self.newton.is_empty(),
+            sparse: self.patterns.any_sparse(),
             newton_single: self.newton.iter().any(|&b| p.blocks[b].size() == 1),
             follows: !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty()),
             rates_newton: !self.rates_blocks.is_empty(),

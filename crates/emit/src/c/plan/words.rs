@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use halfarrow_compiler::algebra::{Outside, math};
 use halfarrow_compiler::program::{BlockId, Cause, ConditionId, ConditionKind};
 
+use super::super::patterns::FULL_AT_MOST;
 use super::super::start::Group;
 use super::super::write::{number, numbers};
 use super::Plan;
@@ -69,6 +70,8 @@ impl Plan<'_> {
             ("SAMPLE_PLACES", join(self.samples.iter().map(usize::to_string).collect())),
             ("BLOCKS", self.newton.len().to_string()),
             ("BLOCK_TABLE", self.block_table()),
+            ("PATTERNS", self.patterns.tables()),
+            ("SPARSE_FULL_AT_MOST", FULL_AT_MOST.to_string()),
             ("RATES_BLOCKS", join(block_numbers(&self.rates_blocks))),
             ("RATES_BLOCK_COUNT", self.rates_blocks.len().to_string()),
             ("SHOWN_BLOCKS", join(block_numbers(&self.shown_blocks))),
@@ -163,8 +166,11 @@ impl Plan<'_> {
                 "static void ha_block_{i}_terms(ha_model *m, const double *o, const double *g, double *terms);\n"
             );
             let n = self.program.blocks[*block].size();
-            list += &format!("    {{{n}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_terms, ha_block_{i}_along}},\n");
-            memory += 2 * (n + reads + n * n);
+            let (pattern, entries) = self.patterns.of_block(self.program, *block);
+            list += &format!(
+                "    {{{pattern}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_terms, ha_block_{i}_along}},\n"
+            );
+            memory += 2 * (n + reads + entries);
         }
         text + "\n" + &list + "};\n"
     }

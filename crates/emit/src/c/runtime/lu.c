@@ -1,9 +1,38 @@
 
 /* ---- linear equations: a symmetric matrix that is definite as U'DU; all others with rows scaled, threshold
- * pivoting and one refinement ---- */
+ * pivoting and one refinement; large sparse ones in an order that is fixed ---- */
 
+//if sparse
+/* An order of elimination, and the entries of the factors: places are positions in it. */
+typedef struct {
+    int odd;
+    const int *rows;
+    const int *columns;
+    const int *lower_starts;
+    const int *lower;
+    const int *upper_starts;
+    const int *upper;
+    const int *starts;
+    const int *matrix;
+    const int *positions;
+} ha_order;
+
+//end
+/* Where the entries of a matrix stand: for each row the first one, and the column of each. */
 typedef struct {
     int n;
+    const int *starts;
+    const int *columns;
+//if sparse
+    /* None for a full one. */
+    const ha_order *order;
+//end
+} ha_pattern;
+
+PATTERNS
+typedef struct {
+    int n;
+    const ha_pattern *pattern;
     double *matrix;
     double *factors;
     double *scale;
@@ -12,14 +41,53 @@ typedef struct {
 //if single
     double *columns;
 //end
+//if sparse
+    /* Of a sparse one: the entries of the matrix and of the factors, inverse pivots and their weights, and a row. */
+    double *entries;
+    double *lower;
+    double *upper;
+    double *inverse;
+    double *weight;
+    double *row;
+//end
     int *order;
 } ha_lu;
 
-/* Its parts in a row. */
-static ha_lu ha_lu_at(double *place, int *order, int n)
+/* The number of entries of a pattern. */
+static int ha_entries(const ha_pattern *pattern)
 {
+    return pattern->starts[pattern->n];
+}
+
+/* Its parts in a row. */
+static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
+{
+    const int n = pattern->n;
     ha_lu l;
     l.n = n;
+    l.pattern = pattern;
+//if sparse
+    if (pattern->order) {
+        l.entries = place;
+        l.lower = l.entries + ha_entries(pattern);
+        l.upper = l.lower + pattern->order->lower_starts[n];
+        l.inverse = l.upper + pattern->order->upper_starts[n];
+        l.weight = l.inverse + n;
+        l.row = l.weight + n;
+        l.scale = l.row + n;
+        l.work = l.scale + n;
+        l.rest = l.work + n;
+        place = l.rest + n;
+//if single
+        l.columns = place;
+        place += n;
+//end
+        l.matrix = place;
+        l.factors = place + n * n;
+        l.order = order;
+        return l;
+    }
+//end
     l.matrix = place;
     l.factors = place + n * n;
     l.scale = l.factors + n * n;
@@ -161,8 +229,8 @@ static void ha_lu_solve_definite(const ha_lu *l, double *b)
     }
 }
 
-/* Factors the matrix; 0 if no pivot is left, or if an entry is not finite. */
-static int ha_lu_factor(ha_lu *l)
+/* Factors a full matrix; 0 if no pivot is left, or if an entry is not finite. */
+static int ha_lu_factor_full(ha_lu *l)
 {
     const int n = l->n;
     int row;
@@ -230,12 +298,178 @@ static void ha_lu_substitute(ha_lu *l, double *b)
     }
 }
 
+//if sparse
+/* Factors the row in a place of the order; 0 if a pivot does not do. */
+static int ha_sparse_row(ha_lu *l, int place)
+{
+    const ha_order *o = l->pattern->order;
+    double scale = DBL_MIN;
+    double weight;
+    int i;
+    int j;
+    for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
+        l->row[o->lower[i]] = 0.0;
+    }
+    for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+        l->row[o->upper[i]] = 0.0;
+    }
+    l->row[place] = 0.0;
+    for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
+//if single
+        const double size = fabs(l->entries[i]) / l->columns[o->matrix[i]];
+//else
+        const double size = fabs(l->entries[i]);
+//end
+        l->row[o->matrix[i]] = l->entries[i];
+        scale = ha_max(scale, size);
+    }
+    for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
+        const int k = o->lower[i];
+        const double factor = l->row[k] * l->inverse[k];
+        if (!(1e-3 * fabs(l->row[k]) <= l->weight[k] * scale)) {
+            return 0;
+        }
+        l->lower[i] = factor;
+        for (j = o->upper_starts[k]; j < o->upper_starts[k + 1]; ++j) {
+            const double product = factor * l->upper[j];
+            l->row[o->upper[j]] -= product;
+        }
+    }
+    weight = fabs(l->row[place]) / scale;
+    l->weight[place] = weight;
+//if single
+    weight /= l->columns[place];
+//end
+    if (!(weight > DBL_EPSILON * (double)l->n && ha_finite(weight))) {
+        return 0;
+    }
+    l->inverse[place] = 1.0 / l->row[place];
+    for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+        l->upper[i] = l->row[o->upper[i]];
+    }
+    return 1;
+}
+
+/* Factors a sparse matrix; where the pivots of its order do not do, as a full one if it is not too large. */
+static int ha_sparse_factor(ha_lu *l)
+{
+    const ha_order *o = l->pattern->order;
+    const int n = l->n;
+    int place;
+    int i;
+//if single
+    ha_fill(l->columns, DBL_MIN, n);
+    for (i = 0; i < o->starts[n]; ++i) {
+        const int column = o->matrix[i];
+        l->columns[column] = ha_max(l->columns[column], fabs(l->entries[i]));
+    }
+//end
+    l->order[n] = 0;
+    for (place = 0; place < n; ++place) {
+        if (!ha_sparse_row(l, place)) {
+            break;
+        }
+    }
+    if (place == n) {
+        return 1;
+    }
+    if (n > SPARSE_FULL_AT_MOST) {
+        return 0;
+    }
+    l->order[n] = 1;
+    ha_fill(l->matrix, 0.0, n * n);
+    for (place = 0; place < n; ++place) {
+        for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
+            l->matrix[o->rows[place] * n + o->columns[o->matrix[i]]] = l->entries[i];
+        }
+    }
+    return ha_lu_factor_full(l);
+}
+
+static void ha_sparse_substitute(ha_lu *l, double *b)
+{
+    const ha_order *o = l->pattern->order;
+    int place;
+    int i;
+    for (place = 0; place < l->n; ++place) {
+        double left = b[o->rows[place]];
+        for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
+            const double product = l->lower[i] * l->work[o->lower[i]];
+            left -= product;
+        }
+        l->work[place] = left;
+    }
+    for (place = l->n - 1; place >= 0; --place) {
+        double left = l->work[place];
+        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+            const double product = l->upper[i] * l->work[o->upper[i]];
+            left -= product;
+        }
+        l->work[place] = left * l->inverse[place];
+        b[o->columns[place]] = l->work[place];
+    }
+}
+
+static void ha_sparse_solve(ha_lu *l, double *b)
+{
+    const ha_order *o = l->pattern->order;
+    const int n = l->n;
+    int place;
+    int i;
+    ha_copy(l->rest, b, n);
+    ha_sparse_substitute(l, b);
+    for (place = 0; place < n; ++place) {
+        double left = l->rest[o->rows[place]];
+        for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
+            const double product = l->entries[i] * b[o->columns[o->matrix[i]]];
+            left -= product;
+        }
+        l->rest[o->rows[place]] = left;
+    }
+    ha_sparse_substitute(l, l->rest);
+    for (i = 0; i < n; ++i) {
+        if (ha_finite(l->rest[i])) {
+            b[i] += l->rest[i];
+        }
+    }
+}
+
+//end
+/* Takes up the entries of a matrix and factors it; 0 if no pivot is left, or if an entry is not finite. */
+static int ha_lu_factor(ha_lu *l, const double *entries)
+{
+    const ha_pattern *p = l->pattern;
+    int i;
+    int e;
+//if sparse
+    if (p->order) {
+        for (e = 0; e < ha_entries(p); ++e) {
+            l->entries[p->order->positions[e]] = entries[e];
+        }
+        return ha_sparse_factor(l);
+    }
+//end
+    ha_fill(l->matrix, 0.0, l->n * l->n);
+    for (i = 0; i < l->n; ++i) {
+        for (e = p->starts[i]; e < p->starts[i + 1]; ++e) {
+            l->matrix[i * l->n + p->columns[e]] = entries[e];
+        }
+    }
+    return ha_lu_factor_full(l);
+}
+
 /* Replaces b by the solution. */
 static void ha_lu_solve(ha_lu *l, double *b)
 {
     const int n = l->n;
     int row;
     int j;
+//if sparse
+    if (l->pattern->order && !l->order[n]) {
+        ha_sparse_solve(l, b);
+        return;
+    }
+//end
     if (n == 1) {
         b[0] /= l->factors[0];
         return;
@@ -268,6 +502,15 @@ static int ha_lu_is_positive(const ha_lu *l)
     int changes = 0;
     int j;
     int k;
+//if sparse
+    if (l->pattern->order && !l->order[n]) {
+        changes = l->pattern->order->odd;
+        for (k = 0; k < n; ++k) {
+            changes += l->inverse[k] > 0.0 ? 0 : 1;
+        }
+        return changes % 2 == 0;
+    }
+//end
     if (l->order[0] < 0) {
         return n % 2 == 0 || l->scale[0] > 0.0;
     }
@@ -285,48 +528,45 @@ static int ha_lu_is_positive(const ha_lu *l)
 }
 
 /* a x = b with a matrix that varies: the solution in x. 0 if there is none or more than one. */
-static int ha_linear(ha_model *m, int n, const double *a, const double *b, double *x)
+static int ha_linear(ha_model *m, const ha_pattern *pattern, const double *a, const double *b, double *x)
 {
-    ha_lu l = ha_lu_at(m->work, m->order, n);
-    ha_copy(l.matrix, a, n * n);
-    if (!ha_lu_factor(&l)) {
+    ha_lu l = ha_lu_at(m->work, m->order, pattern);
+    if (!ha_lu_factor(&l, a)) {
         return 0;
     }
-    ha_copy(x, b, n);
+    ha_copy(x, b, l.n);
     ha_lu_solve(&l, x);
     return 1;
 }
 
 /* The same with a matrix of parameters alone, factored once for a set of parameters. */
-static int ha_linear_constant(ha_model *m, int number, int place, int order, int n, const double *a, const double *b, double *x)
+static int ha_linear_constant(ha_model *m, int number, int place, int order, const ha_pattern *pattern, const double *a, const double *b, double *x)
 {
-    ha_lu l = ha_lu_at(m->factors + place, m->factors_order + order, n);
+    ha_lu l = ha_lu_at(m->factors + place, m->factors_order + order, pattern);
     if (!m->factored[number]) {
-        ha_copy(l.matrix, a, n * n);
-        m->factored[number] = ha_lu_factor(&l);
+        m->factored[number] = ha_lu_factor(&l, a);
     }
     if (!m->factored[number]) {
         return 0;
     }
-    ha_copy(x, b, n);
+    ha_copy(x, b, l.n);
     ha_lu_solve(&l, x);
     return 1;
 }
 
-/* The rate of the solution, once it has been computed with the matrix in l. */
-static void ha_linear_rate(ha_lu l, const double *da, const double *db, const double *x, double *dx)
+/* The rate of the solution, once it has been computed with the matrix whose factors stand in a place. */
+static void ha_linear_rate(double *place, int *order, const ha_pattern *p, const double *da, const double *db, const double *x, double *dx)
 {
-    const int n = l.n;
+    ha_lu l = ha_lu_at(place, order, p);
     int i;
-    int j;
-    for (i = 0; i < n; ++i) {
+    int e;
+    for (i = 0; i < l.n; ++i) {
         double moved = -0.0;
-        for (j = 0; j < n; ++j) {
-            const double product = da[i * n + j] * x[j];
+        for (e = p->starts[i]; e < p->starts[i + 1]; ++e) {
+            const double product = da[e] * x[p->columns[e]];
             moved += product;
         }
         dx[i] = db[i] - moved;
     }
     ha_lu_solve(&l, dx);
 }
-

@@ -2,8 +2,8 @@
 /* ---- nonlinear equations: damped Newton that follows one solution ---- */
 
 typedef struct {
-    /* Unknowns, and values read from outside. */
-    int n;
+    /* The matrix of its derivatives, and the number of values read from outside. */
+    const ha_pattern *pattern;
     int reads;
     /* First place of its memory in m->memory. */
     int memory;
@@ -20,6 +20,10 @@ BLOCK_TABLE
 typedef struct {
     const ha_block *block;
     int n;
+    /* Where the entries of the Jacobian stand, and how many there are. */
+    const int *starts;
+    const int *columns;
+    int entries;
     int following;
     int limit;
     int evaluations;
@@ -67,22 +71,26 @@ static double *ha_take(double **place, int n)
 static ha_newton ha_newton_of(ha_model *m, int number)
 {
     const ha_block *block = &ha_blocks[number];
-    const int n = block->n;
+    const int n = block->pattern->n;
+    const int entries = ha_entries(block->pattern);
     const int reads = block->reads;
     double *place = m->memory + block->memory;
     ha_newton w;
     w.block = block;
     w.n = n;
+    w.starts = block->pattern->starts;
+    w.columns = block->pattern->columns;
+    w.entries = entries;
     w.following = m->following[number];
     w.limit = w.following ? m->most_evaluations : 20000;
     w.evaluations = 0;
     w.near = 0;
     w.memory = ha_take(&place, n);
     w.outer_memory = ha_take(&place, reads);
-    w.jacobian_memory = ha_take(&place, n * n);
+    w.jacobian_memory = ha_take(&place, entries);
     w.x = ha_take(&place, n);
     w.outer = ha_take(&place, reads);
-    w.jacobian = ha_take(&place, n * n);
+    w.jacobian = ha_take(&place, entries);
     place = m->work;
     w.step = ha_take(&place, n);
     w.trial = ha_take(&place, n);
@@ -97,8 +105,8 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.span = ha_take(&place, n);
     w.right = ha_take(&place, n);
     w.present = ha_take(&place, reads);
-    w.base = ha_take(&place, n * n);
-    w.matrix = ha_take(&place, n * n);
+    w.base = ha_take(&place, entries);
+    w.matrix = ha_take(&place, entries);
     w.terms = ha_take(&place, n);
     w.units = ha_take(&place, n);
     w.order = ha_take(&place, n);
@@ -106,7 +114,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.floor = ha_take(&place, n);
     w.loose = ha_take(&place, n * n);
     w.unseen = ha_take(&place, n * n);
-    w.lu = ha_lu_at(place, m->order, n);
+    w.lu = ha_lu_at(place, m->order, block->pattern);
     return w;
 }
 
@@ -116,7 +124,7 @@ static void ha_newton_accept(ha_model *m, int number)
     const ha_newton w = ha_newton_of(m, number);
     ha_copy(w.memory, w.x, w.n);
     ha_copy(w.outer_memory, w.outer, w.block->reads);
-    ha_copy(w.jacobian_memory, w.jacobian, w.n * w.n);
+    ha_copy(w.jacobian_memory, w.jacobian, w.entries);
     m->following[number] = 1;
 }
 
@@ -125,7 +133,7 @@ static int ha_look_at(ha_model *m, ha_newton *w, const double *point)
 {
     ++w->evaluations;
     w->block->code(m, w->present, point, w->right, w->matrix);
-    return ha_all_finite(w->right, w->n) && ha_all_finite(w->matrix, w->n * w->n);
+    return ha_all_finite(w->right, w->n) && ha_all_finite(w->matrix, w->entries);
 }
 
 /* Evaluates a point on the way from where the attempt began (0) to the root (1). */
@@ -152,8 +160,7 @@ static double ha_residual(const ha_newton *w)
 
 static int ha_newton_factor(ha_newton *w)
 {
-    ha_copy(w->lu.matrix, w->matrix, w->n * w->n);
-    return ha_lu_factor(&w->lu);
+    return ha_lu_factor(&w->lu, w->matrix);
 }
 
 static void ha_newton_step(ha_newton *w)
@@ -204,18 +211,21 @@ static void ha_weigh_what_rests(ha_newton *w)
     const int n = w->n;
     int i;
     int j;
-    int k;
+    int e;
     for (j = 0; j < n; ++j) {
         double least = HUGE_VAL;
         if (w->size[j] != 0.0 || w->step[j] != 0.0) {
             continue;
         }
         for (i = 0; i < n; ++i) {
-            const double own = fabs(w->matrix[i * n + j]);
+            double own = 0.0;
             double others = 0.0;
-            for (k = 0; k < n; ++k) {
-                if (k != j) {
-                    const double term = fabs(w->matrix[i * n + k]) * ha_max(w->size[k], fabs(w->step[k]));
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                const int k = w->columns[e];
+                if (k == j) {
+                    own = fabs(w->matrix[e]);
+                } else {
+                    const double term = fabs(w->matrix[e]) * ha_max(w->size[k], fabs(w->step[k]));
                     others += term;
                 }
             }
@@ -267,21 +277,21 @@ static int ha_is_linear(ha_model *m, ha_newton *w)
     int same = 1;
     int look;
     int i;
-    int j;
+    int e;
     for (look = 0; look <= 8; ++look) {
         if (!ha_look(m, w, (double)look / 8.0)) {
             same = 0;
         }
         if (look == 0) {
-            ha_copy(w->jacobian, w->matrix, n * n);
+            ha_copy(w->jacobian, w->matrix, w->entries);
         }
         for (i = 0; i < n; ++i) {
             double most = 0.0;
-            for (j = 0; j < n; ++j) {
-                most = ha_max(most, fabs(w->jacobian[i * n + j]));
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                most = ha_max(most, fabs(w->jacobian[e]));
             }
-            for (j = 0; j < n; ++j) {
-                if (!(fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) <= CLOSE_TO_ROUNDING * most)) {
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                if (!(fabs(w->matrix[e] - w->jacobian[e]) <= CLOSE_TO_ROUNDING * most)) {
                     same = 0;
                 }
             }
@@ -311,6 +321,7 @@ static void ha_measure(ha_model *m, ha_newton *w)
     double largest = 0.0;
     int i;
     int j;
+    int e;
     w->block->terms(m, w->present, w->x, w->terms);
     for (i = 0; i < n; ++i) {
         largest = ha_max(largest, fabs(w->x[i]));
@@ -323,12 +334,13 @@ static void ha_measure(ha_model *m, ha_newton *w)
         w->units[j] = size > 0.0 ? size : (largest > 0.0 ? largest : 1.0);
         w->order[j] = (double)j;
     }
+    ha_fill(w->loose, 0.0, n * n);
     for (i = 0; i < n; ++i) {
         const double rounding = 8.0 * DBL_EPSILON * w->terms[i];
         w->terms[i] = rounding > 0.0 ? rounding : DBL_MIN;
         w->rest[i] = (w->offset[i] - w->right[i]) / w->terms[i];
-        for (j = 0; j < n; ++j) {
-            w->loose[i * n + j] = w->matrix[i * n + j] * w->units[j] / w->terms[i];
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            w->loose[i * n + w->columns[e]] = w->matrix[e] * w->units[w->columns[e]] / w->terms[i];
         }
     }
 }
@@ -523,14 +535,14 @@ static double ha_change_of_slope(const ha_newton *w)
     const int n = w->n;
     double change = 0.0;
     int i;
-    int j;
+    int e;
     for (i = 0; i < n; ++i) {
         double most = DBL_MIN;
-        for (j = 0; j < n; ++j) {
-            most = ha_max(most, fabs(w->jacobian[i * n + j]));
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            most = ha_max(most, fabs(w->jacobian[e]));
         }
-        for (j = 0; j < n; ++j) {
-            change = ha_max(change, fabs(w->matrix[i * n + j] - w->jacobian[i * n + j]) / most);
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            change = ha_max(change, fabs(w->matrix[e] - w->jacobian[e]) / most);
         }
     }
     return change;
@@ -562,7 +574,7 @@ static int ha_crosses_kink(ha_model *m, ha_newton *w)
     if (!ha_look_at(m, w, w->x)) {
         return 0;
     }
-    ha_copy(w->jacobian, w->matrix, w->n * w->n);
+    ha_copy(w->jacobian, w->matrix, w->entries);
     for (i = 0; i < w->n; ++i) {
         w->next[i] = fabs(w->right[i] - w->offset[i]);
     }
@@ -720,7 +732,7 @@ static int ha_goes_on(ha_newton *w)
     double off;
     int still = 1;
     int i;
-    int j;
+    int e;
     for (i = 0; i < n; ++i) {
         if (w->lead[i] != 0.0) {
             still = 0;
@@ -745,8 +757,8 @@ static int ha_goes_on(ha_newton *w)
     /* And that of the Jacobian at the root where it began. */
     for (i = 0; i < n; ++i) {
         double sum = -0.0;
-        for (j = 0; j < n; ++j) {
-            const double product = w->base[i * n + j] * w->lead[j];
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            const double product = w->base[e] * w->lead[w->columns[e]];
             sum += product;
         }
         w->next[i] = sum;
@@ -789,8 +801,7 @@ static int ha_is_straight_at(ha_model *m, ha_newton *w, int looks)
         before = rest;
     }
     /* The orientation at the root from which the way leads, where that is followed and regular. */
-    ha_copy(w->lu.matrix, w->base, w->n * w->n);
-    if (w->following && ha_lu_factor(&w->lu)) {
+    if (w->following && ha_lu_factor(&w->lu, w->base)) {
         orientation = ha_lu_is_positive(&w->lu);
     }
     for (look = 0; look <= looks; ++look) {
@@ -844,7 +855,7 @@ static int ha_approach(ha_model *m, ha_newton *w)
     double stride = 0.25;
     ha_fill(w->offset, 0.0, w->n);
     ha_copy(w->kept, w->memory, w->n);
-    ha_copy(w->base, w->jacobian_memory, w->n * w->n);
+    ha_copy(w->base, w->jacobian_memory, w->entries);
     ha_copy(w->x, w->memory, w->n);
     if (!w->following && !ha_look_at(m, w, w->x)) {
         return 0;
@@ -861,9 +872,9 @@ static int ha_approach(ha_model *m, ha_newton *w)
             if (next == 1.0) {
                 return 1;
             }
-            ha_copy(w->jacobian, w->matrix, w->n * w->n);
+            ha_copy(w->jacobian, w->matrix, w->entries);
             ha_copy(w->kept, w->x, w->n);
-            ha_copy(w->base, w->jacobian, w->n * w->n);
+            ha_copy(w->base, w->jacobian, w->entries);
             s = next;
             stride = 2.0 * stride;
         } else {
@@ -881,6 +892,7 @@ static int ha_stays(ha_model *m, ha_newton *w)
     const double rounding = 2.0 * DBL_EPSILON;
     int i;
     int j;
+    int e;
     if (!ha_look_at(m, w, w->memory)) {
         /* Where a slope is infinite, as that of a root at 0, no step tells: the residuals do if they vanish. */
         int vanishes = 1;
@@ -892,8 +904,8 @@ static int ha_stays(ha_model *m, ha_newton *w)
     }
     for (i = 0; i < w->n; ++i) {
         double terms = 0.0;
-        for (j = 0; j < w->n; ++j) {
-            terms += fabs(w->matrix[i * w->n + j] * w->memory[j]);
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            terms += fabs(w->matrix[e] * w->memory[w->columns[e]]);
         }
         w->first[i] = w->right[i];
         w->span[i] = rounding * terms;
@@ -967,7 +979,7 @@ static int ha_follows_above_rounding(ha_model *m, ha_newton *w)
     }
     ha_fill(w->offset, 0.0, w->n);
     ha_copy(w->kept, w->memory, w->n);
-    ha_copy(w->base, w->jacobian_memory, w->n * w->n);
+    ha_copy(w->base, w->jacobian_memory, w->entries);
     if ((ha_attempt(m, w, HA_DAMPED) && (ha_goes_on(w) || ha_is_the_only_one(m, w))) || ha_approach(m, w)) {
         return 1;
     }
@@ -982,7 +994,7 @@ static int ha_follow(ha_model *m, ha_newton *w)
     int i;
     ha_fill(w->offset, 0.0, w->n);
     ha_copy(w->kept, w->memory, w->n);
-    ha_copy(w->base, w->jacobian_memory, w->n * w->n);
+    ha_copy(w->base, w->jacobian_memory, w->entries);
     if (ha_attempt(m, w, HA_DAMPED)) {
         if (ha_goes_on(w) || (w->following && ha_is_the_only_one(m, w))) {
             return MODEL_OK;
@@ -1131,7 +1143,7 @@ static int ha_find_root(ha_model *m, int number, const double *o, double *x)
     if (status != MODEL_OK && !ha_search(m, &w)) {
         return status;
     }
-    ha_copy(w.jacobian, w.matrix, w.n * w.n);
+    ha_copy(w.jacobian, w.matrix, w.entries);
     ha_copy(x, w.x, w.n);
     return MODEL_OK;
 }
@@ -1147,9 +1159,9 @@ static int ha_root_along(ha_model *m, int number, const double *o, const double 
         return status;
     }
     w = ha_newton_of(m, number);
-    w.block->code(m, o, x, w.right, w.lu.matrix);
+    w.block->code(m, o, x, w.right, w.matrix);
     w.block->along(m, o, e, x, w.right);
-    if (!ha_lu_factor(&w.lu)) {
+    if (!ha_lu_factor(&w.lu, w.matrix)) {
         return MODEL_SINGULAR;
     }
     for (i = 0; i < w.n; ++i) {

@@ -1,0 +1,187 @@
+//! The symbolic factorisation of a sparse matrix: which row and column are eliminated when, and where factors have entries.
+//!
+//! Rows are matched to columns so that no pivot is missing, and the pairs put into an order of approximate minimum degree
+//! (Amestoy, Davis and Duff, SIAM Journal on Matrix Analysis and Applications 17, 1996). The order is fixed before any
+//! value is known; whoever computes the factors has to see to it that pivots are good.
+
+use super::{Matching, Pattern};
+use std::collections::BTreeSet;
+
+/// Matrices of up to this many rows are better treated as full ones,
+const SMALL: usize = 32;
+/// and those for which a full one takes less than this many times the operations.
+const GAIN: u64 = 4;
+
+/// The order of an elimination, and the entries of its factors `L U`: ones stand on the diagonal of `L`. A *place* is a
+/// position in the order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SymbolicFactors {
+    /// The row that stands in each place.
+    pub rows: Vec<u32>,
+    /// The column that stands in each place.
+    pub columns: Vec<u32>,
+    /// Whether rows are exchanged for one another an odd number of times.
+    pub odd: bool,
+    /// The entries of `L` left of the diagonal, by place.
+    pub lower: Pattern,
+    /// The entries of `U` right of the diagonal, by place.
+    pub upper: Pattern,
+    /// The entries of the matrix, rows and columns by place.
+    pub matrix: Pattern,
+    /// For each entry in the pattern of the matrix its number there.
+    pub positions: Vec<u32>,
+}
+
+impl SymbolicFactors {
+    /// The factors of a matrix with this pattern, if that is large and they are sparse; `None` too if it is singular
+    /// whatever its entries are.
+    pub fn of_large(pattern: &Pattern) -> Option<SymbolicFactors> {
+        if pattern.size() <= SMALL {
+            return None;
+        }
+        let factors = SymbolicFactors::new(pattern)?;
+        (GAIN * factors.operations() < full_operations(pattern.size())).then_some(factors)
+    }
+
+    /// The factors of a matrix with this pattern; `None` if it is singular whatever its entries are.
+    pub fn new(pattern: &Pattern) -> Option<SymbolicFactors> {
+        let row_of = matched(pattern)?;
+        let order = minimum_degree(pattern, &row_of);
+        let mut place_of = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(place, &column)| place_of[column] = place);
+        let (mut lower, mut upper, mut matrix) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
+        let (mut positions, mut known) = (vec![0; pattern.len()], 0..);
+        for (place, &column) in order.iter().enumerate() {
+            let row = row_of[column];
+            let mut own: Vec<(usize, usize)> =
+                pattern.row(row).map(|e| (place_of[pattern.columns()[e] as usize], e)).collect();
+            own.sort_unstable();
+            own.iter().zip(known.by_ref()).for_each(|(e, number)| positions[e.1] = number);
+            let (before, after) = filled(own.iter().map(|e| e.0).collect(), place, &upper);
+            lower.push(before);
+            upper.push(after);
+            matrix.push(own.into_iter().map(|e| e.0).collect::<Vec<_>>());
+        }
+        let rows = order.iter().map(|&column| row_of[column] as u32).collect();
+        Some(SymbolicFactors {
+            rows,
+            columns: order.into_iter().map(|column| column as u32).collect(),
+            odd: is_odd(&row_of),
+            lower: Pattern::new(lower),
+            upper: Pattern::new(upper),
+            matrix: Pattern::new(matrix),
+            positions,
+        })
+    }
+
+    /// Additions and products to factor the matrix, to solve with the factors and to refine the solution once.
+    pub fn operations(&self) -> u64 {
+        let rows = self.lower.columns().iter().map(|&k| 1 + 2 * self.upper.columns_of(k as usize).len() as u64);
+        let factors = 2 * (self.lower.len() + self.upper.len() + self.rows.len());
+        rows.sum::<u64>() + 2 * factors as u64 + 2 * self.matrix.len() as u64
+    }
+}
+
+/// Additions and products to solve equations with a full matrix of `n` rows once.
+pub fn full_operations(n: usize) -> u64 {
+    let n = n as u64;
+    2 * n * n * n / 3 + 6 * n * n
+}
+
+/// A row for each column: its own, as far as there is an entry on the diagonal.
+fn matched(pattern: &Pattern) -> Option<Vec<usize>> {
+    let n = pattern.size();
+    let edges: Vec<Vec<usize>> =
+        (0..n).map(|row| pattern.columns_of(row).iter().map(|&c| c as usize).collect()).collect();
+    let mut matching = Matching::new(n);
+    (0..n).filter(|&i| pattern.entry(i, i).is_some()).for_each(|i| matching.join(i, i));
+    (0..n).for_each(|row| matching.augment(row, &edges));
+    matching.row_of.into_iter().collect()
+}
+
+/// Columns in an order of approximate minimum degree, each with its row.
+fn minimum_degree(pattern: &Pattern, row_of: &[usize]) -> Vec<usize> {
+    let mut starts = vec![0isize];
+    let mut columns: Vec<isize> = Vec::with_capacity(pattern.len());
+    for &row in row_of {
+        columns.extend(pattern.columns_of(row).iter().map(|&column| column as isize));
+        starts.push(columns.len() as isize);
+    }
+    let found = amd::order(row_of.len() as isize, &starts, &columns, &amd::Control::default());
+    let (order, _, _) = found.expect("the pattern of a matrix");
+    order.into_iter().map(|column| column as usize).collect()
+}
+
+/// What elimination makes of the columns of a row: those before its own place, and those behind it.
+fn filled(columns: BTreeSet<usize>, place: usize, upper: &[Vec<usize>]) -> (Vec<usize>, Vec<usize>) {
+    let mut open = columns;
+    let mut before = Vec::new();
+    while let Some(&k) = open.first().filter(|&&k| k < place) {
+        open.remove(&k);
+        open.extend(&upper[k]);
+        before.push(k);
+    }
+    (before, open.into_iter().filter(|&column| column > place).collect())
+}
+
+/// Whether a permutation is made of an odd number of exchanges.
+fn is_odd(permutation: &[usize]) -> bool {
+    let mut seen = vec![false; permutation.len()];
+    let mut odd = false;
+    for start in 0..permutation.len() {
+        let mut at = start;
+        while !std::mem::replace(&mut seen[at], true) {
+            at = permutation[at];
+            odd ^= at != start;
+        }
+    }
+    odd
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nodes of a square net, each joined to its neighbours.
+    fn net(n: usize) -> Pattern {
+        let near = move |a: usize, b: usize| {
+            let ((i, j), (k, l)) = ((a / n, a % n), (b / n, b % n));
+            i.abs_diff(k) + j.abs_diff(l) <= 1
+        };
+        Pattern::new((0..n * n).map(|a| (0..n * n).filter(move |&b| near(a, b))))
+    }
+
+    #[test]
+    fn a_chain_fills_nothing_in() {
+        let n = 100;
+        let chain = Pattern::new((0..n).map(|i: usize| i.saturating_sub(1)..n.min(i + 2)));
+        let factors = SymbolicFactors::of_large(&chain).expect("it is large");
+        assert_eq!((factors.lower.len(), factors.upper.len()), (n - 1, n - 1));
+        assert!(!factors.odd);
+    }
+
+    #[test]
+    fn a_net_costs_less_than_its_square() {
+        let costs: Vec<u64> =
+            [10, 20, 40].iter().map(|&n| SymbolicFactors::new(&net(n)).expect("regular").operations()).collect();
+        // Twice as wide: eight times at best, sixteen times as a band.
+        assert!(costs.windows(2).all(|c| c[1] < 11 * c[0]), "{costs:?}");
+    }
+
+    #[test]
+    fn rows_are_exchanged_where_the_diagonal_is_empty() {
+        let swap = Pattern::new([vec![1], vec![0]]);
+        let factors = SymbolicFactors::new(&swap).expect("regular");
+        assert!(factors.odd);
+        assert!(factors.rows.iter().zip(&factors.columns).all(|(row, column)| row + column == 1));
+        assert_eq!(SymbolicFactors::new(&Pattern::new([vec![0], vec![0]])), None);
+        assert!(!is_odd(&[1, 2, 0]) && is_odd(&[0, 2, 1]));
+    }
+
+    #[test]
+    fn full_and_small_ones_are_left() {
+        assert_eq!(SymbolicFactors::of_large(&Pattern::new((0..60).map(|_| 0..60))), None);
+        assert_eq!(SymbolicFactors::of_large(&net(5)), None);
+        assert!(SymbolicFactors::of_large(&net(10)).is_some());
+    }
+}

@@ -1,0 +1,91 @@
+//! Where the matrices of solve blocks have entries, and in which order sparse ones are eliminated, as tables of C.
+
+use halfarrow_compiler::program::{BlockId, Matrix, Program};
+use halfarrow_compiler::sparse::SymbolicFactors;
+
+/// Sparse matrices of more rows are not treated as full ones where the pivots of their order do not do: the room that
+/// this takes is there for good.
+pub(super) const FULL_AT_MOST: usize = 200;
+
+/// The patterns of a model, each of them once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Patterns {
+    different: Vec<Matrix>,
+}
+
+impl Patterns {
+    /// Those of all solve blocks.
+    pub fn of(program: &Program) -> Patterns {
+        let mut patterns = Patterns::default();
+        for block in program.blocks.values() {
+            let matrix = block.matrix();
+            if !patterns.different.iter().any(|other| other.values.pattern() == matrix.values.pattern()) {
+                patterns.different.push(Matrix::clone(matrix));
+            }
+        }
+        patterns
+    }
+
+    /// A pointer to the pattern of a block, and the number of its entries.
+    pub fn of_block(&self, program: &Program, block: BlockId) -> (String, usize) {
+        let pattern = program.blocks[block].matrix().values.pattern();
+        let number = self.different.iter().position(|m| m.values.pattern() == pattern).expect("all blocks are known");
+        (format!("&ha_patterns[{number}]"), pattern.len())
+    }
+
+    /// Whether one of them has an order of its own.
+    pub fn any_sparse(&self) -> bool {
+        self.different.iter().any(|m| m.factors.is_some())
+    }
+
+    /// The tables.
+    pub fn tables(&self) -> String {
+        let mut text = String::new();
+        let mut list = String::from("static const ha_pattern ha_patterns[] = {\n");
+        for (i, matrix) in self.different.iter().enumerate() {
+            let pattern = matrix.values.pattern();
+            text += &table(&format!("ha_starts_{i}"), pattern.starts());
+            text += &table(&format!("ha_columns_{i}"), pattern.columns());
+            let order = matrix.factors.as_ref().map(|f| order(&mut text, i, f));
+            let order = match (self.any_sparse(), order) {
+                (false, _) => String::new(),
+                (true, None) => ", 0".to_string(),
+                (true, Some(name)) => format!(", &{name}"),
+            };
+            list += &format!("    {{{}, ha_starts_{i}, ha_columns_{i}{order}}},\n", pattern.size());
+        }
+        text + &list + "};\n"
+    }
+}
+
+/// The tables of an order; gives the name of the last one.
+fn order(text: &mut String, number: usize, factors: &SymbolicFactors) -> String {
+    let lists = [
+        ("rows", &factors.rows[..]),
+        ("places", &factors.columns),
+        ("lower_starts", factors.lower.starts()),
+        ("lower", factors.lower.columns()),
+        ("upper_starts", factors.upper.starts()),
+        ("upper", factors.upper.columns()),
+        ("matrix_starts", factors.matrix.starts()),
+        ("matrix", factors.matrix.columns()),
+        ("positions", &factors.positions),
+    ];
+    let names: Vec<String> = lists.iter().map(|(name, _)| format!("ha_{name}_{number}")).collect();
+    names.iter().zip(lists).for_each(|(name, (_, values))| *text += &table(name, values));
+    let name = format!("ha_order_{number}");
+    *text += &format!("static const ha_order {name} = {{{}, {}}};\n", u8::from(factors.odd), names.join(", "));
+    name
+}
+
+fn table(name: &str, values: &[u32]) -> String {
+    let texts: Vec<String> = values.iter().map(u32::to_string).collect();
+    match texts.len() {
+        0 => format!("static const int {name}[] = {{0}};\n"),
+        1..=20 => format!("static const int {name}[] = {{{}}};\n", texts.join(", ")),
+        _ => {
+            let lines: Vec<String> = texts.chunks(20).map(|line| format!("    {}", line.join(", "))).collect();
+            format!("static const int {name}[] = {{\n{}\n}};\n", lines.join(",\n"))
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Sparse linear equations in an order that is fixed: row by row, with the pivots on the diagonal of that order and one
+//! refinement. Where a pivot is too small beside what stands below it, the matrix is factored as a full one.
+//!
+//! Exported C does the same operations in the same order.
+
+use super::full::Lu;
+use halfarrow_compiler::sparse::SymbolicFactors;
+use std::sync::Arc;
+
+/// A pivot does if it is at least this fraction of the best one in its column, rows scaled: less than for a full matrix,
+/// as the solution is refined (the bound of KLU: Davis and Palamadai Natarajan, ACM Transactions on Mathematical
+/// Software 37, 2010).
+const THRESHOLD: f64 = 1e-3;
+/// Matrices of more rows are not factored as full ones.
+const FULL_AT_MOST: usize = 1_000;
+
+/// A sparse square matrix and, beside it, its triangular factors.
+#[derive(Debug, Clone)]
+pub(crate) struct SparseLu {
+    symbolic: Arc<SymbolicFactors>,
+    /// The entries of the matrix, by place.
+    matrix: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    /// Inverse pivots, and their magnitudes beside their rows.
+    inverse: Vec<f64>,
+    weight: Vec<f64>,
+    /// The row that is being eliminated.
+    row: Vec<f64>,
+    work: Vec<f64>,
+    rest: Vec<f64>,
+    /// The matrix as a full one; memory is taken when it is needed for the first time.
+    full: Option<Box<Lu>>,
+    /// Whether the factors are those of the full one.
+    is_full: bool,
+}
+
+impl SparseLu {
+    pub fn new(symbolic: Arc<SymbolicFactors>) -> SparseLu {
+        let line = vec![0.0; symbolic.rows.len()];
+        SparseLu {
+            matrix: vec![0.0; symbolic.matrix.len()],
+            lower: vec![0.0; symbolic.lower.len()],
+            upper: vec![0.0; symbolic.upper.len()],
+            inverse: line.clone(),
+            weight: line.clone(),
+            row: line.clone(),
+            work: line.clone(),
+            rest: line,
+            full: None,
+            is_full: false,
+            symbolic,
+        }
+    }
+
+    /// Takes up the entries of the matrix, row by row, and factors it; `Err(unknown)` if no pivot is left for that, or if
+    /// an entry is not finite.
+    pub fn factor(&mut self, entries: impl Iterator<Item = f64>) -> Result<(), usize> {
+        // The entries come in the order of the matrix; `position` says where each one stands.
+        let symbolic = Arc::clone(&self.symbolic);
+        entries.zip(&symbolic.positions).for_each(|(entry, &at)| self.matrix[at as usize] = entry);
+        let found = (0..symbolic.rows.len()).try_for_each(|place| self.eliminate(&symbolic, place).ok_or(place));
+        self.is_full = found.is_err();
+        match found {
+            Ok(()) => Ok(()),
+            Err(place) if symbolic.rows.len() > FULL_AT_MOST => Err(symbolic.columns[place] as usize),
+            Err(_) => self.factor_full(&symbolic),
+        }
+    }
+
+    /// Factors the row in a place; `None` if a pivot does not do.
+    fn eliminate(&mut self, symbolic: &SymbolicFactors, place: usize) -> Option<()> {
+        let (before, after) = (symbolic.lower.row(place), symbolic.upper.row(place));
+        let SparseLu { matrix, lower, upper, inverse, weight, row, .. } = self;
+        symbolic.lower.columns_of(place).iter().for_each(|&k| row[k as usize] = 0.0);
+        symbolic.upper.columns_of(place).iter().for_each(|&j| row[j as usize] = 0.0);
+        row[place] = 0.0;
+        let mut scale = f64::MIN_POSITIVE;
+        for entry in symbolic.matrix.row(place) {
+            row[symbolic.matrix.columns()[entry] as usize] = matrix[entry];
+            scale = scale.max(matrix[entry].abs());
+        }
+        for (l, &k) in lower[before.clone()].iter_mut().zip(symbolic.lower.columns_of(place)) {
+            let k = k as usize;
+            let size = row[k].abs();
+            // Not so for a NaN either.
+            if !(THRESHOLD * size <= weight[k] * scale) {
+                return None;
+            }
+            let factor = row[k] * inverse[k];
+            *l = factor;
+            for (u, &j) in upper[symbolic.upper.row(k)].iter().zip(symbolic.upper.columns_of(k)) {
+                row[j as usize] -= factor * u;
+            }
+        }
+        weight[place] = row[place].abs() / scale;
+        if !(weight[place] > f64::EPSILON * row.len() as f64 && weight[place].is_finite()) {
+            return None;
+        }
+        inverse[place] = 1.0 / row[place];
+        for (u, &j) in upper[after].iter_mut().zip(symbolic.upper.columns_of(place)) {
+            *u = row[j as usize];
+        }
+        Some(())
+    }
+
+    fn factor_full(&mut self, symbolic: &SymbolicFactors) -> Result<(), usize> {
+        let n = symbolic.rows.len();
+        let lu = self.full.get_or_insert_with(|| Box::new(Lu::new(n, false)));
+        lu.matrix().fill(0.0);
+        for ((place, column), &entry) in symbolic.matrix.places().zip(&self.matrix) {
+            lu.matrix()[symbolic.rows[place] as usize * n + symbolic.columns[column] as usize] = entry;
+        }
+        lu.factor()
+    }
+
+    /// Replaces `b` by the solution. The matrix must have been factored.
+    pub fn solve(&mut self, b: &mut [f64]) {
+        if let (true, Some(lu)) = (self.is_full, &mut self.full) {
+            return lu.solve(b);
+        }
+        let symbolic = Arc::clone(&self.symbolic);
+        let mut rest = std::mem::take(&mut self.rest);
+        rest.copy_from_slice(b);
+        self.substitute(&symbolic, b);
+        for (place, &row) in symbolic.rows.iter().enumerate() {
+            let mut left = rest[row as usize];
+            for entry in symbolic.matrix.row(place) {
+                left -= self.matrix[entry] * b[symbolic.columns[symbolic.matrix.columns()[entry] as usize] as usize];
+            }
+            rest[row as usize] = left;
+        }
+        self.substitute(&symbolic, &mut rest);
+        // A refinement that is no small correction is none: the equations are not finite.
+        b.iter_mut().zip(&rest).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
+        self.rest = rest;
+    }
+
+    fn substitute(&mut self, symbolic: &SymbolicFactors, b: &mut [f64]) {
+        let SparseLu { lower, upper, inverse, work, .. } = self;
+        for (place, &row) in symbolic.rows.iter().enumerate() {
+            let factors = lower[symbolic.lower.row(place)].iter().zip(symbolic.lower.columns_of(place));
+            work[place] = factors.fold(b[row as usize], |left, (l, &k)| left - l * work[k as usize]);
+        }
+        for (place, &column) in symbolic.columns.iter().enumerate().rev() {
+            let factors = upper[symbolic.upper.row(place)].iter().zip(symbolic.upper.columns_of(place));
+            let left = factors.fold(work[place], |left, (u, &j)| left - u * work[j as usize]);
+            work[place] = left * inverse[place];
+            b[column as usize] = work[place];
+        }
+    }
+
+    /// Whether the determinant of the factored matrix is above zero.
+    pub fn is_positive(&self) -> bool {
+        match &self.full {
+            Some(lu) if self.is_full => lu.is_positive(),
+            _ => self.inverse.iter().fold(!self.symbolic.odd, |positive, &inverse| positive == (inverse > 0.0)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halfarrow_compiler::sparse::Pattern;
+
+    /// Numbers between -0.5 and 0.5.
+    fn numbers(mut seed: f64) -> impl FnMut() -> f64 {
+        move || {
+            seed = (seed * 16807.0) % 2147483647.0;
+            seed / 2147483647.0 - 0.5
+        }
+    }
+
+    /// A matrix with some entries in each row beside the diagonal, which is `heavy` times as large.
+    fn sparse(n: usize, heavy: f64, seed: f64) -> (Pattern, Vec<f64>) {
+        let mut next = numbers(seed);
+        let rows: Vec<Vec<usize>> = (0..n)
+            .map(|i| {
+                let mut columns: Vec<usize> = (0..3).map(|_| ((next() + 0.5) * n as f64) as usize).collect();
+                columns.push(i);
+                columns.sort_unstable();
+                columns.dedup();
+                columns
+            })
+            .collect();
+        let pattern = Pattern::new(rows);
+        let entries = pattern.places().map(|(i, j)| if i == j { heavy * next() } else { next() }).collect();
+        (pattern, entries)
+    }
+
+    fn full(pattern: &Pattern, entries: &[f64]) -> Lu {
+        let n = pattern.size();
+        let mut lu = Lu::new(n, false);
+        pattern.places().zip(entries).for_each(|((i, j), &e)| lu.matrix()[i * n + j] = e);
+        lu
+    }
+
+    #[test]
+    fn solutions_are_those_of_the_full_matrix() {
+        for (seed, heavy) in (1..40).map(|seed| (f64::from(seed), [0.0, 1e-9, 1.0, 10.0][seed as usize % 4])) {
+            let (pattern, entries) = sparse(40, heavy, seed);
+            let Some(symbolic) = SymbolicFactors::new(&pattern) else { continue };
+            let mut next = numbers(seed + 100.0);
+            let b: Vec<f64> = (0..40).map(|_| next()).collect();
+            let (mut lu, mut other) = (SparseLu::new(Arc::new(symbolic)), full(&pattern, &entries));
+            let (found, expected) = (lu.factor(entries.iter().copied()), other.factor());
+            assert_eq!(found.is_ok(), expected.is_ok(), "{seed}");
+            if found.is_err() {
+                continue;
+            }
+            assert_eq!(lu.is_positive(), other.is_positive(), "{seed} {heavy}");
+            let mut x = b.clone();
+            lu.solve(&mut x);
+            let mut left = b.clone();
+            pattern.places().zip(&entries).for_each(|((i, j), e)| left[i] -= e * x[j]);
+            let size = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+            let rest = left.iter().fold(0.0f64, |most, r| most.max(r.abs()));
+            assert!(rest <= 1e-14 * size.max(1.0), "{seed} {heavy}: {rest:e} of {size:e}");
+        }
+    }
+
+    #[test]
+    fn a_poor_pivot_is_not_taken() {
+        // The pivot of the order vanishes; rows have to be exchanged.
+        let pattern = Pattern::new([vec![0, 1], vec![0, 1]]);
+        let symbolic = Arc::new(SymbolicFactors::new(&pattern).expect("regular"));
+        let mut lu = SparseLu::new(symbolic);
+        for small in [0.0, 1e-20, f64::MIN_POSITIVE] {
+            assert_eq!(lu.factor([small, 1.0, 1.0, small].into_iter()), Ok(()));
+            assert!(lu.is_full && !lu.is_positive());
+            let mut b = [2.0, 3.0];
+            lu.solve(&mut b);
+            assert_eq!(b, [3.0, 2.0]);
+        }
+        assert_eq!(lu.factor([2.0, 1.0, 1.0, 2.0].into_iter()), Ok(()));
+        assert!(!lu.is_full && lu.is_positive());
+    }
+
+    #[test]
+    fn what_is_singular_is_said_to_be_so() {
+        let pattern = Pattern::new([vec![0, 1], vec![0, 1]]);
+        let mut lu = SparseLu::new(Arc::new(SymbolicFactors::new(&pattern).expect("regular")));
+        assert!(lu.factor([1.0, 2.0, 2.0, 4.0].into_iter()).is_err());
+        assert!(lu.factor([f64::NAN, 2.0, 2.0, 4.0].into_iter()).is_err());
+        assert!(lu.factor([1.0, f64::INFINITY, 2.0, 4.0].into_iter()).is_err());
+    }
+}
