@@ -6,7 +6,7 @@
 
 use super::frame::{Frame, Solver};
 use super::instruction::{Register, Routine, Solve};
-use super::newton::{FINISHED, NEAR, SETTLED};
+use super::newton::{CLOSE_TO_ROUNDING, CONTRACTION, CONVERGED};
 use super::packed::Packed;
 use super::registers::Layout;
 use super::wide::{self, WideFrame};
@@ -283,7 +283,7 @@ impl Frame {
         for (members, memory) in group.members.chunks(LANES).zip(group.first..) {
             let follows = |m: &Member| {
                 let newton = &solvers[m.block].newton;
-                newton.following && newton.most / 4 > EVALUATIONS
+                newton.following && newton.evaluation_limit / 4 > EVALUATIONS
             };
             if members.iter().filter(|m| follows(m)).count() < FEWEST {
                 continue;
@@ -311,9 +311,9 @@ impl Space {
             let present = (member.block, newton.version);
             if memory.of[lane] != present {
                 memory.of[lane] = present;
-                (0..n).for_each(|i| memory.kept[i][lane] = newton.memory[i]);
+                (0..n).for_each(|i| memory.kept[i][lane] = newton.previous[i]);
                 for (base, &place) in memory.base.iter_mut().zip(&group.entries) {
-                    base[lane] = newton.jacobian_memory[place as usize];
+                    base[lane] = newton.previous_jacobian[place as usize];
                 }
             }
         }
@@ -436,8 +436,8 @@ impl Space {
                 next = greater(&next, &each(|l| after[l] / scale[l]));
             }
             let shrinks = truth(|l| (next[l] <= 0.75 * size[l]) | (size[l] <= 2.0 * f64::EPSILON));
-            let near = truth(|l| (next[l] <= NEAR * size[l]) | (size[l] <= SETTLED));
-            let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= FINISHED * size[l]));
+            let near = truth(|l| (next[l] <= CONTRACTION * size[l]) | (size[l] <= CLOSE_TO_ROUNDING));
+            let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= CONVERGED * size[l]));
             let done = truth(|l| (finished[l] != 0.0) | (size[l] <= 4.0 * f64::EPSILON));
             good = each(|l| good[l] * shrinks[l]);
             if iteration == 0 {
@@ -597,7 +597,7 @@ impl Space {
     #[inline(always)]
     fn goes_on(&mut self, group: &Group, last: usize, good: &mut Line) {
         let n = group.size;
-        let mut most = wide::Line([SETTLED; LANES]);
+        let mut most = wide::Line([CLOSE_TO_ROUNDING; LANES]);
         let mut off = NONE;
         for i in 0..n {
             let lead = each(|l| self.lead[i][l].abs());

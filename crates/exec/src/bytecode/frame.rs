@@ -198,7 +198,7 @@ impl Frame {
     pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
         if solve.guess.is_empty() {
             self.linear::<ALONG>(solve)
-        } else if !ALONG && self.takes_root(solve) {
+        } else if !ALONG && self.put_known_root(solve) {
             Ok(())
         } else {
             self.newton::<ALONG>(solve)

@@ -229,7 +229,7 @@ impl Code {
                     RARE => frame.part::<ALONG>(routine, &routine.code[piece.code.clone()])?,
                     status => return Err(Trouble::Vanished { watch: (status - STATUS_OF_WATCH) as u32 }),
                 },
-                Step::Solve(solve) if !ALONG && frame.takes_root(&routine.solves[*solve]) => {}
+                Step::Solve(solve) if !ALONG && frame.put_known_root(&routine.solves[*solve]) => {}
                 Step::Solve(solve) => {
                     frame.inner = self.inner[*solve].clone().map(|inner| inner as Arc<dyn InnerCode>);
                     let solved = frame.solve::<ALONG>(&routine.solves[*solve]);

@@ -96,7 +96,7 @@ impl Model {
 
     /// Whether a block is solved by Newton and has an unknown `i`.
     pub(super) fn is_unknown(&self, block: usize, i: usize) -> bool {
-        self.frame.solvers[block].newton.memory.len() > i
+        self.frame.solvers[block].newton.previous.len() > i
     }
 
     /// Delays and samples as they are before a run.

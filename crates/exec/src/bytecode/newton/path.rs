@@ -1,79 +1,83 @@
-//! Whether a root goes on from the one where the attempt began.
+//! Whether a root is the continuation of the one at which the iteration started.
 
-use super::SETTLED;
+use super::CLOSE_TO_ROUNDING;
 use super::workspace::Newton;
 use crate::bytecode::frame::Frame;
 use crate::bytecode::instruction::Solve;
 
-/// Points at which the way to a solution that is not near is looked at.
-pub(super) const LOOKS: usize = 8;
-/// The same where the way may be long.
-const MORE_LOOKS: usize = 64;
+/// Points at which the way from the start to a root is looked at.
+pub(super) const PATH_POINTS: usize = 8;
+/// The same where it may be long.
+const PATH_POINTS_FINE: usize = 64;
 /// A Jacobian whose entries change by less than this part of their row does not change.
 const LINEAR: f64 = 1e-9;
 
 impl Frame {
-    /// Whether the root found is without doubt the one that goes on from where the attempt began: the first step, taken
-    /// whole, came near to it, and the Jacobian there is much the same as at the beginning.
-    pub(super) fn goes_on(&mut self, solve: &Solve) -> bool {
+    /// Whether the root found is without doubt the continuation of the start: the first, undamped step contracted, and the
+    /// first correction would be much the same with the Jacobian at the root.
+    pub(super) fn is_continuation(&mut self, solve: &Solve) -> bool {
         let solver = &mut self.solvers[solve.block.0 as usize];
         let newton = &mut solver.newton;
-        if !newton.near || newton.lead.iter().all(|&lead| lead == 0.0) {
-            return newton.near;
+        if !newton.contracts || newton.first_correction.iter().all(|&first| first == 0.0) {
+            return newton.contracts;
         }
         let n = newton.x.len();
-        let mut most = SETTLED;
+        let mut most = CLOSE_TO_ROUNDING;
         for i in 0..n {
-            let lead = newton.lead[i].abs();
-            most = most.max(lead / newton.size[i].max(lead).max(f64::MIN_POSITIVE));
-            newton.next[i] = newton.x[i] - newton.kept[i];
+            let first = newton.first_correction[i].abs();
+            most = most.max(first / newton.scale[i].max(first).max(f64::MIN_POSITIVE));
+            newton.simplified[i] = newton.x[i] - newton.start[i];
         }
-        let off = newton.off_the_lead();
-        // What the first step would have been with the last Jacobian.
-        newton.next.copy_from_slice(&newton.opening);
-        solver.lu.solve(&mut newton.next);
-        let off = off.max(newton.off_the_lead());
+        let off = newton.distance_from_first_correction();
+        // What the first correction would have been with the last Jacobian.
+        newton.simplified.copy_from_slice(&newton.first_right);
+        solver.lu.solve(&mut newton.simplified);
+        let off = off.max(newton.distance_from_first_correction());
         if !newton.following {
             return off <= 0.5 * most;
         }
-        // And that of the Jacobian at the root where it began.
+        // And that of the Jacobian at the root where the iteration started.
         for i in 0..n {
-            newton.next[i] = newton.base[i * n..][..n].iter().zip(&newton.lead).map(|(j, lead)| j * lead).sum();
+            newton.simplified[i] = newton.start_jacobian[i * n..][..n]
+                .iter()
+                .zip(&newton.first_correction)
+                .map(|(j, first)| j * first)
+                .sum();
         }
-        solver.lu.solve(&mut newton.next);
-        off.max(newton.off_the_lead()) <= 0.5 * most
+        solver.lu.solve(&mut newton.simplified);
+        off.max(newton.distance_from_first_correction()) <= 0.5 * most
     }
 
-    /// Whether the residuals shrink all the way from where the attempt began to the root, and the Jacobian never changes
-    /// its orientation: no fold and no pole lies between them. Ends with an evaluation at the root.
-    pub(super) fn is_straight(&mut self, solve: &Solve, looks: usize) -> bool {
-        let straight = self.is_straight_at(solve, looks);
-        straight & self.evaluate(solve, false)
+    /// Whether the natural level function falls all the way from the start to the root, and the determinant of the Jacobian
+    /// keeps its sign: no fold and no pole lies between them. Ends with an evaluation at the root.
+    pub(super) fn path_is_regular(&mut self, solve: &Solve, points: usize) -> bool {
+        let regular = self.path_is_regular_at(solve, points);
+        regular & self.evaluate(solve, false)
     }
 
-    fn is_straight_at(&mut self, solve: &Solve, looks: usize) -> bool {
-        // Measured by the Jacobian at the root, or where that is singular at the beginning.
-        if ![1.0, 0.0].into_iter().any(|part| self.look(solve, part) && self.factor(solve)) {
+    fn path_is_regular_at(&mut self, solve: &Solve, points: usize) -> bool {
+        // Measured by the Jacobian at the root, or where that is singular by that at the start.
+        if ![1.0, 0.0].into_iter().any(|part| self.evaluate_on_path(solve, part) && self.factor(solve)) {
             return false;
         }
         let mut before = f64::INFINITY;
-        for look in 0..=looks {
-            if !self.look(solve, look as f64 / looks as f64) {
+        for point in 0..=points {
+            if !self.evaluate_on_path(solve, point as f64 / points as f64) {
                 return false;
             }
-            let rest = self.next_step(solve);
-            if rest.is_nan() || rest > before * (1.0 + SETTLED) + SETTLED {
+            let level = self.simplified_correction_norm(solve);
+            if level.is_nan() || level > before * (1.0 + CLOSE_TO_ROUNDING) + CLOSE_TO_ROUNDING {
                 return false;
             }
-            before = rest;
+            before = level;
         }
-        let mut orientation = self.orientation_followed(solve);
-        for look in 0..=looks {
-            let good = self.look(solve, look as f64 / looks as f64);
-            // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless its sign changes there.
+        let mut sign = self.determinant_sign_at_start(solve);
+        for point in 0..=points {
+            let good = self.evaluate_on_path(solve, point as f64 / points as f64);
+            // A point at which the Jacobian is singular, such as 0 of a cube, is no fold unless the sign changes there.
             if good && self.factor(solve) {
                 let here = self.solvers[solve.block.0 as usize].lu.is_positive();
-                if *orientation.get_or_insert(here) != here {
+                if *sign.get_or_insert(here) != here {
                     return false;
                 }
             }
@@ -81,28 +85,28 @@ impl Frame {
         true
     }
 
-    /// The orientation of the Jacobian at the root from which the way leads, where that is followed and regular.
-    fn orientation_followed(&mut self, solve: &Solve) -> Option<bool> {
+    /// Whether the determinant of the Jacobian is positive at the start, where that is a solution followed, and regular.
+    fn determinant_sign_at_start(&mut self, solve: &Solve) -> Option<bool> {
         let solver = &mut self.solvers[solve.block.0 as usize];
-        solver.lu.matrix().copy_from_slice(&solver.newton.base);
+        solver.lu.matrix().copy_from_slice(&solver.newton.start_jacobian);
         (solver.newton.following && solver.lu.factor().is_ok()).then(|| solver.lu.is_positive())
     }
 
-    /// Whether the root found is without doubt the only one near the way to it. Ends with an evaluation at the root.
-    pub(super) fn is_the_only_one(&mut self, solve: &Solve) -> bool {
-        let linear = self.is_linear(solve);
-        (linear || self.is_straight_at(solve, MORE_LOOKS)) & self.evaluate(solve, false)
+    /// Whether the root found is without doubt the only one near the line to it. Ends with an evaluation at the root.
+    pub(super) fn is_unique_near_path(&mut self, solve: &Solve) -> bool {
+        let linear = self.is_linear_on_path(solve);
+        (linear || self.path_is_regular_at(solve, PATH_POINTS_FINE)) & self.evaluate(solve, false)
     }
 
-    /// Whether the Jacobian is the same all the way from where the attempt began to `x`: what differs is rounding.
-    pub(super) fn is_linear(&mut self, solve: &Solve) -> bool {
+    /// Whether the Jacobian is the same all the way from the start to `x`: what differs is rounding.
+    pub(super) fn is_linear_on_path(&mut self, solve: &Solve) -> bool {
         let n = solve.right.len();
         let mut same = true;
-        for look in 0..=LOOKS {
-            same &= self.look(solve, look as f64 / LOOKS as f64);
+        for point in 0..=PATH_POINTS {
+            same &= self.evaluate_on_path(solve, point as f64 / PATH_POINTS as f64);
             let Frame { r, solvers, .. } = self;
             let newton = &mut solvers[solve.block.0 as usize].newton;
-            if look == 0 {
+            if point == 0 {
                 newton.jacobian.iter_mut().zip(&solve.matrix).for_each(|(j, &m)| *j = r[m as usize]);
             }
             for (row, entries) in newton.jacobian.chunks(n).zip(solve.matrix.chunks(n)) {
@@ -113,23 +117,23 @@ impl Frame {
         same
     }
 
-    /// Evaluates a point on the way from where the attempt began (0) to the root (1).
-    fn look(&mut self, solve: &Solve, part: f64) -> bool {
+    /// Evaluates a point on the line from the start (0) to the root (1).
+    fn evaluate_on_path(&mut self, solve: &Solve, part: f64) -> bool {
         let newton = self.newton_of(solve);
         for i in 0..newton.x.len() {
-            newton.trial[i] = newton.kept[i] + part * (newton.x[i] - newton.kept[i]);
+            newton.trial[i] = newton.start[i] + part * (newton.x[i] - newton.start[i]);
         }
         self.evaluate(solve, true)
     }
 }
 
 impl Newton {
-    /// How far `next` is from the first step, measured as steps are.
-    fn off_the_lead(&self) -> f64 {
+    /// Scaled norm of the difference between `simplified` and the first correction.
+    fn distance_from_first_correction(&self) -> f64 {
         let mut most: f64 = 0.0;
-        for i in 0..self.next.len() {
-            let (lead, off) = (self.lead[i], (self.next[i] - self.lead[i]).abs());
-            let size = self.size[i].max(lead.abs()).max(f64::MIN_POSITIVE);
+        for i in 0..self.simplified.len() {
+            let (first, off) = (self.first_correction[i], (self.simplified[i] - self.first_correction[i]).abs());
+            let size = self.scale[i].max(first.abs()).max(f64::MIN_POSITIVE);
             most = if off.is_nan() { f64::INFINITY } else { most.max(off / size) };
         }
         most

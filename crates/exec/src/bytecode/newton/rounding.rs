@@ -1,4 +1,4 @@
-//! Roots that no step tells, since it is rounding.
+//! Roots at which corrections are rounding.
 
 use crate::bytecode::frame::Frame;
 use crate::bytecode::instruction::Solve;
@@ -7,28 +7,28 @@ use crate::bytecode::instruction::Solve;
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 
 impl Frame {
-    /// Whether the memory still solves the equations to rounding: where an unknown is 0 but for the rounding of others,
-    /// no step is small against it.
-    pub(super) fn stays(&mut self, solve: &Solve) -> bool {
+    /// Whether the previous solution still solves the equations to rounding: where an unknown is 0 but for the rounding of
+    /// others, no correction is small against it.
+    pub(super) fn previous_is_root(&mut self, solve: &Solve) -> bool {
         let n = solve.right.len();
         let newton = self.newton_of(solve);
-        newton.trial.copy_from_slice(&newton.memory);
+        newton.trial.copy_from_slice(&newton.previous);
         if !self.evaluate(solve, true) {
-            // Where a slope is infinite, as that of a root at 0, no step tells: the residuals do if they vanish.
+            // Where a derivative is infinite, as that of a root at 0, there is no correction: the residuals tell.
             let vanishes = solve.right.iter().all(|&right| self.r[right as usize] == 0.0);
             let newton = self.newton_of(solve);
-            newton.x.copy_from_slice(&newton.memory);
+            newton.x.copy_from_slice(&newton.previous);
             return vanishes;
         }
         for i in 0..n {
             let Frame { r, solvers, .. } = &mut *self;
             let newton = &mut solvers[solve.block.0 as usize].newton;
-            let entries = solve.matrix[i * n..][..n].iter().zip(&newton.memory);
+            let entries = solve.matrix[i * n..][..n].iter().zip(&newton.previous);
             let terms = entries.fold(0.0, |sum, (&m, x)| sum + (r[m as usize] * x).abs());
-            newton.first[i] = r[solve.right[i] as usize];
-            newton.span[i] = ROUNDING * terms;
+            newton.previous_residual[i] = r[solve.right[i] as usize];
+            newton.magnitude[i] = ROUNDING * terms;
         }
-        // What the last digits of what the block reads make of the residuals.
+        // Change of the residuals by the last digits of what the block reads.
         for &register in &solve.outer {
             let value = self.r[register as usize];
             self.r[register as usize] = value + ROUNDING * value;
@@ -40,26 +40,27 @@ impl Frame {
             for (i, &right) in solve.right.iter().enumerate() {
                 let moved = self.r[right as usize];
                 let newton = self.newton_of(solve);
-                newton.span[i] += (moved - newton.first[i]).abs();
+                newton.magnitude[i] += (moved - newton.previous_residual[i]).abs();
             }
         }
         let newton = self.newton_of(solve);
-        if newton.first.iter().zip(&newton.span).any(|(residual, rounding)| residual.abs() > *rounding) {
+        let mut residuals = newton.previous_residual.iter().zip(&newton.magnitude);
+        if residuals.any(|(residual, rounding)| residual.abs() > *rounding) {
             return false;
         }
-        newton.x.copy_from_slice(&newton.memory);
-        newton.trial.copy_from_slice(&newton.memory);
+        newton.x.copy_from_slice(&newton.previous);
+        newton.trial.copy_from_slice(&newton.previous);
         self.evaluate(solve, true)
     }
 
-    /// Whether the Jacobian is the same at `x` and a whole step from there: that the step does not help is rounding.
-    pub(super) fn is_rounding(&mut self, solve: &Solve) -> bool {
+    /// Whether the Jacobian is the same at `x` and a whole correction from there: that it does not help is rounding.
+    pub(super) fn stagnates_at_rounding(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
-        newton.began.copy_from_slice(&newton.kept);
-        newton.kept.iter_mut().zip(newton.x.iter().zip(&newton.step)).for_each(|(k, (x, step))| *k = x + step);
-        let linear = self.is_linear(solve);
+        newton.saved_start.copy_from_slice(&newton.start);
+        newton.start.iter_mut().zip(newton.x.iter().zip(&newton.correction)).for_each(|(k, (x, step))| *k = x + step);
+        let linear = self.is_linear_on_path(solve);
         let newton = self.newton_of(solve);
-        newton.kept.copy_from_slice(&newton.began);
+        newton.start.copy_from_slice(&newton.saved_start);
         linear & self.evaluate(solve, false)
     }
 }

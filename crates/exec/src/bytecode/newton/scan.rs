@@ -1,25 +1,25 @@
-//! One equation in one unknown: a search over all magnitudes.
+//! One equation in one unknown: a search for a change of sign over all magnitudes, then bisection.
 
-use super::attempt::Trust;
+use super::damped::Globalization;
 use crate::bytecode::frame::{Frame, Trouble};
 use crate::bytecode::instruction::Solve;
 
-/// Powers of ten between which one unknown is searched, and points a power.
-const SEARCHED: (i32, i32, i32) = (-12, 12, 20);
+/// Powers of ten between which it is scanned, and points per power.
+const SCANNED: (i32, i32, i32) = (-12, 12, 20);
 
 impl Frame {
-    /// A root anywhere, those near the memory first; left in `newton.x`.
+    /// A root anywhere, those near the previous solution first; left in `newton.x`.
     pub(super) fn scan(&mut self, solve: &Solve) -> bool {
         self.newton_of(solve).offset.fill(0.0);
-        let middle = self.newton_of(solve).memory[0];
+        let middle = self.newton_of(solve).previous[0];
         let mut ends = [None; 2];
-        for distance in distances() {
+        for distance in scan_distances() {
             for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
                 let at = middle + sign * distance;
                 let here = self.residual_at(solve, at);
                 let before = std::mem::replace(end, here.map(|r| (at, r)));
                 let (Some(r), Some(before)) = (here, before) else { continue };
-                if r.signum() != before.1.signum() && self.between(solve, before, (at, r)) {
+                if r.signum() != before.1.signum() && self.bisect(solve, before, (at, r)) {
                     return true;
                 }
             }
@@ -34,8 +34,8 @@ impl Frame {
         finite.then(|| self.r[solve.right[0] as usize])
     }
 
-    /// Halves an interval at whose ends the residual differs in sign. A pole is no root.
-    pub(super) fn between(&mut self, solve: &Solve, mut a: (f64, f64), mut b: (f64, f64)) -> bool {
+    /// Bisects an interval at whose ends the residual differs in sign. A pole is no root.
+    pub(super) fn bisect(&mut self, solve: &Solve, mut a: (f64, f64), mut b: (f64, f64)) -> bool {
         let jump = a.1.abs().min(b.1.abs());
         for _ in 0..200 {
             let middle = 0.5 * (a.0 + b.0);
@@ -49,16 +49,16 @@ impl Frame {
         if best.1.abs() > jump {
             return false;
         }
-        self.newton_of(solve).kept[0] = best.0;
+        self.newton_of(solve).start[0] = best.0;
         self.newton_of(solve).evaluations = 0;
-        self.attempt(solve, Trust::Damped).is_ok()
+        self.iterate(solve, Globalization::Damped).is_ok()
     }
 
     /// Where the residual of a block without root is least.
-    pub(super) fn nowhere(&mut self, solve: &Solve) -> Trouble {
-        let middle = self.newton_of(solve).memory[0];
+    pub(super) fn least_residual(&mut self, solve: &Solve) -> Trouble {
+        let middle = self.newton_of(solve).previous[0];
         let mut best = (middle, self.residual_at(solve, middle).map_or(f64::INFINITY, f64::abs));
-        for distance in distances() {
+        for distance in scan_distances() {
             for at in [middle + distance, middle - distance] {
                 let r = self.residual_at(solve, at).map_or(f64::INFINITY, f64::abs);
                 if r < best.1 {
@@ -71,8 +71,8 @@ impl Frame {
 }
 
 /// Distances from tiny to huge.
-fn distances() -> impl Iterator<Item = f64> {
-    let (low, high, points) = SEARCHED;
+fn scan_distances() -> impl Iterator<Item = f64> {
+    let (low, high, points) = SCANNED;
     std::iter::once(0.0)
         .chain((low * points..=high * points).map(move |k| crate::math::pow(10.0, f64::from(k) / f64::from(points))))
 }

@@ -1,28 +1,28 @@
-//! The root of a block: the one that goes on from the last, else any.
+//! The root of a block: the continuation of the previous solution, at the start and after events any.
 
-use super::attempt::{Miss, Trust};
+use super::damped::{Globalization, NotConverged};
 use super::workspace::Newton;
 use crate::bytecode::frame::{Frame, Trouble, put_entries};
 use crate::bytecode::instruction::Solve;
 
-/// Attempts from other points after those from the last solution and from zero, at the start and after jumps.
+/// First guesses after the previous solution and zero, at the start and after events.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 
-/// Why the root that goes on from the last one was not found.
+/// Why the continuation of the previous solution was not found.
 #[derive(Debug, Clone, Copy)]
-enum Missed {
-    /// There is another one.
-    Elsewhere { unknown: usize, root: f64 },
-    /// None was found.
-    All(Miss),
+enum NoContinuation {
+    /// There is another root.
+    OtherRoot { unknown: usize, root: f64 },
+    /// No root was found.
+    NotConverged(NotConverged),
 }
 
 impl Frame {
-    /// Finds the root of a block that goes on from its memory, at a start any root; leaves it in `newton.x` and in the
-    /// guesses.
+    /// Finds the root of a block that continues its previous solution, at a start any root; leaves it in `newton.x` and in
+    /// the guesses.
     pub(in crate::bytecode) fn find_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
         if !self.has_root(solve) {
-            self.find_root_alone(solve)?;
+            self.find_single_root(solve)?;
         }
         let Frame { r, solvers, .. } = self;
         let root = &solvers[solve.block.0 as usize].newton.x;
@@ -30,7 +30,7 @@ impl Frame {
         Ok(())
     }
 
-    /// Whether the root is known, or has been found beside those of blocks of the same shape.
+    /// Whether the root is known, or has been found in a batch of blocks of the same shape.
     fn has_root(&mut self, solve: &Solve) -> bool {
         if !self.is_fresh(solve) {
             self.solve_abreast(solve);
@@ -41,7 +41,7 @@ impl Frame {
 
     /// Puts the unknowns of a Newton block where they belong if its root needs no search of its own; whether it does not.
     #[inline]
-    pub fn takes_root(&mut self, solve: &Solve) -> bool {
+    pub fn put_known_root(&mut self, solve: &Solve) -> bool {
         if solve.guess.is_empty() || !self.has_root(solve) {
             return false;
         }
@@ -58,46 +58,50 @@ impl Frame {
         newton.fresh && newton.outer.iter().zip(&solve.outer).all(same)
     }
 
-    fn find_root_alone(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn find_single_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh) = (0, false);
         newton.floating.now.fill(false);
         newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
-        if let Err(missed) = self.follow(solve)
+        if let Err(why) = self.continue_root(solve)
             && (self.newton_of(solve).following || !self.search(solve))
         {
-            return Err(self.trouble(solve, missed));
+            return Err(self.solve_error(solve, why));
         }
-        self.keep_jacobian(solve);
+        self.store_jacobian(solve);
         self.newton_of(solve).fresh = !has_conditions(solve);
         Ok(())
     }
 
-    /// Takes note of the Jacobian at the point evaluated last.
-    pub(super) fn keep_jacobian(&mut self, solve: &Solve) {
+    /// Keeps the Jacobian at the point evaluated last.
+    pub(super) fn store_jacobian(&mut self, solve: &Solve) {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
         put_entries(&mut newton.jacobian, solve, r);
     }
 
-    /// Why there is no root to go on with.
-    fn trouble(&mut self, solve: &Solve, missed: Missed) -> Trouble {
+    /// Why there is no root to continue with.
+    fn solve_error(&mut self, solve: &Solve, why: NoContinuation) -> Trouble {
         let (block, newton) = (solve.block.0, self.newton_of(solve));
-        match missed {
-            Missed::Elsewhere { unknown, root } => {
-                Trouble::Ended { block, unknown, from: newton.memory[unknown], to: root }
+        match why {
+            NoContinuation::OtherRoot { unknown, root } => {
+                Trouble::Ended { block, unknown, from: newton.previous[unknown], to: root }
             }
-            Missed::All(_) if newton.exhausted() => Trouble::Bound { block, evaluations: newton.limit() },
-            Missed::All(_) if solve.right.len() == 1 => match self.scan(solve) {
+            NoContinuation::NotConverged(_) if newton.exhausted() => {
+                Trouble::Bound { block, evaluations: newton.limit() }
+            }
+            NoContinuation::NotConverged(_) if solve.right.len() == 1 => match self.scan(solve) {
                 true => {
                     let newton = self.newton_of(solve);
-                    Trouble::Ended { block, unknown: 0, from: newton.memory[0], to: newton.x[0] }
+                    Trouble::Ended { block, unknown: 0, from: newton.previous[0], to: newton.x[0] }
                 }
-                false => self.nowhere(solve),
+                false => self.least_residual(solve),
             },
-            Missed::All(Miss { iterations, residual }) => Trouble::NoConvergence { block, iterations, residual },
+            NoContinuation::NotConverged(NotConverged { iterations, residual }) => {
+                Trouble::NoConvergence { block, iterations, residual }
+            }
         }
     }
 
@@ -105,15 +109,14 @@ impl Frame {
         &mut self.solvers[solve.block.0 as usize].newton
     }
 
-    /// The root that goes on from the memory.
-    fn follow(&mut self, solve: &Solve) -> Result<(), Missed> {
+    /// The root that continues the previous solution.
+    fn continue_root(&mut self, solve: &Solve) -> Result<(), NoContinuation> {
         let newton = self.newton_of(solve);
-        newton.offset.fill(0.0);
-        newton.kept.copy_from_slice(&newton.memory);
-        newton.base.copy_from_slice(&newton.jacobian_memory);
-        let first = self.attempt(solve, Trust::Damped);
-        if first.is_ok() && (self.goes_on(solve) || self.newton_of(solve).following && self.is_the_only_one(solve))
-            || self.stays(solve)
+        newton.start_at_previous();
+        let first = self.iterate(solve, Globalization::Damped);
+        if first.is_ok()
+            && (self.is_continuation(solve) || self.newton_of(solve).following && self.is_unique_near_path(solve))
+            || self.previous_is_root(solve)
             || self.floats(solve)
         {
             return Ok(());
@@ -121,28 +124,27 @@ impl Frame {
         let newton = self.newton_of(solve);
         newton.floating.now.fill(false);
         for i in 0..newton.x.len() {
-            newton.span[i] = newton.x[i].abs().max(newton.memory[i].abs());
+            newton.magnitude[i] = newton.x[i].abs().max(newton.previous[i].abs());
         }
-        let missed = match first {
-            Ok(()) => self.elsewhere(solve),
-            Err(miss) => Missed::All(miss),
+        let why = match first {
+            Ok(()) => self.other_root(solve),
+            Err(failed) => NoContinuation::NotConverged(failed),
         };
-        if self.approach(solve) || self.follows_above_rounding(solve) { Ok(()) } else { Err(missed) }
+        if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
     }
 
-    /// The root that goes on from the memory, where an unknown that is 0 but for the rounding of others hides it: steps of
-    /// such an unknown are never small against it, but they are against what rounding leaves of it.
-    fn follows_above_rounding(&mut self, solve: &Solve) -> bool {
+    /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
+    /// small against it, but they are against the rounding it is made of.
+    fn continue_above_rounding(&mut self, solve: &Solve) -> bool {
         if !self.newton_of(solve).following || !self.find_floors(solve) {
             return false;
         }
         let newton = self.newton_of(solve);
         newton.floating.now.fill(false);
-        newton.offset.fill(0.0);
-        newton.kept.copy_from_slice(&newton.memory);
-        newton.base.copy_from_slice(&newton.jacobian_memory);
-        let at_once = self.attempt(solve, Trust::Damped).is_ok();
-        let found = at_once && (self.goes_on(solve) || self.is_the_only_one(solve)) || self.approach(solve);
+        newton.start_at_previous();
+        let at_once = self.iterate(solve, Globalization::Damped).is_ok();
+        let found = at_once && (self.is_continuation(solve) || self.is_unique_near_path(solve))
+            || self.continue_in_steps(solve);
         if !found {
             self.newton_of(solve).floor.fill(0.0);
         }
@@ -150,23 +152,23 @@ impl Frame {
     }
 
     /// The root found is another one: the unknown that differs most.
-    fn elsewhere(&mut self, solve: &Solve) -> Missed {
+    fn other_root(&mut self, solve: &Solve) -> NoContinuation {
         let newton = self.newton_of(solve);
-        let leap = |i: usize| (newton.x[i] - newton.memory[i]).abs() / newton.size[i].max(f64::MIN_POSITIVE);
+        let leap = |i: usize| (newton.x[i] - newton.previous[i]).abs() / newton.scale[i].max(f64::MIN_POSITIVE);
         let unknown = (0..newton.x.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
-        Missed::Elsewhere { unknown, root: newton.x[unknown] }
+        NoContinuation::OtherRoot { unknown, root: newton.x[unknown] }
     }
 
-    /// Any root.
+    /// Any root, by iterations from several first guesses.
     pub(super) fn search(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
-        newton.kept.copy_from_slice(&newton.memory);
-        if self.attempt(solve, Trust::Damped).is_ok() || self.floats(solve) {
+        newton.start.copy_from_slice(&newton.previous);
+        if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
             return true;
         }
         for start in std::iter::once(0.0).chain(OTHER_STARTS) {
-            self.newton_of(solve).kept.fill(start);
-            if self.attempt(solve, Trust::Damped).is_ok() || self.floats(solve) {
+            self.newton_of(solve).start.fill(start);
+            if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
                 return true;
             }
         }

@@ -1,65 +1,69 @@
-//! What a Newton block remembers, and what it works with.
+//! The state and the workspace of a Newton block.
 
 use crate::bytecode::floating::Floating;
 
 /// Evaluations of a block at most at the start and after jumps.
-const MOST_AT_START: usize = 20_000;
+const EVALUATIONS_AT_START: usize = 20_000;
 /// Evaluations of a block at most at any other time, unless a bound is set.
-pub(crate) const MOST: usize = 2_000;
+pub(crate) const EVALUATIONS: usize = 2_000;
 
-/// Memory and working space of a Newton block.
+/// State and workspace of a Newton block. Vectors have one entry per unknown, matrices are stored row by row.
 #[derive(Debug, Clone)]
 pub(crate) struct Newton {
-    /// Where the next solution starts: part of the model's state.
-    pub memory: Vec<f64>,
-    /// Whether the memory is an accepted solution, which is followed.
+    /// The previous solution, from which the next one starts: part of the model's state.
+    pub previous: Vec<f64>,
+    /// Whether it is an accepted solution, which is followed.
     pub following: bool,
-    /// Counts the changes of the memory, from 1 on.
+    /// Counts its changes, from 1 on.
     pub(in crate::bytecode) version: u64,
-    /// What the block read there, and its Jacobian, row by row: part of the model's state too.
-    pub(super) outer_memory: Vec<f64>,
-    pub(in crate::bytecode) jacobian_memory: Vec<f64>,
+    /// What the block read there, and its Jacobian: part of the model's state too.
+    pub(super) previous_outer: Vec<f64>,
+    pub(in crate::bytecode) previous_jacobian: Vec<f64>,
     /// The last solution found, what the block read there, and its Jacobian.
     pub x: Vec<f64>,
     pub(in crate::bytecode) outer: Vec<f64>,
     pub(in crate::bytecode) jacobian: Vec<f64>,
-    /// Whether these go on from the present memory, with the present parameters and conditions.
+    /// Whether these continue the previous solution as it is, with the present parameters and conditions.
     pub fresh: bool,
     /// Evaluations at most while following.
-    pub(in crate::bytecode) most: usize,
+    pub(in crate::bytecode) evaluation_limit: usize,
     pub(in crate::bytecode) evaluations: usize,
-    pub(super) step: Vec<f64>,
+    /// The Newton correction at `x`.
+    pub(super) correction: Vec<f64>,
+    /// The point that is tried.
     pub(super) trial: Vec<f64>,
-    pub(in crate::bytecode) next: Vec<f64>,
-    /// Greatest magnitude of each unknown so far.
-    pub(super) size: Vec<f64>,
-    /// Magnitudes below which unknowns are rounding; 0 unless a solution is sought that is not found without them.
+    /// The simplified correction at the trial point; right-hand sides elsewhere.
+    pub(in crate::bytecode) simplified: Vec<f64>,
+    /// Scale of norms: greatest magnitude of each unknown so far.
+    pub(super) scale: Vec<f64>,
+    /// Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them.
     pub(in crate::bytecode) floor: Vec<f64>,
-    /// What is subtracted from the residuals on the way from a point where they do not vanish.
+    /// What is subtracted from the residuals: the Newton homotopy `F(x) = (1 - s) F(previous)`.
     pub(in crate::bytecode) offset: Vec<f64>,
-    pub(super) first: Vec<f64>,
-    /// Where the attempt began: the last root on the way.
-    pub(in crate::bytecode) kept: Vec<f64>,
-    /// Where the attempt began, while another way is looked at.
-    pub(super) began: Vec<f64>,
-    /// The first step of the attempt: to first order the change of the solution.
-    pub(super) lead: Vec<f64>,
-    /// Residuals where the attempt began, with the sign of a right-hand side.
-    pub(super) opening: Vec<f64>,
-    /// The Jacobian of the root at which the attempt began, if it began at one.
-    pub(super) base: Vec<f64>,
-    /// Magnitudes of the unknowns at the memory and where the attempt from there led.
-    pub(in crate::bytecode) span: Vec<f64>,
-    /// Whether the first step, taken whole, left little to do.
-    pub(super) near: bool,
-    /// What nothing tells.
+    /// Residuals at the previous solution.
+    pub(super) previous_residual: Vec<f64>,
+    /// Where the iteration starts: the last root on the path.
+    pub(in crate::bytecode) start: Vec<f64>,
+    /// The start, while another path is looked at.
+    pub(super) saved_start: Vec<f64>,
+    /// The first correction: to first order the change of the solution.
+    pub(super) first_correction: Vec<f64>,
+    /// Its right-hand side.
+    pub(super) first_right: Vec<f64>,
+    /// The Jacobian at the start, if that is a root.
+    pub(super) start_jacobian: Vec<f64>,
+    /// Magnitudes of the unknowns: the previous solution, or where the iteration from there led.
+    pub(in crate::bytecode) magnitude: Vec<f64>,
+    /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
+    pub(super) contracts: bool,
+    /// Unknowns that no equation determines.
     pub floating: Floating,
 }
 
-/// What a Newton block remembers of a run.
+/// The state of a Newton block in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Followed {
-    memory: Vec<f64>,
+    previous: Vec<f64>,
     following: bool,
     /// What the block read at the accepted solution, and its Jacobian there.
     outer: Vec<f64>,
@@ -72,31 +76,31 @@ impl Newton {
     pub fn new(size: usize) -> Newton {
         let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
         Newton {
-            memory: line.clone(),
+            previous: line.clone(),
             version: 1,
             following: false,
-            outer_memory: Vec::new(),
-            jacobian_memory: square.clone(),
+            previous_outer: Vec::new(),
+            previous_jacobian: square.clone(),
             x: line.clone(),
             outer: Vec::new(),
             jacobian: square.clone(),
             fresh: false,
-            most: MOST,
+            evaluation_limit: EVALUATIONS,
             evaluations: 0,
-            step: line.clone(),
+            correction: line.clone(),
             trial: line.clone(),
-            next: line.clone(),
-            size: line.clone(),
+            simplified: line.clone(),
+            scale: line.clone(),
             floor: line.clone(),
             offset: line.clone(),
-            first: line.clone(),
-            kept: line.clone(),
-            began: line.clone(),
-            lead: line.clone(),
-            opening: line.clone(),
-            span: line,
-            base: square,
-            near: false,
+            previous_residual: line.clone(),
+            start: line.clone(),
+            saved_start: line.clone(),
+            first_correction: line.clone(),
+            first_right: line.clone(),
+            magnitude: line,
+            start_jacobian: square,
+            contracts: false,
             floating: Floating::new(size),
         }
     }
@@ -104,12 +108,12 @@ impl Newton {
     /// Makes room for so many values that the block reads.
     pub fn reserve(&mut self, outer: usize) {
         self.outer.resize(outer, 0.0);
-        self.outer_memory.resize(outer, 0.0);
+        self.previous_outer.resize(outer, 0.0);
     }
 
     /// Forgets the run.
     pub fn forget(&mut self) {
-        self.memory.fill(0.0);
+        self.previous.fill(0.0);
         self.version += 1;
         self.floating.ever.fill(false);
         self.leave();
@@ -122,48 +126,55 @@ impl Newton {
 
     /// The next solution starts where unknown `i` has this value.
     pub fn start_at(&mut self, i: usize, value: f64) {
-        (self.memory[i], self.fresh) = (value, false);
+        (self.previous[i], self.fresh) = (value, false);
         self.version += 1;
     }
 
     /// Evaluations at most while following.
     pub fn bound(&mut self, most: usize) {
-        (self.most, self.fresh) = (most, false);
+        (self.evaluation_limit, self.fresh) = (most, false);
     }
 
-    /// Goes on with the solution found last.
+    /// The solution found last becomes the previous one, and is followed.
     pub fn accept(&mut self) {
         self.version += 1;
         self.floating.accept();
-        self.memory.copy_from_slice(&self.x);
-        self.outer_memory.copy_from_slice(&self.outer);
-        self.jacobian_memory.copy_from_slice(&self.jacobian);
+        self.previous.copy_from_slice(&self.x);
+        self.previous_outer.copy_from_slice(&self.outer);
+        self.previous_jacobian.copy_from_slice(&self.jacobian);
         (self.following, self.fresh) = (true, false);
     }
 
-    /// What it remembers of the run.
+    /// The state, to be restored.
     pub fn followed(&self) -> Followed {
         Followed {
-            memory: self.memory.clone(),
+            previous: self.previous.clone(),
             following: self.following,
-            outer: self.outer_memory.clone(),
-            jacobian: self.jacobian_memory.clone(),
+            outer: self.previous_outer.clone(),
+            jacobian: self.previous_jacobian.clone(),
             floated: self.floating.ever.clone(),
         }
     }
 
-    /// Goes on from what it remembered.
+    /// Restores a state.
     pub fn follow_from(&mut self, from: &Followed) {
         self.version += 1;
-        self.memory.copy_from_slice(&from.memory);
-        self.outer_memory.copy_from_slice(&from.outer);
-        self.jacobian_memory.copy_from_slice(&from.jacobian);
+        self.previous.copy_from_slice(&from.previous);
+        self.previous_outer.copy_from_slice(&from.outer);
+        self.previous_jacobian.copy_from_slice(&from.jacobian);
         self.floating.ever.copy_from_slice(&from.floated);
         (self.following, self.fresh) = (from.following, false);
     }
 
+    /// The next iteration starts at the previous solution.
+    pub(super) fn start_at_previous(&mut self) {
+        self.offset.fill(0.0);
+        self.start.copy_from_slice(&self.previous);
+        self.start_jacobian.copy_from_slice(&self.previous_jacobian);
+    }
+
     pub(super) fn limit(&self) -> usize {
-        if self.following { self.most } else { MOST_AT_START }
+        if self.following { self.evaluation_limit } else { EVALUATIONS_AT_START }
     }
 
     pub(in crate::bytecode) fn exhausted(&self) -> bool {
