@@ -1,4 +1,4 @@
-//! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton.c`.
+//! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton/`.
 
 use std::fmt::Write;
 

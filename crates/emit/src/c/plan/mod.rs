@@ -355,7 +355,14 @@ impl<'a> Plan<'a> {
             text += &piece(include_str!("../runtime/lu.c"));
         }
         if !self.newton.is_empty() {
-            text += &piece(include_str!("../runtime/newton.c"));
+            text += &piece(concat!(
+                include_str!("../runtime/newton/workspace.c"),
+                include_str!("../runtime/newton/correction.c"),
+                include_str!("../runtime/newton/floating.c"),
+                include_str!("../runtime/newton/damped.c"),
+                include_str!("../runtime/newton/continuation.c"),
+                include_str!("../runtime/newton/search.c"),
+            ));
         }
         text += &piece(include_str!("../runtime/tables.c"));
         text += &real::wide(&filled(include_str!("../runtime/conditions.c")), size);
