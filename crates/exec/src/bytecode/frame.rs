@@ -25,7 +25,7 @@ pub(crate) trait InnerCode: std::fmt::Debug + Send + Sync {
 
 /// Why a routine stopped.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Trouble {
+pub(crate) enum SolveError {
     /// A watched divisor vanishes.
     Vanished { watch: u32 },
     /// A linear block has no unique solution.
@@ -140,21 +140,21 @@ impl Frame {
     }
 
     /// Runs a routine.
-    pub fn run(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.all::<false>(routine)
     }
 
     /// Runs it with derivatives along the direction that the fixed registers have in `d`.
-    pub fn run_along(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run_along(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.all::<true>(routine)
     }
 
-    fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.part::<ALONG>(routine, &routine.code)
     }
 
     /// Runs a part of the code of a routine.
-    pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), Trouble> {
+    pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), SolveError> {
         for instruction in code {
             match instruction {
                 Instruction::Op(operation) => self.operation::<ALONG>(operation),
@@ -162,7 +162,7 @@ impl Frame {
                 Instruction::Watch { pivot, scale, watch } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     if !Frame::stands(pivot, scale) {
-                        return Err(Trouble::Vanished { watch: *watch });
+                        return Err(SolveError::Vanished { watch: *watch });
                     }
                 }
                 Instruction::Parameter { out, index, default } => {
@@ -195,7 +195,7 @@ impl Frame {
         code.iter().for_each(|operation| self.operation::<ALONG>(operation));
     }
 
-    pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         if solve.guess.is_empty() {
             self.linear::<ALONG>(solve)
         } else if !ALONG && self.put_known_root(solve) {
@@ -205,7 +205,7 @@ impl Frame {
         }
     }
 
-    fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, d, solvers, .. } = self;
         let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
         if solve.shared.is_none() && !(solver.constant && solver.factored) {
@@ -214,7 +214,7 @@ impl Frame {
         }
         solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
         if !solver.factored {
-            return Err(Trouble::Singular { block: solve.block.0 });
+            return Err(SolveError::Singular { block: solve.block.0 });
         }
         solver.lu.solve(&mut solver.x);
         if ALONG {
@@ -231,7 +231,7 @@ impl Frame {
         Ok(())
     }
 
-    fn newton<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn newton<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         self.find_root(solve)?;
         let size = solve.right.len();
         if ALONG {
@@ -241,7 +241,7 @@ impl Frame {
             let solver = &mut solvers[solve.block.0 as usize];
             put_entries(solver.lu.matrix(), solve, r);
             if solver.lu.factor().is_err() {
-                return Err(Trouble::Singular { block: solve.block.0 });
+                return Err(SolveError::Singular { block: solve.block.0 });
             }
             (0..size).for_each(|i| solver.rate[i] = -d[solve.right[i] as usize]);
             solver.lu.solve(&mut solver.rate);

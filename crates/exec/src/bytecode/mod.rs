@@ -15,7 +15,7 @@ pub(crate) use abreast::Abreast;
 #[cfg(feature = "machine")]
 pub(crate) use conditions::table_on;
 pub(crate) use conditions::{HeldConditions, Hold, piece_of};
-pub(crate) use frame::{Frame, Trouble};
+pub(crate) use frame::{Frame, SolveError};
 #[cfg(feature = "machine")]
 pub(crate) use frame::{InnerCode, PIVOT_BELOW};
 #[cfg(feature = "machine")]

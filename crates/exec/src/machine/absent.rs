@@ -1,6 +1,6 @@
 //! What stands in the place of machine code where it is left out.
 
-use crate::bytecode::{Frame, Layout, Routine, Trouble};
+use crate::bytecode::{Frame, Layout, Routine, SolveError};
 use halfarrow_compiler::program::Program;
 use std::fmt;
 
@@ -24,7 +24,7 @@ impl std::error::Error for MachineError {}
 pub(crate) enum Code {}
 
 impl Code {
-    pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), Trouble> {
+    pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), SolveError> {
         match *self {}
     }
     pub fn rates(&self, _: &mut Frame, _: f64, _: &[f64], _: &mut [f64]) -> bool {

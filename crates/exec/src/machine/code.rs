@@ -4,7 +4,7 @@ use super::chunk::{Item, Setting};
 use super::live::Live;
 use super::memory::{Arrays, Gathered, Memory, Reach, Start};
 use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_WATCH, WRITTEN_OUT};
-use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, Trouble};
+use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, SolveError};
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{Op, Program};
 use std::ops::Range;
@@ -203,7 +203,7 @@ impl Code {
     ///
     /// # Errors
     /// As the bytecode.
-    pub fn run(&self, frame: &mut Frame, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run(&self, frame: &mut Frame, routine: &Routine) -> Result<(), SolveError> {
         if self.along { self.steps::<true>(frame, routine) } else { self.steps::<false>(frame, routine) }
     }
 
@@ -217,7 +217,7 @@ impl Code {
         self.memory.enter_rates(start, self.reach, arrays(frame), (t, x, dx)) == 0
     }
 
-    fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), Trouble> {
+    fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), SolveError> {
         // Conditions that are taken anew are for the bytecode.
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
             return frame.part::<ALONG>(routine, &routine.code);
@@ -227,7 +227,7 @@ impl Code {
                 Step::Piece(piece) => match enter(&self.memory, self.reach, piece.start, frame) {
                     0 => {}
                     RARE => frame.part::<ALONG>(routine, &routine.code[piece.code.clone()])?,
-                    status => return Err(Trouble::Vanished { watch: (status - STATUS_OF_WATCH) as u32 }),
+                    status => return Err(SolveError::Vanished { watch: (status - STATUS_OF_WATCH) as u32 }),
                 },
                 Step::Solve(solve) if !ALONG && frame.put_known_root(&routine.solves[*solve]) => {}
                 Step::Solve(solve) => {

@@ -34,7 +34,7 @@ impl Model {
         let Model { frame, code, dx, .. } = self;
         frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
         let run = self.frame.run_along(&self.code.sources);
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     fn source(&self, i: usize) -> (f64, f64) {
@@ -89,7 +89,7 @@ impl Model {
         }
         frame.conditions.state = Hold::Keep;
         self.run.signs_taken = Some(t);
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     pub(super) fn has_delays(&self) -> bool {

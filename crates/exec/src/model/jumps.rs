@@ -37,7 +37,7 @@ impl Model {
         let code = self.code.clone();
         let Some(kept) = &code.kept else { return Ok(Vec::new()) };
         self.place(t, x);
-        self.frame.run(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+        self.frame.run(&kept.sums).map_err(|error| self.failure(t, error))?;
         Ok(kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect())
     }
 
@@ -57,7 +57,7 @@ impl Model {
                 self.place(t, x);
                 self.still();
                 self.frame.d[self.code.layout.states as usize + kept.states[column]] = 1.0;
-                self.frame.run_along(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+                self.frame.run_along(&kept.sums).map_err(|error| self.failure(t, error))?;
                 for (row, &register) in kept.sums.outputs.iter().enumerate() {
                     matrix[row * n + column] = self.frame.d[register as usize];
                     miss[row] = self.frame.r[register as usize] - before[row];

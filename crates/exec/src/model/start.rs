@@ -545,7 +545,7 @@ impl Model {
                 self.frame.run_along(routine)
             }
         };
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {

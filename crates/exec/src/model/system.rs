@@ -1,7 +1,7 @@
 //! The model as a system to integrate.
 
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Hold, Trouble};
+use crate::bytecode::{Hold, SolveError};
 use halfarrow_sim::{Failure, Sparsity, System};
 
 /// How far beside a state the slope is taken where it is infinite: this part of the state and of its change in a second.
@@ -18,7 +18,7 @@ pub(super) enum What {
 }
 
 impl Model {
-    fn once(&mut self, what: What, along: bool) -> Result<bool, Trouble> {
+    fn once(&mut self, what: What, along: bool) -> Result<bool, SolveError> {
         let routine = match what {
             What::Rates => &self.code.rates,
             What::Recorded => &self.recorded.routine,
@@ -45,7 +45,7 @@ impl Model {
         let first = self.once(what, along);
         let held = self.frame.conditions.state == Hold::Keep && !self.code.switching.is_empty();
         if !held || matches!(first, Ok(true)) {
-            return first.map(|_| ()).map_err(|trouble| self.failure(t, trouble));
+            return first.map(|_| ()).map_err(|error| self.failure(t, error));
         }
         self.frame.conditions.state = Hold::Follow;
         let second = self.once(what, along);
@@ -57,7 +57,7 @@ impl Model {
             self.once(what, along)
         };
         self.frame.conditions.state = Hold::Keep;
-        last.map(|_| ()).map_err(|trouble| self.failure(t, trouble))
+        last.map(|_| ()).map_err(|error| self.failure(t, error))
     }
 
     /// Runs the rates at `(t, x)` and leaves them in `dx`.

@@ -324,12 +324,12 @@ impl Radau {
                     self.h = next;
                     self.renew_jacobian();
                 }
-                Err(Trouble::Slow { shorten }) => {
+                Err(StepError::Slow { shorten }) => {
                     self.start_otherwise();
                     self.h = shorten * h;
                     (failure, slow) = (None, true);
                 }
-                Err(Trouble::Failed(reason)) => {
+                Err(StepError::Failed(reason)) => {
                     self.start_otherwise();
                     singular += usize::from(matches!(reason, Failure::Singular { .. }));
                     if singular >= MOST_SINGULAR {
@@ -371,7 +371,7 @@ impl Radau {
     }
 
     /// Solves the equations of a step; the number of iterations that took.
-    fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+    fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, StepError> {
         self.renew(system)?;
         self.allow(h);
         self.refactor(system, h)?;
@@ -397,12 +397,12 @@ impl Radau {
     }
 
     /// Takes the Jacobian, if needed.
-    fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), Trouble> {
+    fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), StepError> {
         if self.jacobian == Age::Stale {
             let (y, yp) = (std::mem::take(&mut self.y), std::mem::take(&mut self.yp));
             let taken = self.take_jacobian(system, self.t, &y, &yp);
             (self.y, self.yp) = (y, yp);
-            taken.map_err(Trouble::Failed)?;
+            taken.map_err(StepError::Failed)?;
             self.jacobian = Age::Fresh;
             self.factored = None;
         }
@@ -410,7 +410,7 @@ impl Radau {
     }
 
     /// Factors for a step of `h`, unless that is done.
-    fn refactor(&mut self, system: &dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+    fn refactor(&mut self, system: &dyn ImplicitSystem, h: f64) -> Result<(), StepError> {
         if self.factored != Some(h) {
             self.factored = None;
             let complex = c64::new(ALPHA / h, BETA / h);
@@ -419,7 +419,7 @@ impl Radau {
             factored.map_err(|no_pivot| {
                 let name = |unknown| format!("the step of {}", system.unknown_name(unknown));
                 let what = no_pivot.unknown.map_or("the equations of the step".into(), name);
-                Trouble::Failed(Failure::Singular { time: self.t, what })
+                StepError::Failed(Failure::Singular { time: self.t, what })
             })?;
             self.factored = Some(h);
         }
@@ -487,7 +487,7 @@ pub(crate) fn solve(pattern: &Sparsity, matrix: &[f64], b: &mut [f64]) -> bool {
 }
 
 /// Why a step cannot be made as it is.
-enum Trouble {
+enum StepError {
     /// Newton converges too slowly or not at all.
     Slow {
         /// By how much the step has to be shortened.

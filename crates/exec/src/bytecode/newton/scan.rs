@@ -1,7 +1,7 @@
 //! One equation in one unknown: a search for a change of sign over all magnitudes, then bisection.
 
 use super::damped::Globalization;
-use crate::bytecode::frame::{Frame, Trouble};
+use crate::bytecode::frame::{Frame, SolveError};
 use crate::bytecode::instruction::Solve;
 
 /// Powers of ten between which it is scanned, and points per power.
@@ -55,7 +55,7 @@ impl Frame {
     }
 
     /// Where the residual of a block without root is least.
-    pub(super) fn least_residual(&mut self, solve: &Solve) -> Trouble {
+    pub(super) fn least_residual(&mut self, solve: &Solve) -> SolveError {
         let middle = self.newton_of(solve).previous[0];
         let mut best = (middle, self.residual_at(solve, middle).map_or(f64::INFINITY, f64::abs));
         for distance in scan_distances() {
@@ -66,7 +66,7 @@ impl Frame {
                 }
             }
         }
-        Trouble::NoSolution { block: solve.block.0, nearest: best.0, residual: best.1 }
+        SolveError::NoSolution { block: solve.block.0, nearest: best.0, residual: best.1 }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::damped::{Globalization, NotConverged};
 use super::workspace::Newton;
-use crate::bytecode::frame::{Frame, Trouble, put_entries};
+use crate::bytecode::frame::{Frame, SolveError, put_entries};
 use crate::bytecode::instruction::Solve;
 
 /// First guesses after the previous solution and zero, at the start and after events.
@@ -20,7 +20,7 @@ enum NoContinuation {
 impl Frame {
     /// Finds the root of a block that continues its previous solution, at a start any root; leaves it in `newton.x` and in
     /// the guesses.
-    pub(in crate::bytecode) fn find_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    pub(in crate::bytecode) fn find_root(&mut self, solve: &Solve) -> Result<(), SolveError> {
         if !self.has_root(solve) {
             self.find_single_root(solve)?;
         }
@@ -58,7 +58,7 @@ impl Frame {
         newton.fresh && newton.outer.iter().zip(&solve.outer).all(same)
     }
 
-    fn find_single_root(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn find_single_root(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh) = (0, false);
@@ -83,24 +83,24 @@ impl Frame {
     }
 
     /// Why there is no root to continue with.
-    fn solve_error(&mut self, solve: &Solve, why: NoContinuation) -> Trouble {
+    fn solve_error(&mut self, solve: &Solve, why: NoContinuation) -> SolveError {
         let (block, newton) = (solve.block.0, self.newton_of(solve));
         match why {
             NoContinuation::OtherRoot { unknown, root } => {
-                Trouble::Ended { block, unknown, from: newton.previous[unknown], to: root }
+                SolveError::Ended { block, unknown, from: newton.previous[unknown], to: root }
             }
             NoContinuation::NotConverged(_) if newton.exhausted() => {
-                Trouble::Bound { block, evaluations: newton.limit() }
+                SolveError::Bound { block, evaluations: newton.limit() }
             }
             NoContinuation::NotConverged(_) if solve.right.len() == 1 => match self.scan(solve) {
                 true => {
                     let newton = self.newton_of(solve);
-                    Trouble::Ended { block, unknown: 0, from: newton.previous[0], to: newton.x[0] }
+                    SolveError::Ended { block, unknown: 0, from: newton.previous[0], to: newton.x[0] }
                 }
                 false => self.least_residual(solve),
             },
             NoContinuation::NotConverged(NotConverged { iterations, residual }) => {
-                Trouble::NoConvergence { block, iterations, residual }
+                SolveError::NoConvergence { block, iterations, residual }
             }
         }
     }

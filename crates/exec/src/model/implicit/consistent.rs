@@ -2,7 +2,7 @@
 
 use super::super::minimum_norm;
 use super::ImplicitModel;
-use crate::bytecode::Trouble;
+use crate::bytecode::SolveError;
 use halfarrow_sim::{Failure, System as _};
 
 /// Passes of Newton on states of the minimal form.
@@ -22,7 +22,7 @@ impl ImplicitModel {
     pub(super) fn guess(&mut self, t: f64) -> Result<(), Failure> {
         let ImplicitModel { reference, form, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.of_guesses).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.of_guesses).map_err(|error| reference.failure(t, error))?;
         for (&(block, i), &register) in map.guesses.iter().zip(&map.of_guesses.outputs) {
             let value = reference.frame.r[register as usize];
             if value.is_finite() {
@@ -40,7 +40,7 @@ impl ImplicitModel {
         }
         let ImplicitModel { reference, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.of_known).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.of_known).map_err(|error| reference.failure(t, error))?;
         for (&i, &register) in map.known.iter().zip(&map.of_known.outputs) {
             let value = reference.frame.r[register as usize];
             if value.is_finite() {
@@ -55,7 +55,7 @@ impl ImplicitModel {
     pub(super) fn infer(&mut self, t: f64, y: &mut [f64]) -> Result<(), Failure> {
         let ImplicitModel { reference, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.common_there).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.common_there).map_err(|error| reference.failure(t, error))?;
         let wanted: Vec<f64> = map.common_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
         let (rows, columns) = (wanted.len(), self.map.unknown.len());
         let (mut matrix, mut miss) = (vec![0.0; rows * columns], vec![0.0; rows]);
@@ -67,7 +67,7 @@ impl ImplicitModel {
                 self.place(t, y, &still);
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.states as usize + self.map.unknown[column]] = 1.0;
-                self.form.frame.run_along(&self.map.common).map_err(|trouble| self.form.failure(t, trouble))?;
+                self.form.frame.run_along(&self.map.common).map_err(|error| self.form.failure(t, error))?;
                 for (row, &register) in self.map.common.outputs.iter().enumerate() {
                     matrix[row * columns + column] = self.form.frame.d[register as usize];
                     miss[row] = self.form.frame.r[register as usize] - wanted[row];
@@ -109,7 +109,7 @@ impl ImplicitModel {
         if free > 0 {
             let ImplicitModel { reference, map, x, .. } = self;
             reference.place(t, x);
-            reference.frame.run(&map.carried_there).map_err(|trouble| reference.failure(t, trouble))?;
+            reference.frame.run(&map.carried_there).map_err(|error| reference.failure(t, error))?;
             let wanted: Vec<f64> = map.carried_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
             // What a bond carries is linear in the rates: one step of Newton.
             let mut matrix = vec![0.0; free * free];
@@ -119,7 +119,7 @@ impl ImplicitModel {
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.rates as usize + self.map.free[column]] = 1.0;
                 let run = self.form.frame.run_along(&self.map.carried);
-                run.map_err(|trouble: Trouble| self.form.failure(t, trouble))?;
+                run.map_err(|error: SolveError| self.form.failure(t, error))?;
                 for (row, &register) in self.map.carried.outputs.iter().enumerate() {
                     matrix[row * free + column] = self.form.frame.d[register as usize];
                     if column == 0 {
@@ -157,7 +157,7 @@ impl ImplicitModel {
         reference.let_time_pass(t);
         let states = reference.code.layout.states as usize;
         reference.frame.d[states..states + dx.len()].copy_from_slice(&dx);
-        reference.frame.run_along(&map.of_known).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run_along(&map.of_known).map_err(|error| reference.failure(t, error))?;
         for (&i, &register) in map.known.iter().zip(&map.of_known.outputs) {
             if map.equations.differential[i] && !map.equations.explicit[i] {
                 yp[i] = reference.frame.d[register as usize];
@@ -171,7 +171,7 @@ impl ImplicitModel {
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.states as usize + self.map.unknown[column]] = 1.0;
                 let form = &mut self.form;
-                form.frame.run_along(&form.code.rates).map_err(|trouble| form.failure(t, trouble))?;
+                form.frame.run_along(&form.code.rates).map_err(|error| form.failure(t, error))?;
                 for (row, &i) in open.iter().enumerate() {
                     let register = form.code.rates.outputs[i] as usize;
                     matrix[row * columns + column] = form.frame.d[register];
@@ -261,7 +261,7 @@ impl ImplicitModel {
     /// The state of the reference from the unknowns, both in the mode that ends here.
     pub(super) fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place(t, y, yp);
-        self.form.frame.run(&self.map.of_states).map_err(|trouble| self.form.failure(t, trouble))?;
+        self.form.frame.run(&self.map.of_states).map_err(|error| self.form.failure(t, error))?;
         for (&k, &register) in self.map.states.iter().zip(&self.map.of_states.outputs) {
             self.x[k] = self.form.frame.r[register as usize];
         }
