@@ -1,13 +1,13 @@
 //! Registers and the code that runs on them.
 
-use super::abreast::{Abreast, Space};
+use super::block_batch::{BatchWorkspace, BlockBatches};
 use super::conditions::{Conditions, table_on};
 use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use super::lu::Lu;
 use super::newton::Newton;
 use super::piece_of;
 use super::registers::Layout;
-use super::wide::Lane;
+use super::wide::HasFrame;
 use halfarrow_compiler::algebra::Table1d;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::program::calculus::{Calculus, Plain};
@@ -57,9 +57,9 @@ pub(crate) struct Frame {
     time: u32,
     /// The code of the Newton block that is being solved, where it is not to be interpreted.
     pub inner: Option<Arc<dyn InnerCode>>,
-    /// Newton blocks of the routine that runs which are solved together.
-    pub abreast: Option<Arc<Abreast>>,
-    pub(super) space: Space,
+    /// Newton blocks of the routine that runs which are solved in batches.
+    pub batches: Option<Arc<BlockBatches>>,
+    pub(super) workspace: BatchWorkspace,
 }
 
 /// What a solve block needs.
@@ -105,8 +105,8 @@ impl Frame {
             tables: program.tables.clone(),
             time: layout.time,
             inner: None,
-            abreast: None,
-            space: Space::default(),
+            batches: None,
+            workspace: BatchWorkspace::default(),
         }
     }
 
@@ -121,15 +121,15 @@ impl Frame {
         }
     }
 
-    /// Makes room for Newton blocks that are solved together.
-    pub fn reserve_abreast(&mut self, abreast: &Abreast) {
-        self.space.reserve(abreast);
+    /// Makes room for batches of Newton blocks.
+    pub fn reserve_batches(&mut self, batches: &BlockBatches) {
+        self.workspace.reserve(batches);
     }
 
-    /// From now on Newton blocks are solved together where `abreast` says so, if it says anything.
-    pub fn begin(&mut self, abreast: Option<&Arc<Abreast>>) {
-        self.abreast = abreast.cloned();
-        self.space.turn += 1;
+    /// From now on Newton blocks are solved in these batches, if there are any.
+    pub fn begin(&mut self, batches: Option<&Arc<BlockBatches>>) {
+        self.batches = batches.cloned();
+        self.workspace.turn += 1;
     }
 
     /// Forgets what was kept for the old parameters.
@@ -341,7 +341,7 @@ impl Frame {
     }
 }
 
-impl Lane for Frame {
+impl HasFrame for Frame {
     fn frame(&mut self) -> &mut Frame {
         self
     }

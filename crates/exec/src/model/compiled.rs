@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::jacobian::JacobianCode;
 use super::jumps::Kept;
-use crate::bytecode::{Abreast, Layout, Routine};
+use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::program::{Cause, ConditionId, Entry, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::sync::Arc;
@@ -68,7 +68,7 @@ pub(super) struct Mode {
     pub jacobian: Option<JacobianCode>,
     pub sparsity: Sparsity,
     /// Newton blocks of the rates that are solved together.
-    pub abreast: Option<Arc<Abreast>>,
+    pub batches: Option<Arc<BlockBatches>>,
     /// Conditions of the state, whose operands are the event indicators.
     pub switching: Vec<ConditionId>,
     /// Computes these operands.
@@ -96,7 +96,7 @@ impl Mode {
             assumed: layout.routine(&program, &assumed),
             jacobian: entries.map(|entries| JacobianCode::new(&program, &layout, &sparsity, &entries)),
             sparsity,
-            abreast: Abreast::of(&program, &layout, &rates).map(Arc::new),
+            batches: BlockBatches::of(&program, &layout, &rates).map(Arc::new),
             rates,
             switching: of_state().map(|(id, _)| id).collect(),
             indicators: layout.routine(&program, &operands),

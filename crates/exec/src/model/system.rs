@@ -26,8 +26,8 @@ impl Model {
             What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
         };
         self.frame.begin(match what {
-            What::Rates => self.code.abreast.as_ref(),
-            What::Recorded => self.recorded.abreast.as_ref(),
+            What::Rates => self.code.batches.as_ref(),
+            What::Recorded => self.recorded.batches.as_ref(),
             What::Indicators | What::Jacobian => None,
         });
         match (self.codes.of(&self.recorded, what, along), along) {

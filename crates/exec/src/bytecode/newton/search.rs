@@ -33,7 +33,7 @@ impl Frame {
     /// Whether the root is known, or has been found in a batch of blocks of the same shape.
     fn has_root(&mut self, solve: &Solve) -> bool {
         if !self.is_fresh(solve) {
-            self.solve_abreast(solve);
+            self.solve_batch(solve);
             return self.is_fresh(solve);
         }
         true
