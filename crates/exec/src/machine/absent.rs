@@ -21,9 +21,9 @@ impl std::error::Error for MachineError {}
 
 /// There is none.
 #[derive(Debug)]
-pub(crate) enum Code {}
+pub(crate) enum MachineCode {}
 
-impl Code {
+impl MachineCode {
     pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), SolveError> {
         match *self {}
     }
@@ -39,7 +39,7 @@ impl Generator {
     pub fn new() -> Result<Generator, MachineError> {
         Err(MachineError::LeftOut)
     }
-    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<Code, MachineError> {
+    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<MachineCode, MachineError> {
         Err(MachineError::LeftOut)
     }
 }

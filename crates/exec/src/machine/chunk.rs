@@ -13,8 +13,8 @@ use halfarrow_compiler::program::elimination::{Definite, Elimination};
 use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Op};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is the same for all chunks of a model.
-pub(super) struct Setting<'a> {
+/// What all chunks of a model share.
+pub(super) struct ChunkContext<'a> {
     pub conditions: &'a Table<ConditionId, Condition>,
     /// The register of time: those below never move, constants and parameters.
     pub time: Register,
@@ -31,7 +31,7 @@ pub(super) struct Direct {
 
 /// What a chunk consists of.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Item<'a> {
+pub(super) enum ChunkItem<'a> {
     Op(&'a Operation),
     /// Stops if the pivot vanishes against its scale.
     Watch {
@@ -43,14 +43,14 @@ pub(super) enum Item<'a> {
     Solve(&'a Solve),
 }
 
-/// Translates items, then stores what is read later.
+/// Translates items, then stores the registers that are live behind them.
 pub(super) struct Chunk<'a, 'b> {
     w: Writer<'a>,
-    setting: &'b Setting<'b>,
+    context: &'b ChunkContext<'b>,
     along: bool,
     inline: bool,
     values: Value,
-    slopes: Value,
+    derivatives: Value,
     held: Value,
     tables: Value,
     keep: Value,
@@ -60,26 +60,32 @@ pub(super) struct Chunk<'a, 'b> {
     loaded: BTreeSet<Register>,
     /// 0, or the first thing that is wrong.
     status: Option<Value>,
-    /// Whether all usual ways hold.
+    /// Whether the fast path holds.
     good: Option<Value>,
     /// Truth values that stand in registers as 0 and 1.
     truth: BTreeMap<Value, Value>,
-    turns: BTreeMap<Value, (Value, Value)>,
+    sines_and_cosines: BTreeMap<Value, (Value, Value)>,
     kept: [Option<Value>; 2],
     direct: Option<Direct>,
 }
 
 impl<'a, 'b> Chunk<'a, 'b> {
     /// `parameters` are those of the function, as in [`memory`](super::memory).
-    pub fn new(w: Writer<'a>, parameters: [Value; 5], setting: &'b Setting<'b>, along: bool, inline: bool) -> Self {
-        let [values, slopes, held, tables, keep] = parameters;
+    pub fn new(
+        w: Writer<'a>,
+        parameters: [Value; 5],
+        context: &'b ChunkContext<'b>,
+        along: bool,
+        inline: bool,
+    ) -> Self {
+        let [values, derivatives, held, tables, keep] = parameters;
         Chunk {
             w,
-            setting,
+            context,
             along,
             inline,
             values,
-            slopes,
+            derivatives,
             held,
             tables,
             keep,
@@ -89,26 +95,26 @@ impl<'a, 'b> Chunk<'a, 'b> {
             status: None,
             good: None,
             truth: BTreeMap::new(),
-            turns: BTreeMap::new(),
+            sines_and_cosines: BTreeMap::new(),
             kept: [None; 2],
             direct: None,
         }
     }
 
-    /// From now on time and states are read where they are given.
+    /// From now on time and states are read from the arguments.
     pub fn reads_directly(&mut self, direct: Direct) {
         self.direct = Some(direct);
     }
 
-    pub fn item(&mut self, item: Item) {
+    pub fn item(&mut self, item: ChunkItem) {
         match item {
-            Item::Op(&Operation { out, op }) => self.operation(out, op),
-            Item::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
-            Item::Solve(solve) => self.solve(solve),
+            ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
+            ChunkItem::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
+            ChunkItem::Solve(solve) => self.solve(solve),
         }
     }
 
-    /// Stores what is read later, unless something is wrong or unusual, and returns the status.
+    /// Stores live registers unless something is wrong or unusual, and returns the status.
     pub fn end(mut self, live: impl Iterator<Item = Register>) -> Writer<'a> {
         self.stop_unless_fine();
         for register in live.filter(|r| !self.loaded.contains(r)).collect::<Vec<_>>() {
@@ -116,7 +122,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 self.w.store(self.values, register, value);
             }
             if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
-                self.w.store(self.slopes, register, slope);
+                self.w.store(self.derivatives, register, slope);
             }
         }
         self.fine()
@@ -171,7 +177,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 let (base, index) = (direct.states.1, register - direct.states.0.start);
                 self.w.load_fixed(base, index)
             }
-            _ if register < self.setting.states.end => self.w.load_fixed(self.values, register),
+            _ if register < self.context.states.end => self.w.load_fixed(self.values, register),
             _ => self.w.load(self.values, register),
         };
         self.r.insert(register, value);
@@ -180,13 +186,13 @@ impl<'a, 'b> Chunk<'a, 'b> {
     }
 
     fn slope(&mut self, register: Register) -> Value {
-        if !self.along || register < self.setting.time {
+        if !self.along || register < self.context.time {
             return self.w.number(0.0);
         }
         if let Some(&known) = self.d.get(&register) {
             return known;
         }
-        let slope = self.w.load(self.slopes, register);
+        let slope = self.w.load(self.derivatives, register);
         self.d.insert(register, slope);
         self.loaded.insert(register);
         slope
@@ -357,12 +363,12 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     /// Sine and cosine, shared by both.
     fn turn(&mut self, a: Value) -> (Value, Value) {
-        if let Some(&known) = self.turns.get(&a) {
+        if let Some(&known) = self.sines_and_cosines.get(&a) {
             return known;
         }
         let (sine, cosine, good) = self.w.sine_cosine(a);
         self.usual(good);
-        self.turns.insert(a, (sine, cosine));
+        self.sines_and_cosines.insert(a, (sine, cosine));
         (sine, cosine)
     }
 
@@ -386,7 +392,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
     }
 
     fn condition(&mut self, condition: ConditionId, operand: Value) -> Value {
-        let Condition { kind, cause, .. } = self.setting.conditions[condition];
+        let Condition { kind, cause, .. } = self.context.conditions[condition];
         let follow = match kind {
             ConditionKind::Sign => {
                 let (one, zero) = (self.w.number(1.0), self.zero());

@@ -16,18 +16,18 @@ mod kernels;
 mod live;
 mod memory;
 
-pub(crate) use code::Code;
+pub(crate) use code::MachineCode;
 
 use crate::bytecode::Register;
 use arithmetic::Writer;
-use chunk::{Chunk, Direct, Item, Setting};
+use chunk::{Chunk, ChunkContext, ChunkItem, Direct};
 use cranelift_codegen::control::ControlPlane;
 use cranelift_codegen::ir::{AbiParam, Function, Signature, Type, UserFuncName, Value, types};
 use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::Configurable;
 use cranelift_codegen::{Context, settings};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
-use memory::{Gathered, Start};
+use memory::{CodeBuffer, EntryPoint};
 use std::fmt;
 
 /// Something is unusual: the bytecode is to run the chunk.
@@ -92,12 +92,12 @@ impl Generator {
     /// The function of a chunk; `live` are the registers that are read after it.
     fn chunk(
         &mut self,
-        into: &mut Gathered,
-        setting: &Setting,
-        items: &[Item],
+        into: &mut CodeBuffer,
+        setting: &ChunkContext,
+        items: &[ChunkItem],
         live: &[Register],
         (along, inline): (bool, bool),
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         self.function(into, &[types::I64; 5], |writer, arguments| {
             let arguments = std::array::from_fn(|i| arguments[i]);
             let mut chunk = Chunk::new(writer, arguments, setting, along, inline);
@@ -109,12 +109,12 @@ impl Generator {
     /// The function of a routine of one chunk that reads time and states, and writes what is wanted, where it is told.
     fn rates(
         &mut self,
-        into: &mut Gathered,
-        setting: &Setting,
-        items: &[Item],
+        into: &mut CodeBuffer,
+        setting: &ChunkContext,
+        items: &[ChunkItem],
         outputs: &[Register],
         inline: bool,
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         let mut kinds = [types::I64; 7];
         kinds[6] = types::F64;
         self.function(into, &kinds, |writer, arguments| {
@@ -129,10 +129,10 @@ impl Generator {
 
     fn function(
         &mut self,
-        into: &mut Gathered,
+        into: &mut CodeBuffer,
         kinds: &[Type],
         body: impl for<'f> FnOnce(Writer<'f>, &[Value]) -> Writer<'f>,
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         let convention = self.isa.default_call_conv();
         let mut signature = Signature::new(convention);
         signature.params.extend(kinds.iter().map(|&kind| AbiParam::new(kind)));

@@ -3,7 +3,7 @@
 use super::compiled::Mode;
 use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
-use crate::machine::Code;
+use crate::machine::MachineCode;
 use halfarrow_compiler::program::{BlockId, Value};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(super) struct Recorded {
     /// Newton blocks that it needs and no rate does.
     pub blocks: Vec<BlockId>,
     /// Its machine code, where it has been made.
-    pub code: Option<Arc<Code>>,
+    pub code: Option<Arc<MachineCode>>,
 }
 
 impl Recorded {
