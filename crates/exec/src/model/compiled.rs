@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::jacobian::JacobianCode;
-use super::jumps::Kept;
+use super::jumps::ConservedSums;
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::program::{Cause, ConditionId, Entry, Program, Value};
 use halfarrow_sim::Sparsity;
@@ -77,7 +77,7 @@ pub(super) struct Mode {
     /// Computes what is delayed or sampled.
     pub sources: Routine,
     /// States that jump with a source, if there are any.
-    pub kept: Option<Kept>,
+    pub kept: Option<ConservedSums>,
 }
 
 impl Mode {
@@ -102,7 +102,7 @@ impl Mode {
             indicators: layout.routine(&program, &operands),
             clock: Clock::new(&program, &layout),
             sources: layout.routine(&program, &sources),
-            kept: Kept::of(&program, &layout),
+            kept: ConservedSums::of(&program, &layout),
             layout,
             program,
         }
@@ -111,7 +111,12 @@ impl Mode {
     /// Everything that runs on registers.
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
         let Mode { rates, preamble, assumed, sources, indicators, clock, .. } = self;
-        let more = self.jacobian.as_ref().map(|j| &j.routine).into_iter().chain(self.kept.as_ref().map(Kept::routine));
+        let more = self
+            .jacobian
+            .as_ref()
+            .map(|j| &j.routine)
+            .into_iter()
+            .chain(self.kept.as_ref().map(ConservedSums::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

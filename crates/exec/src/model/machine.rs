@@ -1,7 +1,7 @@
 //! Which routines of a model run as machine code.
 
 use super::Model;
-use super::inputs::Signal;
+use super::inputs::InputSignal;
 use super::recorded::Recorded;
 use super::system::What;
 use crate::machine::{Generator, MachineCode, MachineError};
@@ -37,7 +37,7 @@ impl Model {
         if self.codes.rates.is_none() {
             return false;
         }
-        if !self.run.held.is_empty() || self.inputs().iter().any(Signal::moves) {
+        if !self.run.delays_and_samples.is_empty() || self.inputs().iter().any(InputSignal::moves) {
             self.place_time(t);
         }
         let Model { codes, frame, code, run, .. } = self;

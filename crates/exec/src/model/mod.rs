@@ -39,7 +39,7 @@ use crate::bytecode::{Frame, Hold, SolveError};
 use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
-use inputs::Signal;
+use inputs::InputSignal;
 use machine::Codes;
 use memory::{DelayOrSample, Remembered};
 use recorded::Recorded;
@@ -107,7 +107,7 @@ impl Model {
             clock_event: None,
             conserved: vec![0.0; code.program.conserved.len()],
             scales: vec![0.0; n],
-            held: Vec::new(),
+            delays_and_samples: Vec::new(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -252,7 +252,7 @@ impl Model {
         self.run.pieces.fill(None);
         self.place_constant_inputs();
         self.forget_solutions();
-        self.run.held = self.empty_held();
+        self.run.delays_and_samples = self.empty_delays_and_samples();
     }
 
     fn follow(&mut self) {
@@ -302,7 +302,7 @@ impl Model {
     }
 
     /// What is connected to the inputs.
-    fn inputs(&self) -> &[Signal] {
+    fn inputs(&self) -> &[InputSignal] {
         &self.setup.given(self.run.mode).inputs
     }
 
@@ -321,7 +321,7 @@ impl Model {
         for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
             frame.r[layout.inputs as usize + i] = signal.at(t, *piece).0;
         }
-        for (i, held) in run.held.iter().enumerate() {
+        for (i, held) in run.delays_and_samples.iter().enumerate() {
             frame.r[layout.held as usize + i] = match held {
                 DelayOrSample::Delay(delay) => delay.at(t, run.crossed).0,
                 DelayOrSample::Sample(sample) => sample.value,

@@ -4,7 +4,7 @@ use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, SolveError};
 use halfarrow_sim::{Failure, Sparsity, System};
 
-/// How far beside a state the slope is taken where it is infinite: this part of the state and of its change in a second.
+/// How far beside a state the derivative is taken where it is infinite: this part of the state and of its change in a second.
 const BESIDE: f64 = 1e-8;
 
 /// Which routine is run.
@@ -39,7 +39,7 @@ impl Model {
         Ok(routine.outputs.iter().all(|&out| registers[out as usize].is_finite()))
     }
 
-    /// Runs a routine with conditions as held. Beyond a switch the held branch may have no value any more: then the
+    /// Runs a routine with conditions as held. Beyond a zero crossing the held branch may have no value any more: then the
     /// conditions are followed instead.
     pub(super) fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
         let first = self.once(what, along);
@@ -76,7 +76,7 @@ impl Model {
         for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
             frame.d[layout.inputs as usize + i] = signal.at(t, *piece).1;
         }
-        for (i, held) in run.held.iter().enumerate() {
+        for (i, held) in run.delays_and_samples.iter().enumerate() {
             let slope = if let DelayOrSample::Delay(delay) = held { delay.at(t, run.crossed).1 } else { 0.0 };
             frame.d[layout.held as usize + i] = slope;
         }
@@ -95,7 +95,7 @@ impl Model {
         self.derivative_along(t, x, jv)
     }
 
-    /// Derivative of the rates along the direction that is set. Where the slope of a law is infinite it is that a little
+    /// Derivative of the rates along the direction that is set. Where the derivative of a law is infinite it is that a little
     /// beside.
     fn derivative_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;

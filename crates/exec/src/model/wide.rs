@@ -158,6 +158,6 @@ impl WideSystem for WideModel {
 
     fn remembers(&self) -> bool {
         let newton = |routine: &Routine| routine.solves.iter().any(|solve| !solve.guess.is_empty());
-        newton(&self.code.rates) || newton(&self.recorded.routine) || !self.models[0].run.held.is_empty()
+        newton(&self.code.rates) || newton(&self.recorded.routine) || !self.models[0].run.delays_and_samples.is_empty()
     }
 }

@@ -58,7 +58,7 @@ impl ImplicitModel {
         reference.frame.run(&map.common_there).map_err(|error| reference.failure(t, error))?;
         let wanted: Vec<f64> = map.common_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
         let (rows, columns) = (wanted.len(), self.map.unknown.len());
-        let (mut matrix, mut miss) = (vec![0.0; rows * columns], vec![0.0; rows]);
+        let (mut matrix, mut residual) = (vec![0.0; rows * columns], vec![0.0; rows]);
         let still = vec![0.0; y.len()];
         self.map.unknown.iter().for_each(|&i| y[i] = 0.0);
         let mut before = f64::INFINITY;
@@ -70,7 +70,7 @@ impl ImplicitModel {
                 self.form.frame.run_along(&self.map.common).map_err(|error| self.form.failure(t, error))?;
                 for (row, &register) in self.map.common.outputs.iter().enumerate() {
                     matrix[row * columns + column] = self.form.frame.d[register as usize];
-                    miss[row] = self.form.frame.r[register as usize] - wanted[row];
+                    residual[row] = self.form.frame.r[register as usize] - wanted[row];
                 }
             }
             // What does not read them, or only by what rounding leaves of terms that cancel, says nothing about them.
@@ -80,14 +80,14 @@ impl ImplicitModel {
             }
             for row in 0..rows {
                 let slopes = &mut matrix[row * columns..][..columns];
-                let good = miss[row].is_finite() && slopes.iter().all(|s| s.is_finite());
+                let good = residual[row].is_finite() && slopes.iter().all(|s| s.is_finite());
                 if !good || slopes.iter().zip(&greatest).all(|(s, most)| s.abs() <= CANCELLED * most) {
                     slopes.fill(0.0);
-                    miss[row] = 0.0;
+                    residual[row] = 0.0;
                 }
             }
             // Most of what they carry is linear in them: the second step is rounding then.
-            let Some(step) = minimum_norm::step(&matrix, &miss, columns) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, columns) else { break };
             let relative = |(&i, s): (&usize, &f64)| s.abs() / y[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
             let length = self.map.unknown.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
             if !length.is_finite() || length < NOISE && length >= 0.5 * before {
@@ -165,7 +165,7 @@ impl ImplicitModel {
         }
         let columns = self.map.unknown.len();
         for _ in 0..if columns == 0 { 0 } else { REFINEMENTS } {
-            let (mut matrix, mut miss) = (vec![0.0; open.len() * columns], vec![0.0; open.len()]);
+            let (mut matrix, mut residual) = (vec![0.0; open.len() * columns], vec![0.0; open.len()]);
             for column in 0..columns {
                 self.place(t, y, yp);
                 self.form.still();
@@ -175,10 +175,10 @@ impl ImplicitModel {
                 for (row, &i) in open.iter().enumerate() {
                     let register = form.code.rates.outputs[i] as usize;
                     matrix[row * columns + column] = form.frame.d[register];
-                    miss[row] = form.frame.r[register];
+                    residual[row] = form.frame.r[register];
                 }
             }
-            let Some(step) = minimum_norm::step(&matrix, &miss, columns) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, columns) else { break };
             self.map.unknown.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);
         }
         let mut out = vec![0.0; n];
@@ -225,7 +225,7 @@ impl ImplicitModel {
         let mut before = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             self.run_rates(t, &whole, &rates, &mut out)?;
-            let miss: Vec<f64> = rows.iter().map(|&row| out[row]).collect();
+            let residual: Vec<f64> = rows.iter().map(|&row| out[row]).collect();
             let k = rows.len();
             let mut matrix = vec![0.0; k * k];
             for (column, &unknown) in rows.iter().enumerate() {
@@ -237,7 +237,7 @@ impl ImplicitModel {
                 along[unknown] = 0.0;
                 (0..k).for_each(|row| matrix[row * k + column] = slope[rows[row]]);
             }
-            let Some(step) = minimum_norm::step(&matrix, &miss, k) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, k) else { break };
             let length = step.step.iter().map(|s| s.abs()).fold(0.0, f64::max);
             if step.rank < k {
                 // Rates that the equations hold only differentiated.
