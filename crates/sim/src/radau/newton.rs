@@ -50,7 +50,7 @@ impl Radau {
                 let growth = size / before;
                 self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
                 growth_before = growth;
-                self.foresee(size, MOST_ITERATIONS - 1 - iteration)?;
+                self.predict_convergence(size, MOST_ITERATIONS - 1 - iteration)?;
             }
             if !size.is_finite() {
                 return Err(StepError::Slow { shorten: 0.5 });
@@ -68,7 +68,7 @@ impl Radau {
     }
 
     /// Whether `remaining` more iterations will do after a correction of this size.
-    fn foresee(&mut self, size: f64, remaining: usize) -> Result<(), StepError> {
+    fn predict_convergence(&mut self, size: f64, remaining: usize) -> Result<(), StepError> {
         let rate = self.newton.rate;
         if rate.is_nan() || rate >= DIVERGENT {
             return Err(StepError::Slow { shorten: 0.5 });

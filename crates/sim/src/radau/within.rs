@@ -11,7 +11,7 @@ const ALLOWED: f64 = 0.5;
 
 impl Radau {
     /// Unknowns at a time inside the last step, by its polynomial.
-    pub(crate) fn between(&self, t: f64, y: &mut [f64]) {
+    pub(crate) fn interpolate(&self, t: f64, y: &mut [f64]) {
         if t >= self.t { y.copy_from_slice(&self.y) } else { self.last.state(t, y) }
     }
 
