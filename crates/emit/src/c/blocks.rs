@@ -6,7 +6,7 @@ use halfarrow_compiler::program::elimination::Definite;
 use halfarrow_compiler::program::{Block, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
 
-use super::slopes::Expressions;
+use super::derivatives::Expressions;
 use super::write::{Body, Reading, Writer};
 use crate::Real;
 

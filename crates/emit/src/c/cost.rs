@@ -16,7 +16,7 @@ const EVALUATIONS_AT_JUMPS: u64 = 20_000 + 400;
 
 /// What a function does.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Work {
+pub(super) struct OperationCount {
     /// Additions, products, comparisons.
     pub operations: u64,
     /// Divisions and square roots.
@@ -29,10 +29,10 @@ pub(super) struct Work {
     pub newton: Vec<(BlockId, u64, u64)>,
 }
 
-impl Work {
+impl OperationCount {
     /// What code does.
-    pub fn of(program: &Program, code: &Code) -> Work {
-        let mut work = Work::default();
+    pub fn of(program: &Program, code: &Code) -> OperationCount {
+        let mut work = OperationCount::default();
         for step in &code.steps {
             match step {
                 Step::Op { op, .. } => work.count(*op),
@@ -62,7 +62,7 @@ impl Work {
                 self.operations += elimination(n);
             }
             Method::Newton { code, .. } => {
-                let one = Work::of(program, code);
+                let one = OperationCount::of(program, code);
                 let one = one.operations + one.divisions + one.calls;
                 self.newton.push((solve.block, 1, one + elimination(n) + 20 * n as u64));
             }
@@ -70,8 +70,8 @@ impl Work {
     }
 
     /// The same with derivatives beside the values.
-    pub fn along(self) -> Work {
-        Work { operations: 4 * self.operations, divisions: 3 * self.divisions, calls: 2 * self.calls, ..self }
+    pub fn along(self) -> OperationCount {
+        OperationCount { operations: 4 * self.operations, divisions: 3 * self.divisions, calls: 2 * self.calls, ..self }
     }
 
     fn newton_solves(&self) -> u64 {
@@ -94,9 +94,9 @@ fn elimination(n: usize) -> u64 {
     }
 }
 
-impl Add for Work {
-    type Output = Work;
-    fn add(mut self, other: Work) -> Work {
+impl Add for OperationCount {
+    type Output = OperationCount;
+    fn add(mut self, other: OperationCount) -> OperationCount {
         self.operations += other.operations;
         self.divisions += other.divisions;
         self.calls += other.calls;
@@ -111,9 +111,9 @@ impl Add for Work {
     }
 }
 
-impl Mul<u64> for Work {
-    type Output = Work;
-    fn mul(mut self, n: u64) -> Work {
+impl Mul<u64> for OperationCount {
+    type Output = OperationCount;
+    fn mul(mut self, n: u64) -> OperationCount {
         self.operations *= n;
         self.divisions *= n;
         self.calls *= n;
@@ -154,7 +154,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    pub(super) fn new(step: Work, jump: Work, plan: &Plan) -> Cost {
+    pub(super) fn new(step: OperationCount, jump: OperationCount, plan: &Plan) -> Cost {
         let s = &plan.sizes;
         let jumps = !(plan.export.program.held.is_empty() && plan.export.program.conditions.is_empty());
         let implicit = plan.export.method == crate::Method::ImplicitMidpoint;

@@ -9,9 +9,9 @@ use halfarrow_compiler::program::{
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::blocks::Factored;
+use super::derivatives::{Expressions, expression, power};
 use super::givens::Givens;
 use super::header::comment;
-use super::slopes::{Expressions, expression, power};
 use super::variables::Variables;
 use crate::Real;
 
