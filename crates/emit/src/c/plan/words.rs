@@ -272,7 +272,7 @@ fn tableau(method: Method) -> (String, String) {
 /// What linearly implicit methods have besides: γ, parts of the derivative by time, weights of earlier stages on the right
 /// side of each, and which stages stand where the one before does.
 fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
-    let (gamma, drifts, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
+    let (gamma, time_weights, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
         Method::Rosenbrock => (
             0.5,
             &[0.5, 1.5, 0.0, 0.0],
@@ -284,7 +284,7 @@ fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
     let repeats: Vec<&str> = repeats.iter().map(|&repeats| if repeats { "1" } else { "0" }).collect();
     [
         ("GAMMA", number(gamma)),
-        ("DRIFTS", list(drifts)),
+        ("TIME_WEIGHTS", list(time_weights)),
         ("RIGHT_WEIGHTS", rows(&right)),
         ("REPEATS", repeats.join(", ")),
     ]

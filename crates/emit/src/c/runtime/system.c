@@ -223,7 +223,7 @@ int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double 
 //end
 //if time_derivative
 /* Derivatives of the rates by time, states and inputs at rest. */
-static int ha_drift(ha_model *m, ha_wide t, const double *x, double *dv)
+static int ha_time_derivative(ha_model *m, ha_wide t, const double *x, double *dv)
 {
     ha_let_time_pass(m, t);
 //if held
