@@ -94,7 +94,7 @@ fn indices_at(rows: &[Linear], states: &[State], algebraic: &[Algebraic]) -> Ind
 
 /// What a form promises of its unknowns: multipliers hold relations among states, break variables among themselves.
 fn promised_indices(states: &[State], algebraic: &[Algebraic]) -> Vec<u8> {
-    let of = |a: &Algebraic| if matches!(a.cause, super::Cause::Multiplier(_)) { 2 } else { 1 };
+    let of = |a: &Algebraic| if matches!(a.cause, super::AlgebraicRole::Multiplier(_)) { 2 } else { 1 };
     states.iter().map(|_| 1).chain(algebraic.iter().map(of)).collect()
 }
 

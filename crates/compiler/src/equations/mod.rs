@@ -178,14 +178,14 @@ pub struct Algebraic {
     /// Its name: `R1.e`, `ZCx.e`.
     pub name: String,
     /// What it is there for.
-    pub cause: Cause,
+    pub cause: AlgebraicRole,
     /// SI unit, where known.
     pub unit: Option<Unit>,
 }
 
 /// What an algebraic unknown is there for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum AlgebraicRole {
     /// It opens a loop of variables: the loop closes where the residual vanishes.
     Break,
     /// It is the law of an element that gives no value to what the element sets.

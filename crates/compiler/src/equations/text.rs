@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Cause, Dependent, DisplayEquation, Shown, ShownDefinition, Step, places};
+use super::{AlgebraicRole, Dependent, DisplayEquation, Shown, ShownDefinition, Step, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
     unicode_name,
@@ -85,9 +85,9 @@ pub fn print_form(shown: &Shown) -> String {
     for unknown in &equations.algebraic {
         let element = |e: ElementId| &equations.graph.elements[e].name;
         let cause = match unknown.cause {
-            Cause::Break => "break variable".to_string(),
-            Cause::Law(e) => format!("law of {}", element(e)),
-            Cause::Multiplier(e) => format!("multiplier of {}", element(e)),
+            AlgebraicRole::Break => "break variable".to_string(),
+            AlgebraicRole::Law(e) => format!("law of {}", element(e)),
+            AlgebraicRole::Multiplier(e) => format!("multiplier of {}", element(e)),
         };
         text += &format!("  {}  {cause}{}\n", unknown.name, higher());
     }

@@ -333,7 +333,7 @@ pub struct Condition {
     /// How it decides.
     pub kind: ConditionKind,
     /// When it may change.
-    pub cause: Cause,
+    pub trigger: EventTrigger,
 }
 
 /// How a condition decides.
@@ -349,15 +349,15 @@ pub enum ConditionKind {
 
 /// What moves a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum EventTrigger {
     /// Time alone, and between two changes of other conditions in a straight line: its next change has a closed form.
-    Clock,
+    LinearTime,
     /// Time alone, along some other curve.
-    Curve,
+    CurvedTime,
     /// States, inputs or held signals; rates read it.
     State,
     /// States, inputs or held signals, but no rate reads it: it needs no event.
-    Shown,
+    RecordedOnly,
 }
 
 /// A solve block.

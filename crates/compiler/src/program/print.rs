@@ -1,7 +1,7 @@
 //! A program as text: `%1` is a value of a routine, `$1` one of parameters alone, `.1` one within a Newton block, `?1` the
 //! guess of an unknown there.
 
-use super::{Arg, Block, Cause, Code, Method, Op, Program, Routine, Solve, Step, Value};
+use super::{Arg, Block, Code, EventTrigger, Method, Op, Program, Routine, Solve, Step, Value};
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::fmt;
@@ -117,13 +117,13 @@ impl Program {
         }
         writeln!(f, "\nconditions")?;
         for (id, condition) in self.conditions.iter() {
-            let cause = match condition.cause {
-                Cause::Clock => "of time, in closed form",
-                Cause::Curve => "of time, searched",
-                Cause::State => "of the state",
-                Cause::Shown => "of the state, for what is recorded",
+            let trigger = match condition.trigger {
+                EventTrigger::LinearTime => "of time, in closed form",
+                EventTrigger::CurvedTime => "of time, searched",
+                EventTrigger::State => "of the state",
+                EventTrigger::RecordedOnly => "of the state, for what is recorded",
             };
-            writeln!(f, "    c{}: {:?}, {cause}", id.index(), condition.kind)?;
+            writeln!(f, "    c{}: {:?}, {trigger}", id.index(), condition.kind)?;
         }
         Ok(())
     }

@@ -6,8 +6,9 @@ use super::op::Op;
 use super::sharing::share;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
-    Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of, verify,
+    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, Domain, EventTrigger, Held, Holds, Implicit,
+    Input, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
+    verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
@@ -518,39 +519,39 @@ enum Degree {
 
 fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
     let degrees = degrees(program);
-    let mut causes: Vec<Cause> = Vec::new();
+    let mut triggers: Vec<EventTrigger> = Vec::new();
     for condition in program.conditions.values() {
         let reads = program.values.reads(condition.operand);
-        causes.push(match degrees[condition.operand.index()] {
-            _ if reads.includes(Reads::STATE) => Cause::Shown,
-            Degree::Curve => Cause::Curve,
-            _ => Cause::Clock,
+        triggers.push(match degrees[condition.operand.index()] {
+            _ if reads.includes(Reads::STATE) => EventTrigger::RecordedOnly,
+            Degree::Curve => EventTrigger::CurvedTime,
+            _ => EventTrigger::LinearTime,
         });
     }
-    let shown = |cause: &mut Cause| {
-        if *cause == Cause::Shown {
-            *cause = Cause::State;
+    let shown = |trigger: &mut EventTrigger| {
+        if *trigger == EventTrigger::RecordedOnly {
+            *trigger = EventTrigger::State;
             return true;
         }
         false
     };
     kinks.iter().for_each(|c| {
-        shown(&mut causes[c.index()]);
+        shown(&mut triggers[c.index()]);
     });
     let mut roots: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
     roots.extend(program.held.iter().map(|h| h.source));
     loop {
-        let events = program.conditions.iter().filter(|(id, _)| causes[id.index()] == Cause::State);
+        let events = program.conditions.iter().filter(|(id, _)| triggers[id.index()] == EventTrigger::State);
         roots.extend(events.map(|(_, c)| c.operand));
         let live = program.live(&roots, false);
         let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| op.condition());
         // Not short-circuited: all of them are marked.
-        if used.filter(|c| shown(&mut causes[c.index()])).count() == 0 {
+        if used.filter(|c| shown(&mut triggers[c.index()])).count() == 0 {
             break;
         }
     }
     program.conditions.iter_mut().for_each(|(id, condition): (ConditionId, &mut Condition)| {
-        condition.cause = causes[id.index()];
+        condition.trigger = triggers[id.index()];
     });
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{
-    Arg, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Step, Value,
+    Arg, BlockId, Code, ConditionId, ConditionKind, EventTrigger, Local, Method, Op, Program, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -259,7 +259,7 @@ impl<'a> Writer<'a> {
 
     /// Whether a condition is taken with the rate of its operand: only what time alone moves is.
     fn takes_rate(&self, condition: ConditionId, moving: Moving) -> bool {
-        moving.time.is_some() && self.program.conditions[condition].cause != Cause::State
+        moving.time.is_some() && self.program.conditions[condition].trigger != EventTrigger::State
     }
 
     fn outputs(&self, f: &mut Body, code: &Code, (values, rates): (&[String], &[String]), chunks: usize) {
@@ -462,10 +462,10 @@ impl<'a> Writer<'a> {
 
     fn condition(&self, f: &Body, id: ConditionId, a: &str, d: Option<&str>) -> String {
         let condition = &self.program.conditions[id];
-        let hold = match condition.cause {
-            Cause::Clock | Cause::Curve => "m->clock_hold",
-            Cause::State => "m->state_hold",
-            Cause::Shown => "HA_FOLLOW",
+        let hold = match condition.trigger {
+            EventTrigger::LinearTime | EventTrigger::CurvedTime => "m->clock_hold",
+            EventTrigger::State => "m->state_hold",
+            EventTrigger::RecordedOnly => "HA_FOLLOW",
         };
         let (name, table) = match condition.kind {
             ConditionKind::Sign => ("side", String::new()),

@@ -10,7 +10,7 @@ use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::ids::Table;
 use halfarrow_compiler::program::calculus::{Calculus, Moving};
 use halfarrow_compiler::program::elimination::{Definite, Elimination};
-use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Op};
+use halfarrow_compiler::program::{Condition, ConditionId, ConditionKind, EventTrigger, Op};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What all chunks of a model share.
@@ -392,13 +392,13 @@ impl<'a, 'b> Chunk<'a, 'b> {
     }
 
     fn condition(&mut self, condition: ConditionId, operand: Value) -> Value {
-        let Condition { kind, cause, .. } = self.context.conditions[condition];
+        let Condition { kind, trigger, .. } = self.context.conditions[condition];
         let follow = match kind {
             ConditionKind::Sign => {
                 let (one, zero) = (self.w.number(1.0), self.zero());
                 let above = self.w.is(FloatCC::GreaterThan, operand, zero);
                 let value = self.w.choose(above, one, zero);
-                if cause == Cause::Shown {
+                if trigger == EventTrigger::RecordedOnly {
                     self.truth.insert(value, above);
                 }
                 value
@@ -409,17 +409,17 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 self.call_kernel(kernels::piece(), &[self.tables, table, operand])
             }
         };
-        let Some(kept) = self.kept(cause) else { return follow };
+        let Some(kept) = self.kept(trigger) else { return follow };
         let held = self.w.load(self.held, condition.0);
         self.w.choose(kept, held, follow)
     }
 
-    /// Whether conditions of this cause are kept; `None` if they always follow.
-    fn kept(&mut self, cause: Cause) -> Option<Value> {
-        let place = match cause {
-            Cause::Clock | Cause::Curve => 0,
-            Cause::State => 1,
-            Cause::Shown => return None,
+    /// Whether conditions of this trigger are kept; `None` if they always follow.
+    fn kept(&mut self, trigger: EventTrigger) -> Option<Value> {
+        let place = match trigger {
+            EventTrigger::LinearTime | EventTrigger::CurvedTime => 0,
+            EventTrigger::State => 1,
+            EventTrigger::RecordedOnly => return None,
         };
         if self.kept[place].is_none() {
             let bit = self.w.builder.ins().band_imm_s(self.keep, 1 << place);

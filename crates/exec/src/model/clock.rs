@@ -2,7 +2,7 @@
 
 use crate::bytecode::{Frame, Hold};
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Cause, ConditionId, Program, Value};
+use halfarrow_compiler::program::{ConditionId, EventTrigger, Program, Value};
 
 /// Evaluations in one search for a zero crossing; at its end the run makes a stop at which nothing changes.
 const SEARCH: usize = 4000;
@@ -13,7 +13,7 @@ const SHALLOW: f64 = 1e-9;
 /// Conditions of time, in an order in which each reads those before it.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
-    conditions: Vec<(ConditionId, Cause)>,
+    conditions: Vec<(ConditionId, EventTrigger)>,
     /// Computes their operands.
     routine: Routine,
     time: usize,
@@ -21,8 +21,11 @@ pub(super) struct Clock {
 
 impl Clock {
     pub fn new(program: &Program, layout: &Layout) -> Clock {
-        let timed = program.conditions.iter().filter(|(_, c)| matches!(c.cause, Cause::Clock | Cause::Curve));
-        let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.cause), c.operand)).unzip();
+        let timed = program
+            .conditions
+            .iter()
+            .filter(|(_, c)| matches!(c.trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime));
+        let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.trigger), c.operand)).unzip();
         let routine = layout.routine(program, &operands);
         Clock { conditions, routine, time: layout.time as usize }
     }
@@ -44,7 +47,8 @@ impl Clock {
         }
         frame.conditions.clock = Hold::Keep;
         let lines = self.next_on_linear(frame, t);
-        let curves: Vec<usize> = (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
+        let curves: Vec<usize> =
+            (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == EventTrigger::CurvedTime).collect();
         let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
         *next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);
@@ -64,9 +68,9 @@ impl Clock {
     fn next_on_linear(&self, frame: &mut Frame, t: f64) -> Option<f64> {
         self.evaluate(frame, 0.0);
         let mut next: Option<f64> = None;
-        for (&(condition, cause), &register) in self.conditions.iter().zip(&self.routine.outputs) {
+        for (&(condition, trigger), &register) in self.conditions.iter().zip(&self.routine.outputs) {
             let (start, slope) = (frame.r[register as usize], frame.d[register as usize]);
-            if cause != Cause::Clock || slope == 0.0 {
+            if trigger != EventTrigger::LinearTime || slope == 0.0 {
                 continue;
             }
             let border = frame.conditions.borders(condition, &frame.tables)[usize::from(slope > 0.0)];

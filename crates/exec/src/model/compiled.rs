@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
 use crate::bytecode::{BlockBatches, Layout, Routine};
-use halfarrow_compiler::program::{Cause, ConditionId, Entry, Program, Value};
+use halfarrow_compiler::program::{ConditionId, Entry, EventTrigger, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::sync::Arc;
 
@@ -87,7 +87,7 @@ impl Mode {
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = layout.watched_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
-        let of_state = || program.conditions.iter().filter(|(_, c)| c.cause == Cause::State);
+        let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);

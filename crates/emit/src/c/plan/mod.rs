@@ -7,8 +7,8 @@ use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program;
 use halfarrow_compiler::program::{
-    Assumption, Block, BlockId, Cause, Code, ConditionId, ConditionKind, DomainKind, Holds, Program, Reads, Routine,
-    Value,
+    Assumption, Block, BlockId, Code, ConditionId, ConditionKind, DomainKind, EventTrigger, Holds, Program, Reads,
+    Routine, Value,
 };
 
 use super::blocks::elimination_room;
@@ -118,16 +118,16 @@ fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value
 impl<'a> Plan<'a> {
     pub fn new(export: &'a Export<'a>, name: &str) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
-        let of = |wanted: fn(Cause) -> bool| -> Vec<ConditionId> {
-            program.conditions.iter().filter(|(_, c)| wanted(c.cause)).map(|(id, _)| id).collect()
+        let of = |wanted: fn(EventTrigger) -> bool| -> Vec<ConditionId> {
+            program.conditions.iter().filter(|(_, c)| wanted(c.trigger)).map(|(id, _)| id).collect()
         };
         let mut plan = Plan {
             export,
             program,
             name: name.to_string(),
             functions: String::new(),
-            switches: of(|cause| cause == Cause::State),
-            clocks: of(|cause| matches!(cause, Cause::Clock | Cause::Curve)),
+            switches: of(|trigger| trigger == EventTrigger::State),
+            clocks: of(|trigger| matches!(trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime)),
             delays: delays(export)?,
             samples: held(program, HeldKind::Sample),
             newton: Vec::new(),
@@ -420,7 +420,7 @@ impl<'a> Plan<'a> {
             floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
             piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
             clocks: !self.clocks.is_empty(),
-            curves: self.clocks.iter().any(|&c| p.conditions[c].cause == Cause::Curve),
+            curves: self.clocks.iter().any(|&c| p.conditions[c].trigger == EventTrigger::CurvedTime),
             switches: !self.switches.is_empty(),
             held,
             delays: !self.delays.is_empty(),
@@ -518,7 +518,9 @@ impl<'a> Plan<'a> {
         };
         step = step + followed.clone() + sources.clone();
         let held = self.program.held.len() as u64;
-        let curves = self.clocks.iter().filter(|&&c| self.program.conditions[c].cause == Cause::Curve).count() as u64;
+        let curves =
+            self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()
+                as u64;
         let looks = 2 + curves * (2 * 4000 + 4 * 2200);
         let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
         let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::{Outside, math};
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, ConditionKind};
+use halfarrow_compiler::program::{BlockId, ConditionId, ConditionKind, EventTrigger};
 
 use super::super::start::Group;
 use super::super::write::{number, numbers};
@@ -55,7 +55,7 @@ impl Plan<'_> {
                 lines(
                     self.clocks
                         .iter()
-                        .map(|&c| u8::from(program.conditions[c].cause == Cause::Clock).to_string())
+                        .map(|&c| u8::from(program.conditions[c].trigger == EventTrigger::LinearTime).to_string())
                         .collect(),
                 ),
             ),
