@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::definitions::Definitions;
-use super::{Algebraic, State, StateKind, Step};
+use super::{Algebraic, EquationStep, State, StateKind};
 use crate::algebra::{Expr, Symbol};
 use crate::causal_paths::Count;
 use crate::causal_paths::numeric::{Row, arbitrary, rank};
@@ -40,7 +40,7 @@ pub fn indices(
     d: &mut Definitions,
     states: &[State],
     algebraic: &[Algebraic],
-    steps: &[Step],
+    steps: &[EquationStep],
     residuals: &[Expr],
 ) -> Indices {
     let n = states.len() + algebraic.len();
@@ -143,7 +143,7 @@ pub fn cancelling(
     d: &mut Definitions,
     states: &[State],
     algebraic: &[Algebraic],
-    steps: &[Step],
+    steps: &[EquationStep],
     residuals: &[Expr],
 ) -> Vec<usize> {
     if residuals.is_empty() || states.len() + algebraic.len() > EXAMINED {
@@ -164,7 +164,13 @@ struct Linearised<'d, 'a> {
 }
 
 impl<'d, 'a> Linearised<'d, 'a> {
-    fn of(d: &'d mut Definitions<'a>, size: f64, states: &[State], algebraic: &[Algebraic], steps: &[Step]) -> Self {
+    fn of(
+        d: &'d mut Definitions<'a>,
+        size: f64,
+        states: &[State],
+        algebraic: &[Algebraic],
+        steps: &[EquationStep],
+    ) -> Self {
         let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), size, good: true };
         let unknowns = states.iter().map(|s| s.symbol).chain(algebraic.iter().map(|a| a.symbol));
         for (i, symbol) in unknowns.enumerate() {
@@ -207,15 +213,15 @@ impl<'d, 'a> Linearised<'d, 'a> {
         slope
     }
 
-    fn step(&mut self, step: &Step) {
+    fn step(&mut self, step: &EquationStep) {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let gradient = self.gradient(*value, &[]);
                 let value = self.value(*value);
                 self.values.insert(*symbol, value);
                 self.gradients.insert(*symbol, gradient);
             }
-            Step::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
                 let a: Vec<Vec<f64>> = matrix.iter().map(|r| r.iter().map(|&e| self.value(e)).collect()).collect();
                 let b: Vec<f64> = right.iter().map(|&e| self.value(e)).collect();
                 let Some(inverse) = inverse(&a) else {
@@ -236,7 +242,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
                 }
                 self.solved(unknowns, &inverse, &moved);
             }
-            Step::Newton { unknowns, body, residuals, .. } => {
+            EquationStep::Newton { unknowns, body, residuals, .. } => {
                 let flat = super::blocks::substituted(&mut self.d.x, body, residuals);
                 let slopes: Vec<Vec<f64>> =
                     flat.iter().map(|&r| unknowns.iter().map(|&u| self.slope(r, u)).collect()).collect();
@@ -253,7 +259,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
                     None => self.good = false,
                 }
             }
-            Step::Watch { .. } => {}
+            EquationStep::Watch { .. } => {}
         }
     }
 
@@ -285,16 +291,16 @@ impl<'d, 'a> Linearised<'d, 'a> {
     }
 }
 
-impl Step {
+impl EquationStep {
     /// Whether a symbol is among those that the step defines.
     pub(super) fn defines(&self, symbol: Symbol) -> bool {
         match self {
-            Step::Assign { symbol: own, .. } => *own == symbol,
-            Step::Linear { unknowns, .. } => unknowns.contains(&symbol),
-            Step::Newton { unknowns, body, .. } => {
+            EquationStep::Assign { symbol: own, .. } => *own == symbol,
+            EquationStep::Linear { unknowns, .. } => unknowns.contains(&symbol),
+            EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.contains(&symbol) || body.iter().any(|(own, _)| *own == symbol)
             }
-            Step::Watch { .. } => false,
+            EquationStep::Watch { .. } => false,
         }
     }
 }

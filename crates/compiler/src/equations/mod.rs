@@ -74,15 +74,15 @@ pub struct Equations {
     /// How states move together whatever laws say, for the search of equilibria.
     pub relations: Relations,
     /// The steps.
-    pub steps: Vec<Step>,
+    pub steps: Vec<EquationStep>,
     /// What can be recorded: every effort, flow, `q`, `p` under element names, junction variables, signals, lets and outputs.
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
-    pub conditions: Vec<Condition>,
+    pub conditions: Vec<InitialCondition>,
     /// Where the search of the start begins.
     pub guesses: Vec<Guess>,
     /// Where laws have a value, for messages.
-    pub domains: Vec<Domain>,
+    pub domains: Vec<LawDomain>,
     /// What defines each variable, before loops were opened.
     pub definitions: Map<Symbol, Definition>,
     /// The rows of all linear loops.
@@ -218,7 +218,7 @@ pub struct Conserved {
 
 /// One step of an evaluation.
 #[derive(Debug, Clone)]
-pub enum Step {
+pub enum EquationStep {
     /// `symbol = value`.
     Assign {
         /// What is defined.
@@ -298,7 +298,7 @@ impl std::fmt::Display for Unavailable {
 
 /// A start value: `residual = 0` at the start.
 #[derive(Debug, Clone)]
-pub struct Condition {
+pub struct InitialCondition {
     /// In symbols that the steps define, states and parameters.
     pub residual: Expr,
     /// The variable it is about, as shown: `I1.f`.
@@ -328,7 +328,7 @@ pub struct Guess {
 
 /// What must hold for a law to have a value.
 #[derive(Debug, Clone)]
-pub struct Domain {
+pub struct LawDomain {
     /// The variable that the law gives.
     pub symbol: Symbol,
     /// The elements concerned.

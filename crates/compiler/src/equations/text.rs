@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{AlgebraicRole, Dependent, DisplayEquation, Shown, ShownDefinition, Step, places};
+use super::{AlgebraicRole, Dependent, DisplayEquation, EquationStep, Shown, ShownDefinition, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
     unicode_name,
@@ -310,16 +310,16 @@ impl Display for Shown {
         writeln!(f, "\nsteps")?;
         for step in &equations.steps {
             match step {
-                Step::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
-                Step::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
-                Step::Linear { unknowns, matrix, right, .. } => {
+                EquationStep::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
+                EquationStep::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
+                EquationStep::Linear { unknowns, matrix, right, .. } => {
                     writeln!(f, "  solve for {}", list(unknowns, &names))?;
                     for (row, &right) in matrix.iter().zip(right) {
                         let row: Vec<String> = row.iter().map(|&e| text(e)).collect();
                         writeln!(f, "    [{}] = {}", row.join(", "), text(right))?;
                     }
                 }
-                Step::Newton { unknowns, body, residuals, .. } => {
+                EquationStep::Newton { unknowns, body, residuals, .. } => {
                     writeln!(f, "  iterate for {}", list(unknowns, &names))?;
                     for (symbol, value) in body {
                         writeln!(f, "    {} = {}", names.ascii(*symbol), text(*value))?;

@@ -111,7 +111,7 @@ pub struct Program {
     /// Divisors that must not vanish.
     pub watches: Vec<Watch>,
     /// What must hold for laws to have values, for messages.
-    pub domains: Vec<Domain>,
+    pub domains: Vec<LawDomain>,
     /// What must hold of parameters: where it does not, the equations are others than these.
     pub assumptions: Vec<Assumption>,
     /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
@@ -310,7 +310,7 @@ pub fn first_of(names: &str) -> String {
 
 /// What must hold for a law to have a value.
 #[derive(Debug, Clone)]
-pub struct Domain {
+pub struct LawDomain {
     /// The variable that the law gives.
     pub given: String,
     /// The elements concerned.

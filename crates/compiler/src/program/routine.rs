@@ -235,7 +235,7 @@ impl Program {
         wanted.extend(self.watches.iter().flat_map(|w| [w.pivot, w.scale]));
         wanted.extend(self.conditions.values().map(|c| c.operand));
         wanted.extend(self.assumptions.iter().flat_map(|a| [a.value, a.scale]));
-        let asked = |d: &super::Domain| d.asked.as_ref().map(|a| a.1);
+        let asked = |d: &super::LawDomain| d.asked.as_ref().map(|a| a.1);
         wanted.extend(self.domains.iter().flat_map(|d| [Some(d.argument), asked(d), d.limit]).flatten());
         wanted
     }

@@ -6,13 +6,13 @@ use super::op::Op;
 use super::sharing::share;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, Domain, EventTrigger, Held, Holds, Implicit,
-    Input, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
-    verify,
+    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Held, Holds, Implicit, Input,
+    LawDomain, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch,
+    first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
-use crate::equations::{Equations, Momentum, Step};
+use crate::equations::{EquationStep, Equations, Momentum};
 use crate::ids::{Id, Table};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -45,12 +45,12 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     let mut step_of: FxHashMap<Symbol, usize> = FxHashMap::default();
     for (i, step) in equations.steps.iter().enumerate() {
         match step {
-            Step::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
-            Step::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
-            Step::Newton { unknowns, body, .. } => {
+            EquationStep::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
+            EquationStep::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
+            EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
             }
-            Step::Watch { .. } => {}
+            EquationStep::Watch { .. } => {}
         }
     }
     let mut roots = equations.residuals.clone();
@@ -61,10 +61,12 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
         while let Some(symbol) = open.pop() {
             let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
             match &equations.steps[i] {
-                Step::Assign { value, .. } => roots.push(*value),
-                Step::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
-                Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
-                Step::Watch { .. } => {}
+                EquationStep::Assign { value, .. } => roots.push(*value),
+                EquationStep::Linear { matrix, right, .. } => roots.extend(matrix.iter().flatten().chain(right)),
+                EquationStep::Newton { body, residuals, .. } => {
+                    roots.extend(body.iter().map(|b| &b.1).chain(residuals))
+                }
+                EquationStep::Watch { .. } => {}
             }
         }
         if read == roots.len() {
@@ -141,15 +143,19 @@ impl Schedule<'_> {
         free.for_each(|(i, s)| give(s.rate, Op::Rate(i as u32), Reads::STATE));
     }
 
-    fn step(&mut self, step: &Step) {
+    fn step(&mut self, step: &EquationStep) {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let value = self.lower.value(*value);
                 self.lower.define(*symbol, value);
             }
-            Step::Linear { unknowns, matrix, right, elements } => self.linear(unknowns, matrix, right, elements),
-            Step::Newton { unknowns, body, residuals, elements } => self.newton(unknowns, body, residuals, elements),
-            Step::Watch { pivot, elements } => {
+            EquationStep::Linear { unknowns, matrix, right, elements } => {
+                self.linear(unknowns, matrix, right, elements)
+            }
+            EquationStep::Newton { unknowns, body, residuals, elements } => {
+                self.newton(unknowns, body, residuals, elements)
+            }
+            EquationStep::Watch { pivot, elements } => {
                 let read: Vec<Symbol> = self.graph.exprs.symbols_of(*pivot).into_iter().collect();
                 let elements = self.concerned(elements, &read);
                 divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.watch(factor, &elements));
@@ -408,10 +414,10 @@ fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
 }
 
 /// A domain, if all that it reads is evaluated.
-fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Domain) -> Option<Domain> {
+fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::LawDomain) -> Option<LawDomain> {
     let name = |s: Symbol| graph.exprs.name(s).trim_end_matches('*').to_string();
     let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
-    defined.then(|| Domain {
+    defined.then(|| LawDomain {
         given: name(domain.symbol),
         elements: names(graph, &domain.elements),
         argument: lower.value(domain.argument),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Assumption, Domain, DomainKind, Watch, first_of};
+use halfarrow_compiler::program::{Assumption, DomainKind, LawDomain, Watch, first_of};
 
 use super::plan::Plan;
 use crate::Real;
@@ -100,7 +100,7 @@ fn structure(a: &Assumption) -> String {
     )
 }
 
-fn domain(d: &Domain) -> String {
+fn domain(d: &LawDomain) -> String {
     let what = match d.elements.as_str() {
         "" => d.given.clone(),
         elements => format!("the law of {elements}"),

@@ -406,7 +406,7 @@ impl<'a> Plan<'a> {
         let Plan { export, program: p, .. } = *self;
         let held = !p.held.is_empty();
         let time_derivative = export.method.is_linearly_implicit();
-        let always = |d: &program::Domain| p.values.reads(d.argument) == Reads::PARAMETERS;
+        let always = |d: &program::LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
         Flags {
             single: export.real == Real::Float,
             states: !p.states.is_empty(),
