@@ -97,7 +97,7 @@ fn put_in(equations: &Equations, x: &mut Exprs) -> BTreeMap<Symbol, Expr> {
                 let value = x.substitute(*value, &known);
                 known.insert(*symbol, value);
             }
-            EquationStep::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
             _ => panic!("the examples have no blocks left: {step:?}"),
         }
     }

@@ -68,7 +68,7 @@ fn values(equations: &Equations, (first, step): (f64, f64)) -> BTreeMap<Symbol, 
                     known.insert(symbol, value);
                 }
             }
-            EquationStep::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
     known

@@ -203,7 +203,7 @@ fn a_divisor_that_vanishes_stops_the_run() {
     let pivot = s.x.sub(cos, one);
     let rate = s.x.recip(pivot);
     let elements = vec![s.element("crank")];
-    s.step(EquationStep::Watch { pivot, elements });
+    s.step(EquationStep::Guard { pivot, elements });
     s.rate("x", rate);
     let mut model = s.model();
     assert!(rates(&mut model, 0.0, &[1.0])[0] < 0.0);

@@ -141,7 +141,7 @@ fn block(
     match (&matrix[..], &right[..], &torn[..]) {
         ([row], [right], [unknown]) => {
             if !x.nonzero(row[0]) {
-                ordered.steps.push(EquationStep::Watch { pivot: row[0], elements });
+                ordered.steps.push(EquationStep::Guard { pivot: row[0], elements });
                 x.assume_nonzero(row[0]);
             }
             let value = x.div(*right, row[0]);

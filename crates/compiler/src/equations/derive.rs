@@ -177,7 +177,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         if !watched.insert(pivot) {
             continue;
         }
-        ordered.steps.push(EquationStep::Watch { pivot, elements: readers(&d, pivot) });
+        ordered.steps.push(EquationStep::Guard { pivot, elements: readers(&d, pivot) });
     }
     let momenta = known(&d, momenta).into_iter();
     let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();

@@ -259,7 +259,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
                     None => self.good = false,
                 }
             }
-            EquationStep::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
 
@@ -300,7 +300,7 @@ impl EquationStep {
             EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.contains(&symbol) || body.iter().any(|(own, _)| *own == symbol)
             }
-            EquationStep::Watch { .. } => false,
+            EquationStep::Guard { .. } => false,
         }
     }
 }

@@ -249,7 +249,7 @@ pub enum EquationStep {
         elements: Vec<ElementId>,
     },
     /// `pivot` has been divided by: if it vanishes the run stops.
-    Watch {
+    Guard {
         /// The expression.
         pivot: Expr,
         /// The elements concerned, for messages.

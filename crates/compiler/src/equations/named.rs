@@ -268,7 +268,7 @@ impl EquationStep {
         match self {
             EquationStep::Assign { symbol, .. } => std::slice::from_ref(symbol),
             EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns,
-            EquationStep::Watch { .. } => &[],
+            EquationStep::Guard { .. } => &[],
         }
     }
 }

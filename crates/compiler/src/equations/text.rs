@@ -311,7 +311,7 @@ impl Display for Shown {
         for step in &equations.steps {
             match step {
                 EquationStep::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
-                EquationStep::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
+                EquationStep::Guard { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
                 EquationStep::Linear { unknowns, matrix, right, .. } => {
                     writeln!(f, "  solve for {}", list(unknowns, &names))?;
                     for (row, &right) in matrix.iter().zip(right) {

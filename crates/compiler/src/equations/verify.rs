@@ -57,7 +57,7 @@ impl EquationStep {
         match self {
             EquationStep::Assign { symbol, .. } => vec![*symbol],
             EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns.clone(),
-            EquationStep::Watch { .. } => Vec::new(),
+            EquationStep::Guard { .. } => Vec::new(),
         }
     }
 }

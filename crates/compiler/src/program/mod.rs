@@ -109,7 +109,7 @@ pub struct Program {
     /// Where the search of the start begins, in the order in which they are placed.
     pub guesses: Vec<StartGuess>,
     /// Divisors that must not vanish.
-    pub watches: Vec<Watch>,
+    pub pivot_guards: Vec<PivotGuard>,
     /// What must hold for laws to have values, for messages.
     pub domains: Vec<LawDomain>,
     /// What must hold of parameters: where it does not, the equations are others than these.
@@ -259,7 +259,7 @@ pub struct StartGuess {
 
 /// A divisor: if it vanishes the run stops.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub struct PivotGuard {
     /// The divisor.
     pub pivot: Value,
     /// Magnitude of the terms it is the sum of, 0 if it is no sum: below rounding of it the divisor counts as zero.

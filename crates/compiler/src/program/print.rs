@@ -25,12 +25,12 @@ impl fmt::Display for Program {
             false => "0".to_string(),
         };
         let told: Vec<String> = self.states.iter().enumerate().map(told).collect();
-        self.print_routine(f, what, &self.watched_routine(&rates), &names, &told)?;
+        self.print_routine(f, what, &self.guarded_routine(&rates), &names, &told)?;
         self.print_conditions(f)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
         let told: Vec<String> = shown.iter().map(|(o, _)| o.name.clone()).collect();
-        self.print_routine(f, "recorded", &self.watched_routine(&values), &names, &told)
+        self.print_routine(f, "recorded", &self.guarded_routine(&values), &names, &told)
     }
 }
 
@@ -135,7 +135,7 @@ impl Program {
             match step {
                 Step::Op { op, .. } => writeln!(f, "{indent}{out} = {}", op.map_operands(|a| Named(names, a)).text()),
                 Step::Parameter { default, .. } => writeln!(f, "{indent}{out} = {} unless set", names.name(*default)),
-                Step::Watch { pivot, .. } => writeln!(f, "{indent}stop if {} vanishes", names.name(*pivot)),
+                Step::Guard { pivot, .. } => writeln!(f, "{indent}stop if {} vanishes", names.name(*pivot)),
                 Step::Solve(solve) => self.print_solve(f, solve, &out, names),
             }
         })

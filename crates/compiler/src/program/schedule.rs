@@ -7,7 +7,7 @@ use super::sharing::share;
 use super::values::Reads;
 use super::{
     Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Held, Holds, Implicit, Input,
-    LawDomain, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch,
+    LawDomain, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess, State, Value,
     first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
@@ -30,7 +30,7 @@ pub fn schedule(equations: &Equations) -> Program {
         graph,
         lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
         blocks: Table::new(),
-        watches: Vec::new(),
+        pivot_guards: Vec::new(),
         kinks: Vec::new(),
     };
     let parameters = schedule.parameters();
@@ -50,7 +50,7 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
             EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
             }
-            EquationStep::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
     let mut roots = equations.residuals.clone();
@@ -66,7 +66,7 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
                 EquationStep::Newton { body, residuals, .. } => {
                     roots.extend(body.iter().map(|b| &b.1).chain(residuals))
                 }
-                EquationStep::Watch { .. } => {}
+                EquationStep::Guard { .. } => {}
             }
         }
         if read == roots.len() {
@@ -84,7 +84,7 @@ struct Schedule<'a> {
     graph: &'a BondGraph,
     lower: Lowering<'a>,
     blocks: Table<BlockId, Block>,
-    watches: Vec<Watch>,
+    pivot_guards: Vec<PivotGuard>,
     /// Conditions inside Newton blocks, as seen from outside.
     kinks: Vec<ConditionId>,
 }
@@ -155,10 +155,10 @@ impl Schedule<'_> {
             EquationStep::Newton { unknowns, body, residuals, elements } => {
                 self.newton(unknowns, body, residuals, elements)
             }
-            EquationStep::Watch { pivot, elements } => {
+            EquationStep::Guard { pivot, elements } => {
                 let read: Vec<Symbol> = self.graph.exprs.symbols_of(*pivot).into_iter().collect();
                 let elements = self.concerned(elements, &read);
-                divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.watch(factor, &elements));
+                divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.guard(factor, &elements));
             }
         }
     }
@@ -218,7 +218,7 @@ impl Schedule<'_> {
         }
     }
 
-    fn watch(&mut self, factor: Expr, elements: &str) {
+    fn guard(&mut self, factor: Expr, elements: &str) {
         let pivot = self.lower.value(factor);
         let scale = match self.graph.exprs.node(factor) {
             Node::Add(terms) => {
@@ -234,7 +234,7 @@ impl Schedule<'_> {
             _ => self.lower.constant(0.0),
         };
         let divisor = self.described(factor);
-        self.watches.push(Watch { pivot, scale, elements: elements.to_string(), divisor });
+        self.pivot_guards.push(PivotGuard { pivot, scale, elements: elements.to_string(), divisor });
     }
 
     /// An expression as text if it is short, else what varies in it.
@@ -335,13 +335,13 @@ impl Schedule<'_> {
             assumptions: equations
                 .assumptions
                 .iter()
-                .filter_map(|a| assumption(lower, graph, &self.watches, a))
+                .filter_map(|a| assumption(lower, graph, &self.pivot_guards, a))
                 .collect(),
             relations: relations(lower, graph, &equations.relations),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
             parameters,
             blocks: self.blocks,
-            watches: self.watches,
+            pivot_guards: self.pivot_guards,
             conditions: self.lower.conditions,
             values: self.lower.values,
             dependence: Vec::new(),
@@ -427,11 +427,11 @@ fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::La
     })
 }
 
-/// An assumption with the value that tells whether it holds; none if it is a divisor that is watched as it is.
+/// An assumption with the value that tells whether it holds; none if it is a divisor that is guarded as it is.
 fn assumption(
     lower: &mut Lowering,
     graph: &BondGraph,
-    watches: &[Watch],
+    pivot_guards: &[PivotGuard],
     of: &crate::algebra::Assumption,
 ) -> Option<Assumption> {
     let exprs = &graph.exprs;
@@ -449,7 +449,7 @@ fn assumption(
         format!("an expression in {}", first_of(&read.join(", ")))
     };
     let value = lower.value(of.expr);
-    if of.holds == Holds::NotZero && watches.iter().any(|w| w.pivot == value) {
+    if of.holds == Holds::NotZero && pivot_guards.iter().any(|w| w.pivot == value) {
         return None;
     }
     let sum = matches!(of.holds, Holds::Zero | Holds::NotZero) && !matches!(exprs.node(of.expr), Node::Symbol(_));

@@ -36,7 +36,7 @@ impl OperationCount {
         for step in &code.steps {
             match step {
                 Step::Op { op, .. } => work.count(*op),
-                Step::Parameter { .. } | Step::Watch { .. } => work.operations += 1,
+                Step::Parameter { .. } | Step::Guard { .. } => work.operations += 1,
                 Step::Solve(solve) => work.solve(program, solve),
             }
         }

@@ -232,7 +232,7 @@ impl<'a> Writer<'a> {
             let can = match step {
                 Step::Op { op, .. } => op.moves(),
                 Step::Solve(_) => true,
-                Step::Parameter { .. } | Step::Watch { .. } => false,
+                Step::Parameter { .. } | Step::Guard { .. } => false,
             };
             step.defines().iter().for_each(|out| moves[out.0 as usize] = one && can);
         }
@@ -360,7 +360,7 @@ impl<'a> Writer<'a> {
         match step {
             Step::Op { op: Op::Side(..) | Op::Floor(..), .. } => (single, single),
             Step::Op { op: Op::Table(..) | Op::TableSlope(..) | Op::TableCurvature(..), .. } => (single, false),
-            Step::Watch { .. } => (single && self.all_timely(step, &f.wide), false),
+            Step::Guard { .. } => (single && self.all_timely(step, &f.wide), false),
             _ => {
                 let wide = step.defines().first().is_some_and(|out| f.wide[out.0 as usize]);
                 (wide, wide)
@@ -377,13 +377,13 @@ impl<'a> Writer<'a> {
         });
         let a = &reads.values;
         match step {
-            Step::Watch { watch, .. } => {
+            Step::Guard { guard, .. } => {
                 let rounding = 64.0 * if wide { f64::EPSILON } else { self.real.epsilon() };
                 let holds = format!("{0} != 0.0 && fabs({0}) > {1} * {2}", a[0], number(rounding), a[1]);
                 let holds = if wide { format!("HA_WIDE({holds})") } else { format!("({holds})") };
                 let _ = writeln!(
                     f.text,
-                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {watch}, {});\n    }}",
+                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {guard}, {});\n    }}",
                     f.shape.time
                 );
             }

@@ -675,7 +675,7 @@ mod tests {
     fn same_bits(program: &Program) -> usize {
         let layout = Layout::new(program, &[]);
         let wanted: Vec<_> = program.states.iter().map(|s| s.rate).collect();
-        let routine = layout.watched_routine(program, &wanted);
+        let routine = layout.guarded_routine(program, &wanted);
         let batches = Arc::new(BlockBatches::of(program, &layout, &routine).expect("blocks of one shape"));
         let mut alone = frame(program, &layout, &routine, None);
         let mut together = frame(program, &layout, &routine, Some(&batches));

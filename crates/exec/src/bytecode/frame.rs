@@ -14,7 +14,7 @@ use halfarrow_compiler::program::calculus::{Calculus, Plain};
 use halfarrow_compiler::program::{Block, ConditionId, Op, Program, Reads};
 use std::sync::Arc;
 
-/// A watched divisor vanishes below this part of the terms that it is made of.
+/// A guarded divisor vanishes below this part of the terms that it is made of.
 pub(crate) const PIVOT_BELOW: f64 = 64.0 * f64::EPSILON;
 
 /// The inner code of a Newton block in another form.
@@ -26,8 +26,8 @@ pub(crate) trait InnerCode: std::fmt::Debug + Send + Sync {
 /// Why a routine stopped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SolveError {
-    /// A watched divisor vanishes.
-    Vanished { watch: u32 },
+    /// A guarded divisor vanishes.
+    Vanished { guard: u32 },
     /// A linear block has no unique solution.
     Singular { block: u32 },
     /// A Newton block found none.
@@ -159,10 +159,10 @@ impl Frame {
             match instruction {
                 Instruction::Op(operation) => self.operation::<ALONG>(operation),
                 Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[*solve as usize])?,
-                Instruction::Watch { pivot, scale, watch } => {
+                Instruction::Guard { pivot, scale, guard } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
-                    if !Frame::stands(pivot, scale) {
-                        return Err(SolveError::Vanished { watch: *watch });
+                    if !Frame::is_pivot(pivot, scale) {
+                        return Err(SolveError::Vanished { guard: *guard });
                     }
                 }
                 Instruction::Parameter { out, index, default } => {
@@ -176,7 +176,7 @@ impl Frame {
 
     /// Whether a divisor is clearly not 0.
     #[inline]
-    pub(super) fn stands(pivot: f64, scale: f64) -> bool {
+    pub(super) fn is_pivot(pivot: f64, scale: f64) -> bool {
         pivot != 0.0 && pivot.abs() > PIVOT_BELOW * scale
     }
 

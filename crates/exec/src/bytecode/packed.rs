@@ -26,7 +26,7 @@ pub(crate) enum PackedStep {
     /// Any other operation, on slots.
     One(Operation),
     /// A divisor that must not vanish against its scale.
-    Watch { pivot: u32, scale: u32 },
+    Guard { pivot: u32, scale: u32 },
     /// A solve block.
     Solve(PackedSolve),
 }
@@ -198,8 +198,8 @@ impl Slots {
                         let op = op.map_operands(|_| reads.next().expect("as many slots as operands"));
                         runs.push(PackedStep::One(Operation { out: writes[0], op }));
                     }
-                    (None, Step::Watch { .. }) => {
-                        runs.push(PackedStep::Watch { pivot: reads[0], scale: reads[1] });
+                    (None, Step::Guard { .. }) => {
+                        runs.push(PackedStep::Guard { pivot: reads[0], scale: reads[1] });
                     }
                     (None, Step::Solve(solve)) => {
                         let alone = !matches!(solve.method, Method::Linear { shared: Some(_), .. });

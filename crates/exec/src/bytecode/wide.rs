@@ -99,9 +99,9 @@ impl<const N: usize> WideFrame<N> {
                 PackedStep::Many(Arithmetic::Div, all) => self.many(all, |a, b| a / b),
                 PackedStep::Many(Arithmetic::Neg, all) => self.many(all, |a, _| -a),
                 PackedStep::Solve(block) => self.solve(solves, block, frames, good),
-                PackedStep::Watch { pivot, scale } => {
+                PackedStep::Guard { pivot, scale } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
-                    (0..N).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
+                    (0..N).for_each(|l| good[l] &= Frame::is_pivot(pivot[l], scale[l]));
                 }
                 PackedStep::One(operation) => self.step(operation, frames),
             }

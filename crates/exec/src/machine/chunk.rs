@@ -1,7 +1,7 @@
 //! One chunk of a routine as a function: loads, arithmetic without branches, and stores if all went well.
 
 use super::arithmetic::Writer;
-use super::{RARE, STATUS_OF_WATCH, kernels};
+use super::{RARE, STATUS_OF_GUARD, kernels};
 use crate::bytecode::{Operation, PIVOT_BELOW, Register, Solve};
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, Value, types};
@@ -34,10 +34,10 @@ pub(super) struct Direct {
 pub(super) enum ChunkItem<'a> {
     Op(&'a Operation),
     /// Stops if the pivot vanishes against its scale.
-    Watch {
+    Guard {
         pivot: Register,
         scale: Register,
-        watch: u32,
+        guard: u32,
     },
     /// A small linear block, written out.
     Solve(&'a Solve),
@@ -109,7 +109,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
     pub fn item(&mut self, item: ChunkItem) {
         match item {
             ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
-            ChunkItem::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
+            ChunkItem::Guard { pivot, scale, guard } => self.guard(pivot, scale, guard),
             ChunkItem::Solve(solve) => self.solve(solve),
         }
     }
@@ -237,7 +237,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.w.is(FloatCC::NotEqual, value, zero)
     }
 
-    fn watch(&mut self, pivot: Register, scale: Register, watch: u32) {
+    fn guard(&mut self, pivot: Register, scale: Register, guard: u32) {
         let (pivot, scale) = (self.value(pivot), self.value(scale));
         let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
         let least = self.w.mul(factor, scale);
@@ -245,7 +245,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let above = self.w.is(FloatCC::GreaterThan, size, least);
         let some = self.w.is(FloatCC::NotEqual, pivot, zero);
         let stands = self.w.both(above, some);
-        self.stop_unless(stands, STATUS_OF_WATCH + u64::from(watch));
+        self.stop_unless(stands, STATUS_OF_GUARD + u64::from(guard));
     }
 
     /// One operation: its value, and by the rules of the table its slope.

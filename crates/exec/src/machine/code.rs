@@ -3,7 +3,7 @@
 use super::chunk::{ChunkContext, ChunkItem};
 use super::live::Live;
 use super::memory::{ArrayLengths, CodeBuffer, EntryPoint, ExecutablePages, Operands};
-use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_WATCH, WRITTEN_OUT};
+use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD, WRITTEN_OUT};
 use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, SolveError};
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{Op, Program};
@@ -81,7 +81,7 @@ impl Generator {
             let start = self.chunk(&mut buffer, &context, &items, &live.registers(), (along, inline))?;
             items.iter().rev().for_each(|item| match item {
                 ChunkItem::Op(operation) => live.before(operation),
-                ChunkItem::Watch { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
+                ChunkItem::Guard { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
                 ChunkItem::Solve(solve) => live.before_solve(solve),
             });
             steps.push(MachineStep::Segment(Segment { start, code: cut }));
@@ -181,7 +181,7 @@ fn is_written_out(program: &Program, layout: &Layout, routine: &Routine, solve: 
 fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> ChunkItem<'a> {
     match instruction {
         Instruction::Op(operation) => ChunkItem::Op(operation),
-        &Instruction::Watch { pivot, scale, watch } => ChunkItem::Watch { pivot, scale, watch },
+        &Instruction::Guard { pivot, scale, guard } => ChunkItem::Guard { pivot, scale, guard },
         Instruction::Solve { solve } => ChunkItem::Solve(&routine.solves[*solve as usize]),
         Instruction::Parameter { .. } => unreachable!("parameters are set by the bytecode"),
     }
@@ -227,7 +227,7 @@ impl MachineCode {
                 MachineStep::Segment(segment) => match enter(&self.memory, self.lengths, segment.start, frame) {
                     0 => {}
                     RARE => frame.part::<ALONG>(routine, &routine.code[segment.code.clone()])?,
-                    status => return Err(SolveError::Vanished { watch: (status - STATUS_OF_WATCH) as u32 }),
+                    status => return Err(SolveError::Vanished { guard: (status - STATUS_OF_GUARD) as u32 }),
                 },
                 MachineStep::Solve(solve) if !ALONG && frame.put_known_root(&routine.solves[*solve]) => {}
                 MachineStep::Solve(solve) => {

@@ -1,7 +1,7 @@
 //! Machine code of routines, bit for bit what the bytecode computes.
 //!
 //! A routine is cut into chunks of some 250 instructions. A chunk is one function without branches: it loads, computes,
-//! and stores what is read after it, unless something is wrong (a watched divisor vanishes) or unusual (a sine of a huge
+//! and stores what is read after it, unless something is wrong (a guarded divisor vanishes) or unusual (a sine of a huge
 //! angle, a pivot that must be sought). Then it stores nothing, and the bytecode runs the chunk. Between chunks stand
 //! the solve blocks, which the bytecode's solver solves, with inner code that is compiled as well; small ones are written
 //! out in the chunk.
@@ -32,8 +32,8 @@ use std::fmt;
 
 /// Something is unusual: the bytecode is to run the chunk.
 const RARE: u64 = u64::MAX;
-/// A watched divisor vanishes: this and its number.
-const STATUS_OF_WATCH: u64 = 1;
+/// A guarded divisor vanishes: this and its number.
+const STATUS_OF_GUARD: u64 = 1;
 /// Instructions in a chunk: beyond some hundreds the time to compile grows faster than the code.
 const CHUNK: usize = 250;
 /// Linear blocks of up to this many unknowns are written out.

@@ -85,7 +85,7 @@ impl Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = layout.watched_routine(&program, &rates);
+        let rates = layout.guarded_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
         let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();

@@ -341,9 +341,9 @@ impl Model {
         let what = |b: u32| first_of(block(b).elements());
         let unknown = |b: u32, unknown: usize| block(b).unknown(unknown).to_string();
         match error {
-            SolveError::Vanished { watch } => {
-                let watch = &self.code.program.watches[watch as usize];
-                Failure::Vanished { time, what: first_of(&watch.elements), divisor: watch.divisor.clone() }
+            SolveError::Vanished { guard } => {
+                let guard = &self.code.program.pivot_guards[guard as usize];
+                Failure::Vanished { time, what: first_of(&guard.elements), divisor: guard.divisor.clone() }
             }
             SolveError::Singular { block } => Failure::Singular { time, what: what(block) },
             SolveError::NoConvergence { block, iterations, residual } => {

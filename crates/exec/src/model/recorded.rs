@@ -25,7 +25,7 @@ impl Recorded {
     pub fn new(mode: &Mode, chosen: Vec<usize>) -> Recorded {
         let value = |&i: &usize| mode.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = chosen.iter().filter_map(value).collect();
-        let routine = mode.layout.watched_routine(&mode.program, &wanted);
+        let routine = mode.layout.guarded_routine(&mode.program, &wanted);
         let of_rates = |block: &BlockId| mode.rates.solves.iter().any(|s| s.block == *block);
         let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
         let blocks = newton.filter(|block| !of_rates(block)).collect();

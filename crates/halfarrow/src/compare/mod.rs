@@ -290,7 +290,7 @@ impl Model {
             EquationStep::Newton { body, residuals, .. } => {
                 body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
             }
-            EquationStep::Watch { .. } => false,
+            EquationStep::Guard { .. } => false,
         }))
     }
 

@@ -143,7 +143,7 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
                 }
             }
             EquationStep::Newton { .. } => return None,
-            EquationStep::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
     Some(known)
