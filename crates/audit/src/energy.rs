@@ -68,7 +68,7 @@ pub(crate) fn rates(
                         unchecked
                             .push(format!("the impulse that {name} takes at t = {time} s: no effort or flow tells it"));
                     }
-                    let held = Held { name: &element.name, x, rate, terms };
+                    let held = IntegratedQuantity { name: &element.name, x, rate, terms };
                     held.compare(values.times, settled, worst, Vec::new);
                 }
                 _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
@@ -92,7 +92,12 @@ pub(crate) fn rates(
             unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
             continue;
         }
-        let held = Held { name: &signal.name, x, rate: &rate, terms: vec![Term::of(Quantity::Of(signal.symbol), 1.0)] };
+        let held = IntegratedQuantity {
+            name: &signal.name,
+            x,
+            rate: &rate,
+            terms: vec![Term::of(Quantity::Of(signal.symbol), 1.0)],
+        };
         held.compare(values.times, settled, worst, || {
             // What its rate reads moves it: the terms that its rate has in the middle of the run.
             let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
@@ -102,14 +107,14 @@ pub(crate) fn rates(
 }
 
 /// Something that changes by its rate.
-struct Held<'a> {
+struct IntegratedQuantity<'a> {
     name: &'a str,
     x: &'a [f64],
     rate: &'a [f64],
     terms: Vec<Term>,
 }
 
-impl Held<'_> {
+impl IntegratedQuantity<'_> {
     /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
     fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
         let integral = integrate(times, self.rate);

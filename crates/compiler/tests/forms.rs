@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, SparseRow, Symbol, eliminate};
 use halfarrow_compiler::bond_graph::{BondId, ElementId, Kind};
-use halfarrow_compiler::equations::{Equations, Form, Step, derive_equations, show};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, derive_equations, show};
 use halfarrow_compiler::ids::Id;
 use serde_json::Value;
 use support::formula::formula;
@@ -93,11 +93,11 @@ fn put_in(equations: &Equations, x: &mut Exprs) -> BTreeMap<Symbol, Expr> {
     let mut known = BTreeMap::new();
     for step in &equations.steps {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let value = x.substitute(*value, &known);
                 known.insert(*symbol, value);
             }
-            Step::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
             _ => panic!("the examples have no blocks left: {step:?}"),
         }
     }

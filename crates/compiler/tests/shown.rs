@@ -7,7 +7,7 @@ use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
 use halfarrow_compiler::bond_graph::{Meaning, NoFiles};
 use halfarrow_compiler::compile::{Text, to_equations};
 use halfarrow_compiler::equations::{
-    Equations, Form, Shown, Step, Style, print, print_dependent, print_meanings, show,
+    EquationStep, Equations, Form, Shown, Style, print, print_dependent, print_meanings, show,
 };
 
 fn models() -> Vec<PathBuf> {
@@ -49,25 +49,25 @@ fn values(equations: &Equations, (first, step): (f64, f64)) -> BTreeMap<Symbol, 
     }
     for step in &equations.steps {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let value = at(x, *value, &known);
                 known.insert(*symbol, value);
             }
-            Step::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
                 let (full, right) = (matrix.map(|&e| at(x, e, &known)).dense(0.0), right.iter());
                 let row = |(row, &r): (&[f64], &Expr)| [row, &[at(x, r, &known)]].concat();
                 let solution = solved(full.chunks(unknowns.len()).zip(right).map(row).collect());
                 known.extend(unknowns.iter().copied().zip(solution));
             }
             // What is shown holds for any value of what stays implicit.
-            Step::Newton { unknowns, body, .. } => {
+            EquationStep::Newton { unknowns, body, .. } => {
                 known.extend(unknowns.iter().map(|&u| (u, 0.17)));
                 for &(symbol, value) in body {
                     let value = at(x, value, &known);
                     known.insert(symbol, value);
                 }
             }
-            Step::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
     known

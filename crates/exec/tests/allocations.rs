@@ -4,7 +4,7 @@ mod common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::equations::Step;
+use halfarrow_compiler::equations::EquationStep;
 use halfarrow_compiler::sparse::SparseMatrix;
 use halfarrow_sim::{Events, System};
 use std::alloc::{GlobalAlloc, Layout, System as Memory};
@@ -42,7 +42,7 @@ fn a_step_takes_no_memory() {
     let x = s.state("x");
     let (u, ue) = s.symbol("u");
     let (three, one) = (s.number(3.0), s.number(1.0));
-    s.step(Step::Linear {
+    s.step(EquationStep::Linear {
         unknowns: vec![u],
         matrix: SparseMatrix::full(vec![vec![three]]),
         right: vec![x],
@@ -52,7 +52,7 @@ fn a_step_takes_no_memory() {
     let exp = s.call(Function::Exp, ee);
     let terms = [exp, ee, ue];
     let residual = s.x.add(&terms);
-    s.step(Step::Newton { unknowns: vec![e], body: vec![], residuals: vec![residual], elements: vec![] });
+    s.step(EquationStep::Newton { unknowns: vec![e], body: vec![], residuals: vec![residual], elements: vec![] });
     let size = s.call(Function::Abs, x);
     let limit = s.x.call(Function::Min, &[size, one]);
     let rate = s.x.mul(&[ee, limit]);

@@ -5,7 +5,7 @@ use halfarrow_compiler::sparse::SparseMatrix;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
-use halfarrow_compiler::equations::Step;
+use halfarrow_compiler::equations::EquationStep;
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
 use halfarrow_sim::{Events as _, Failure, System};
@@ -74,7 +74,7 @@ fn linear(singular: bool) -> Model {
     let elements = vec![s.element("R1"), s.element("R2")];
     // a u + 3 v = 1; b u + 9 v = 2 with b = 3 a is singular.
     let (one, two, nine) = (s.number(1.0), s.number(2.0), s.number(9.0));
-    s.step(Step::Linear {
+    s.step(EquationStep::Linear {
         unknowns: vec![u, v],
         matrix: SparseMatrix::full(vec![vec![a, three], vec![other, nine]]),
         right: vec![one, two],
@@ -125,7 +125,7 @@ fn diode(reverse: bool) -> Sketch {
         s.x.sub(sum, x)
     };
     let elements = vec![s.element("D1")];
-    s.step(Step::Newton { unknowns: vec![e], body: vec![(i, current)], residuals: vec![residual], elements });
+    s.step(EquationStep::Newton { unknowns: vec![e], body: vec![(i, current)], residuals: vec![residual], elements });
     s.rate("x", ie);
     s.observe("e", ee);
     s
@@ -164,7 +164,7 @@ fn only_accepted_steps_move_the_starting_point() {
     let square = s.x.powi(ye, 2);
     let residual = s.x.sub(square, x);
     let elements = vec![s.element("R1")];
-    s.step(Step::Newton { unknowns: vec![y], body: vec![], residuals: vec![residual], elements });
+    s.step(EquationStep::Newton { unknowns: vec![y], body: vec![], residuals: vec![residual], elements });
     s.rate("x", ye);
     let mut model = s.model();
     let first = rates(&mut model, 0.0, &[4.0])[0];
@@ -188,7 +188,7 @@ fn a_cubic_law_at_rest_is_solved() {
         let terms = [s.x.mul(&[two, fe]), s.x.mul(&[three, cube])];
         let sum = s.x.add(&terms);
         let residual = s.x.sub(sum, state);
-        s.step(Step::Newton { unknowns: vec![f], body: vec![], residuals: vec![residual], elements: vec![] });
+        s.step(EquationStep::Newton { unknowns: vec![f], body: vec![], residuals: vec![residual], elements: vec![] });
         s.rate("x", fe);
         let f = rates(&mut s.model(), 0.0, &[x])[0];
         assert!((f - exact).abs() < 1e-15, "{linear} {x}: {f}");
@@ -204,7 +204,7 @@ fn a_divisor_that_vanishes_stops_the_run() {
     let pivot = s.x.sub(cos, one);
     let rate = s.x.recip(pivot);
     let elements = vec![s.element("crank")];
-    s.step(Step::Watch { pivot, elements });
+    s.step(EquationStep::Guard { pivot, elements });
     s.rate("x", rate);
     let mut model = s.model();
     assert!(rates(&mut model, 0.0, &[1.0])[0] < 0.0);
@@ -230,7 +230,7 @@ fn reactions_are_left_out_of_the_rates() {
     let x = s.state("x");
     let (reaction, re) = s.symbol("reaction");
     let value = s.call(Function::Exp, x);
-    s.step(Step::Assign { symbol: reaction, value });
+    s.step(EquationStep::Assign { symbol: reaction, value });
     let rate = s.x.neg(x);
     s.rate("x", rate);
     s.hidden("r", re);
@@ -278,7 +278,7 @@ fn measure_a_long_ladder() {
         let next = if i + 1 < n { states[i + 1] } else { one };
         let drop = s.x.sub(states[i], next);
         let value = s.x.div(drop, parameters[i]);
-        s.step(Step::Assign { symbol: flow, value });
+        s.step(EquationStep::Assign { symbol: flow, value });
         s.hidden(&format!("R{i}.f"), e);
         flows.push(e);
     }

@@ -44,7 +44,7 @@ fn compare(name: &str, text: &str, to: f64) {
     let program = compile(Text { name, text, files: &NoFiles, overrides: &[] }, Form::Minimal);
     let program = program.unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
     let rates: Vec<_> = program.states.iter().map(|s| s.rate).collect();
-    let instructions = program.watched_routine(&rates).code.steps.len();
+    let instructions = program.guarded_routine(&rates).code.steps.len();
     let model = Model::new(program).expect("parameters that fit");
     let method = Method::Fixed(FixedMethod::Rk4);
     let options = Options { method, step: Some(1e-3), to, every: Some(to), ..Options::default() };

@@ -71,7 +71,7 @@ fn evaluate(model: &mut Model, start: &[f64], count: usize) -> (f64, Vec<f64>) {
 
 fn instructions(program: &Program) -> usize {
     let rates: Vec<_> = program.states.iter().map(|s| s.rate).collect();
-    program.watched_routine(&rates).code.steps.len()
+    program.guarded_routine(&rates).code.steps.len()
 }
 
 struct Nothing;

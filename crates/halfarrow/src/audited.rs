@@ -23,13 +23,13 @@ pub struct AuditReport {
     /// What is missed by more than may be, with what to do about it.
     pub warnings: Vec<String>,
     /// Power made or eaten by the junction structure.
-    pub power: Option<Miss>,
+    pub power: Option<Deviation>,
     /// Stored less initial, supplied plus dissipated energy.
-    pub energy: Option<Miss>,
+    pub energy: Option<Deviation>,
     /// Laws of junctions and elements.
-    pub residual: Option<Miss>,
+    pub residual: Option<Deviation>,
     /// Stored quantities and integrated signals against the integrals of their rates.
-    pub rates: Option<Miss>,
+    pub rates: Option<Deviation>,
     /// Storages that make or eat energy, and why.
     pub notes: Vec<String>,
     /// What could not be checked, and why.
@@ -38,7 +38,7 @@ pub struct AuditReport {
 
 /// The greatest miss of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Miss {
+pub struct Deviation {
     /// Relative to the greatest magnitude of its kind around its place.
     pub value: f64,
     /// When, in s.
@@ -318,7 +318,7 @@ impl Sink for Auditing<'_> {
 
 impl From<Audit> for AuditReport {
     fn from(a: Audit) -> AuditReport {
-        let miss = |found: Option<Finding>| found.map(Miss::from);
+        let miss = |found: Option<Finding>| found.map(Deviation::from);
         AuditReport {
             power: miss(a.power),
             energy: miss(a.energy),
@@ -331,8 +331,8 @@ impl From<Audit> for AuditReport {
     }
 }
 
-impl From<Finding> for Miss {
-    fn from(f: Finding) -> Miss {
-        Miss { value: f.value, time: f.time, place: f.place, resolution: f.resolution }
+impl From<Finding> for Deviation {
+    fn from(f: Finding) -> Deviation {
+        Deviation { value: f.value, time: f.time, place: f.place, resolution: f.resolution }
     }
 }

@@ -1,7 +1,7 @@
 //! The equations, as plain data.
 
 use halfarrow_compiler::equations::{
-    Algebraic, Cause, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_definitions,
+    Algebraic, AlgebraicRole, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_definitions,
     print_expr, print_form, print_meanings, print_symbol, show,
 };
 use serde::Serialize;
@@ -161,9 +161,9 @@ fn algebraic(equations: &Equations) -> Vec<AlgebraicReport> {
     let first = equations.states.len();
     let report = |(i, a): (usize, &Algebraic)| {
         let (cause, element) = match a.cause {
-            Cause::Break => ("break", None),
-            Cause::Law(element) => ("law", Some(element)),
-            Cause::Multiplier(element) => ("multiplier", Some(element)),
+            AlgebraicRole::Break => ("break", None),
+            AlgebraicRole::Law(element) => ("law", Some(element)),
+            AlgebraicRole::Multiplier(element) => ("multiplier", Some(element)),
         };
         AlgebraicReport {
             name: a.name.clone(),

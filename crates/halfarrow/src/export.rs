@@ -178,7 +178,7 @@ impl Model {
     }
 
     fn export_c(&self, export: &Export) -> Result<Exported, Error> {
-        let code = Code::new(self, export)?;
+        let code = ExportedProgram::new(self, export)?;
         let written = emit::c::write(&code.asked(false)?).map_err(refused)?;
         let w = &written;
         let files = vec![
@@ -193,7 +193,7 @@ impl Model {
 
     #[cfg(feature = "fmu")]
     fn export_fmu(&self, export: &Export, version: Version) -> Result<Exported, Error> {
-        let mut code = Code::new(self, export)?;
+        let mut code = ExportedProgram::new(self, export)?;
         code.start.grown = grown(&mut code.system, &code.start, export);
         let written = fmu::write(&code.asked(true)?, version).map_err(refused)?;
         let binary = if export.binary { Some(library(&written, version)?) } else { None };
@@ -211,7 +211,7 @@ impl Model {
 }
 
 /// A program with its start, ready to be written.
-struct Code<'a> {
+struct ExportedProgram<'a> {
     export: &'a Export,
     system: exec::Model,
     program: Program,
@@ -219,8 +219,8 @@ struct Code<'a> {
     recorded: Vec<usize>,
 }
 
-impl<'a> Code<'a> {
-    fn new(model: &Model, export: &'a Export) -> Result<Code<'a>, Error> {
+impl<'a> ExportedProgram<'a> {
+    fn new(model: &Model, export: &'a Export) -> Result<ExportedProgram<'a>, Error> {
         if !matches!(export.form, Form::Minimal | Form::Kane) {
             return Err(refused(EmitError::Implicit));
         }
@@ -228,7 +228,7 @@ impl<'a> Code<'a> {
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
         let recorded = system.recorded().to_vec();
-        Ok(Code { export, program: system.program().clone(), system, start, recorded })
+        Ok(ExportedProgram { export, program: system.program().clone(), system, start, recorded })
     }
 
     fn asked(&self, derivatives: bool) -> Result<emit::c::Export<'_>, Problem> {

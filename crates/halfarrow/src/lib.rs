@@ -54,7 +54,7 @@ mod verdict;
 #[cfg(feature = "real_time")]
 mod wall_clock;
 
-pub use audited::{AuditReport, Miss};
+pub use audited::{AuditReport, Deviation};
 pub use check::CheckReport;
 pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
 pub use compiled::Compiled;

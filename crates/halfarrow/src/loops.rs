@@ -8,7 +8,9 @@ use halfarrow_compiler::causal_graph::{
     CausalGraph, Combination, PortState, Role, Stroke, by_hand, kept_junctions, state_rank,
 };
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
-use halfarrow_compiler::equations::{Equations, Form, StateKind, Step, Style, derive_equations, print_expr, show};
+use halfarrow_compiler::equations::{
+    EquationStep, Equations, Form, StateKind, Style, derive_equations, print_expr, show,
+};
 use halfarrow_compiler::ids::{Id, Map};
 use serde::Serialize;
 
@@ -235,10 +237,12 @@ fn resolution(graph: &BondGraph, path: &Path, equations: &Equations) -> String {
     let mut linear = None;
     for step in &equations.steps {
         match step {
-            Step::Newton { unknowns, elements, .. } if meets(elements) => {
+            EquationStep::Newton { unknowns, elements, .. } if meets(elements) => {
                 return format!("Newton iteration for {} unknown{}", unknowns.len(), plural(unknowns.len()));
             }
-            Step::Linear { unknowns, elements, .. } if meets(elements) => linear = linear.or(Some(unknowns.len())),
+            EquationStep::Linear { unknowns, elements, .. } if meets(elements) => {
+                linear = linear.or(Some(unknowns.len()))
+            }
             _ => {}
         }
     }

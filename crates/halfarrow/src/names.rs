@@ -61,7 +61,7 @@ pub struct Place {
 }
 
 /// A name with what it gives others to read, and what it reads.
-struct Entry<'g> {
+struct NamedItem<'g> {
     name: &'g str,
     kind: NameKind,
     span: Span,
@@ -73,8 +73,8 @@ impl Model {
     /// All names, those of one kind in the order of the text.
     pub fn names(&self) -> Vec<Name> {
         let entries = entries(&self.graph);
-        let named = |entry: &Entry| {
-            let reads = |other: &&Entry| {
+        let named = |entry: &NamedItem| {
+            let reads = |other: &&NamedItem| {
                 other.name != entry.name && entry.symbols.iter().any(|symbol| other.reads.contains(symbol))
             };
             Name {
@@ -95,16 +95,16 @@ impl Model {
     }
 }
 
-fn entries(graph: &BondGraph) -> Vec<Entry<'_>> {
+fn entries(graph: &BondGraph) -> Vec<NamedItem<'_>> {
     let symbols = |exprs: &[Expr]| exprs.iter().flat_map(|e| graph.exprs.symbols_of(*e)).collect();
-    let entry = |name, kind, span, own: &[Symbol], exprs: &[Expr]| Entry {
+    let entry = |name, kind, span, own: &[Symbol], exprs: &[Expr]| NamedItem {
         name,
         kind,
         span,
         symbols: own.to_vec(),
         reads: symbols(exprs),
     };
-    let mut all: Vec<Entry> = Vec::new();
+    let mut all: Vec<NamedItem> = Vec::new();
     all.extend(graph.parameters.values().map(|p| {
         let kind = if p.constant { NameKind::Constant } else { NameKind::Parameter };
         entry(&p.name, kind, p.span, &[p.symbol], &[p.value])

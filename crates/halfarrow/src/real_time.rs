@@ -167,7 +167,7 @@ impl Model {
             // So do derivatives.
             let _ = system.compile_directional();
         }
-        let mut ports = Ports::open(run, &system, stop)?;
+        let mut ports = Channels::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
         let error = match end {
@@ -262,19 +262,19 @@ fn files(run: &RealTimeRun, system: &exec::Model) -> Result<Vec<(String, Input)>
 
 /// A number in a declared unit, to SI or back: `factor · value + offset`.
 #[derive(Clone, Copy)]
-struct Scale {
+struct UnitConversion {
     factor: f64,
     offset: f64,
 }
 
-impl Scale {
-    fn to_si(unit: Option<&Unit>) -> Scale {
+impl UnitConversion {
+    fn to_si(unit: Option<&Unit>) -> UnitConversion {
         let at = |value: f64| unit.map_or(value, |unit| unit.to_si_f64(value));
-        Scale { factor: at(1.0) - at(0.0), offset: at(0.0) }
+        UnitConversion { factor: at(1.0) - at(0.0), offset: at(0.0) }
     }
-    fn from_si(unit: Option<&Unit>) -> Scale {
+    fn from_si(unit: Option<&Unit>) -> UnitConversion {
         let at = |value: f64| unit.map_or(value, |unit| unit.from_si_f64(value));
-        Scale { factor: at(1.0) - at(0.0), offset: at(0.0) }
+        UnitConversion { factor: at(1.0) - at(0.0), offset: at(0.0) }
     }
     fn of(self, value: f64) -> f64 {
         self.factor * value + self.offset
@@ -282,15 +282,15 @@ impl Scale {
 }
 
 /// What stands between a run and the outside. All memory is taken when it is opened.
-struct Ports<'s> {
+struct Channels<'s> {
     /// Whether to end the run.
     stop: &'s AtomicBool,
     names: Vec<String>,
-    scales: Vec<Scale>,
+    scales: Vec<UnitConversion>,
     from: Option<UdpSocket>,
     stdin: Option<Arc<Lines>>,
     to: Option<UdpSocket>,
-    shown: Vec<Scale>,
+    shown: Vec<UnitConversion>,
     buffer: Box<[u8; DATAGRAM]>,
     values: Vec<f64>,
     received: u64,
@@ -307,8 +307,8 @@ struct Lines {
     rejected: AtomicU64,
 }
 
-impl<'s> Ports<'s> {
-    fn open(run: &RealTimeRun, system: &exec::Model, stop: &'s AtomicBool) -> Result<Ports<'s>, Problem> {
+impl<'s> Channels<'s> {
+    fn open(run: &RealTimeRun, system: &exec::Model, stop: &'s AtomicBool) -> Result<Channels<'s>, Problem> {
         let program = system.program();
         let names: Vec<String> = program.inputs.iter().map(|i| i.name.clone()).collect();
         let wants = |wanted: &Feed| matches!(wanted, Feed::Udp(_) | Feed::Stdin);
@@ -318,13 +318,13 @@ impl<'s> Ports<'s> {
         let refused = |what: &str, at: SocketAddr, why: std::io::Error| Problem::BadOption {
             reason: format!("{what} udp://{at} cannot be opened: {why}"),
         };
-        let mut ports = Ports {
+        let mut ports = Channels {
             stop,
-            scales: program.inputs.iter().map(|i| Scale::to_si(i.unit.as_ref())).collect(),
+            scales: program.inputs.iter().map(|i| UnitConversion::to_si(i.unit.as_ref())).collect(),
             from: None,
             stdin: None,
             to: None,
-            shown: units(system).iter().map(|unit| Scale::from_si(unit.as_ref())).collect(),
+            shown: units(system).iter().map(|unit| UnitConversion::from_si(unit.as_ref())).collect(),
             buffer: Box::new([0; DATAGRAM]),
             values: vec![f64::NAN; names.len()],
             names,
@@ -381,7 +381,7 @@ impl<'s> Ports<'s> {
     }
 }
 
-impl Exchange<exec::Model> for Ports<'_> {
+impl Exchange<exec::Model> for Channels<'_> {
     fn input(&mut self, _: f64, system: &mut exec::Model) -> bool {
         self.take_datagrams();
         self.take_lines();

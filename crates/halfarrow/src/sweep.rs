@@ -28,7 +28,7 @@ use crate::error::{Error, Problem};
 use crate::input::connect;
 use crate::model::Model;
 use crate::run::{Record, Run, choose, options, units};
-use journal::{Entry, Journal};
+use journal::{Journal, JournalChunk};
 use plan::Plan;
 use reduce::Reducers;
 use structures::{Structures, set_all};
@@ -111,7 +111,7 @@ impl Model {
         let resumed = journal.sets();
         let open = plan.chunks().filter(|chunk| !journal.has(*chunk)).collect();
         let work = prepared.work();
-        let add = &mut |entry: Entry| journal.add(&entry);
+        let add = &mut |entry: JournalChunk| journal.add(&entry);
         if !compute(&work, sweep.run.start, (open, resumed), add, progress).map_err(unwritable)? {
             return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
         }
@@ -132,9 +132,9 @@ impl Model {
     ) -> Result<(Vec<Column>, SweepReport), Error> {
         let prepared = self.prepare(sweep)?;
         let Prepared { plan, columns, .. } = &prepared;
-        let mut entries: BTreeMap<usize, Entry> = BTreeMap::new();
+        let mut entries: BTreeMap<usize, JournalChunk> = BTreeMap::new();
         let work = prepared.work();
-        let add = &mut |entry: Entry| {
+        let add = &mut |entry: JournalChunk| {
             entries.insert(entry.chunk, entry);
             Ok(())
         };
@@ -201,9 +201,9 @@ struct Prepared {
 }
 
 impl Prepared {
-    fn work(&self) -> Work<'_> {
+    fn work(&self) -> SweepContext<'_> {
         let Prepared { plan, reducers, options, structures, .. } = self;
-        Work { plan, reducers, options, structures }
+        SweepContext { plan, reducers, options, structures }
     }
 }
 
@@ -216,7 +216,7 @@ struct Failures {
 }
 
 impl Failures {
-    fn note(&mut self, entry: &Entry) {
+    fn note(&mut self, entry: &JournalChunk) {
         self.count += entry.failures.len();
         let room = TOLD.saturating_sub(self.first.len());
         self.first.extend(entry.failures.iter().take(room).cloned());
@@ -225,16 +225,16 @@ impl Failures {
 
 /// Computes the chunks that are open, where so many sets are done already; false if it was stopped.
 fn compute(
-    work: &Work<'_>,
+    work: &SweepContext<'_>,
     start: crate::run::Start,
     (open, mut done): (Vec<usize>, usize),
-    keep: &mut dyn FnMut(Entry) -> io::Result<()>,
+    keep: &mut dyn FnMut(JournalChunk) -> io::Result<()>,
     progress: &mut dyn FnMut(usize, usize) -> bool,
 ) -> io::Result<bool> {
     if open.is_empty() || !progress(done, work.plan.sets()) {
         return Ok(open.is_empty());
     }
-    let mut take = |entry: Entry| -> io::Result<bool> {
+    let mut take = |entry: JournalChunk| -> io::Result<bool> {
         done += entry.rows;
         keep(entry)?;
         Ok(progress(done, work.plan.sets()))
@@ -250,7 +250,7 @@ fn compute(
         return Ok(true);
     }
     // Few results wait to be kept: memory stays bounded however many sets there are.
-    let (sender, receiver): (SyncSender<Entry>, Receiver<Entry>) = sync_channel(16);
+    let (sender, receiver): (SyncSender<JournalChunk>, Receiver<JournalChunk>) = sync_channel(16);
     std::thread::scope(|scope| {
         scope.spawn(move || {
             // An end of the other side stops the work.
@@ -274,7 +274,7 @@ fn fingerprint(bytes: &[u8]) -> u64 {
 }
 
 /// What all workers read.
-struct Work<'a> {
+struct SweepContext<'a> {
     plan: &'a Plan,
     reducers: &'a [Reducers],
     options: &'a Options,
@@ -283,7 +283,7 @@ struct Work<'a> {
 
 /// A core's own copies of the model, by the numbers of their equations.
 struct Worker<'a> {
-    work: &'a Work<'a>,
+    work: &'a SweepContext<'a>,
     copies: Vec<Option<Copies<'a>>>,
 }
 
@@ -298,13 +298,13 @@ struct Copies<'a> {
 type Outcome = Result<Vec<f64>, String>;
 
 impl<'a> Worker<'a> {
-    fn new(work: &'a Work<'a>) -> Worker<'a> {
+    fn new(work: &'a SweepContext<'a>) -> Worker<'a> {
         Worker { work, copies: (0..work.structures.len()).map(|_| None).collect() }
     }
 
-    fn chunk(&mut self, chunk: usize, start: crate::run::Start) -> Entry {
+    fn chunk(&mut self, chunk: usize, start: crate::run::Start) -> JournalChunk {
         let sets: Vec<usize> = (chunk * CHUNK..self.work.plan.sets().min((chunk + 1) * CHUNK)).collect();
-        let mut entry = Entry { chunk, rows: sets.len(), values: Vec::new(), failures: Vec::new() };
+        let mut entry = JournalChunk { chunk, rows: sets.len(), values: Vec::new(), failures: Vec::new() };
         let mut outcomes: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut alike: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for &set in &sets {
@@ -325,7 +325,7 @@ impl<'a> Worker<'a> {
         entry
     }
 
-    fn row(&self, set: usize, outcome: Outcome, entry: &mut Entry) {
+    fn row(&self, set: usize, outcome: Outcome, entry: &mut JournalChunk) {
         entry.values.push((set + 1) as f64);
         entry.values.extend(self.work.plan.values(set));
         let failed = outcome.is_err();
@@ -342,14 +342,14 @@ impl<'a> Worker<'a> {
 }
 
 impl<'a> Copies<'a> {
-    fn of(work: &Work<'a>, number: usize) -> Copies<'a> {
+    fn of(work: &SweepContext<'a>, number: usize) -> Copies<'a> {
         let structure = work.structures.get(number);
         let wide = is_wide(work.options.method).then(|| exec::WideModel::new(&structure.system));
         Copies { model: &structure.model, wide, system: structure.system.clone() }
     }
 
     /// Sets with the same equations, together where the method allows that.
-    fn group(&mut self, work: &Work<'_>, sets: &[usize], start: crate::run::Start) -> Vec<Outcome> {
+    fn group(&mut self, work: &SweepContext<'_>, sets: &[usize], start: crate::run::Start) -> Vec<Outcome> {
         match self.wide.take() {
             Some(mut wide) => {
                 let outcomes = self.together(work, &mut wide, sets, start);
@@ -361,7 +361,7 @@ impl<'a> Copies<'a> {
     }
 
     /// One set by itself, with any method.
-    fn alone(&mut self, work: &Work<'_>, set: usize, start: crate::run::Start) -> Outcome {
+    fn alone(&mut self, work: &SweepContext<'_>, set: usize, start: crate::run::Start) -> Outcome {
         let mut x = prepare(&mut self.system, self.model, work.plan, set, start)?;
         let mut sink = Reducers::begin(work.reducers);
         simulate(&mut self.system, work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
@@ -371,7 +371,7 @@ impl<'a> Copies<'a> {
     /// Several sets on vectors.
     fn together(
         &self,
-        work: &Work<'_>,
+        work: &SweepContext<'_>,
         wide: &mut exec::WideModel,
         sets: &[usize],
         start: crate::run::Start,

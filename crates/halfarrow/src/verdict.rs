@@ -6,7 +6,7 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
-use crate::audited::{AuditReport, Miss};
+use crate::audited::{AuditReport, Deviation};
 use crate::run::Run;
 
 /// A miss above this part of what is there is said.
@@ -101,7 +101,7 @@ impl Made {
 
 /// A miss beyond what may be.
 struct Beyond<'a> {
-    miss: &'a Miss,
+    miss: &'a Deviation,
     verdict: Verdict,
     remedy: String,
 }
@@ -113,7 +113,7 @@ impl AuditReport {
         let verdict = beyond.iter().map(|b| b.verdict).max().unwrap_or_default();
         let mut by_remedy: BTreeMap<&str, Vec<String>> = BTreeMap::new();
         for b in &beyond {
-            let Miss { place, value, time, .. } = b.miss;
+            let Deviation { place, value, time, .. } = b.miss;
             by_remedy.entry(&b.remedy).or_default().push(format!("{place} is missed by {value:.0e} at t = {time} s"));
         }
         let said = |(remedy, misses): (&str, Vec<String>)| format!("audit: {}: {remedy}", misses.join("; "));
@@ -124,7 +124,7 @@ impl AuditReport {
     /// Why the result is not to be used, if it is not.
     pub(crate) fn refusal(&self, made: &Made) -> Option<Failure> {
         let refused = self.beyond(made).into_iter().find(|b| b.verdict == Verdict::Refused)?;
-        let Miss { place, value, time, .. } = refused.miss.clone();
+        let Deviation { place, value, time, .. } = refused.miss.clone();
         Some(Failure::Untrue { time, what: place, miss: value, remedy: refused.remedy })
     }
 
@@ -137,7 +137,7 @@ impl AuditReport {
             .into_iter()
             .flatten()
             .any(|miss| miss.value.is_nan());
-        let judged = |(miss, (said, refused), remedy): (&'_ Option<Miss>, (f64, f64), String)| {
+        let judged = |(miss, (said, refused), remedy): (&'_ Option<Deviation>, (f64, f64), String)| {
             let miss = miss.as_ref()?;
             // What the samples leave open says nothing about the run.
             let excess = miss.value - ESTIMATED * miss.resolution;
@@ -163,8 +163,8 @@ mod tests {
     use super::*;
     use halfarrow_sim::fixed_step::FixedMethod;
 
-    fn miss(value: f64, resolution: f64) -> Option<Miss> {
-        Some(Miss { value, time: 1.0, place: "body: its law".into(), resolution })
+    fn miss(value: f64, resolution: f64) -> Option<Deviation> {
+        Some(Deviation { value, time: 1.0, place: "body: its law".into(), resolution })
     }
 
     fn made(form: Form, method: Method) -> Made {

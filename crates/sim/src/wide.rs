@@ -236,11 +236,11 @@ impl Lane<'_> {
     /// The end of a step of a lane that has events or memory.
     fn arrive(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Failure> {
         let crossed = self.run.has_crossed(system, self.target, x)?;
-        let reason = self.run.reach(system, self.target, self.stop, crossed, x)?;
+        let reason = self.run.arrive(system, self.target, self.stop, crossed, x)?;
         if reason == StopReason::StepEnd {
             return Ok(());
         }
-        self.run.go_over(system, reason, x)?;
+        self.run.handle_stop(system, reason, x)?;
         self.settled = true;
         self.stop = self.run.next_stop(system);
         self.over = self.run.time >= self.run.to;

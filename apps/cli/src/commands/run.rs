@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, DrawOptions, Error, FixedMethod, Method, Miss, Model, Problem, Record, Run, RunReport, Simulated,
+    AuditReport, Deviation, DrawOptions, Error, FixedMethod, Method, Model, Problem, Record, Run, RunReport, Simulated,
     Start, Stopped, Timings, Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
@@ -238,6 +238,6 @@ pub(super) fn misses(audit: &AuditReport) -> String {
 }
 
 /// A miss; one that the samples cannot resolve is said to be below that.
-fn missed(miss: &Miss) -> String {
+fn missed(miss: &Deviation) -> String {
     if miss.value < miss.resolution { format!("below {:.0e}", miss.resolution) } else { format!("{:.0e}", miss.value) }
 }

@@ -96,7 +96,7 @@ pub enum StatementKind {
     /// `constraint hinge: left = right`.
     Constraint(Box<Constraint>),
     /// `domain thermal pseudo { ... }`.
-    Domain(Box<Domain>),
+    Domain(Box<DomainBlock>),
     /// Nodes and the bonds between them: `Sf:ground(v) -> 0:tyre -> hub`.
     Chain(Chain),
     /// `when cond { ... }`: reserved; an error of the parser says so.
@@ -249,7 +249,7 @@ pub struct Constraint {
 
 /// `domain thermal pseudo { ... }`: the statements inside are about that domain, their names belong to the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Domain {
+pub struct DomainBlock {
     /// Its name.
     pub name: Name,
     /// Where `pseudo` stands: effort times flow is not a power.

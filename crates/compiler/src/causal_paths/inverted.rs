@@ -212,7 +212,7 @@ pub(super) struct Turner<'a> {
 }
 
 /// A bond that turns, and the end at which this must be made good.
-type Step = (BondId, PortRef);
+type TurnedBond = (BondId, PortRef);
 
 impl Turner<'_> {
     pub fn is_resistor(&self, place: PortRef) -> bool {
@@ -226,7 +226,7 @@ impl Turner<'_> {
     /// Turns the bond at `start` and what follows from it, up to the nearest port that is `open`. Whether it could.
     pub fn turn(&mut self, start: PortRef, open: impl Fn(PortRef, &Turner) -> bool) -> bool {
         let first = (self.graph.bond_of(start), self.other_end(self.graph.bond_of(start), start));
-        let mut parent: BTreeMap<Step, Option<Step>> = BTreeMap::from([(first, None)]);
+        let mut parent: BTreeMap<TurnedBond, Option<TurnedBond>> = BTreeMap::from([(first, None)]);
         let mut queue = VecDeque::from([first]);
         while let Some(step) = queue.pop_front() {
             if !self.graph.elements[step.1.element].kind.is_inner() {
@@ -251,7 +251,7 @@ impl Turner<'_> {
     }
 
     /// What else can turn when a bond turns at an element of the junction structure.
-    fn consequences(&self, (bond, end): Step) -> Vec<Step> {
+    fn consequences(&self, (bond, end): TurnedBond) -> Vec<TurnedBond> {
         let element = &self.graph.elements[end.element];
         let sets = |port: &Port| match element.kind {
             Kind::Zero => self.effort_in(port),
@@ -279,7 +279,7 @@ impl Turner<'_> {
     }
 
     /// Turns the bonds on the way to `last`, if that leaves everything in order.
-    fn apply(&mut self, parent: &BTreeMap<Step, Option<Step>>, last: Step) -> bool {
+    fn apply(&mut self, parent: &BTreeMap<TurnedBond, Option<TurnedBond>>, last: TurnedBond) -> bool {
         let mut way = vec![last];
         while let Some(&Some(step)) = parent.get(way.last().expect("not empty")) {
             way.push(step);

@@ -3,7 +3,7 @@
 
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Cell, Chosen, Later, variables_of_laws};
-use super::{Cause, StateKind, Unavailable};
+use super::{AlgebraicRole, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{Kind, PortRef};
 use crate::causal_graph::{CausalGraph, Role};
@@ -23,7 +23,7 @@ pub enum Treatment {
 #[derive(Debug, Clone, Copy)]
 pub struct Closure {
     /// The unknown; `None` where a free rate of a state takes its place.
-    pub unknown: Option<(Symbol, Cause)>,
+    pub unknown: Option<(Symbol, AlgebraicRole)>,
     /// What vanishes.
     pub residual: Expr,
 }
@@ -101,7 +101,7 @@ impl<'a> Assembled<'a> {
         }
         let element = cell.state.port.element;
         self.d.free.insert(cell.rate);
-        Some(Closure { unknown: Some((cell.rate, Cause::Multiplier(element))), residual })
+        Some(Closure { unknown: Some((cell.rate, AlgebraicRole::Multiplier(element))), residual })
     }
 
     fn with_free_rate(&mut self, cell: &Cell) -> Option<Closure> {
@@ -128,7 +128,7 @@ impl<'a> Assembled<'a> {
                 None
             } else {
                 self.d.free.insert(v.speed);
-                Some((v.speed, Cause::Multiplier(v.junction)))
+                Some((v.speed, AlgebraicRole::Multiplier(v.junction)))
             };
             closures.push(Closure { unknown, residual });
         }
@@ -157,7 +157,7 @@ impl<'a> Assembled<'a> {
                 self.d.of.remove(&state.input);
                 self.d.free.insert(state.input);
                 let law = matches!(kind, Kind::Resistor(_));
-                let cause = if law { Cause::Law(element) } else { Cause::Multiplier(element) };
+                let cause = if law { AlgebraicRole::Law(element) } else { AlgebraicRole::Multiplier(element) };
                 closures.push(Closure { unknown: Some((state.input, cause)), residual });
             }
         }

@@ -6,7 +6,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
 
-use super::Step;
+use super::EquationStep;
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
 use super::supports::Supports;
@@ -43,7 +43,7 @@ pub struct Insoluble {
 #[derive(Debug, Clone, Default)]
 pub struct Ordered {
     /// The steps.
-    pub steps: Vec<Step>,
+    pub steps: Vec<EquationStep>,
     /// The rows of all linear blocks.
     pub rows: Vec<LinearRow>,
     /// Names for parts of these rows, with their values; steps define them.
@@ -65,7 +65,7 @@ pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) 
     for component in components(d, symbols) {
         match component[..] {
             [only] if is_direct(d, only) => {
-                ordered.steps.push(Step::Assign { symbol: only, value: d.of[&only].expr() });
+                ordered.steps.push(EquationStep::Assign { symbol: only, value: d.of[&only].expr() });
             }
             _ => block(d, component, first, &mut ordered)?,
         }
@@ -130,7 +130,7 @@ fn block(
     let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     let Some((named, rows)) = linear(&mut d.x, &torn, &body, &residuals) else {
         let inner = body.clone();
-        ordered.steps.push(Step::Newton { unknowns: torn, body: inner, residuals, elements });
+        ordered.steps.push(EquationStep::Newton { unknowns: torn, body: inner, residuals, elements });
         ordered.assign(body);
         return Ok(());
     };
@@ -148,13 +148,13 @@ fn block(
     match (matrix.entries(), &right[..], &torn[..]) {
         (&[pivot], [right], [unknown]) => {
             if !x.nonzero(pivot) {
-                ordered.steps.push(Step::Watch { pivot, elements });
+                ordered.steps.push(EquationStep::Guard { pivot, elements });
                 x.assume_nonzero(pivot);
             }
             let value = x.div(*right, pivot);
-            ordered.steps.push(Step::Assign { symbol: *unknown, value });
+            ordered.steps.push(EquationStep::Assign { symbol: *unknown, value });
         }
-        _ => ordered.steps.push(Step::Linear { unknowns: torn, matrix, right, elements }),
+        _ => ordered.steps.push(EquationStep::Linear { unknowns: torn, matrix, right, elements }),
     }
     ordered.assign(body);
     Ok(())
@@ -245,7 +245,7 @@ fn short(x: &mut Exprs, e: Expr, work: u64) -> Expr {
 
 impl Ordered {
     fn assign(&mut self, body: Vec<(Symbol, Expr)>) {
-        self.steps.extend(body.into_iter().map(|(symbol, value)| Step::Assign { symbol, value }));
+        self.steps.extend(body.into_iter().map(|(symbol, value)| EquationStep::Assign { symbol, value }));
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::Closure;
 use super::definitions::Definitions;
-use super::{BreakBound, Cause};
+use super::{AlgebraicRole, BreakBound};
 use crate::algebra::Symbol;
 use crate::bond_graph::{BondId, Meaning, PortRef};
 use crate::causal_graph::Stroke;
@@ -57,7 +57,7 @@ fn close(d: &mut Definitions, symbol: Symbol) -> Closure {
         }
         super::definitions::Definition::Implicit(e) => e,
     };
-    Closure { unknown: Some((symbol, Cause::Break)), residual }
+    Closure { unknown: Some((symbol, AlgebraicRole::Break)), residual }
 }
 
 /// Who reads whom among the definitions on the way to what is wanted.

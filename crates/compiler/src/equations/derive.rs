@@ -13,8 +13,8 @@ use super::momenta::{Momentum, known};
 use super::stiff::parameters;
 use super::verify::verify;
 use super::{
-    Algebraic, BreakBound, Conserved, Equations, Form, Relations, State, StateKind, Step, Unavailable, conserved,
-    display, domains, index, observed, relations,
+    Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Relations, State, StateKind, Unavailable,
+    conserved, display, domains, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -177,7 +177,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         if !watched.insert(pivot) {
             continue;
         }
-        ordered.steps.push(Step::Watch { pivot, elements: readers(&d, pivot) });
+        ordered.steps.push(EquationStep::Guard { pivot, elements: readers(&d, pivot) });
     }
     let momenta = known(&d, momenta).into_iter();
     let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();
@@ -209,7 +209,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
     let guesses = if own_start { observed::guesses(&mut d) } else { Vec::new() };
     let domains = domains::domains(&mut d, &states);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
-        Step::Newton { unknowns, .. } => unknowns.clone(),
+        EquationStep::Newton { unknowns, .. } => unknowns.clone(),
         _ => Vec::new(),
     });
     let implicit = implicit.collect();
@@ -278,7 +278,7 @@ fn without_cancelling_terms(
     d: &mut Definitions,
     states: &[State],
     algebraic: &[Algebraic],
-    steps: &[Step],
+    steps: &[EquationStep],
     residuals: &mut [Expr],
 ) {
     let cancelling = index::cancelling(d, states, algebraic, steps, residuals);

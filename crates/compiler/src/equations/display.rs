@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::blocks::{LinearRow, Ordered};
 use super::definitions::{Definition, Definitions};
 use super::named::named_page;
-use super::{Equations, State, Step};
+use super::{EquationStep, Equations, State};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{BondGraph, Kind, Meaning, Named};
 use crate::unit::Unit;
@@ -297,7 +297,7 @@ fn equations(
     let mut implicit = Vec::new();
     for step in &ordered.steps {
         match step {
-            Step::Newton { residuals, body, .. } => {
+            EquationStep::Newton { residuals, body, .. } => {
                 let inner = super::blocks::substituted(&mut d.x, body, residuals);
                 let zero = d.x.int(0);
                 for residual in inner {
@@ -305,7 +305,7 @@ fn equations(
                     implicit.push(equation(left, zero));
                 }
             }
-            Step::Linear { unknowns, matrix, right, .. }
+            EquationStep::Linear { unknowns, matrix, right, .. }
                 if unknowns.len() > CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
             {
                 for (row, &right) in matrix.rows().zip(right) {
@@ -437,7 +437,7 @@ pub fn textbook(x: &mut Exprs, e: Expr) -> Expr {
 /// `None` if the search for short forms is over before all are found: [`Exprs::bound_search`].
 pub fn expansions(
     d: &mut Definitions,
-    steps: &[Step],
+    steps: &[EquationStep],
     rates: &BTreeSet<Symbol>,
     named: &BTreeMap<Symbol, Expr>,
 ) -> Option<BTreeMap<Symbol, Expr>> {
@@ -447,11 +447,11 @@ pub fn expansions(
             return None;
         }
         match step {
-            Step::Assign { symbol, value } if !named.contains_key(symbol) => {
+            EquationStep::Assign { symbol, value } if !named.contains_key(symbol) => {
                 let value = put_in(&mut d.x, *value, &known);
                 known.insert(*symbol, value);
             }
-            Step::Linear { unknowns, matrix, right, .. }
+            EquationStep::Linear { unknowns, matrix, right, .. }
                 if unknowns.len() <= CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
             {
                 let matrix = matrix.map(|&e| put_in(&mut d.x, e, &known)).dense(crate::algebra::ZERO);

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use super::blocks::elements_of;
 use super::definitions::{Definition, Definitions};
-use super::{Domain, DomainKind, State};
+use super::{DomainKind, LawDomain, State};
 use crate::algebra::{Expr, Exprs, Function, Node, Outside, Symbol};
 use crate::bond_graph::Meaning;
 
 /// The domains of all that is defined, in the order of the symbols. A law that was inverted has one wherever its values
 /// do not reach everywhere: `f = is*(exp(e/vt) - 1)` gives `e` only for `f` above `-is`.
-pub fn domains(d: &mut Definitions, states: &[State]) -> Vec<Domain> {
+pub fn domains(d: &mut Definitions, states: &[State]) -> Vec<LawDomain> {
     let mut all = Vec::new();
     let states: BTreeSet<Symbol> = states.iter().map(|s| s.symbol).collect();
     let explicit: Vec<(Symbol, Expr)> =
@@ -25,7 +25,7 @@ pub fn domains(d: &mut Definitions, states: &[State]) -> Vec<Domain> {
         for (argument, kind) in partial_parts(&d.x, value) {
             let asked = asked(d, argument);
             let limit = asked.and_then(|asked| limit(d, argument, kind, asked));
-            all.push(Domain { symbol, elements: elements.clone(), argument, kind, asked, limit });
+            all.push(LawDomain { symbol, elements: elements.clone(), argument, kind, asked, limit });
         }
     }
     all

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Condition;
+use super::InitialCondition;
 use super::definitions::{Definition, Definitions};
 use super::independent_rows::{IndependentRows, Row, equilibrate};
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
@@ -28,8 +28,8 @@ pub(super) fn conditions(
     d: &mut Definitions,
     causal: &CausalGraph,
     sums: &[Sum],
-    given: &[Condition],
-) -> Vec<Condition> {
+    given: &[InitialCondition],
+) -> Vec<InitialCondition> {
     let empty = storages(d, causal, sums);
     let guessed: BTreeMap<Expr, Expr> = d.graph.guesses.iter().map(|g| (g.what, g.value)).collect();
     let value = |x: &mut Exprs, s: Symbol| guessed.get(&x.sym(s)).copied().unwrap_or(ZERO);
@@ -37,7 +37,7 @@ pub(super) fn conditions(
     let mut weak = Vec::new();
     for (symbol, value) in Freedom::new(d, &wanted, given).missing(d, &wanted, given) {
         let own = d.x.sym(symbol);
-        weak.push(Condition {
+        weak.push(InitialCondition {
             residual: d.x.sub(own, value),
             name: d.x.name(symbol).trim_end_matches('*').to_string(),
             value,
@@ -73,7 +73,7 @@ struct Freedom {
 }
 
 impl Freedom {
-    fn new(d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Freedom {
+    fn new(d: &Definitions, wanted: &[(Symbol, Expr)], given: &[InitialCondition]) -> Freedom {
         let roots = given.iter().flat_map(|g| d.x.symbols_of(g.residual)).chain(wanted.iter().map(|w| w.0));
         let mut found = Freedom { reads: reached(d, roots), open: BTreeSet::new(), point: start_point(&d.x, d.graph) };
         let closed = found.closed(d, given);
@@ -99,7 +99,7 @@ impl Freedom {
     }
 
     /// The unknowns that conditions with one unknown determine.
-    fn closed(&self, d: &Definitions, given: &[Condition]) -> BTreeSet<Symbol> {
+    fn closed(&self, d: &Definitions, given: &[InitialCondition]) -> BTreeSet<Symbol> {
         let mut closed = BTreeSet::new();
         let mut waiting: Vec<BTreeSet<Symbol>> = given.iter().map(|g| self.unknowns(d, g.residual)).collect();
         loop {
@@ -118,7 +118,12 @@ impl Freedom {
     }
 
     /// The storages that have to be told to be empty (or as guessed).
-    fn missing(mut self, d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Vec<(Symbol, Expr)> {
+    fn missing(
+        mut self,
+        d: &Definitions,
+        wanted: &[(Symbol, Expr)],
+        given: &[InitialCondition],
+    ) -> Vec<(Symbol, Expr)> {
         let holds = self.zero_definitions(d);
         let parts = self.parts(d, given);
         let of = |s: &Symbol| parts.get(s).copied();
@@ -146,7 +151,7 @@ impl Freedom {
     }
 
     /// For everything that is open one of those that it hangs together with.
-    fn parts(&self, d: &Definitions, given: &[Condition]) -> BTreeMap<Symbol, Symbol> {
+    fn parts(&self, d: &Definitions, given: &[InitialCondition]) -> BTreeMap<Symbol, Symbol> {
         let mut leader: BTreeMap<Symbol, Symbol> = self.open.iter().map(|&s| (s, s)).collect();
         let mut join = |together: &[Symbol]| {
             for pair in together.windows(2) {
@@ -165,7 +170,12 @@ impl Freedom {
     }
 
     /// The storages whose being empty is independent of definitions, of what is given, and of the storages before them.
-    fn independent(&mut self, d: &Definitions, wanted: &[(Symbol, Expr)], given: &[Condition]) -> Vec<(Symbol, Expr)> {
+    fn independent(
+        &mut self,
+        d: &Definitions,
+        wanted: &[(Symbol, Expr)],
+        given: &[InitialCondition],
+    ) -> Vec<(Symbol, Expr)> {
         let mut x = d.x.clone();
         let mut rows = Vec::new();
         let mut own = Vec::new();
@@ -196,7 +206,7 @@ impl Freedom {
         &self,
         d: &Definitions,
         chosen: &mut Vec<(Symbol, Expr)>,
-        given: &[Condition],
+        given: &[InitialCondition],
         holds: &BTreeSet<Symbol>,
     ) {
         let open = |s: &Symbol| self.open.contains(s) && is_unknown(d, *s);

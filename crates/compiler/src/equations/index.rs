@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::definitions::Definitions;
-use super::{Algebraic, State, StateKind, Step};
+use super::{Algebraic, EquationStep, State, StateKind};
 use crate::algebra::{Expr, Symbol};
 use crate::causal_paths::Count;
 use crate::causal_paths::numeric::{Row, arbitrary, rank};
@@ -40,7 +40,7 @@ pub fn indices(
     d: &mut Definitions,
     states: &[State],
     algebraic: &[Algebraic],
-    steps: &[Step],
+    steps: &[EquationStep],
     residuals: &[Expr],
 ) -> Indices {
     let n = states.len() + algebraic.len();
@@ -94,7 +94,7 @@ fn indices_at(rows: &[Linear], states: &[State], algebraic: &[Algebraic]) -> Ind
 
 /// What a form promises of its unknowns: multipliers hold relations among states, break variables among themselves.
 fn promised_indices(states: &[State], algebraic: &[Algebraic]) -> Vec<u8> {
-    let of = |a: &Algebraic| if matches!(a.cause, super::Cause::Multiplier(_)) { 2 } else { 1 };
+    let of = |a: &Algebraic| if matches!(a.cause, super::AlgebraicRole::Multiplier(_)) { 2 } else { 1 };
     states.iter().map(|_| 1).chain(algebraic.iter().map(of)).collect()
 }
 
@@ -143,7 +143,7 @@ pub fn cancelling(
     d: &mut Definitions,
     states: &[State],
     algebraic: &[Algebraic],
-    steps: &[Step],
+    steps: &[EquationStep],
     residuals: &[Expr],
 ) -> Vec<usize> {
     if residuals.is_empty() || states.len() + algebraic.len() > EXAMINED {
@@ -164,7 +164,13 @@ struct Linearised<'d, 'a> {
 }
 
 impl<'d, 'a> Linearised<'d, 'a> {
-    fn of(d: &'d mut Definitions<'a>, size: f64, states: &[State], algebraic: &[Algebraic], steps: &[Step]) -> Self {
+    fn of(
+        d: &'d mut Definitions<'a>,
+        size: f64,
+        states: &[State],
+        algebraic: &[Algebraic],
+        steps: &[EquationStep],
+    ) -> Self {
         let mut all = Linearised { d, values: BTreeMap::new(), gradients: BTreeMap::new(), size, good: true };
         let unknowns = states.iter().map(|s| s.symbol).chain(algebraic.iter().map(|a| a.symbol));
         for (i, symbol) in unknowns.enumerate() {
@@ -207,15 +213,15 @@ impl<'d, 'a> Linearised<'d, 'a> {
         slope
     }
 
-    fn step(&mut self, step: &Step) {
+    fn step(&mut self, step: &EquationStep) {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let gradient = self.gradient(*value, &[]);
                 let value = self.value(*value);
                 self.values.insert(*symbol, value);
                 self.gradients.insert(*symbol, gradient);
             }
-            Step::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
                 let n = unknowns.len().max(1);
                 let dense = matrix.map(|&e| self.value(e)).dense(0.0);
                 let a: Vec<Vec<f64>> = dense.chunks(n).map(<[f64]>::to_vec).collect();
@@ -238,7 +244,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
                 }
                 self.solved(unknowns, &inverse, &moved);
             }
-            Step::Newton { unknowns, body, residuals, .. } => {
+            EquationStep::Newton { unknowns, body, residuals, .. } => {
                 let flat = super::blocks::substituted(&mut self.d.x, body, residuals);
                 let slopes: Vec<Vec<f64>> =
                     flat.iter().map(|&r| unknowns.iter().map(|&u| self.slope(r, u)).collect()).collect();
@@ -255,7 +261,7 @@ impl<'d, 'a> Linearised<'d, 'a> {
                     None => self.good = false,
                 }
             }
-            Step::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
 
@@ -287,16 +293,16 @@ impl<'d, 'a> Linearised<'d, 'a> {
     }
 }
 
-impl Step {
+impl EquationStep {
     /// Whether a symbol is among those that the step defines.
     pub(super) fn defines(&self, symbol: Symbol) -> bool {
         match self {
-            Step::Assign { symbol: own, .. } => *own == symbol,
-            Step::Linear { unknowns, .. } => unknowns.contains(&symbol),
-            Step::Newton { unknowns, body, .. } => {
+            EquationStep::Assign { symbol: own, .. } => *own == symbol,
+            EquationStep::Linear { unknowns, .. } => unknowns.contains(&symbol),
+            EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.contains(&symbol) || body.iter().any(|(own, _)| *own == symbol)
             }
-            Step::Watch { .. } => false,
+            EquationStep::Guard { .. } => false,
         }
     }
 }

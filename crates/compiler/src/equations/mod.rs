@@ -76,15 +76,15 @@ pub struct Equations {
     /// How states move together whatever laws say, for the search of equilibria.
     pub relations: Relations,
     /// The steps.
-    pub steps: Vec<Step>,
+    pub steps: Vec<EquationStep>,
     /// What can be recorded: every effort, flow, `q`, `p` under element names, junction variables, signals, lets and outputs.
     pub observed: Vec<Observed>,
     /// What the start of the run has to satisfy.
-    pub conditions: Vec<Condition>,
+    pub conditions: Vec<InitialCondition>,
     /// Where the search of the start begins.
     pub guesses: Vec<Guess>,
     /// Where laws have a value, for messages.
-    pub domains: Vec<Domain>,
+    pub domains: Vec<LawDomain>,
     /// What defines each variable, before loops were opened.
     pub definitions: Map<Symbol, Definition>,
     /// The rows of all linear loops.
@@ -180,14 +180,14 @@ pub struct Algebraic {
     /// Its name: `R1.e`, `ZCx.e`.
     pub name: String,
     /// What it is there for.
-    pub cause: Cause,
+    pub cause: AlgebraicRole,
     /// SI unit, where known.
     pub unit: Option<Unit>,
 }
 
 /// What an algebraic unknown is there for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum AlgebraicRole {
     /// It opens a loop of variables: the loop closes where the residual vanishes.
     Break,
     /// It is the law of an element that gives no value to what the element sets.
@@ -220,7 +220,7 @@ pub struct Conserved {
 
 /// One step of an evaluation.
 #[derive(Debug, Clone)]
-pub enum Step {
+pub enum EquationStep {
     /// `symbol = value`.
     Assign {
         /// What is defined.
@@ -251,7 +251,7 @@ pub enum Step {
         elements: Vec<ElementId>,
     },
     /// `pivot` has been divided by: if it vanishes the run stops.
-    Watch {
+    Guard {
         /// The expression.
         pivot: Expr,
         /// The elements concerned, for messages.
@@ -300,7 +300,7 @@ impl std::fmt::Display for Unavailable {
 
 /// A start value: `residual = 0` at the start.
 #[derive(Debug, Clone)]
-pub struct Condition {
+pub struct InitialCondition {
     /// In symbols that the steps define, states and parameters.
     pub residual: Expr,
     /// The variable it is about, as shown: `I1.f`.
@@ -330,7 +330,7 @@ pub struct Guess {
 
 /// What must hold for a law to have a value.
 #[derive(Debug, Clone)]
-pub struct Domain {
+pub struct LawDomain {
     /// The variable that the law gives.
     pub symbol: Symbol,
     /// The elements concerned.

@@ -9,7 +9,7 @@ use super::display::{
     Dependent, DisplayEquation, Page, ShownDefinition, aliases, assign_rows, equation, from_sides, gathered,
     named_sources, put_in, put_in_shown,
 };
-use super::{Equations, Step};
+use super::{EquationStep, Equations};
 use crate::algebra::{Expr, Exprs, Node, ONE, Shared, Symbol};
 use crate::ids::Map;
 
@@ -164,12 +164,14 @@ impl Drafts {
         named: &BTreeMap<Symbol, Expr>,
     ) {
         let mut values: Map<Symbol, Expr> = Map::new();
-        let mut blocks: BTreeMap<Symbol, &Step> = BTreeMap::new();
+        let mut blocks: BTreeMap<Symbol, &EquationStep> = BTreeMap::new();
         for step in &ordered.steps {
             match step {
-                Step::Assign { symbol, value } if !named.contains_key(symbol) => _ = values.insert(*symbol, *value),
-                Step::Linear { unknowns, .. } if unknowns.iter().any(|u| rates.contains(u)) => {}
-                Step::Linear { unknowns, .. } | Step::Newton { unknowns, .. } => {
+                EquationStep::Assign { symbol, value } if !named.contains_key(symbol) => {
+                    _ = values.insert(*symbol, *value)
+                }
+                EquationStep::Linear { unknowns, .. } if unknowns.iter().any(|u| rates.contains(u)) => {}
+                EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => {
                     blocks.extend(unknowns.iter().map(|&u| (u, step)));
                 }
                 _ => {}
@@ -193,7 +195,7 @@ impl Drafts {
             }
         }
         let in_order = ordered.steps.iter().filter_map(|step| match step {
-            Step::Assign { symbol, value } if needed.contains(symbol) && values.contains_key(symbol) => {
+            EquationStep::Assign { symbol, value } if needed.contains(symbol) && values.contains_key(symbol) => {
                 Some((*symbol, *value))
             }
             _ => None,
@@ -201,15 +203,15 @@ impl Drafts {
         self.values = in_order.collect();
     }
 
-    fn add_block(&mut self, step: &Step) {
+    fn add_block(&mut self, step: &EquationStep) {
         match step {
-            Step::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
                 for (row, &right) in matrix.rows().zip(right) {
                     let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
                     self.rows.push(Draft::of_row(&LinearRow { left, right }));
                 }
             }
-            Step::Newton { residuals, .. } => {
+            EquationStep::Newton { residuals, .. } => {
                 self.rows.extend(residuals.iter().map(|&r| Draft { symbols: Vec::new(), sides: vec![r] }));
             }
             _ => {}
@@ -259,13 +261,13 @@ fn shown_row(x: &mut Exprs, symbols: &[Symbol], sides: &[Expr], work: u64) -> Di
     }
 }
 
-impl Step {
+impl EquationStep {
     /// What the step defines.
     fn unknowns(&self) -> &[Symbol] {
         match self {
-            Step::Assign { symbol, .. } => std::slice::from_ref(symbol),
-            Step::Linear { unknowns, .. } | Step::Newton { unknowns, .. } => unknowns,
-            Step::Watch { .. } => &[],
+            EquationStep::Assign { symbol, .. } => std::slice::from_ref(symbol),
+            EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns,
+            EquationStep::Guard { .. } => &[],
         }
     }
 }

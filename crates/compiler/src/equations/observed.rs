@@ -6,7 +6,7 @@ use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
 use super::definitions::Definitions;
-use super::{Condition, Guess, Observed, State, Unavailable};
+use super::{Guess, InitialCondition, Observed, State, Unavailable};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::{BondGraph, Kind};
 use crate::unit::Unit;
@@ -136,14 +136,14 @@ pub fn guesses(d: &mut Definitions) -> Vec<Guess> {
 }
 
 /// Start values of storages and signals, and constraints on displacements.
-pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
+pub fn conditions(d: &mut Definitions) -> Vec<InitialCondition> {
     let graph = d.graph;
     let mut all = Vec::new();
     let mut add = |d: &mut Definitions, symbol: Symbol, value: Expr, span| {
         let own = d.x.sym(symbol);
         let residual = d.x.sub(own, value);
         let name = d.x.name(symbol).to_string();
-        all.push(Condition { residual, name, value, firm: false, weak: false, span });
+        all.push(InitialCondition { residual, name, value, firm: false, weak: false, span });
     };
     for element in graph.elements.values() {
         if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
@@ -159,7 +159,7 @@ pub fn conditions(d: &mut Definitions) -> Vec<Condition> {
     }
     for constraint in graph.constraints.iter().filter(|c| c.holonomic) {
         let zero = d.x.int(0);
-        all.push(Condition {
+        all.push(InitialCondition {
             residual: constraint.expr,
             name: constraint.name.clone(),
             value: zero,

@@ -11,7 +11,7 @@ use super::along::Closure;
 use super::breaks::name_of;
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
-use super::{Cause, StateKind};
+use super::{AlgebraicRole, StateKind};
 use crate::algebra::{Expr, Facts, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, Parameter, ParameterId, PortRef, StorageLaw, Variable};
 use crate::causal_graph::CausalGraph;
@@ -133,7 +133,7 @@ impl Assembled<'_> {
         let mut left = Vec::new();
         for closure in closures {
             match closure.unknown {
-                Some((multiplier, Cause::Multiplier(element))) => {
+                Some((multiplier, AlgebraicRole::Multiplier(element))) => {
                     let along = takes_up_along(causal, multiplier);
                     self.spring(springs, &mobility, element, multiplier, closure.residual, along);
                 }

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Cause, Dependent, DisplayEquation, Shown, ShownDefinition, Step, places};
+use super::{AlgebraicRole, Dependent, DisplayEquation, EquationStep, Shown, ShownDefinition, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
     unicode_name,
@@ -88,9 +88,9 @@ pub fn print_form(shown: &Shown) -> String {
     for unknown in &equations.algebraic {
         let element = |e: ElementId| &equations.graph.elements[e].name;
         let cause = match unknown.cause {
-            Cause::Break => "break variable".to_string(),
-            Cause::Law(e) => format!("law of {}", element(e)),
-            Cause::Multiplier(e) => format!("multiplier of {}", element(e)),
+            AlgebraicRole::Break => "break variable".to_string(),
+            AlgebraicRole::Law(e) => format!("law of {}", element(e)),
+            AlgebraicRole::Multiplier(e) => format!("multiplier of {}", element(e)),
         };
         text += &format!("  {}  {cause}{}\n", unknown.name, higher());
     }
@@ -313,9 +313,9 @@ impl Display for Shown {
         writeln!(f, "\nsteps")?;
         for step in &equations.steps {
             match step {
-                Step::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
-                Step::Watch { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
-                Step::Linear { unknowns, matrix, right, .. } => {
+                EquationStep::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
+                EquationStep::Guard { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
+                EquationStep::Linear { unknowns, matrix, right, .. } => {
                     writeln!(f, "  solve for {}", list(unknowns, &names))?;
                     for (row, &right) in matrix.rows().zip(right) {
                         let named = |(k, &e): (usize, &Expr)| format!("{}: {}", names.ascii(unknowns[k]), text(e));
@@ -329,7 +329,7 @@ impl Display for Shown {
                         writeln!(f, "    [{}] = {}", row.join(", "), text(right))?;
                     }
                 }
-                Step::Newton { unknowns, body, residuals, .. } => {
+                EquationStep::Newton { unknowns, body, residuals, .. } => {
                     writeln!(f, "  iterate for {}", list(unknowns, &names))?;
                     for (symbol, value) in body {
                         writeln!(f, "    {} = {}", names.ascii(*symbol), text(*value))?;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Equations, Step};
+use super::{EquationStep, Equations};
 use crate::algebra::Symbol;
 
 /// Checks the invariants of [`Equations`]: every unknown has a name and a symbol of its own, what can be recorded has
@@ -41,7 +41,7 @@ fn names(equations: &Equations) -> Result<(), String> {
 fn symbols(equations: &Equations) -> Result<(), String> {
     let name = |s: &Symbol| format!("`{}` is unknown or defined twice", equations.graph.exprs.name(*s));
     let conserved = equations.conserved.iter().map(|c| c.symbol);
-    let defined = equations.steps.iter().flat_map(Step::defined);
+    let defined = equations.steps.iter().flat_map(EquationStep::defined);
     let all: Vec<Symbol> = equations.unknowns().into_iter().chain(conserved).chain(defined).collect();
     once(all.iter(), name)
 }
@@ -51,13 +51,13 @@ fn once<'a, T: Ord + 'a>(all: impl Iterator<Item = &'a T>, breach: impl Fn(&T) -
     all.into_iter().find(|one| !seen.insert(*one)).map_or(Ok(()), |again| Err(breach(again)))
 }
 
-impl Step {
+impl EquationStep {
     /// The symbols that the step defines; the body of an iteration is written out after it once more.
     fn defined(&self) -> Vec<Symbol> {
         match self {
-            Step::Assign { symbol, .. } => vec![*symbol],
-            Step::Linear { unknowns, .. } | Step::Newton { unknowns, .. } => unknowns.clone(),
-            Step::Watch { .. } => Vec::new(),
+            EquationStep::Assign { symbol, .. } => vec![*symbol],
+            EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns.clone(),
+            EquationStep::Guard { .. } => Vec::new(),
         }
     }
 }

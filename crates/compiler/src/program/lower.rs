@@ -3,7 +3,7 @@
 use super::op::Op;
 use super::sharing::{Sharing, Unit, UnitId};
 use super::values::{Reads, Values};
-use super::{BlockId, Cause, Condition, ConditionId, ConditionKind, Value};
+use super::{BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
 use crate::ids::Table;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -450,7 +450,7 @@ impl<'a> Lowering<'a> {
         if let Some(&known) = self.condition_of.get(&(operand, kind)) {
             return known;
         }
-        let id = self.conditions.push(Condition { operand, kind, cause: Cause::Shown });
+        let id = self.conditions.push(Condition { operand, kind, trigger: EventTrigger::RecordedOnly });
         self.condition_of.insert((operand, kind), id);
         id
     }

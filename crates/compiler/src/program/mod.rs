@@ -111,9 +111,9 @@ pub struct Program {
     /// Where the search of the start begins, in the order in which they are placed.
     pub guesses: Vec<StartGuess>,
     /// Divisors that must not vanish.
-    pub watches: Vec<Watch>,
+    pub pivot_guards: Vec<PivotGuard>,
     /// What must hold for laws to have values, for messages.
-    pub domains: Vec<Domain>,
+    pub domains: Vec<LawDomain>,
     /// What must hold of parameters: where it does not, the equations are others than these.
     pub assumptions: Vec<Assumption>,
     /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
@@ -261,7 +261,7 @@ pub struct StartGuess {
 
 /// A divisor: if it vanishes the run stops.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub struct PivotGuard {
     /// The divisor.
     pub pivot: Value,
     /// Magnitude of the terms it is the sum of, 0 if it is no sum: below rounding of it the divisor counts as zero.
@@ -312,7 +312,7 @@ pub fn first_of(names: &str) -> String {
 
 /// What must hold for a law to have a value.
 #[derive(Debug, Clone)]
-pub struct Domain {
+pub struct LawDomain {
     /// The variable that the law gives.
     pub given: String,
     /// The elements concerned.
@@ -335,7 +335,7 @@ pub struct Condition {
     /// How it decides.
     pub kind: ConditionKind,
     /// When it may change.
-    pub cause: Cause,
+    pub trigger: EventTrigger,
 }
 
 /// How a condition decides.
@@ -351,15 +351,15 @@ pub enum ConditionKind {
 
 /// What moves a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum EventTrigger {
     /// Time alone, and between two changes of other conditions in a straight line: its next change has a closed form.
-    Clock,
+    LinearTime,
     /// Time alone, along some other curve.
-    Curve,
+    CurvedTime,
     /// States, inputs or held signals; rates read it.
     State,
     /// States, inputs or held signals, but no rate reads it: it needs no event.
-    Shown,
+    RecordedOnly,
 }
 
 /// A solve block.

@@ -1,7 +1,7 @@
 //! A program as text: `%1` is a value of a routine, `$1` one of parameters alone, `.1` one within a Newton block, `?1` the
 //! guess of an unknown there.
 
-use super::{Arg, Block, Cause, Code, Method, Op, Program, Routine, Solve, Step, Value};
+use super::{Arg, Block, Code, EventTrigger, Method, Op, Program, Routine, Solve, Step, Value};
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::fmt;
@@ -25,12 +25,12 @@ impl fmt::Display for Program {
             false => "0".to_string(),
         };
         let told: Vec<String> = self.states.iter().enumerate().map(told).collect();
-        self.print_routine(f, what, &self.watched_routine(&rates), &names, &told)?;
+        self.print_routine(f, what, &self.guarded_routine(&rates), &names, &told)?;
         self.print_conditions(f)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
         let told: Vec<String> = shown.iter().map(|(o, _)| o.name.clone()).collect();
-        self.print_routine(f, "recorded", &self.watched_routine(&values), &names, &told)
+        self.print_routine(f, "recorded", &self.guarded_routine(&values), &names, &told)
     }
 }
 
@@ -117,13 +117,13 @@ impl Program {
         }
         writeln!(f, "\nconditions")?;
         for (id, condition) in self.conditions.iter() {
-            let cause = match condition.cause {
-                Cause::Clock => "of time, in closed form",
-                Cause::Curve => "of time, searched",
-                Cause::State => "of the state",
-                Cause::Shown => "of the state, for what is recorded",
+            let trigger = match condition.trigger {
+                EventTrigger::LinearTime => "of time, in closed form",
+                EventTrigger::CurvedTime => "of time, searched",
+                EventTrigger::State => "of the state",
+                EventTrigger::RecordedOnly => "of the state, for what is recorded",
             };
-            writeln!(f, "    c{}: {:?}, {cause}", id.index(), condition.kind)?;
+            writeln!(f, "    c{}: {:?}, {trigger}", id.index(), condition.kind)?;
         }
         Ok(())
     }
@@ -135,7 +135,7 @@ impl Program {
             match step {
                 Step::Op { op, .. } => writeln!(f, "{indent}{out} = {}", op.map_operands(|a| Named(names, a)).text()),
                 Step::Parameter { default, .. } => writeln!(f, "{indent}{out} = {} unless set", names.name(*default)),
-                Step::Watch { pivot, .. } => writeln!(f, "{indent}stop if {} vanishes", names.name(*pivot)),
+                Step::Guard { pivot, .. } => writeln!(f, "{indent}stop if {} vanishes", names.name(*pivot)),
                 Step::Solve(solve) => self.print_solve(f, solve, &out, names),
             }
         })

@@ -47,9 +47,9 @@ pub enum Step {
         default: Arg,
     },
     /// Stops if a divisor vanishes against its scale.
-    Watch {
-        /// Which divisor: index into [`Program::watches`].
-        watch: u32,
+    Guard {
+        /// Which divisor: index into [`Program::pivot_guards`].
+        guard: u32,
         /// The divisor.
         pivot: Arg,
         /// Its scale.
@@ -133,7 +133,7 @@ impl Step {
         match self {
             Step::Op { op, .. } => op.for_each_operand(visit),
             Step::Parameter { default, .. } => visit(*default),
-            Step::Watch { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(visit),
+            Step::Guard { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(visit),
             Step::Solve(solve) => solve.reads().for_each(visit),
         }
     }
@@ -142,7 +142,7 @@ impl Step {
     pub fn defines(&self) -> &[Local] {
         match self {
             Step::Op { out, .. } | Step::Parameter { out, .. } => std::slice::from_ref(out),
-            Step::Watch { .. } => &[],
+            Step::Guard { .. } => &[],
             Step::Solve(solve) => &solve.unknowns,
         }
     }
@@ -179,7 +179,7 @@ impl Program {
         self.values.iter().filter(|&(v, op)| is(v, op)).map(|(v, _)| v).collect()
     }
 
-    /// The routine that computes all that reads parameters alone; divisors among it are watched. `determined` is what
+    /// The routine that computes all that reads parameters alone; divisors among it are guarded. `determined` is what
     /// [`determined`](Program::determined) gives.
     pub fn preamble(&self, determined: &[Value]) -> Routine {
         Builder::new(self, true).build(determined, &self.watches_of(true))
@@ -190,15 +190,16 @@ impl Program {
         Builder::new(self, false).build(wanted, &[])
     }
 
-    /// The same, with all divisors watched that vary.
-    pub fn watched_routine(&self, wanted: &[Value]) -> Routine {
+    /// The same, with all divisors guarded that vary.
+    pub fn guarded_routine(&self, wanted: &[Value]) -> Routine {
         Builder::new(self, false).build(wanted, &self.watches_of(false))
     }
 
-    /// The watches of divisors that read parameters alone, or of the others.
+    /// The pivot guards of divisors that read parameters alone, or of the others.
     fn watches_of(&self, parameters: bool) -> Vec<u32> {
         let fixed = |v: Value| self.values.reads(v) == Reads::PARAMETERS;
-        let chosen = self.watches.iter().enumerate().filter(|(_, w)| (fixed(w.pivot) && fixed(w.scale)) == parameters);
+        let chosen =
+            self.pivot_guards.iter().enumerate().filter(|(_, w)| (fixed(w.pivot) && fixed(w.scale)) == parameters);
         chosen.map(|(index, _)| index as u32).collect()
     }
 
@@ -234,10 +235,10 @@ impl Program {
         wanted.extend(self.momenta.values());
         wanted.extend(self.inputs.iter().map(|i| i.default));
         wanted.extend(self.parameters.iter().map(|p| p.default));
-        wanted.extend(self.watches.iter().flat_map(|w| [w.pivot, w.scale]));
+        wanted.extend(self.pivot_guards.iter().flat_map(|w| [w.pivot, w.scale]));
         wanted.extend(self.conditions.values().map(|c| c.operand));
         wanted.extend(self.assumptions.iter().flat_map(|a| [a.value, a.scale]));
-        let asked = |d: &super::Domain| d.asked.as_ref().map(|a| a.1);
+        let asked = |d: &super::LawDomain| d.asked.as_ref().map(|a| a.1);
         wanted.extend(self.domains.iter().flat_map(|d| [Some(d.argument), asked(d), d.limit]).flatten());
         wanted
     }
@@ -269,7 +270,7 @@ enum Item {
     Inner(Value),
     Open(BlockId),
     Close(BlockId),
-    Watch(u32),
+    PivotGuard(u32),
 }
 
 impl<'a> Builder<'a> {
@@ -278,12 +279,12 @@ impl<'a> Builder<'a> {
         Builder { program, preamble, local, code, inner }
     }
 
-    fn build(mut self, wanted: &[Value], watches: &[u32]) -> Routine {
+    fn build(mut self, wanted: &[Value], pivot_guards: &[u32]) -> Routine {
         let mut roots = wanted.to_vec();
-        let watched = |w: &u32| &self.program.watches[*w as usize];
-        roots.extend(watches.iter().map(watched).flat_map(|w| [w.pivot, w.scale]));
+        let guarded = |w: &u32| &self.program.pivot_guards[*w as usize];
+        roots.extend(pivot_guards.iter().map(guarded).flat_map(|w| [w.pivot, w.scale]));
         let live = self.program.live(&roots, self.preamble);
-        self.order(&live, watches).into_iter().for_each(|item| self.emit(item));
+        self.order(&live, pivot_guards).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
         debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);
         Routine { wanted: wanted.to_vec(), code: self.code }
@@ -333,19 +334,19 @@ impl<'a> Builder<'a> {
         all
     }
 
-    fn order(&self, live: &[bool], watches: &[u32]) -> Vec<Item> {
+    fn order(&self, live: &[bool], pivot_guards: &[u32]) -> Vec<Item> {
         let program = self.program;
         let sequence = self.sequence(live);
         let mut place = vec![0u32; program.values.len()];
         (0u32..).zip(&sequence).for_each(|(at, v)| place[v.index()] = at);
         let mut watch_after: FxHashMap<Value, Vec<u32>> = FxHashMap::default();
         let mut items = Vec::new();
-        for &watch in watches {
-            let w = &program.watches[watch as usize];
+        for &guard in pivot_guards {
+            let w = &program.pivot_guards[guard as usize];
             let last = [w.pivot, w.scale].into_iter().filter(|&v| !self.is_fixed(v)).max_by_key(|v| place[v.index()]);
             match last {
-                Some(last) => watch_after.entry(last).or_default().push(watch),
-                None => items.push(Item::Watch(watch)),
+                Some(last) => watch_after.entry(last).or_default().push(guard),
+                None => items.push(Item::PivotGuard(guard)),
             }
         }
         let mut inner: FxHashMap<BlockId, Vec<Value>> = FxHashMap::default();
@@ -373,7 +374,7 @@ impl<'a> Builder<'a> {
                 }
                 _ => items.push(Item::Value(value)),
             }
-            items.extend(watch_after.remove(&value).unwrap_or_default().into_iter().map(Item::Watch));
+            items.extend(watch_after.remove(&value).unwrap_or_default().into_iter().map(Item::PivotGuard));
         }
         items
     }
@@ -395,10 +396,10 @@ impl<'a> Builder<'a> {
                 self.inner = Inner { outer, ..Inner::default() };
             }
             Item::Close(block) => self.close(block),
-            Item::Watch(watch) => {
-                let w = &self.program.watches[watch as usize];
+            Item::PivotGuard(guard) => {
+                let w = &self.program.pivot_guards[guard as usize];
                 let (pivot, scale) = (self.arg(w.pivot), self.arg(w.scale));
-                self.code.steps.push(Step::Watch { watch, pivot, scale });
+                self.code.steps.push(Step::Guard { guard, pivot, scale });
             }
         }
     }

@@ -6,13 +6,13 @@ use super::op::Op;
 use super::sharing::share;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Cause, Condition, ConditionId, ConditionKind, Domain, Held, Holds, Implicit, Input,
-    Matrix, Moved, Observed, Parameter, Program, Relations, StartCondition, StartGuess, State, Value, Watch, first_of,
-    verify,
+    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Held, Holds, Implicit, Input,
+    LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess, State,
+    Value, first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
-use crate::equations::{Equations, Momentum, Step};
+use crate::equations::{EquationStep, Equations, Momentum};
 use crate::ids::{Id, Table};
 use crate::sparse::SparseMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -32,7 +32,7 @@ pub fn schedule(equations: &Equations) -> Program {
         graph,
         lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
         blocks: Table::new(),
-        watches: Vec::new(),
+        pivot_guards: Vec::new(),
         kinks: Vec::new(),
     };
     let parameters = schedule.parameters();
@@ -47,12 +47,12 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     let mut step_of: FxHashMap<Symbol, usize> = FxHashMap::default();
     for (i, step) in equations.steps.iter().enumerate() {
         match step {
-            Step::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
-            Step::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
-            Step::Newton { unknowns, body, .. } => {
+            EquationStep::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
+            EquationStep::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
+            EquationStep::Newton { unknowns, body, .. } => {
                 unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
             }
-            Step::Watch { .. } => {}
+            EquationStep::Guard { .. } => {}
         }
     }
     let mut roots = equations.residuals.clone();
@@ -63,10 +63,12 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
         while let Some(symbol) = open.pop() {
             let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
             match &equations.steps[i] {
-                Step::Assign { value, .. } => roots.push(*value),
-                Step::Linear { matrix, right, .. } => roots.extend(matrix.entries().iter().chain(right)),
-                Step::Newton { body, residuals, .. } => roots.extend(body.iter().map(|b| &b.1).chain(residuals)),
-                Step::Watch { .. } => {}
+                EquationStep::Assign { value, .. } => roots.push(*value),
+                EquationStep::Linear { matrix, right, .. } => roots.extend(matrix.entries().iter().chain(right)),
+                EquationStep::Newton { body, residuals, .. } => {
+                    roots.extend(body.iter().map(|b| &b.1).chain(residuals))
+                }
+                EquationStep::Guard { .. } => {}
             }
         }
         if read == roots.len() {
@@ -84,7 +86,7 @@ struct Schedule<'a> {
     graph: &'a BondGraph,
     lower: Lowering<'a>,
     blocks: Table<BlockId, Block>,
-    watches: Vec<Watch>,
+    pivot_guards: Vec<PivotGuard>,
     /// Conditions inside Newton blocks, as seen from outside.
     kinks: Vec<ConditionId>,
 }
@@ -143,18 +145,22 @@ impl Schedule<'_> {
         free.for_each(|(i, s)| give(s.rate, Op::Rate(i as u32), Reads::STATE));
     }
 
-    fn step(&mut self, step: &Step) {
+    fn step(&mut self, step: &EquationStep) {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let value = self.lower.value(*value);
                 self.lower.define(*symbol, value);
             }
-            Step::Linear { unknowns, matrix, right, elements } => self.linear(unknowns, matrix, right, elements),
-            Step::Newton { unknowns, body, residuals, elements } => self.newton(unknowns, body, residuals, elements),
-            Step::Watch { pivot, elements } => {
+            EquationStep::Linear { unknowns, matrix, right, elements } => {
+                self.linear(unknowns, matrix, right, elements)
+            }
+            EquationStep::Newton { unknowns, body, residuals, elements } => {
+                self.newton(unknowns, body, residuals, elements)
+            }
+            EquationStep::Guard { pivot, elements } => {
                 let read: Vec<Symbol> = self.graph.exprs.symbols_of(*pivot).into_iter().collect();
                 let elements = self.concerned(elements, &read);
-                divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.watch(factor, &elements));
+                divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.guard(factor, &elements));
             }
         }
     }
@@ -218,7 +224,7 @@ impl Schedule<'_> {
         }
     }
 
-    fn watch(&mut self, factor: Expr, elements: &str) {
+    fn guard(&mut self, factor: Expr, elements: &str) {
         let pivot = self.lower.value(factor);
         let scale = match self.graph.exprs.node(factor) {
             Node::Add(terms) => {
@@ -234,7 +240,7 @@ impl Schedule<'_> {
             _ => self.lower.constant(0.0),
         };
         let divisor = self.described(factor);
-        self.watches.push(Watch { pivot, scale, elements: elements.to_string(), divisor });
+        self.pivot_guards.push(PivotGuard { pivot, scale, elements: elements.to_string(), divisor });
     }
 
     /// An expression as text if it is short, else what varies in it.
@@ -335,13 +341,13 @@ impl Schedule<'_> {
             assumptions: equations
                 .assumptions
                 .iter()
-                .filter_map(|a| assumption(lower, graph, &self.watches, a))
+                .filter_map(|a| assumption(lower, graph, &self.pivot_guards, a))
                 .collect(),
             relations: relations(lower, graph, &equations.relations),
             tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
             parameters,
             blocks: self.blocks,
-            watches: self.watches,
+            pivot_guards: self.pivot_guards,
             conditions: self.lower.conditions,
             values: self.lower.values,
             dependence: Vec::new(),
@@ -414,10 +420,10 @@ fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
 }
 
 /// A domain, if all that it reads is evaluated.
-fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Domain) -> Option<Domain> {
+fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::LawDomain) -> Option<LawDomain> {
     let name = |s: Symbol| graph.exprs.name(s).trim_end_matches('*').to_string();
     let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
-    defined.then(|| Domain {
+    defined.then(|| LawDomain {
         given: name(domain.symbol),
         elements: names(graph, &domain.elements),
         argument: lower.value(domain.argument),
@@ -427,11 +433,11 @@ fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Do
     })
 }
 
-/// An assumption with the value that tells whether it holds; none if it is a divisor that is watched as it is.
+/// An assumption with the value that tells whether it holds; none if it is a divisor that is guarded as it is.
 fn assumption(
     lower: &mut Lowering,
     graph: &BondGraph,
-    watches: &[Watch],
+    pivot_guards: &[PivotGuard],
     of: &crate::algebra::Assumption,
 ) -> Option<Assumption> {
     let exprs = &graph.exprs;
@@ -449,7 +455,7 @@ fn assumption(
         format!("an expression in {}", first_of(&read.join(", ")))
     };
     let value = lower.value(of.expr);
-    if of.holds == Holds::NotZero && watches.iter().any(|w| w.pivot == value) {
+    if of.holds == Holds::NotZero && pivot_guards.iter().any(|w| w.pivot == value) {
         return None;
     }
     let sum = matches!(of.holds, Holds::Zero | Holds::NotZero) && !matches!(exprs.node(of.expr), Node::Symbol(_));
@@ -525,39 +531,39 @@ enum Degree {
 
 fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
     let degrees = degrees(program);
-    let mut causes: Vec<Cause> = Vec::new();
+    let mut triggers: Vec<EventTrigger> = Vec::new();
     for condition in program.conditions.values() {
         let reads = program.values.reads(condition.operand);
-        causes.push(match degrees[condition.operand.index()] {
-            _ if reads.includes(Reads::STATE) => Cause::Shown,
-            Degree::Curve => Cause::Curve,
-            _ => Cause::Clock,
+        triggers.push(match degrees[condition.operand.index()] {
+            _ if reads.includes(Reads::STATE) => EventTrigger::RecordedOnly,
+            Degree::Curve => EventTrigger::CurvedTime,
+            _ => EventTrigger::LinearTime,
         });
     }
-    let shown = |cause: &mut Cause| {
-        if *cause == Cause::Shown {
-            *cause = Cause::State;
+    let shown = |trigger: &mut EventTrigger| {
+        if *trigger == EventTrigger::RecordedOnly {
+            *trigger = EventTrigger::State;
             return true;
         }
         false
     };
     kinks.iter().for_each(|c| {
-        shown(&mut causes[c.index()]);
+        shown(&mut triggers[c.index()]);
     });
     let mut roots: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
     roots.extend(program.held.iter().map(|h| h.source));
     loop {
-        let events = program.conditions.iter().filter(|(id, _)| causes[id.index()] == Cause::State);
+        let events = program.conditions.iter().filter(|(id, _)| triggers[id.index()] == EventTrigger::State);
         roots.extend(events.map(|(_, c)| c.operand));
         let live = program.live(&roots, false);
         let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| op.condition());
         // Not short-circuited: all of them are marked.
-        if used.filter(|c| shown(&mut causes[c.index()])).count() == 0 {
+        if used.filter(|c| shown(&mut triggers[c.index()])).count() == 0 {
             break;
         }
     }
     program.conditions.iter_mut().for_each(|(id, condition): (ConditionId, &mut Condition)| {
-        condition.cause = causes[id.index()];
+        condition.trigger = triggers[id.index()];
     });
 }
 

@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn routines_are_defined_in_order() {
         let program = bridge();
-        let mut code = program.watched_routine(&[program.states[0].rate]).code;
+        let mut code = program.guarded_routine(&[program.states[0].rate]).code;
         assert_eq!(code.verify(), Ok(()));
         assert!(code.solves().any(|s| matches!(s.method, Method::Newton { .. })));
         let whole = code.clone();

@@ -1,4 +1,4 @@
-//! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton.c`.
+//! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton/`.
 
 use std::fmt::Write;
 
@@ -6,8 +6,8 @@ use halfarrow_compiler::program::elimination::Definite;
 use halfarrow_compiler::program::{Block, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
 
+use super::derivatives::Expressions;
 use super::patterns::FULL_AT_MOST;
-use super::slopes::Expressions;
 use super::write::{Body, Reading, Writer};
 use crate::Real;
 

@@ -17,7 +17,7 @@ const EVALUATIONS_AT_JUMPS: u64 = 20_000 + 400;
 
 /// What a function does.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Work {
+pub(super) struct OperationCount {
     /// Additions, products, comparisons.
     pub operations: u64,
     /// Divisions and square roots.
@@ -30,14 +30,14 @@ pub(super) struct Work {
     pub newton: Vec<(BlockId, u64, u64)>,
 }
 
-impl Work {
+impl OperationCount {
     /// What code does.
-    pub fn of(program: &Program, code: &Code) -> Work {
-        let mut work = Work::default();
+    pub fn of(program: &Program, code: &Code) -> OperationCount {
+        let mut work = OperationCount::default();
         for step in &code.steps {
             match step {
                 Step::Op { op, .. } => work.count(*op),
-                Step::Parameter { .. } | Step::Watch { .. } => work.operations += 1,
+                Step::Parameter { .. } | Step::Guard { .. } => work.operations += 1,
                 Step::Solve(solve) => work.solve(program, solve),
             }
         }
@@ -63,7 +63,7 @@ impl Work {
                 self.operations += elimination(&program.blocks[solve.block]);
             }
             Method::Newton { code, .. } => {
-                let one = Work::of(program, code);
+                let one = OperationCount::of(program, code);
                 let one = one.operations + one.divisions + one.calls;
                 self.newton.push((solve.block, 1, one + elimination(&program.blocks[solve.block]) + 20 * n as u64));
             }
@@ -71,8 +71,8 @@ impl Work {
     }
 
     /// The same with derivatives beside the values.
-    pub fn along(self) -> Work {
-        Work { operations: 4 * self.operations, divisions: 3 * self.divisions, calls: 2 * self.calls, ..self }
+    pub fn along(self) -> OperationCount {
+        OperationCount { operations: 4 * self.operations, divisions: 3 * self.divisions, calls: 2 * self.calls, ..self }
     }
 
     fn newton_solves(&self) -> u64 {
@@ -97,9 +97,9 @@ fn elimination(block: &Block) -> u64 {
     }
 }
 
-impl Add for Work {
-    type Output = Work;
-    fn add(mut self, other: Work) -> Work {
+impl Add for OperationCount {
+    type Output = OperationCount;
+    fn add(mut self, other: OperationCount) -> OperationCount {
         self.operations += other.operations;
         self.divisions += other.divisions;
         self.calls += other.calls;
@@ -114,9 +114,9 @@ impl Add for Work {
     }
 }
 
-impl Mul<u64> for Work {
-    type Output = Work;
-    fn mul(mut self, n: u64) -> Work {
+impl Mul<u64> for OperationCount {
+    type Output = OperationCount;
+    fn mul(mut self, n: u64) -> OperationCount {
         self.operations *= n;
         self.divisions *= n;
         self.calls *= n;
@@ -157,7 +157,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    pub(super) fn new(step: Work, jump: Work, plan: &Plan) -> Cost {
+    pub(super) fn new(step: OperationCount, jump: OperationCount, plan: &Plan) -> Cost {
         let s = &plan.sizes;
         let jumps = !(plan.export.program.held.is_empty() && plan.export.program.conditions.is_empty());
         let implicit = plan.export.method == crate::Method::ImplicitMidpoint;

@@ -63,11 +63,11 @@ flags! {
     domains_always
     assumptions
     /// A function for derivatives of the rates.
-    tangent
+    directional_derivative
     /// Derivatives for the user.
     derivatives
     /// Derivatives of the rates by time.
-    drift
+    time_derivative
     time_passes
     /// Linear blocks with a constant matrix.
     linear_constant

@@ -95,7 +95,11 @@ fn private_parts(export: &Export, plan: &Plan) -> String {
         .conditions
         .values()
         .filter(|c| {
-            matches!(c.cause, halfarrow_compiler::program::Cause::Clock | halfarrow_compiler::program::Cause::Curve)
+            matches!(
+                c.trigger,
+                halfarrow_compiler::program::EventTrigger::LinearTime
+                    | halfarrow_compiler::program::EventTrigger::CurvedTime
+            )
         })
         .count();
     part(clocks > 0, "int clock_hold; /* what is done with those of time */".into());

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Assumption, Domain, DomainKind, Watch, first_of};
+use halfarrow_compiler::program::{Assumption, DomainKind, LawDomain, PivotGuard, first_of};
 
 use super::plan::Plan;
 use crate::Real;
@@ -27,7 +27,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
     };
     vec![
-        ("VANISHED", p.watches.iter().map(vanished).collect()),
+        ("VANISHED", p.pivot_guards.iter().map(vanished).collect()),
         ("SINGULAR", block(&singular)),
         (
             "NO_CONVERGENCE",
@@ -85,11 +85,11 @@ fn out_of_range(plan: &Plan) -> Vec<String> {
     }
 }
 
-fn vanished(watch: &Watch) -> String {
+fn vanished(guard: &PivotGuard) -> String {
     format!(
         "the equations of {} have no unique solution: they divide by {}, which vanishes there; the machine is in a singular position, unless another variable may stay independent: name it with `prefer`",
-        first_of(&watch.elements),
-        watch.divisor
+        first_of(&guard.elements),
+        guard.divisor
     )
 }
 
@@ -100,7 +100,7 @@ fn structure(a: &Assumption) -> String {
     )
 }
 
-fn domain(d: &Domain) -> String {
+fn domain(d: &LawDomain) -> String {
     let what = match d.elements.as_str() {
         "" => d.given.clone(),
         elements => format!("the law of {elements}"),

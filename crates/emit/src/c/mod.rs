@@ -5,6 +5,7 @@
 
 mod blocks;
 mod cost;
+mod derivatives;
 pub(crate) mod flags;
 mod givens;
 mod header;
@@ -15,7 +16,6 @@ mod plan;
 mod project;
 mod range;
 mod real;
-mod slopes;
 mod start;
 pub(crate) mod template;
 mod terms;

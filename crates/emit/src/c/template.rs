@@ -111,13 +111,13 @@ pub(super) fn without_empty_sections(text: &str) -> String {
 }
 
 /// A piece of a source file; a static function or table has a name.
-struct Part<'a> {
+struct TopLevelItem<'a> {
     name: Option<&'a str>,
     text: &'a str,
 }
 
 /// Cuts a source at its top level.
-fn parts(text: &str) -> Vec<Part<'_>> {
+fn parts(text: &str) -> Vec<TopLevelItem<'_>> {
     let mut parts = Vec::new();
     let (mut start, mut at) = (0, 0);
     let mut name = None;
@@ -126,9 +126,9 @@ fn parts(text: &str) -> Vec<Part<'_>> {
         let bare = line.trim_end();
         let end = at + line.len();
         if let Some(define) = bare.strip_prefix("#define ").filter(|_| !inside && !bare.ends_with('\\')) {
-            parts.push(Part { name: None, text: &text[start..at] });
+            parts.push(TopLevelItem { name: None, text: &text[start..at] });
             let word = define.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(define.len());
-            parts.push(Part { name: Some(&define[..word]), text: &text[at..end] });
+            parts.push(TopLevelItem { name: Some(&define[..word]), text: &text[at..end] });
             start = end;
         }
         if !inside
@@ -140,23 +140,23 @@ fn parts(text: &str) -> Vec<Part<'_>> {
             // The comment above goes with it.
             let above = comment_above(&text[start..at]);
             if above > 0 {
-                parts.push(Part { name: None, text: &text[start..start + above] });
+                parts.push(TopLevelItem { name: None, text: &text[start..start + above] });
                 start += above;
             }
             name = name_of(bare);
             inside = !bare.ends_with(';');
             if !inside {
-                parts.push(Part { name, text: &text[start..end] });
+                parts.push(TopLevelItem { name, text: &text[start..end] });
                 (start, name) = (end, None);
             }
         } else if inside && (bare == "}" || bare == "};") {
             inside = false;
-            parts.push(Part { name, text: &text[start..end] });
+            parts.push(TopLevelItem { name, text: &text[start..end] });
             (start, name) = (end, None);
         }
         at = end;
     }
-    parts.push(Part { name: None, text: &text[start..] });
+    parts.push(TopLevelItem { name: None, text: &text[start..] });
     parts
 }
 

@@ -61,7 +61,7 @@ pub(super) fn without_the_unread(mut code: Code) -> Code {
     code.outputs.iter().for_each(|&a| mark(&mut read, a));
     let mut kept = Vec::with_capacity(code.steps.len());
     for step in code.steps.into_iter().rev() {
-        let stays = matches!(step, Step::Watch { .. } | Step::Solve(_));
+        let stays = matches!(step, Step::Guard { .. } | Step::Solve(_));
         if stays || step.defines().iter().any(|out| read[out.0 as usize]) {
             step.for_each_read(|a| mark(&mut read, a));
             kept.push(step);

@@ -4,15 +4,15 @@ use std::fmt::Write;
 
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{
-    Arg, BlockId, Cause, Code, ConditionId, ConditionKind, Local, Method, Op, Program, Step, Value,
+    Arg, BlockId, Code, ConditionId, ConditionKind, EventTrigger, Local, Method, Op, Program, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::blocks::Factored;
+use super::derivatives::{Expressions, expression, power};
 use super::givens::Givens;
 use super::header::comment;
 use super::patterns::Patterns;
-use super::slopes::{Expressions, expression, power};
 use super::variables::Variables;
 use crate::Real;
 
@@ -234,7 +234,7 @@ impl<'a> Writer<'a> {
             let can = match step {
                 Step::Op { op, .. } => op.moves(),
                 Step::Solve(_) => true,
-                Step::Parameter { .. } | Step::Watch { .. } => false,
+                Step::Parameter { .. } | Step::Guard { .. } => false,
             };
             step.defines().iter().for_each(|out| moves[out.0 as usize] = one && can);
         }
@@ -261,7 +261,7 @@ impl<'a> Writer<'a> {
 
     /// Whether a condition is taken with the rate of its operand: only what time alone moves is.
     fn takes_rate(&self, condition: ConditionId, moving: Moving) -> bool {
-        moving.time.is_some() && self.program.conditions[condition].cause != Cause::State
+        moving.time.is_some() && self.program.conditions[condition].trigger != EventTrigger::State
     }
 
     fn outputs(&self, f: &mut Body, code: &Code, (values, rates): (&[String], &[String]), chunks: usize) {
@@ -362,7 +362,7 @@ impl<'a> Writer<'a> {
         match step {
             Step::Op { op: Op::Side(..) | Op::Floor(..), .. } => (single, single),
             Step::Op { op: Op::Table(..) | Op::TableSlope(..) | Op::TableCurvature(..), .. } => (single, false),
-            Step::Watch { .. } => (single && self.all_timely(step, &f.wide), false),
+            Step::Guard { .. } => (single && self.all_timely(step, &f.wide), false),
             _ => {
                 let wide = step.defines().first().is_some_and(|out| f.wide[out.0 as usize]);
                 (wide, wide)
@@ -379,13 +379,13 @@ impl<'a> Writer<'a> {
         });
         let a = &reads.values;
         match step {
-            Step::Watch { watch, .. } => {
+            Step::Guard { guard, .. } => {
                 let rounding = 64.0 * if wide { f64::EPSILON } else { self.real.epsilon() };
                 let holds = format!("{0} != 0.0 && fabs({0}) > {1} * {2}", a[0], number(rounding), a[1]);
                 let holds = if wide { format!("HA_WIDE({holds})") } else { format!("({holds})") };
                 let _ = writeln!(
                     f.text,
-                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {watch}, {});\n    }}",
+                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {guard}, {});\n    }}",
                     f.shape.time
                 );
             }
@@ -464,10 +464,10 @@ impl<'a> Writer<'a> {
 
     fn condition(&self, f: &Body, id: ConditionId, a: &str, d: Option<&str>) -> String {
         let condition = &self.program.conditions[id];
-        let hold = match condition.cause {
-            Cause::Clock | Cause::Curve => "m->clock_hold",
-            Cause::State => "m->state_hold",
-            Cause::Shown => "HA_FOLLOW",
+        let hold = match condition.trigger {
+            EventTrigger::LinearTime | EventTrigger::CurvedTime => "m->clock_hold",
+            EventTrigger::State => "m->state_hold",
+            EventTrigger::RecordedOnly => "HA_FOLLOW",
         };
         let (name, table) = match condition.kind {
             ConditionKind::Sign => ("side", String::new()),

@@ -6,10 +6,10 @@ use halfarrow_compiler::unit::{Unit, WHOLE};
 
 /// Units by name: their base units, and display units with factor and offset.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Units(BTreeMap<String, Entry>);
+pub(super) struct Units(BTreeMap<String, BaseUnit>);
 
 #[derive(Debug, Clone, Default)]
-struct Entry {
+struct BaseUnit {
     /// Attributes of the base unit; none if an exponent is no whole number.
     base: Option<String>,
     display: BTreeMap<String, (f64, f64)>,
@@ -23,7 +23,7 @@ impl Units {
             text if text.is_empty() => "1".to_string(),
             text => text,
         };
-        let entry = self.0.entry(name.clone()).or_insert_with(|| Entry { base: base(&si), ..Entry::default() });
+        let entry = self.0.entry(name.clone()).or_insert_with(|| BaseUnit { base: base(&si), ..BaseUnit::default() });
         if unit.is_si() {
             return (name, None);
         }

@@ -1,6 +1,6 @@
 //! The variables that importers see: their value references, kinds and start values.
 
-use halfarrow_compiler::program::{Cause, Op, Program, Reads, Value};
+use halfarrow_compiler::program::{EventTrigger, Op, Program, Reads, Value};
 use halfarrow_compiler::unit::Unit;
 
 use crate::c::Export;
@@ -145,7 +145,7 @@ const SMALL: f64 = 1e-6;
 
 /// The operand of each event indicator.
 pub(super) fn indicators(p: &Program) -> Vec<Value> {
-    let of_state = p.conditions.values().filter(|c| c.cause == Cause::State);
+    let of_state = p.conditions.values().filter(|c| c.trigger == EventTrigger::State);
     of_state.flat_map(|c| vec![c.operand; c.kind.switches()]).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Conditions: held, followed, or taken anew.
 
 use halfarrow_compiler::algebra::{Outside, Table1d};
-use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind};
+use halfarrow_compiler::program::{Condition, ConditionId, ConditionKind, EventTrigger};
 
 /// What a routine does with conditions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(crate) enum Hold {
 #[derive(Debug, Clone)]
 pub(crate) struct Conditions {
     kinds: Vec<ConditionKind>,
-    causes: Vec<Cause>,
+    triggers: Vec<EventTrigger>,
     pub held: Vec<f64>,
     /// What to do with those that time alone moves.
     pub clock: Hold,
@@ -39,9 +39,9 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 impl Conditions {
     pub fn new<'a>(conditions: impl Iterator<Item = &'a Condition>) -> Conditions {
-        let (kinds, causes): (Vec<_>, Vec<_>) = conditions.map(|c| (c.kind, c.cause)).unzip();
+        let (kinds, triggers): (Vec<_>, Vec<_>) = conditions.map(|c| (c.kind, c.trigger)).unzip();
         let held = vec![0.0; kinds.len()];
-        Conditions { kinds, causes, held, clock: Hold::Follow, state: Hold::Follow }
+        Conditions { kinds, triggers, held, clock: Hold::Follow, state: Hold::Follow }
     }
 
     /// What they remember of the run.
@@ -56,10 +56,10 @@ impl Conditions {
     }
 
     fn hold(&self, condition: ConditionId) -> Hold {
-        match self.causes[condition.0 as usize] {
-            Cause::Clock | Cause::Curve => self.clock,
-            Cause::State => self.state,
-            Cause::Shown => Hold::Follow,
+        match self.triggers[condition.0 as usize] {
+            EventTrigger::LinearTime | EventTrigger::CurvedTime => self.clock,
+            EventTrigger::State => self.state,
+            EventTrigger::RecordedOnly => Hold::Follow,
         }
     }
 

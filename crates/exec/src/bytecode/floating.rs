@@ -6,7 +6,7 @@
 
 use super::frame::{Frame, entries};
 use super::instruction::{Operation, Solve};
-use super::newton::SETTLED;
+use super::newton::CLOSE_TO_ROUNDING;
 use halfarrow_compiler::program::Op;
 
 /// A residual below this part of its terms is rounding.
@@ -107,7 +107,7 @@ impl Floating {
     /// Whether after elimination the least pivot tells no more digits of its unknown than a step needs to be settled.
     fn is_weak(&self, rank: usize) -> bool {
         let n = self.order.len();
-        rank < n || self.matrix[n * n - 1].abs() < 1.0 / SETTLED
+        rank < n || self.matrix[n * n - 1].abs() < 1.0 / CLOSE_TO_ROUNDING
     }
 
     /// Replaces the right side by the shortest step, in places, and tells which unknowns float.
@@ -169,11 +169,11 @@ impl Frame {
         self.floating_of(solve).rest() <= BORROWED
     }
 
-    /// From `newton.kept` in steps by what the equations tell of the unknowns, to where the residuals are rounding; only
+    /// From `newton.start` in steps by what the equations tell of the unknowns, to where the residuals are rounding; only
     /// as long as something is hardly told. Ends with an evaluation at the root.
     pub(super) fn floats(&mut self, solve: &Solve) -> bool {
         let newton = &mut self.solvers[solve.block.0 as usize].newton;
-        newton.x.copy_from_slice(&newton.kept);
+        newton.x.copy_from_slice(&newton.start);
         let mut before = f64::INFINITY;
         for _ in 0..STEPS {
             if self.is_exhausted(solve) || !self.evaluate_root(solve) {
@@ -207,7 +207,7 @@ impl Frame {
     /// one of them is greater than its unknown.
     pub(super) fn find_floors(&mut self, solve: &Solve) -> bool {
         let newton = &mut self.solvers[solve.block.0 as usize].newton;
-        newton.x.copy_from_slice(&newton.memory);
+        newton.x.copy_from_slice(&newton.previous);
         if self.is_exhausted(solve) || !self.evaluate_root(solve) || !self.factor(solve) {
             return false;
         }
@@ -217,14 +217,14 @@ impl Frame {
         let newton = &mut solver.newton;
         newton.floor.fill(0.0);
         for (j, &right) in solve.right.iter().enumerate() {
-            newton.next.fill(0.0);
-            newton.next[j] = ROUNDING * terms[right as usize];
-            solver.factors.solve(&mut newton.next);
-            newton.floor.iter_mut().zip(&newton.next).for_each(|(floor, part)| *floor += part.abs());
+            newton.simplified.fill(0.0);
+            newton.simplified[j] = ROUNDING * terms[right as usize];
+            solver.factors.solve(&mut newton.simplified);
+            newton.floor.iter_mut().zip(&newton.simplified).for_each(|(floor, part)| *floor += part.abs());
         }
         let mut hidden = false;
-        for (floor, span) in newton.floor.iter_mut().zip(&mut newton.span) {
-            *floor /= SETTLED;
+        for (floor, span) in newton.floor.iter_mut().zip(&mut newton.magnitude) {
+            *floor /= CLOSE_TO_ROUNDING;
             hidden |= *floor > *span;
             *span = span.max(*floor);
         }
@@ -245,10 +245,10 @@ impl Frame {
         let n = solve.right.len();
         let Frame { r, solvers, terms, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        let largest = newton.x.iter().chain(&newton.memory).fold(0.0f64, |most, x| most.max(x.abs()));
+        let largest = newton.x.iter().chain(&newton.previous).fold(0.0f64, |most, x| most.max(x.abs()));
         let floating = &mut newton.floating;
         for j in 0..n {
-            let size = newton.x[j].abs().max(newton.memory[j].abs());
+            let size = newton.x[j].abs().max(newton.previous[j].abs());
             let unknown = if largest > 0.0 { largest } else { 1.0 };
             floating.size[j] = if size > 0.0 { size } else { unknown };
             floating.order[j] = j;

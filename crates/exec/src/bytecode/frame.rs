@@ -1,20 +1,20 @@
 //! Registers and the code that runs on them.
 
-use super::abreast::{Abreast, Space};
+use super::block_batch::{BatchWorkspace, BlockBatches};
 use super::conditions::{Conditions, table_on};
 use super::elimination::Factors;
 use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use super::newton::Newton;
 use super::piece_of;
 use super::registers::Layout;
-use super::wide::Lane;
+use super::wide::HasFrame;
 use halfarrow_compiler::algebra::Table1d;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::program::calculus::{Calculus, Plain};
 use halfarrow_compiler::program::{Block, ConditionId, Op, Program, Reads};
 use std::sync::Arc;
 
-/// A watched divisor vanishes below this part of the terms that it is made of.
+/// A guarded divisor vanishes below this part of the terms that it is made of.
 pub(crate) const PIVOT_BELOW: f64 = 64.0 * f64::EPSILON;
 
 /// The inner code of a Newton block in another form.
@@ -25,9 +25,9 @@ pub(crate) trait InnerCode: std::fmt::Debug + Send + Sync {
 
 /// Why a routine stopped.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Trouble {
-    /// A watched divisor vanishes.
-    Vanished { watch: u32 },
+pub(crate) enum SolveError {
+    /// A guarded divisor vanishes.
+    Vanished { guard: u32 },
     /// A linear block has no unique solution.
     Singular { block: u32 },
     /// A Newton block found none.
@@ -57,9 +57,9 @@ pub(crate) struct Frame {
     time: u32,
     /// The code of the Newton block that is being solved, where it is not to be interpreted.
     pub inner: Option<Arc<dyn InnerCode>>,
-    /// Newton blocks of the routine that runs which are solved together.
-    pub abreast: Option<Arc<Abreast>>,
-    pub(super) space: Space,
+    /// Newton blocks of the routine that runs which are solved in batches.
+    pub batches: Option<Arc<BlockBatches>>,
+    pub(super) workspace: BatchWorkspace,
 }
 
 /// What a solve block needs.
@@ -108,8 +108,8 @@ impl Frame {
             tables: program.tables.clone(),
             time: layout.time,
             inner: None,
-            abreast: None,
-            space: Space::default(),
+            batches: None,
+            workspace: BatchWorkspace::default(),
         }
     }
 
@@ -124,15 +124,15 @@ impl Frame {
         }
     }
 
-    /// Makes room for Newton blocks that are solved together.
-    pub fn reserve_abreast(&mut self, abreast: &Abreast) {
-        self.space.reserve(abreast);
+    /// Makes room for batches of Newton blocks.
+    pub fn reserve_batches(&mut self, batches: &BlockBatches) {
+        self.workspace.reserve(batches);
     }
 
-    /// From now on Newton blocks are solved together where `abreast` says so, if it says anything.
-    pub fn begin(&mut self, abreast: Option<&Arc<Abreast>>) {
-        self.abreast = abreast.cloned();
-        self.space.turn += 1;
+    /// From now on Newton blocks are solved in these batches, if there are any.
+    pub fn begin(&mut self, batches: Option<&Arc<BlockBatches>>) {
+        self.batches = batches.cloned();
+        self.workspace.turn += 1;
     }
 
     /// Forgets what was kept for the old parameters.
@@ -143,29 +143,29 @@ impl Frame {
     }
 
     /// Runs a routine.
-    pub fn run(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.all::<false>(routine)
     }
 
     /// Runs it with derivatives along the direction that the fixed registers have in `d`.
-    pub fn run_along(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run_along(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.all::<true>(routine)
     }
 
-    fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), Trouble> {
+    fn all<const ALONG: bool>(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.part::<ALONG>(routine, &routine.code)
     }
 
     /// Runs a part of the code of a routine.
-    pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), Trouble> {
+    pub fn part<const ALONG: bool>(&mut self, routine: &Routine, code: &[Instruction]) -> Result<(), SolveError> {
         for instruction in code {
             match instruction {
                 Instruction::Op(operation) => self.operation::<ALONG>(operation),
                 Instruction::Solve { solve } => self.solve::<ALONG>(&routine.solves[*solve as usize])?,
-                Instruction::Watch { pivot, scale, watch } => {
+                Instruction::Guard { pivot, scale, guard } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
-                    if !Frame::stands(pivot, scale) {
-                        return Err(Trouble::Vanished { watch: *watch });
+                    if !Frame::is_pivot(pivot, scale) {
+                        return Err(SolveError::Vanished { guard: *guard });
                     }
                 }
                 Instruction::Parameter { out, index, default } => {
@@ -179,7 +179,7 @@ impl Frame {
 
     /// Whether a divisor is clearly not 0.
     #[inline]
-    pub(super) fn stands(pivot: f64, scale: f64) -> bool {
+    pub(super) fn is_pivot(pivot: f64, scale: f64) -> bool {
         pivot != 0.0 && pivot.abs() > PIVOT_BELOW * scale
     }
 
@@ -198,17 +198,17 @@ impl Frame {
         code.iter().for_each(|operation| self.operation::<ALONG>(operation));
     }
 
-    pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    pub fn solve<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         if solve.guess.is_empty() {
             self.linear::<ALONG>(solve)
-        } else if !ALONG && self.takes_root(solve) {
+        } else if !ALONG && self.put_known_root(solve) {
             Ok(())
         } else {
             self.newton::<ALONG>(solve)
         }
     }
 
-    fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn linear<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, d, solvers, .. } = self;
         let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
         if solve.shared.is_none() && !(solver.constant && solver.factored) {
@@ -216,7 +216,7 @@ impl Frame {
         }
         solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
         if !solver.factored {
-            return Err(Trouble::Singular { block: solve.block.0 });
+            return Err(SolveError::Singular { block: solve.block.0 });
         }
         solver.factors.solve(&mut solver.x);
         if ALONG {
@@ -233,7 +233,7 @@ impl Frame {
         Ok(())
     }
 
-    fn newton<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), Trouble> {
+    fn newton<const ALONG: bool>(&mut self, solve: &Solve) -> Result<(), SolveError> {
         self.find_root(solve)?;
         let size = solve.right.len();
         if ALONG {
@@ -242,7 +242,7 @@ impl Frame {
             let Frame { r, d, solvers, .. } = self;
             let solver = &mut solvers[solve.block.0 as usize];
             if solver.factors.factor(entries(solve, r)).is_err() {
-                return Err(Trouble::Singular { block: solve.block.0 });
+                return Err(SolveError::Singular { block: solve.block.0 });
             }
             (0..size).for_each(|i| solver.rate[i] = -d[solve.right[i] as usize]);
             solver.factors.solve(&mut solver.rate);
@@ -342,7 +342,7 @@ impl Frame {
     }
 }
 
-impl Lane for Frame {
+impl HasFrame for Frame {
     fn frame(&mut self) -> &mut Frame {
         self
     }

@@ -22,7 +22,7 @@ pub(crate) enum Instruction {
     /// The parameter's set value, or `default` where none is set.
     Parameter { out: Register, index: u32, default: Register },
     /// Stops if the pivot vanishes against its scale.
-    Watch { pivot: Register, scale: Register, watch: u32 },
+    Guard { pivot: Register, scale: Register, guard: u32 },
     /// A solve block: index into [`Routine::solves`].
     Solve { solve: u32 },
 }

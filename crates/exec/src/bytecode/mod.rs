@@ -1,6 +1,6 @@
 //! The interpreter of routines.
 
-mod abreast;
+mod block_batch;
 mod conditions;
 mod elimination;
 mod floating;
@@ -11,12 +11,12 @@ mod packed;
 mod registers;
 mod wide;
 
-pub(crate) use abreast::Abreast;
+pub(crate) use block_batch::BlockBatches;
 #[cfg(feature = "machine")]
 pub(crate) use conditions::table_on;
 pub(crate) use conditions::{HeldConditions, Hold, piece_of};
 pub(crate) use elimination::Lu;
-pub(crate) use frame::{Frame, Trouble};
+pub(crate) use frame::{Frame, SolveError};
 #[cfg(feature = "machine")]
 pub(crate) use frame::{InnerCode, PIVOT_BELOW};
 #[cfg(feature = "machine")]
@@ -25,4 +25,4 @@ pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
 pub(crate) use newton::Followed;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;
-pub(crate) use wide::{Lane, Line, WideFrame};
+pub(crate) use wide::{HasFrame, Vector, WideFrame};

@@ -1,6 +1,6 @@
-//! A routine for lanes: its instructions in another order, so that many of one kind stand together.
+//! A routine for SIMD batches: its instructions in another order, so that many of one kind stand together.
 //!
-//! To find out what an instruction does takes longer than to do it. Every value keeps the operation it comes from, hence
+//! To dispatch an instruction takes longer than to execute it. Every value keeps the operation it comes from, hence
 //! its bits; only the order of what does not read each other changes.
 
 use super::instruction::{Operation, Register, Routine, Solve};
@@ -8,9 +8,9 @@ use super::registers::Layout;
 use halfarrow_compiler::program::{Arg, Code, Method, Op, Step};
 use std::collections::BTreeMap;
 
-/// What stands together.
+/// Operations that are packed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Kind {
+pub(crate) enum Arithmetic {
     Add,
     Sub,
     Mul,
@@ -20,20 +20,20 @@ pub(crate) enum Kind {
 
 /// A step of the packed routine.
 #[derive(Debug, Clone)]
-pub(crate) enum Run {
+pub(crate) enum PackedStep {
     /// Operations of one kind: result and operands, in their slots.
-    Many(Kind, Vec<[u32; 3]>),
+    Many(Arithmetic, Vec<[u32; 3]>),
     /// Any other operation, on slots.
     One(Operation),
     /// A divisor that must not vanish against its scale.
-    Watch { pivot: u32, scale: u32 },
+    Guard { pivot: u32, scale: u32 },
     /// A solve block.
-    Solve(Block),
+    Solve(PackedSolve),
 }
 
 /// A solve block, which works on the registers of a frame.
 #[derive(Debug, Clone)]
-pub(crate) struct Block {
+pub(crate) struct PackedSolve {
     /// Its number in the routine.
     pub solve: usize,
     /// What it reads: slot and register.
@@ -45,7 +45,7 @@ pub(crate) struct Block {
 /// The packed routine.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Packed {
-    pub runs: Vec<Run>,
+    pub runs: Vec<PackedStep>,
     /// Slots of what is wanted.
     pub outputs: Vec<u32>,
     /// Slots in all; those of fixed registers are their registers.
@@ -53,8 +53,8 @@ pub(crate) struct Packed {
 }
 
 /// A step with the numbers of what it reads and defines: fixed slots first, then the locals of the code.
-struct Item<'a> {
-    kind: Option<Kind>,
+struct PackedItem<'a> {
+    kind: Option<Arithmetic>,
     step: &'a Step,
     reads: Vec<u32>,
     writes: Vec<u32>,
@@ -73,8 +73,8 @@ impl Packed {
 
     /// Code in packed order. `slot` is where it finds what it reads: below `fixed`, or a local that far above.
     pub fn of(code: &Code, fixed: u32, solves: &[Solve], slot: impl Fn(Arg) -> u32) -> Packed {
-        let item = |step| Item::of(step, fixed, &slot);
-        let items: Vec<Item> = code.steps.iter().map(item).collect();
+        let item = |step| PackedItem::of(step, fixed, &slot);
+        let items: Vec<PackedItem> = code.steps.iter().map(item).collect();
         let outputs: Vec<u32> = code.outputs.iter().map(|&a| slot(a)).collect();
         let values = fixed + code.values.len() as u32;
         let order = packed_order(&items, values);
@@ -82,19 +82,19 @@ impl Packed {
     }
 }
 
-impl Item<'_> {
-    fn of<'s>(step: &'s Step, fixed: u32, slot: &impl Fn(Arg) -> u32) -> Item<'s> {
+impl PackedItem<'_> {
+    fn of<'s>(step: &'s Step, fixed: u32, slot: &impl Fn(Arg) -> u32) -> PackedItem<'s> {
         let kind = match step {
-            Step::Op { op: Op::Add(..), .. } => Some(Kind::Add),
-            Step::Op { op: Op::Sub(..), .. } => Some(Kind::Sub),
-            Step::Op { op: Op::Mul(..), .. } => Some(Kind::Mul),
-            Step::Op { op: Op::Div(..), .. } => Some(Kind::Div),
-            Step::Op { op: Op::Neg(..), .. } => Some(Kind::Neg),
+            Step::Op { op: Op::Add(..), .. } => Some(Arithmetic::Add),
+            Step::Op { op: Op::Sub(..), .. } => Some(Arithmetic::Sub),
+            Step::Op { op: Op::Mul(..), .. } => Some(Arithmetic::Mul),
+            Step::Op { op: Op::Div(..), .. } => Some(Arithmetic::Div),
+            Step::Op { op: Op::Neg(..), .. } => Some(Arithmetic::Neg),
             _ => None,
         };
         let mut reads = Vec::new();
         step.for_each_read(|a| reads.push(slot(a)));
-        Item { kind, step, reads, writes: step.defines().iter().map(|out| fixed + out.0).collect() }
+        PackedItem { kind, step, reads, writes: step.defines().iter().map(|out| fixed + out.0).collect() }
     }
 }
 
@@ -105,8 +105,8 @@ fn read_by(solve: &Solve) -> impl Iterator<Item = Register> + '_ {
     solve.outer.iter().chain(matrix).chain(right).copied()
 }
 
-/// All that is ready of the kind of which most is, again and again.
-fn packed_order(items: &[Item], values: u32) -> Vec<Vec<usize>> {
+/// List scheduling: all that is ready of the kind of which most is, again and again.
+fn packed_order(items: &[PackedItem], values: u32) -> Vec<Vec<usize>> {
     let mut readers: Vec<Vec<usize>> = vec![Vec::new(); values as usize];
     let mut missing = vec![0usize; items.len()];
     let mut made_by = vec![usize::MAX; values as usize];
@@ -117,7 +117,7 @@ fn packed_order(items: &[Item], values: u32) -> Vec<Vec<usize>> {
         }
         item.writes.iter().for_each(|&value| made_by[value as usize] = i);
     }
-    let mut ready: BTreeMap<Option<Kind>, Vec<usize>> = BTreeMap::new();
+    let mut ready: BTreeMap<Option<Arithmetic>, Vec<usize>> = BTreeMap::new();
     for (i, item) in items.iter().enumerate().filter(|(i, _)| missing[*i] == 0) {
         ready.entry(item.kind).or_default().push(i);
     }
@@ -153,7 +153,7 @@ struct Slots {
 }
 
 impl Slots {
-    fn new(fixed: u32, values: u32, items: &[Item], order: &[Vec<usize>], outputs: &[u32]) -> Slots {
+    fn new(fixed: u32, values: u32, items: &[PackedItem], order: &[Vec<usize>], outputs: &[u32]) -> Slots {
         let mut left = vec![0; values as usize];
         let all = order.iter().flatten().flat_map(|&i| &items[i].reads);
         all.chain(outputs).for_each(|&value| left[value as usize] += 1);
@@ -181,7 +181,7 @@ impl Slots {
         slot
     }
 
-    fn place(mut self, solves: &[Solve], items: &[Item], order: Vec<Vec<usize>>, outputs: &[u32]) -> Packed {
+    fn place(mut self, solves: &[Solve], items: &[PackedItem], order: Vec<Vec<usize>>, outputs: &[u32]) -> Packed {
         let number_of: BTreeMap<u32, usize> = solves.iter().enumerate().map(|(i, s)| (s.block.0, i)).collect();
         let mut runs = Vec::with_capacity(order.len());
         for group in order {
@@ -196,10 +196,10 @@ impl Slots {
                     (None, Step::Op { op, .. }) => {
                         let mut reads = reads.into_iter();
                         let op = op.map_operands(|_| reads.next().expect("as many slots as operands"));
-                        runs.push(Run::One(Operation { out: writes[0], op }));
+                        runs.push(PackedStep::One(Operation { out: writes[0], op }));
                     }
-                    (None, Step::Watch { .. }) => {
-                        runs.push(Run::Watch { pivot: reads[0], scale: reads[1] });
+                    (None, Step::Guard { .. }) => {
+                        runs.push(PackedStep::Guard { pivot: reads[0], scale: reads[1] });
                     }
                     (None, Step::Solve(solve)) => {
                         let alone = !matches!(solve.method, Method::Linear { shared: Some(_), .. });
@@ -208,13 +208,13 @@ impl Slots {
                         let block = &solves[solve];
                         let reads = reads.into_iter().zip(read_by(block)).collect();
                         let finds = writes.into_iter().zip(block.unknowns.iter().copied()).collect();
-                        runs.push(Run::Solve(Block { solve, reads, finds }));
+                        runs.push(PackedStep::Solve(PackedSolve { solve, reads, finds }));
                     }
                     (None, Step::Parameter { .. }) => unreachable!("parameters are set lane by lane"),
                 }
             }
             if let Some(kind) = kind {
-                runs.push(Run::Many(kind, many));
+                runs.push(PackedStep::Many(kind, many));
             }
         }
         let outputs = outputs.iter().map(|&value| self.of[value as usize]).collect();

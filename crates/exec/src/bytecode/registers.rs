@@ -72,7 +72,7 @@ impl Layout {
         layout
     }
 
-    /// The code that computes all that reads parameters alone, into its fixed registers; divisors among it are watched.
+    /// The code that computes all that reads parameters alone, into its fixed registers; divisors among it are guarded.
     pub fn preamble(&self, program: &Program) -> Routine {
         let routine = program.preamble(&self.determined);
         let mut fixed = FxHashMap::default();
@@ -89,9 +89,9 @@ impl Layout {
         Allocator::new(self, &FxHashMap::default()).routine(program.routine(wanted).code)
     }
 
-    /// The same, with all divisors watched that vary.
-    pub fn watched_routine(&self, program: &Program, wanted: &[Value]) -> Routine {
-        Allocator::new(self, &FxHashMap::default()).routine(program.watched_routine(wanted).code)
+    /// The same, with all divisors guarded that vary.
+    pub fn guarded_routine(&self, program: &Program, wanted: &[Value]) -> Routine {
+        Allocator::new(self, &FxHashMap::default()).routine(program.guarded_routine(wanted).code)
     }
 }
 
@@ -157,10 +157,10 @@ impl<'a> Allocator<'a> {
                 self.release(places, *value, at);
                 Instruction::Parameter { out: self.define(places, out.index()), index: *index, default }
             }
-            Step::Watch { watch, pivot: divisor, scale: size } => {
+            Step::Guard { guard, pivot: divisor, scale: size } => {
                 let [pivot, scale] = [*divisor, *size].map(|a| self.register(places, a));
                 [*divisor, *size].into_iter().for_each(|a| self.release(places, a, at));
-                Instruction::Watch { pivot, scale, watch: *watch }
+                Instruction::Guard { pivot, scale, guard: *guard }
             }
             Step::Solve(solve) => {
                 let solve = self.solve(solve, at, places);

@@ -1,33 +1,33 @@
-//! A routine for several sets of parameters at once: each instruction works on a lane for every set.
+//! A routine for a SIMD batch: several sets of parameters at once, one to a lane.
 //!
 //! The same operations in the same order as one at a time, hence the same bits. Solve blocks, conditions and tables go
 //! through the frame of each lane.
 
 use super::frame::Frame;
 use super::instruction::{Operation, Routine, Solve};
-use super::packed::{Block, Kind, Packed, Run};
+use super::packed::{Arithmetic, Packed, PackedSolve, PackedStep};
 use crate::math;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::program::{ConditionId, Op};
 
-/// What has a frame of its own.
-pub(crate) trait Lane {
+/// The model of a lane, with its own frame.
+pub(crate) trait HasFrame {
     /// The frame.
     fn frame(&mut self) -> &mut Frame;
 }
 
-/// A number for each lane, in cache lines of its own.
+/// A SIMD vector: a number for each lane, aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(crate) struct Line<const N: usize>(pub [f64; N]);
+pub(crate) struct Vector<const N: usize>(pub [f64; N]);
 
-impl<const N: usize> Default for Line<N> {
-    fn default() -> Line<N> {
-        Line([0.0; N])
+impl<const N: usize> Default for Vector<N> {
+    fn default() -> Vector<N> {
+        Vector([0.0; N])
     }
 }
 
-impl<const N: usize> std::ops::Deref for Line<N> {
+impl<const N: usize> std::ops::Deref for Vector<N> {
     type Target = [f64; N];
 
     #[inline(always)]
@@ -36,7 +36,7 @@ impl<const N: usize> std::ops::Deref for Line<N> {
     }
 }
 
-impl<const N: usize> std::ops::DerefMut for Line<N> {
+impl<const N: usize> std::ops::DerefMut for Vector<N> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [f64; N] {
         &mut self.0
@@ -46,13 +46,13 @@ impl<const N: usize> std::ops::DerefMut for Line<N> {
 /// The registers of all lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WideFrame<const N: usize> {
-    pub r: Vec<Line<N>>,
+    pub r: Vec<Vector<N>>,
     arch: pulp::Arch,
 }
 
-/// A routine to be run with the vectors of the machine. A type of its own, not a closure: only then is all of it compiled
-/// for them.
-struct All<'a, L, const N: usize> {
+/// A routine to be run with the SIMD vectors of the machine. A type of its own, not a closure: only then is all of it
+/// compiled for them.
+struct AllLanes<'a, L, const N: usize> {
     registers: &'a mut WideFrame<N>,
     solves: &'a [Solve],
     packed: &'a Packed,
@@ -60,7 +60,7 @@ struct All<'a, L, const N: usize> {
     good: &'a mut [bool; N],
 }
 
-impl<L: Lane, const N: usize> pulp::WithSimd for All<'_, L, N> {
+impl<L: HasFrame, const N: usize> pulp::WithSimd for AllLanes<'_, L, N> {
     type Output = ();
 
     #[inline(always)]
@@ -72,32 +72,38 @@ impl<L: Lane, const N: usize> pulp::WithSimd for All<'_, L, N> {
 impl<const N: usize> WideFrame<N> {
     /// Makes room for a routine.
     pub fn reserve(&mut self, registers: usize) {
-        self.r.resize(self.r.len().max(registers), Line::default());
+        self.r.resize(self.r.len().max(registers), Vector::default());
     }
 
-    /// Runs a routine, packed, for all lanes; `good` loses those that run into trouble. The fixed registers have been
+    /// Runs a routine, packed, for all lanes; `good` loses those that fail. The fixed registers have been
     /// filled.
-    pub fn run<L: Lane>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
+    pub fn run<L: HasFrame>(&mut self, routine: &Routine, packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
         // The widest vectors that the machine has; they round as narrow ones do.
-        self.arch.dispatch(All { registers: self, solves: &routine.solves, packed, frames, good });
+        self.arch.dispatch(AllLanes { registers: self, solves: &routine.solves, packed, frames, good });
     }
 
     /// The same where the vectors of the machine are in use already.
     #[inline(always)]
-    pub(super) fn all<L: Lane>(&mut self, solves: &[Solve], packed: &Packed, frames: &mut [L], good: &mut [bool; N]) {
+    pub(super) fn all<L: HasFrame>(
+        &mut self,
+        solves: &[Solve],
+        packed: &Packed,
+        frames: &mut [L],
+        good: &mut [bool; N],
+    ) {
         for run in &packed.runs {
             match run {
-                Run::Many(Kind::Add, all) => self.many(all, |a, b| a + b),
-                Run::Many(Kind::Sub, all) => self.many(all, |a, b| a - b),
-                Run::Many(Kind::Mul, all) => self.many(all, |a, b| a * b),
-                Run::Many(Kind::Div, all) => self.many(all, |a, b| a / b),
-                Run::Many(Kind::Neg, all) => self.many(all, |a, _| -a),
-                Run::Solve(block) => self.solve(solves, block, frames, good),
-                Run::Watch { pivot, scale } => {
+                PackedStep::Many(Arithmetic::Add, all) => self.many(all, |a, b| a + b),
+                PackedStep::Many(Arithmetic::Sub, all) => self.many(all, |a, b| a - b),
+                PackedStep::Many(Arithmetic::Mul, all) => self.many(all, |a, b| a * b),
+                PackedStep::Many(Arithmetic::Div, all) => self.many(all, |a, b| a / b),
+                PackedStep::Many(Arithmetic::Neg, all) => self.many(all, |a, _| -a),
+                PackedStep::Solve(block) => self.solve(solves, block, frames, good),
+                PackedStep::Guard { pivot, scale } => {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
-                    (0..N).for_each(|l| good[l] &= Frame::stands(pivot[l], scale[l]));
+                    (0..N).for_each(|l| good[l] &= Frame::is_pivot(pivot[l], scale[l]));
                 }
-                Run::One(operation) => self.step(operation, frames),
+                PackedStep::One(operation) => self.step(operation, frames),
             }
         }
     }
@@ -106,12 +112,12 @@ impl<const N: usize> WideFrame<N> {
     fn many(&mut self, all: &[[u32; 3]], value: impl Fn(f64, f64) -> f64) {
         for &[out, a, b] in all {
             let (a, b) = (self.r[a as usize], self.r[b as usize]);
-            self.r[out as usize] = Line(std::array::from_fn(|l| value(a[l], b[l])));
+            self.r[out as usize] = Vector(std::array::from_fn(|l| value(a[l], b[l])));
         }
     }
 
     #[inline(never)]
-    fn solve<L: Lane>(&mut self, solves: &[Solve], block: &Block, frames: &mut [L], good: &mut [bool; N]) {
+    fn solve<L: HasFrame>(&mut self, solves: &[Solve], block: &PackedSolve, frames: &mut [L], good: &mut [bool; N]) {
         for lane in 0..N {
             if !good[lane] {
                 continue;
@@ -125,13 +131,13 @@ impl<const N: usize> WideFrame<N> {
 
     #[inline(always)]
     fn each(&mut self, out: u32, value: impl Fn(usize) -> f64) {
-        self.r[out as usize] = Line(std::array::from_fn(value));
+        self.r[out as usize] = Vector(std::array::from_fn(value));
     }
 
     /// One operation: what has a way of its own for lanes, else lane by lane as the table says.
     #[inline(always)]
     #[allow(unreachable_patterns, unused_variables, reason = "the table has what has a way of its own as well")]
-    fn step<L: Lane>(&mut self, operation: &Operation, frames: &mut [L]) {
+    fn step<L: HasFrame>(&mut self, operation: &Operation, frames: &mut [L]) {
         let out = operation.out;
         macro_rules! compute {
             (($k:ident $value:ident)
@@ -141,11 +147,11 @@ impl<const N: usize> WideFrame<N> {
              })* }
              held $held:tt) => {
                 match operation.op {
-                    Op::Powi(n, a) => self.r[out as usize] = Line(powers(self.r[a as usize].0, n)),
+                    Op::Powi(n, a) => self.r[out as usize] = Vector(powers(self.r[a as usize].0, n)),
                     Op::Pow(a, b) => {
-                        self.r[out as usize] = Line(math::pow_lanes(&self.r[a as usize].0, &self.r[b as usize].0));
+                        self.r[out as usize] = Vector(math::pow_lanes(&self.r[a as usize].0, &self.r[b as usize].0));
                     }
-                    Op::Call(f, a) => self.r[out as usize] = Line(math::call_lanes(f, &self.r[a as usize].0)),
+                    Op::Call(f, a) => self.r[out as usize] = Vector(math::call_lanes(f, &self.r[a as usize].0)),
                     Op::Side(condition, a) | Op::Floor(condition, a) => {
                         let a = self.r[a as usize];
                         for (lane, frame) in frames.iter_mut().enumerate() {
@@ -171,7 +177,7 @@ impl<const N: usize> WideFrame<N> {
 
     /// A table, or its derivative of some order.
     #[inline(never)]
-    fn table<L: Lane>(
+    fn table<L: HasFrame>(
         &mut self,
         frames: &mut [L],
         (out, a): (u32, u32),

@@ -1,6 +1,6 @@
 //! What stands in the place of machine code where it is left out.
 
-use crate::bytecode::{Frame, Layout, Routine, Trouble};
+use crate::bytecode::{Frame, Layout, Routine, SolveError};
 use halfarrow_compiler::program::Program;
 use std::fmt;
 
@@ -21,10 +21,10 @@ impl std::error::Error for MachineError {}
 
 /// There is none.
 #[derive(Debug)]
-pub(crate) enum Code {}
+pub(crate) enum MachineCode {}
 
-impl Code {
-    pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), Trouble> {
+impl MachineCode {
+    pub fn run(&self, _: &mut Frame, _: &Routine) -> Result<(), SolveError> {
         match *self {}
     }
     pub fn rates(&self, _: &mut Frame, _: f64, _: &[f64], _: &mut [f64]) -> bool {
@@ -39,7 +39,7 @@ impl Generator {
     pub fn new() -> Result<Generator, MachineError> {
         Err(MachineError::LeftOut)
     }
-    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<Code, MachineError> {
+    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<MachineCode, MachineError> {
         Err(MachineError::LeftOut)
     }
 }

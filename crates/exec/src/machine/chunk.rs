@@ -1,7 +1,7 @@
 //! One chunk of a routine as a function: loads, arithmetic without branches, and stores if all went well.
 
 use super::arithmetic::Writer;
-use super::{RARE, STATUS_OF_WATCH, kernels};
+use super::{RARE, STATUS_OF_GUARD, kernels};
 use crate::bytecode::{Operation, PIVOT_BELOW, Register, Solve};
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, Value, types};
@@ -10,11 +10,11 @@ use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::ids::Table;
 use halfarrow_compiler::program::calculus::{Calculus, Moving};
 use halfarrow_compiler::program::elimination::{Definite, Elimination};
-use halfarrow_compiler::program::{Cause, Condition, ConditionId, ConditionKind, Op};
+use halfarrow_compiler::program::{Condition, ConditionId, ConditionKind, EventTrigger, Op};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is the same for all chunks of a model.
-pub(super) struct Setting<'a> {
+/// What all chunks of a model share.
+pub(super) struct ChunkContext<'a> {
     pub conditions: &'a Table<ConditionId, Condition>,
     /// The register of time: those below never move, constants and parameters.
     pub time: Register,
@@ -31,26 +31,26 @@ pub(super) struct Direct {
 
 /// What a chunk consists of.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Item<'a> {
+pub(super) enum ChunkItem<'a> {
     Op(&'a Operation),
     /// Stops if the pivot vanishes against its scale.
-    Watch {
+    Guard {
         pivot: Register,
         scale: Register,
-        watch: u32,
+        guard: u32,
     },
     /// A small linear block, written out.
     Solve(&'a Solve),
 }
 
-/// Translates items, then stores what is read later.
+/// Translates items, then stores the registers that are live behind them.
 pub(super) struct Chunk<'a, 'b> {
     w: Writer<'a>,
-    setting: &'b Setting<'b>,
+    context: &'b ChunkContext<'b>,
     along: bool,
     inline: bool,
     values: Value,
-    slopes: Value,
+    derivatives: Value,
     held: Value,
     tables: Value,
     keep: Value,
@@ -60,26 +60,32 @@ pub(super) struct Chunk<'a, 'b> {
     loaded: BTreeSet<Register>,
     /// 0, or the first thing that is wrong.
     status: Option<Value>,
-    /// Whether all usual ways hold.
+    /// Whether the fast path holds.
     good: Option<Value>,
     /// Truth values that stand in registers as 0 and 1.
     truth: BTreeMap<Value, Value>,
-    turns: BTreeMap<Value, (Value, Value)>,
+    sines_and_cosines: BTreeMap<Value, (Value, Value)>,
     kept: [Option<Value>; 2],
     direct: Option<Direct>,
 }
 
 impl<'a, 'b> Chunk<'a, 'b> {
     /// `parameters` are those of the function, as in [`memory`](super::memory).
-    pub fn new(w: Writer<'a>, parameters: [Value; 5], setting: &'b Setting<'b>, along: bool, inline: bool) -> Self {
-        let [values, slopes, held, tables, keep] = parameters;
+    pub fn new(
+        w: Writer<'a>,
+        parameters: [Value; 5],
+        context: &'b ChunkContext<'b>,
+        along: bool,
+        inline: bool,
+    ) -> Self {
+        let [values, derivatives, held, tables, keep] = parameters;
         Chunk {
             w,
-            setting,
+            context,
             along,
             inline,
             values,
-            slopes,
+            derivatives,
             held,
             tables,
             keep,
@@ -89,26 +95,26 @@ impl<'a, 'b> Chunk<'a, 'b> {
             status: None,
             good: None,
             truth: BTreeMap::new(),
-            turns: BTreeMap::new(),
+            sines_and_cosines: BTreeMap::new(),
             kept: [None; 2],
             direct: None,
         }
     }
 
-    /// From now on time and states are read where they are given.
+    /// From now on time and states are read from the arguments.
     pub fn reads_directly(&mut self, direct: Direct) {
         self.direct = Some(direct);
     }
 
-    pub fn item(&mut self, item: Item) {
+    pub fn item(&mut self, item: ChunkItem) {
         match item {
-            Item::Op(&Operation { out, op }) => self.operation(out, op),
-            Item::Watch { pivot, scale, watch } => self.watch(pivot, scale, watch),
-            Item::Solve(solve) => self.solve(solve),
+            ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
+            ChunkItem::Guard { pivot, scale, guard } => self.guard(pivot, scale, guard),
+            ChunkItem::Solve(solve) => self.solve(solve),
         }
     }
 
-    /// Stores what is read later, unless something is wrong or unusual, and returns the status.
+    /// Stores live registers unless something is wrong or unusual, and returns the status.
     pub fn end(mut self, live: impl Iterator<Item = Register>) -> Writer<'a> {
         self.stop_unless_fine();
         for register in live.filter(|r| !self.loaded.contains(r)).collect::<Vec<_>>() {
@@ -116,7 +122,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 self.w.store(self.values, register, value);
             }
             if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
-                self.w.store(self.slopes, register, slope);
+                self.w.store(self.derivatives, register, slope);
             }
         }
         self.fine()
@@ -171,7 +177,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 let (base, index) = (direct.states.1, register - direct.states.0.start);
                 self.w.load_fixed(base, index)
             }
-            _ if register < self.setting.states.end => self.w.load_fixed(self.values, register),
+            _ if register < self.context.states.end => self.w.load_fixed(self.values, register),
             _ => self.w.load(self.values, register),
         };
         self.r.insert(register, value);
@@ -180,13 +186,13 @@ impl<'a, 'b> Chunk<'a, 'b> {
     }
 
     fn slope(&mut self, register: Register) -> Value {
-        if !self.along || register < self.setting.time {
+        if !self.along || register < self.context.time {
             return self.w.number(0.0);
         }
         if let Some(&known) = self.d.get(&register) {
             return known;
         }
-        let slope = self.w.load(self.slopes, register);
+        let slope = self.w.load(self.derivatives, register);
         self.d.insert(register, slope);
         self.loaded.insert(register);
         slope
@@ -231,7 +237,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.w.is(FloatCC::NotEqual, value, zero)
     }
 
-    fn watch(&mut self, pivot: Register, scale: Register, watch: u32) {
+    fn guard(&mut self, pivot: Register, scale: Register, guard: u32) {
         let (pivot, scale) = (self.value(pivot), self.value(scale));
         let (factor, zero) = (self.w.number(PIVOT_BELOW), self.zero());
         let least = self.w.mul(factor, scale);
@@ -239,7 +245,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let above = self.w.is(FloatCC::GreaterThan, size, least);
         let some = self.w.is(FloatCC::NotEqual, pivot, zero);
         let stands = self.w.both(above, some);
-        self.stop_unless(stands, STATUS_OF_WATCH + u64::from(watch));
+        self.stop_unless(stands, STATUS_OF_GUARD + u64::from(guard));
     }
 
     /// One operation: its value, and by the rules of the table its slope.
@@ -357,12 +363,12 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     /// Sine and cosine, shared by both.
     fn turn(&mut self, a: Value) -> (Value, Value) {
-        if let Some(&known) = self.turns.get(&a) {
+        if let Some(&known) = self.sines_and_cosines.get(&a) {
             return known;
         }
         let (sine, cosine, good) = self.w.sine_cosine(a);
         self.usual(good);
-        self.turns.insert(a, (sine, cosine));
+        self.sines_and_cosines.insert(a, (sine, cosine));
         (sine, cosine)
     }
 
@@ -386,13 +392,13 @@ impl<'a, 'b> Chunk<'a, 'b> {
     }
 
     fn condition(&mut self, condition: ConditionId, operand: Value) -> Value {
-        let Condition { kind, cause, .. } = self.setting.conditions[condition];
+        let Condition { kind, trigger, .. } = self.context.conditions[condition];
         let follow = match kind {
             ConditionKind::Sign => {
                 let (one, zero) = (self.w.number(1.0), self.zero());
                 let above = self.w.is(FloatCC::GreaterThan, operand, zero);
                 let value = self.w.choose(above, one, zero);
-                if cause == Cause::Shown {
+                if trigger == EventTrigger::RecordedOnly {
                     self.truth.insert(value, above);
                 }
                 value
@@ -403,17 +409,17 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 self.call_kernel(kernels::piece(), &[self.tables, table, operand])
             }
         };
-        let Some(kept) = self.kept(cause) else { return follow };
+        let Some(kept) = self.kept(trigger) else { return follow };
         let held = self.w.load(self.held, condition.0);
         self.w.choose(kept, held, follow)
     }
 
-    /// Whether conditions of this cause are kept; `None` if they always follow.
-    fn kept(&mut self, cause: Cause) -> Option<Value> {
-        let place = match cause {
-            Cause::Clock | Cause::Curve => 0,
-            Cause::State => 1,
-            Cause::Shown => return None,
+    /// Whether conditions of this trigger are kept; `None` if they always follow.
+    fn kept(&mut self, trigger: EventTrigger) -> Option<Value> {
+        let place = match trigger {
+            EventTrigger::LinearTime | EventTrigger::CurvedTime => 0,
+            EventTrigger::State => 1,
+            EventTrigger::RecordedOnly => return None,
         };
         if self.kept[place].is_none() {
             let bit = self.w.builder.ins().band_imm_s(self.keep, 1 << place);

@@ -1,51 +1,51 @@
 //! Compiled routines and how they run.
 
-use super::chunk::{Item, Setting};
+use super::chunk::{ChunkContext, ChunkItem};
 use super::live::Live;
-use super::memory::{Arrays, Gathered, Memory, Reach, Start};
-use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_WATCH, WRITTEN_OUT};
-use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, Trouble};
+use super::memory::{ArrayLengths, CodeBuffer, EntryPoint, ExecutablePages, Operands};
+use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD, WRITTEN_OUT};
+use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, SolveError};
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{Op, Program};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A part of a routine as one function.
+/// A segment of a routine, compiled as one function.
 #[derive(Debug, Clone)]
-struct Piece {
-    start: Start,
-    /// The instructions that it stands for.
+struct Segment {
+    start: EntryPoint,
+    /// The instructions that it replaces.
     code: Range<usize>,
 }
 
-/// What is done in turn.
+/// One step of compiled code.
 #[derive(Debug, Clone)]
-enum Step {
-    Piece(Piece),
+enum MachineStep {
+    Segment(Segment),
     /// A solve block, by its number in the routine.
     Solve(usize),
 }
 
 /// The machine code of a routine.
 #[derive(Debug)]
-pub(crate) struct Code {
-    memory: Memory,
-    reach: Reach,
-    steps: Vec<Step>,
+pub(crate) struct MachineCode {
+    memory: ExecutablePages,
+    lengths: ArrayLengths,
+    steps: Vec<MachineStep>,
     /// Inner code of each Newton block.
-    inner: Vec<Option<Arc<Inner>>>,
+    inner: Vec<Option<Arc<InnerMachineCode>>>,
     along: bool,
     /// All of it from time and states to rates, if it is one chunk.
-    direct: Option<Start>,
+    direct: Option<EntryPoint>,
 }
 
 /// The machine code inside a Newton block.
 #[derive(Debug)]
-struct Inner {
-    memory: Memory,
-    reach: Reach,
+struct InnerMachineCode {
+    memory: ExecutablePages,
+    lengths: ArrayLengths,
     /// For values, and with derivatives.
-    pieces: [Vec<Piece>; 2],
+    segments: [Vec<Segment>; 2],
 }
 
 impl Generator {
@@ -59,10 +59,10 @@ impl Generator {
         layout: &Layout,
         routine: &Routine,
         along: bool,
-    ) -> Result<Code, MachineError> {
+    ) -> Result<MachineCode, MachineError> {
         let states = layout.states..layout.states + program.states.len() as u32;
-        let setting = Setting { conditions: &program.conditions, time: layout.time, states };
-        let mut gathered = Gathered::default();
+        let context = ChunkContext { conditions: &program.conditions, time: layout.time, states };
+        let mut buffer = CodeBuffer::default();
         let written_out: Vec<bool> =
             (0..routine.solves.len()).map(|solve| !along && is_written_out(program, layout, routine, solve)).collect();
         let cuts = cuts(routine, &written_out);
@@ -70,73 +70,73 @@ impl Generator {
         let mut steps = Vec::with_capacity(cuts.len());
         let inline = inlines(operations(&routine.code));
         for cut in cuts.into_iter().rev() {
-            let items: Vec<Item> = routine.code[cut.clone()].iter().map(|i| item(routine, i)).collect();
+            let items: Vec<ChunkItem> = routine.code[cut.clone()].iter().map(|i| item(routine, i)).collect();
             if let [Instruction::Solve { solve }] = routine.code[cut.clone()]
                 && !written_out[solve as usize]
             {
-                steps.push(Step::Solve(solve as usize));
+                steps.push(MachineStep::Solve(solve as usize));
                 live.before_solve(&routine.solves[solve as usize]);
                 continue;
             }
-            let start = self.chunk(&mut gathered, &setting, &items, &live.registers(), (along, inline))?;
+            let start = self.chunk(&mut buffer, &context, &items, &live.registers(), (along, inline))?;
             items.iter().rev().for_each(|item| match item {
-                Item::Op(operation) => live.before(operation),
-                Item::Watch { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
-                Item::Solve(solve) => live.before_solve(solve),
+                ChunkItem::Op(operation) => live.before(operation),
+                ChunkItem::Guard { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
+                ChunkItem::Solve(solve) => live.before_solve(solve),
             });
-            steps.push(Step::Piece(Piece { start, code: cut }));
+            steps.push(MachineStep::Segment(Segment { start, code: cut }));
         }
         steps.reverse();
-        let single = matches!(steps[..], [Step::Piece(_)]) && routine.outputs.len() == program.states.len();
+        let single = matches!(steps[..], [MachineStep::Segment(_)]) && routine.outputs.len() == program.states.len();
         let direct = if single && !along {
-            let items: Vec<Item> = routine.code.iter().map(|i| item(routine, i)).collect();
-            Some(self.rates(&mut gathered, &setting, &items, &routine.outputs, inline)?)
+            let items: Vec<ChunkItem> = routine.code.iter().map(|i| item(routine, i)).collect();
+            Some(self.rates(&mut buffer, &context, &items, &routine.outputs, inline)?)
         } else {
             None
         };
         let mut inner = Vec::with_capacity(routine.solves.len());
         for solve in &routine.solves {
-            let value = self.inner(&mut gathered, &setting, solve, false)?;
-            let slopes = if along { self.inner(&mut gathered, &setting, solve, true)? } else { Vec::new() };
-            inner.push((!solve.code.is_empty()).then_some([value, slopes]));
+            let value = self.inner(&mut buffer, &context, solve, false)?;
+            let derivatives = if along { self.inner(&mut buffer, &context, solve, true)? } else { Vec::new() };
+            inner.push((!solve.code.is_empty()).then_some([value, derivatives]));
         }
-        let memory = gathered.seal().map_err(|why| MachineError::Memory(why.to_string()))?;
-        let reach = Reach {
+        let memory = buffer.seal().map_err(|why| MachineError::Memory(why.to_string()))?;
+        let lengths = ArrayLengths {
             registers: layout.size.max(routine.registers) as usize,
             conditions: program.conditions.len(),
             tables: program.tables.len(),
             states: program.states.len(),
         };
-        let inner = inner.into_iter().map(|pieces| {
+        let inner = inner.into_iter().map(|segments| {
             let memory = memory.clone();
-            pieces.map(|pieces| Arc::new(Inner { memory, reach, pieces }))
+            segments.map(|segments| Arc::new(InnerMachineCode { memory, lengths, segments }))
         });
         let inner = inner.collect();
-        Ok(Code { memory, reach, steps, inner, along, direct })
+        Ok(MachineCode { memory, lengths, steps, inner, along, direct })
     }
 
-    /// The code inside a Newton block: what its matrix and right side read is wanted.
+    /// The code inside a Newton block: its matrix and right side are the outputs.
     fn inner(
         &mut self,
-        gathered: &mut Gathered,
-        setting: &Setting,
+        buffer: &mut CodeBuffer,
+        context: &ChunkContext,
         solve: &Solve,
         along: bool,
-    ) -> Result<Vec<Piece>, MachineError> {
+    ) -> Result<Vec<Segment>, MachineError> {
         let wanted: Vec<Register> = solve.matrix.iter().chain(&solve.right).copied().collect();
         let mut live = Live::of(&wanted);
-        let mut pieces = Vec::new();
+        let mut segments = Vec::new();
         let inline = inlines(solve.code.iter());
         let starts: Vec<usize> = (0..solve.code.len()).step_by(CHUNK).collect();
         for start in starts.into_iter().rev() {
             let code = start..(start + CHUNK).min(solve.code.len());
-            let items: Vec<Item> = solve.code[code.clone()].iter().map(Item::Op).collect();
-            let start = self.chunk(gathered, setting, &items, &live.registers(), (along, inline))?;
+            let items: Vec<ChunkItem> = solve.code[code.clone()].iter().map(ChunkItem::Op).collect();
+            let start = self.chunk(buffer, context, &items, &live.registers(), (along, inline))?;
             solve.code[code.clone()].iter().rev().for_each(|operation| live.before(operation));
-            pieces.push(Piece { start, code });
+            segments.push(Segment { start, code });
         }
-        pieces.reverse();
-        Ok(pieces)
+        segments.reverse();
+        Ok(segments)
     }
 }
 
@@ -178,16 +178,16 @@ fn is_written_out(program: &Program, layout: &Layout, routine: &Routine, solve: 
     linear && small && !constant && !used
 }
 
-fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> Item<'a> {
+fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> ChunkItem<'a> {
     match instruction {
-        Instruction::Op(operation) => Item::Op(operation),
-        &Instruction::Watch { pivot, scale, watch } => Item::Watch { pivot, scale, watch },
-        Instruction::Solve { solve } => Item::Solve(&routine.solves[*solve as usize]),
+        Instruction::Op(operation) => ChunkItem::Op(operation),
+        &Instruction::Guard { pivot, scale, guard } => ChunkItem::Guard { pivot, scale, guard },
+        Instruction::Solve { solve } => ChunkItem::Solve(&routine.solves[*solve as usize]),
         Instruction::Parameter { .. } => unreachable!("parameters are set by the bytecode"),
     }
 }
 
-/// Whether functions are written out: not where there are many, as that takes long to compile.
+/// Whether functions are inlined: not where there are many, as that takes long to compile.
 fn inlines<'a>(code: impl Iterator<Item = &'a Operation>) -> bool {
     let wanted =
         |o: &&Operation| matches!(o.op, Op::Call(Function::Sin | Function::Cos | Function::Exp | Function::Log, _));
@@ -198,12 +198,12 @@ fn operations(code: &[Instruction]) -> impl Iterator<Item = &Operation> {
     code.iter().filter_map(|i| if let Instruction::Op(operation) = i { Some(operation) } else { None })
 }
 
-impl Code {
+impl MachineCode {
     /// Runs the routine that it was made of, exactly as the bytecode does.
     ///
     /// # Errors
     /// As the bytecode.
-    pub fn run(&self, frame: &mut Frame, routine: &Routine) -> Result<(), Trouble> {
+    pub fn run(&self, frame: &mut Frame, routine: &Routine) -> Result<(), SolveError> {
         if self.along { self.steps::<true>(frame, routine) } else { self.steps::<false>(frame, routine) }
     }
 
@@ -214,23 +214,23 @@ impl Code {
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
             return false;
         }
-        self.memory.enter_rates(start, self.reach, arrays(frame), (t, x, dx)) == 0
+        self.memory.enter_rates(start, self.lengths, arrays(frame), (t, x, dx)) == 0
     }
 
-    fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), Trouble> {
+    fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), SolveError> {
         // Conditions that are taken anew are for the bytecode.
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
             return frame.part::<ALONG>(routine, &routine.code);
         }
         for step in &self.steps {
             match step {
-                Step::Piece(piece) => match enter(&self.memory, self.reach, piece.start, frame) {
+                MachineStep::Segment(segment) => match enter(&self.memory, self.lengths, segment.start, frame) {
                     0 => {}
-                    RARE => frame.part::<ALONG>(routine, &routine.code[piece.code.clone()])?,
-                    status => return Err(Trouble::Vanished { watch: (status - STATUS_OF_WATCH) as u32 }),
+                    RARE => frame.part::<ALONG>(routine, &routine.code[segment.code.clone()])?,
+                    status => return Err(SolveError::Vanished { guard: (status - STATUS_OF_GUARD) as u32 }),
                 },
-                Step::Solve(solve) if !ALONG && frame.takes_root(&routine.solves[*solve]) => {}
-                Step::Solve(solve) => {
+                MachineStep::Solve(solve) if !ALONG && frame.put_known_root(&routine.solves[*solve]) => {}
+                MachineStep::Solve(solve) => {
                     frame.inner = self.inner[*solve].clone().map(|inner| inner as Arc<dyn InnerCode>);
                     let solved = frame.solve::<ALONG>(&routine.solves[*solve]);
                     frame.inner = None;
@@ -242,25 +242,25 @@ impl Code {
     }
 }
 
-impl InnerCode for Inner {
+impl InnerCode for InnerMachineCode {
     fn run(&self, frame: &mut Frame, solve: &Solve, along: bool) {
-        for piece in &self.pieces[usize::from(along)] {
-            if enter(&self.memory, self.reach, piece.start, frame) != 0 {
-                let code = &solve.code[piece.code.clone()];
+        for segment in &self.segments[usize::from(along)] {
+            if enter(&self.memory, self.lengths, segment.start, frame) != 0 {
+                let code = &solve.code[segment.code.clone()];
                 if along { frame.plain::<true>(code) } else { frame.plain::<false>(code) }
             }
         }
     }
 }
 
-fn enter(memory: &Memory, reach: Reach, start: Start, frame: &mut Frame) -> u64 {
-    memory.enter(start, reach, arrays(frame))
+fn enter(memory: &ExecutablePages, lengths: ArrayLengths, start: EntryPoint, frame: &mut Frame) -> u64 {
+    memory.enter(start, lengths, arrays(frame))
 }
 
 #[inline]
-fn arrays(frame: &mut Frame) -> Arrays<'_> {
+fn arrays(frame: &mut Frame) -> Operands<'_> {
     let keeps = |hold: Hold| u64::from(hold == Hold::Keep);
     let keep = keeps(frame.conditions.clock) | keeps(frame.conditions.state) << 1;
     let held = &frame.conditions.held[..];
-    Arrays { values: &mut frame.r, slopes: &mut frame.d, held, tables: &frame.tables, keep }
+    Operands { values: &mut frame.r, derivatives: &mut frame.d, held, tables: &frame.tables, keep }
 }

@@ -1,7 +1,7 @@
 //! Machine code of routines, bit for bit what the bytecode computes.
 //!
 //! A routine is cut into chunks of some 250 instructions. A chunk is one function without branches: it loads, computes,
-//! and stores what is read after it, unless something is wrong (a watched divisor vanishes) or unusual (a sine of a huge
+//! and stores what is read after it, unless something is wrong (a guarded divisor vanishes) or unusual (a sine of a huge
 //! angle, a pivot that must be sought). Then it stores nothing, and the bytecode runs the chunk. Between chunks stand
 //! the solve blocks, which the bytecode's solver solves, with inner code that is compiled as well; small ones are written
 //! out in the chunk.
@@ -16,24 +16,24 @@ mod kernels;
 mod live;
 mod memory;
 
-pub(crate) use code::Code;
+pub(crate) use code::MachineCode;
 
 use crate::bytecode::Register;
 use arithmetic::Writer;
-use chunk::{Chunk, Direct, Item, Setting};
+use chunk::{Chunk, ChunkContext, ChunkItem, Direct};
 use cranelift_codegen::control::ControlPlane;
 use cranelift_codegen::ir::{AbiParam, Function, Signature, Type, UserFuncName, Value, types};
 use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::Configurable;
 use cranelift_codegen::{Context, settings};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
-use memory::{Gathered, Start};
+use memory::{CodeBuffer, EntryPoint};
 use std::fmt;
 
 /// Something is unusual: the bytecode is to run the chunk.
 const RARE: u64 = u64::MAX;
-/// A watched divisor vanishes: this and its number.
-const STATUS_OF_WATCH: u64 = 1;
+/// A guarded divisor vanishes: this and its number.
+const STATUS_OF_GUARD: u64 = 1;
 /// Instructions in a chunk: beyond some hundreds the time to compile grows faster than the code.
 const CHUNK: usize = 250;
 /// Linear blocks of up to this many unknowns are written out.
@@ -92,12 +92,12 @@ impl Generator {
     /// The function of a chunk; `live` are the registers that are read after it.
     fn chunk(
         &mut self,
-        into: &mut Gathered,
-        setting: &Setting,
-        items: &[Item],
+        into: &mut CodeBuffer,
+        setting: &ChunkContext,
+        items: &[ChunkItem],
         live: &[Register],
         (along, inline): (bool, bool),
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         self.function(into, &[types::I64; 5], |writer, arguments| {
             let arguments = std::array::from_fn(|i| arguments[i]);
             let mut chunk = Chunk::new(writer, arguments, setting, along, inline);
@@ -109,12 +109,12 @@ impl Generator {
     /// The function of a routine of one chunk that reads time and states, and writes what is wanted, where it is told.
     fn rates(
         &mut self,
-        into: &mut Gathered,
-        setting: &Setting,
-        items: &[Item],
+        into: &mut CodeBuffer,
+        setting: &ChunkContext,
+        items: &[ChunkItem],
         outputs: &[Register],
         inline: bool,
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         let mut kinds = [types::I64; 7];
         kinds[6] = types::F64;
         self.function(into, &kinds, |writer, arguments| {
@@ -129,10 +129,10 @@ impl Generator {
 
     fn function(
         &mut self,
-        into: &mut Gathered,
+        into: &mut CodeBuffer,
         kinds: &[Type],
         body: impl for<'f> FnOnce(Writer<'f>, &[Value]) -> Writer<'f>,
-    ) -> Result<Start, MachineError> {
+    ) -> Result<EntryPoint, MachineError> {
         let convention = self.isa.default_call_conv();
         let mut signature = Signature::new(convention);
         signature.params.extend(kinds.iter().map(|&kind| AbiParam::new(kind)));

@@ -1,10 +1,10 @@
-//! Conditions that time alone moves: when they change next.
+//! Conditions on time alone: time events.
 
 use crate::bytecode::{Frame, Hold};
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Cause, ConditionId, Program, Value};
+use halfarrow_compiler::program::{ConditionId, EventTrigger, Program, Value};
 
-/// Evaluations in one search along a curve; at its end the run makes a stop at which nothing changes.
+/// Evaluations in one search for a zero crossing; at its end the run makes a stop at which nothing changes.
 const SEARCH: usize = 4000;
 
 /// Depth beyond a border, relative to the values around it, below which it may be rounding.
@@ -13,7 +13,7 @@ const SHALLOW: f64 = 1e-9;
 /// Conditions of time, in an order in which each reads those before it.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
-    conditions: Vec<(ConditionId, Cause)>,
+    conditions: Vec<(ConditionId, EventTrigger)>,
     /// Computes their operands.
     routine: Routine,
     time: usize,
@@ -21,8 +21,11 @@ pub(super) struct Clock {
 
 impl Clock {
     pub fn new(program: &Program, layout: &Layout) -> Clock {
-        let timed = program.conditions.iter().filter(|(_, c)| matches!(c.cause, Cause::Clock | Cause::Curve));
-        let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.cause), c.operand)).unzip();
+        let timed = program
+            .conditions
+            .iter()
+            .filter(|(_, c)| matches!(c.trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime));
+        let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.trigger), c.operand)).unzip();
         let routine = layout.routine(program, &operands);
         Clock { conditions, routine, time: layout.time as usize }
     }
@@ -31,8 +34,8 @@ impl Clock {
         &self.routine
     }
 
-    /// Takes all of them as they are just after `t`, and finds when the first of them changes next, in s.
-    pub fn cross(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
+    /// Takes all of them as they are just after `t`, and finds the next time event: when the first of them changes, in s.
+    pub fn handle_time_event(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
         if self.conditions.is_empty() {
             return;
         }
@@ -43,8 +46,9 @@ impl Clock {
             frame.conditions.value_after(condition, operand, t, &frame.tables);
         }
         frame.conditions.clock = Hold::Keep;
-        let lines = self.next_on_lines(frame, t);
-        let curves: Vec<usize> = (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == Cause::Curve).collect();
+        let lines = self.next_on_linear(frame, t);
+        let curves: Vec<usize> =
+            (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == EventTrigger::CurvedTime).collect();
         let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
         *next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);
@@ -59,14 +63,14 @@ impl Clock {
         let _ = frame.run_along(&self.routine);
     }
 
-    /// Straight lines: where each meets the border it runs towards, computed from time zero so that the result does not
+    /// Linear operands: where each meets the border it runs towards, computed from time zero so that the result does not
     /// depend on when it is asked for.
-    fn next_on_lines(&self, frame: &mut Frame, t: f64) -> Option<f64> {
+    fn next_on_linear(&self, frame: &mut Frame, t: f64) -> Option<f64> {
         self.evaluate(frame, 0.0);
         let mut next: Option<f64> = None;
-        for (&(condition, cause), &register) in self.conditions.iter().zip(&self.routine.outputs) {
+        for (&(condition, trigger), &register) in self.conditions.iter().zip(&self.routine.outputs) {
             let (start, slope) = (frame.r[register as usize], frame.d[register as usize]);
-            if cause != Cause::Clock || slope == 0.0 {
+            if trigger != EventTrigger::LinearTime || slope == 0.0 {
                 continue;
             }
             let border = frame.conditions.borders(condition, &frame.tables)[usize::from(slope > 0.0)];
@@ -90,13 +94,13 @@ impl Clock {
     /// Searches a curve with steps in which a cubic follows it, or a straight line its rate, as beside a double zero, where
     /// values are all rounding, or in which it cannot come to its border; gives the change, or where the search ended.
     ///
-    /// A value beyond the border counts where the rates on the way there tell of it: what they do not explain is rounding,
+    /// A value beyond the border counts where the rates on the way there explain it: what they do not explain is rounding,
     /// as beside a double zero, which is no change.
     fn next_on_curve(&self, frame: &mut Frame, index: usize, from: f64, until: Option<f64>) -> Option<f64> {
         let mut t = from;
         let mut h = 1e-9 * from.abs().max(1.0);
         let mut here = self.margin(frame, index, t);
-        let mut way = Way { from: t, margin: here.0, fastest: here.1.abs() };
+        let mut inside = LastInside { from: t, margin: here.0, fastest: here.1.abs() };
         for _ in 0..SEARCH {
             if until.is_some_and(|until| t > until) {
                 return None;
@@ -119,7 +123,7 @@ impl Clock {
                 continue;
             }
             for (a, b) in [((t, here), (t + 0.5 * h, middle)), ((t + 0.5 * h, middle), (t + h, there))] {
-                if let Some(change) = self.change_between(frame, index, (a, b), &mut way) {
+                if let Some(change) = self.change_between(frame, index, (a, b), &mut inside) {
                     return Some(change).filter(|&c| c > from);
                 }
             }
@@ -131,15 +135,21 @@ impl Clock {
         Some(t)
     }
 
-    /// The change between two points, if the second is beyond a border or the way to it leads there.
-    fn change_between(&self, frame: &mut Frame, index: usize, (a, b): (At, At), way: &mut Way) -> Option<f64> {
-        way.fastest = way.fastest.max(b.1.1.abs());
+    /// The change between two points, if the second is beyond a border or the margin vanishes on the way to it.
+    fn change_between(
+        &self,
+        frame: &mut Frame,
+        index: usize,
+        (a, b): (MarginAt, MarginAt),
+        inside: &mut LastInside,
+    ) -> Option<f64> {
+        inside.fastest = inside.fastest.max(b.1.1.abs());
         if b.1.0 < 0.0 {
-            let told = (b.0 - way.from) * way.fastest >= 0.5 * (way.margin - b.1.0);
+            let told = (b.0 - inside.from) * inside.fastest >= 0.5 * (inside.margin - b.1.0);
             return told
-                .then(|| self.bisect(frame, way.from, b.0, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
+                .then(|| self.bisect(frame, inside.from, b.0, |this, frame, t| this.margin(frame, index, t).0 < 0.0));
         }
-        *way = Way { from: b.0, margin: b.1.0, fastest: b.1.1.abs() };
+        *inside = LastInside { from: b.0, margin: b.1.0, fastest: b.1.1.abs() };
         if a.1.0 >= 0.0 && a.1.1 < 0.0 && b.1.1 > 0.0 {
             let lowest = self.bisect(frame, a.0, b.0, |this, frame, t| this.margin(frame, index, t).1 > 0.0);
             let depth = self.margin(frame, index, lowest).0;
@@ -183,13 +193,13 @@ impl Clock {
 }
 
 /// A time with margin and rate.
-type At = (f64, (f64, f64));
+type MarginAt = (f64, (f64, f64));
 
-/// The way of a margin since it was last seen not beyond the border.
-struct Way {
+/// Where a margin was last inside its border.
+struct LastInside {
     /// When that was, in s.
     from: f64,
     margin: f64,
-    /// The greatest rate since.
+    /// The greatest rate of the margin since.
     fastest: f64,
 }

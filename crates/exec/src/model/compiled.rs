@@ -2,9 +2,9 @@
 
 use super::clock::Clock;
 use super::jacobian::JacobianCode;
-use super::jumps::Kept;
-use crate::bytecode::{Abreast, Layout, Routine};
-use halfarrow_compiler::program::{Cause, ConditionId, Entry, Program, Value};
+use super::jumps::ConservedSums;
+use crate::bytecode::{BlockBatches, Layout, Routine};
+use halfarrow_compiler::program::{ConditionId, Entry, EventTrigger, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ pub(super) struct Mode {
     pub jacobian: Option<JacobianCode>,
     pub sparsity: Sparsity,
     /// Newton blocks of the rates that are solved together.
-    pub abreast: Option<Arc<Abreast>>,
+    pub batches: Option<Arc<BlockBatches>>,
     /// Conditions of the state, whose operands are the event indicators.
     pub switching: Vec<ConditionId>,
     /// Computes these operands.
@@ -77,7 +77,7 @@ pub(super) struct Mode {
     /// Computes what is delayed or sampled.
     pub sources: Routine,
     /// States that jump with a source, if there are any.
-    pub kept: Option<Kept>,
+    pub kept: Option<ConservedSums>,
 }
 
 impl Mode {
@@ -85,9 +85,9 @@ impl Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = layout.watched_routine(&program, &rates);
+        let rates = layout.guarded_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
-        let of_state = || program.conditions.iter().filter(|(_, c)| c.cause == Cause::State);
+        let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);
@@ -96,13 +96,13 @@ impl Mode {
             assumed: layout.routine(&program, &assumed),
             jacobian: entries.map(|entries| JacobianCode::new(&program, &layout, &sparsity, &entries)),
             sparsity,
-            abreast: Abreast::of(&program, &layout, &rates).map(Arc::new),
+            batches: BlockBatches::of(&program, &layout, &rates).map(Arc::new),
             rates,
             switching: of_state().map(|(id, _)| id).collect(),
             indicators: layout.routine(&program, &operands),
             clock: Clock::new(&program, &layout),
             sources: layout.routine(&program, &sources),
-            kept: Kept::of(&program, &layout),
+            kept: ConservedSums::of(&program, &layout),
             layout,
             program,
         }
@@ -111,7 +111,12 @@ impl Mode {
     /// Everything that runs on registers.
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
         let Mode { rates, preamble, assumed, sources, indicators, clock, .. } = self;
-        let more = self.jacobian.as_ref().map(|j| &j.routine).into_iter().chain(self.kept.as_ref().map(Kept::routine));
+        let more = self
+            .jacobian
+            .as_ref()
+            .map(|j| &j.routine)
+            .into_iter()
+            .chain(self.kept.as_ref().map(ConservedSums::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

@@ -1,6 +1,6 @@
-//! Where everything is at rest.
+//! Equilibria: Newton's method, and pseudo-transient continuation where it fails. Source: [KelleyKeyes].
 
-use super::leaf::{Leaf, Ways};
+use super::leaf::{Directions, Leaf};
 use super::minimum_norm;
 use super::{EquilibriumError, Model};
 use halfarrow_sim::{Failure, System};
@@ -25,31 +25,31 @@ pub struct Equilibrium {
     pub iterations: usize,
 }
 
-/// A state with its rates, their derivatives row by row, and the ways that lead on from it.
-struct Point {
+/// A state with its rates, the Jacobian row by row, and the directions in which constraints let it move.
+struct LinearisedPoint {
     x: Vec<f64>,
     rates: Vec<f64>,
     jacobian: Vec<f64>,
-    ways: Ways,
-    /// The derivatives along the ways.
+    directions: Directions,
+    /// The Jacobian along the directions.
     along: Vec<f64>,
 }
 
-/// The least rates that a search has seen, all weighed as at its beginning.
-struct Nearest {
+/// The least rates of a search, all weighed as at its beginning.
+struct LeastRates {
     weights: Vec<f64>,
     least: f64,
     rates: Vec<f64>,
-    /// What the rates were made of when they were seen.
+    /// The terms that the rates were made of.
     scale: Vec<f64>,
 }
 
-impl Nearest {
-    fn new(weights: Vec<f64>) -> Nearest {
-        Nearest { weights, least: f64::INFINITY, rates: Vec::new(), scale: Vec::new() }
+impl LeastRates {
+    fn new(weights: Vec<f64>) -> LeastRates {
+        LeastRates { weights, least: f64::INFINITY, rates: Vec::new(), scale: Vec::new() }
     }
 
-    fn see(&mut self, rates: &[f64], scale: &[f64]) {
+    fn update(&mut self, rates: &[f64], scale: &[f64]) {
         let size = rates.iter().zip(&self.weights).fold(0.0f64, |most, (r, w)| most.max((r * w).abs()));
         if size < self.least {
             (self.least, self.rates, self.scale) = (size, rates.to_vec(), scale.to_vec());
@@ -59,8 +59,9 @@ impl Nearest {
 
 impl Model {
     /// The equilibrium nearest to `x` at time `t`, with inputs and conditions as they are then: Newton with the exact
-    /// Jacobian, by way of a damped motion where Newton alone does not get there; where that fails as well, the loads
-    /// that would hold `x` at rest are taken away little by little, and the equilibrium is followed, round folds too.
+    /// Jacobian, by way of pseudo-transient continuation where Newton alone does not get there; where that fails as well,
+    /// by continuation: the loads that would hold `x` at rest are taken away little by little, and the equilibrium is followed,
+    /// round folds too.
     ///
     /// The search goes only where the junction structure lets the states go from `x`: relations of displacements hold at
     /// the equilibrium as they do at `x`, those of constraints and those that the graph implies. `x` should keep the
@@ -88,28 +89,29 @@ impl Model {
     /// What was found, if the constraints are kept there.
     fn audited(&mut self, leaf: Option<&Leaf>, t: f64, found: Equilibrium) -> Result<Equilibrium, EquilibriumError> {
         let constraints = self.constraints();
-        match self.missed_constraint(&constraints, t, &found.x, leaf.map_or(&[], |leaf| &leaf.size), KEPT) {
+        match self.unmet_constraint(&constraints, t, &found.x, leaf.map_or(&[], |leaf| &leaf.size), KEPT) {
             Some((name, miss)) => Err(EquilibriumError::Missed(name, miss)),
             None => Ok(found),
         }
     }
 
-    /// Newton from `x`, by way of a damped motion.
+    /// Newton's method from `x`; where it fails pseudo-transient continuation, whose step grows as the rates shrink (switched
+    /// evolution relaxation), until it is Newton's again.
     fn settle(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let n = x.len();
         let mut scale = vec![0.0f64; n];
-        let mut pull = f64::INFINITY;
-        let mut nearest: Option<Nearest> = None;
+        let mut pseudo_step = f64::INFINITY;
+        let mut least: Option<LeastRates> = None;
         let mut at = self.point(leaf, t, x.to_vec()).map_err(EquilibriumError::Failure)?;
         for iteration in 0..ITERATIONS {
-            let Point { x, rates, jacobian, ways, along } = &at;
+            let LinearisedPoint { x, rates, jacobian, directions, along } = &at;
             for (i, row) in jacobian.chunks(n.max(1)).enumerate() {
                 let terms: f64 = row.iter().zip(x).map(|(j, x)| (j * x).abs()).sum();
                 scale[i] = scale[i].max(rates[i].abs()).max(terms);
             }
-            let newton = minimum_norm::step(along, rates, ways.count(n));
+            let newton = minimum_norm::step(along, rates, directions.count(n));
             let Some(newton) = newton else { break };
-            let step = ways.step(&newton.step);
+            let step = directions.step(&newton.step);
             // A rate that changes nothing in the shortest time that the model knows is none.
             let fastest = (0..n).map(|i| jacobian[i * n + i].abs()).fold(fastest_pair(jacobian, n), f64::max);
             let idle = |i: usize, part: f64| rates[i].abs() <= part * x[i].abs() * fastest;
@@ -117,68 +119,72 @@ impl Model {
             let rests = |i: usize| rates[i].abs() <= 1e-15 * scale[i] || idle(i, 1e-15);
             if (0..n).all(stays) || (0..n).all(rests) {
                 if (0..n).all(|i| rates[i].abs() <= AT_REST * scale[i] || idle(i, 1e-13)) {
-                    return Ok(Equilibrium { x: x.clone(), free: ways.count(n) - newton.rank, iterations: iteration });
+                    return Ok(Equilibrium {
+                        x: x.clone(),
+                        free: directions.count(n) - newton.rank,
+                        iterations: iteration,
+                    });
                 }
-                if pull.is_infinite() {
+                if pseudo_step.is_infinite() {
                     break;
                 }
             }
             let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
             let before = norm(rates);
-            let nearest = nearest.get_or_insert_with(|| Nearest::new(newton.weights.clone()));
-            nearest.see(rates, &scale);
-            let step = match pull.is_infinite() {
+            let least = least.get_or_insert_with(|| LeastRates::new(newton.weights.clone()));
+            least.update(rates, &scale);
+            let step = match pseudo_step.is_infinite() {
                 true => step,
-                false => damped_motion(&at, pull, n).unwrap_or(step),
+                false => pseudo_transient_step(&at, pseudo_step, n).unwrap_or(step),
             };
-            let shortest = if pull.is_infinite() { 1e-3 } else { 1e-9 };
-            let mut fraction = 1.0;
+            let least_damping = if pseudo_step.is_infinite() { 1e-3 } else { 1e-9 };
+            let mut damping = 1.0;
             let moved = loop {
-                let part: Vec<f64> = step.iter().map(|s| fraction * s).collect();
+                let part: Vec<f64> = step.iter().map(|s| damping * s).collect();
                 let trial = self.moved(leaf, t, &at.x, &part);
-                let kept = trial.filter(|trial| !self.strays(leaf, t, trial));
+                let kept = trial.filter(|trial| !self.leaves_constraints(leaf, t, trial));
                 match kept.and_then(|trial| self.point(leaf, t, trial).ok()) {
-                    Some(next) if norm(&next.rates) < before || !pull.is_infinite() => break Some(next),
-                    _ if fraction < shortest => break None,
-                    _ => fraction *= 0.5,
+                    Some(next) if norm(&next.rates) < before || !pseudo_step.is_infinite() => break Some(next),
+                    _ if damping < least_damping => break None,
+                    _ => damping *= 0.5,
                 }
             };
             match moved {
                 Some(next) => {
                     let gain = (before / norm(&next.rates).max(f64::MIN_POSITIVE)).clamp(0.3, 10.0);
-                    pull *= gain;
-                    pull = if pull > 1e12 { f64::INFINITY } else { pull };
+                    pseudo_step *= gain;
+                    pseudo_step = if pseudo_step > 1e12 { f64::INFINITY } else { pseudo_step };
                     at = next;
                 }
-                // Newton is stuck: follow the motion, strongly damped at first.
-                None if pull.is_infinite() => {
+                // Newton's method fails: follow the motion in pseudo-time, with a small step at first.
+                None if pseudo_step.is_infinite() => {
                     let fastest = at.jacobian.iter().fold(0.0f64, |most, j| most.max(j.abs()));
-                    pull = if fastest > 0.0 { 0.1 / fastest } else { break };
+                    pseudo_step = if fastest > 0.0 { 0.1 / fastest } else { break };
                 }
                 None => break,
             }
         }
-        match nearest {
-            Some(Nearest { rates, scale, .. }) if !rates.is_empty() => self.nowhere(&rates, &scale),
-            _ => self.nowhere(&at.rates, &scale),
+        match least {
+            Some(LeastRates { rates, scale, .. }) if !rates.is_empty() => self.no_equilibrium(&rates, &scale),
+            _ => self.no_equilibrium(&at.rates, &scale),
         }
     }
 
     /// Whether a move has left a constraint: near a position where a form is singular a long one may.
-    fn strays(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
-        leaf.is_some_and(|leaf| self.missed_constraint(&leaf.constraints, t, x, &leaf.size, KEPT).is_some())
+    fn leaves_constraints(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
+        leaf.is_some_and(|leaf| self.unmet_constraint(&leaf.constraints, t, x, &leaf.size, KEPT).is_some())
     }
 
-    /// Rates and ways at a state.
-    fn point(&mut self, leaf: Option<&Leaf>, t: f64, x: Vec<f64>) -> Result<Point, Failure> {
+    /// Rates and directions at a state.
+    fn point(&mut self, leaf: Option<&Leaf>, t: f64, x: Vec<f64>) -> Result<LinearisedPoint, Failure> {
         let (rates, jacobian) = self.at_rest(t, &x)?;
         let without = || Failure::NotFinite { time: t, what: "what the states keep together".into() };
-        let ways = self.ways(leaf, t, &x).ok_or_else(without)?;
-        let along = ways.along(&jacobian, x.len());
-        Ok(Point { x, rates, jacobian, ways, along })
+        let directions = self.directions(leaf, t, &x).ok_or_else(without)?;
+        let along = directions.along(&jacobian, x.len());
+        Ok(LinearisedPoint { x, rates, jacobian, directions, along })
     }
 
-    fn nowhere(&self, rates: &[f64], scale: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+    fn no_equilibrium(&self, rates: &[f64], scale: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let mut worst: Vec<usize> = (0..rates.len()).filter(|&i| rates[i].abs() > AT_REST * scale[i]).collect();
         let share = |i: usize| rates[i].abs() / scale[i].max(f64::MIN_POSITIVE);
         worst.sort_by(|&a, &b| share(b).total_cmp(&share(a)).then(a.cmp(&b)));
@@ -208,17 +214,17 @@ fn fastest_pair(jacobian: &[f64], n: usize) -> f64 {
     (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)))
 }
 
-/// An implicit Euler step of length `pull` along the motion.
-fn damped_motion(at: &Point, pull: f64, n: usize) -> Option<Vec<f64>> {
-    let k = at.ways.count(n);
+/// A linearly implicit Euler step of length `pseudo_step` along the motion.
+fn pseudo_transient_step(at: &LinearisedPoint, pseudo_step: f64, n: usize) -> Option<Vec<f64>> {
+    let k = at.directions.count(n);
     let mut lu = crate::bytecode::Lu::new(k, false);
     for j in 0..k {
         let column: Vec<f64> = (0..n).map(|i| at.along[i * k + j]).collect();
-        at.ways.parts(&column).iter().enumerate().for_each(|(i, a)| lu.matrix()[i * k + j] = -a);
-        lu.matrix()[j * k + j] += 1.0 / pull;
+        at.directions.parts(&column).iter().enumerate().for_each(|(i, a)| lu.matrix()[i * k + j] = -a);
+        lu.matrix()[j * k + j] += 1.0 / pseudo_step;
     }
     lu.factor().ok()?;
-    let mut step = at.ways.parts(&at.rates);
+    let mut step = at.directions.parts(&at.rates);
     lu.solve(&mut step);
-    step.iter().all(|s| s.is_finite()).then(|| at.ways.step(&step))
+    step.iter().all(|s| s.is_finite()).then(|| at.directions.step(&step))
 }

@@ -34,7 +34,7 @@ impl Model {
         let Model { frame, code, dx, .. } = self;
         frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
         let run = self.frame.run_along(&self.code.sources);
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     fn source(&self, i: usize) -> (f64, f64) {
@@ -42,14 +42,14 @@ impl Model {
         (self.frame.r[register], self.frame.d[register])
     }
 
-    /// Held signals at the start of a run. They may read each other: passes until nothing changes.
-    pub(super) fn begin_held(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        for _ in 0..self.run.held.len() {
+    /// Delays and samples at the start of a run. They may read each other: passes until nothing changes.
+    pub(super) fn begin_delays_and_samples(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        for _ in 0..self.run.delays_and_samples.len() {
             self.place(t, x);
             self.run_sources(t, x)?;
-            for i in 0..self.run.held.len() {
+            for i in 0..self.run.delays_and_samples.len() {
                 let (value, slope) = self.source(i);
-                match &mut self.run.held[i] {
+                match &mut self.run.delays_and_samples[i] {
                     DelayOrSample::Delay(delay) => delay.begin(t, value, slope),
                     DelayOrSample::Sample(sample) => sample.begin(t, value),
                 }
@@ -61,12 +61,12 @@ impl Model {
 
     /// Takes the samples that are due, in order: each sees those taken before it.
     fn take_samples(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        for i in 0..self.run.held.len() {
-            if matches!(&self.run.held[i], DelayOrSample::Sample(sample) if sample.is_due(t)) {
+        for i in 0..self.run.delays_and_samples.len() {
+            if matches!(&self.run.delays_and_samples[i], DelayOrSample::Sample(sample) if sample.is_due(t)) {
                 self.place(t, x);
                 self.run_sources(t, x)?;
                 let (value, _) = self.source(i);
-                if let DelayOrSample::Sample(sample) = &mut self.run.held[i] {
+                if let DelayOrSample::Sample(sample) = &mut self.run.delays_and_samples[i] {
                     sample.value = value;
                     sample.pass(t);
                 }
@@ -89,18 +89,18 @@ impl Model {
         }
         frame.conditions.state = Hold::Keep;
         self.run.signs_taken = Some(t);
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     pub(super) fn has_delays(&self) -> bool {
-        self.run.held.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
+        self.run.delays_and_samples.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
     }
 }
 
 impl Events for Model {
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
         let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
-        let held = self.run.held.iter().filter_map(|held| match held {
+        let held = self.run.delays_and_samples.iter().filter_map(|held| match held {
             DelayOrSample::Delay(delay) => delay.next_time_event(t),
             DelayOrSample::Sample(sample) => Some(sample.next_time()),
         });
@@ -108,7 +108,7 @@ impl Events for Model {
     }
 
     fn is_corner(&mut self, t: f64) -> bool {
-        let held = self.run.held.iter().any(|held| match held {
+        let held = self.run.delays_and_samples.iter().any(|held| match held {
             DelayOrSample::Delay(delay) => delay.next_time_event(self.run.crossed) == Some(t),
             DelayOrSample::Sample(sample) => sample.is_due(t),
         });
@@ -128,27 +128,27 @@ impl Events for Model {
         let inputs = &self.setup.given(self.run.mode).inputs;
         self.run.pieces.iter_mut().zip(inputs).for_each(|(piece, signal)| *piece = signal.piece(t));
         self.frame.conditions.state = Hold::Follow;
-        // A solution may leap where something jumps.
+        // Solutions of nonlinear laws may jump at an event.
         self.leave_solutions();
-        self.code.clock.cross(&mut self.frame, t, &mut self.run.clock_event);
+        self.code.clock.handle_time_event(&mut self.frame, t, &mut self.run.clock_event);
         if !self.run.begun {
-            self.begin_held(t, x)?;
+            self.begin_delays_and_samples(t, x)?;
             self.run.begun = true;
             self.take_signs(t, x)?;
         } else {
-            self.keep_sums(t, x, &sums)?;
+            self.conserve_sums(t, x, &sums)?;
             self.take_samples(t, x)?;
-            self.keep_sums(t, x, &sums)?;
+            self.conserve_sums(t, x, &sums)?;
             self.take_signs(t, x)?;
-            if self.keep_sums(t, x, &sums)? {
+            if self.conserve_sums(t, x, &sums)? {
                 self.take_signs(t, x)?;
             }
         }
         if self.has_delays() {
             self.run_sources(t, x)?;
-            for i in 0..self.run.held.len() {
+            for i in 0..self.run.delays_and_samples.len() {
                 let (value, slope) = self.source(i);
-                if let DelayOrSample::Delay(delay) = &mut self.run.held[i] {
+                if let DelayOrSample::Delay(delay) = &mut self.run.delays_and_samples[i] {
                     delay.jump(t, value, slope);
                 }
             }
@@ -160,9 +160,9 @@ impl Events for Model {
         if self.has_delays() {
             self.place(t, x);
             self.run_sources(t, x)?;
-            for i in 0..self.run.held.len() {
+            for i in 0..self.run.delays_and_samples.len() {
                 let (value, slope) = self.source(i);
-                if let DelayOrSample::Delay(delay) = &mut self.run.held[i] {
+                if let DelayOrSample::Delay(delay) = &mut self.run.delays_and_samples[i] {
                     delay.append(t, value, slope);
                 }
             }

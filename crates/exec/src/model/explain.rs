@@ -1,7 +1,7 @@
 //! Why something has no value: the law that is asked for one outside its domain.
 
 use super::Model;
-use halfarrow_compiler::program::{Domain, DomainKind, Reads};
+use halfarrow_compiler::program::{DomainKind, LawDomain, Reads};
 use halfarrow_sim::Failure;
 
 /// Laws that are looked at when a value is missing.
@@ -17,7 +17,7 @@ impl Model {
 
     /// A law that has no value whatever happens: all it is asked for are parameters.
     pub(super) fn violated_always(&mut self) -> Option<Failure> {
-        let constant = |d: &Domain| self.code.program.values.reads(d.argument) == Reads::PARAMETERS;
+        let constant = |d: &LawDomain| self.code.program.values.reads(d.argument) == Reads::PARAMETERS;
         let constant: Vec<usize> =
             self.code.program.domains.iter().enumerate().filter(|(_, d)| constant(d)).map(|(i, _)| i).collect();
         constant.into_iter().find_map(|index| self.violated(f64::NAN, index))
@@ -43,7 +43,7 @@ impl Model {
     }
 }
 
-fn reason(domain: &Domain, argument: f64, asked: Option<f64>, limit: Option<f64>) -> String {
+fn reason(domain: &LawDomain, argument: f64, asked: Option<f64>, limit: Option<f64>) -> String {
     let given = &domain.given;
     match (&domain.asked, asked, limit) {
         (Some((name, _)), Some(asked), Some(limit)) => {
@@ -58,7 +58,7 @@ fn reason(domain: &Domain, argument: f64, asked: Option<f64>, limit: Option<f64>
     }
 }
 
-fn outside(domain: &Domain, argument: f64) -> String {
+fn outside(domain: &LawDomain, argument: f64) -> String {
     match domain.kind {
         DomainKind::Positive => format!("the logarithm of {argument}"),
         DomainKind::NotNegative => format!("a root of {argument}"),

@@ -6,18 +6,18 @@ use std::sync::Arc;
 ///
 /// Between two corners it is one straight line, which is evaluated beyond its ends as it is inside.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Signal {
+pub(super) struct InputSignal {
     default: f64,
     times: Arc<[f64]>,
     values: Arc<[f64]>,
 }
 
 /// The points (first and last index) between which a held line runs.
-pub(super) type Piece = (usize, usize);
+pub(super) type PointRange = (usize, usize);
 
-impl Signal {
+impl InputSignal {
     /// A signal through points; times ascend, a time given twice is a jump.
-    pub fn table(times: &[f64], values: &[f64]) -> Result<Signal, String> {
+    pub fn table(times: &[f64], values: &[f64]) -> Result<InputSignal, String> {
         if times.len() != values.len() {
             return Err(format!("{} times but {} values", times.len(), values.len()));
         }
@@ -33,7 +33,7 @@ impl Signal {
         if let Some(i) = (2..times.len()).find(|&i| times[i] == times[i - 2]) {
             return Err(format!("{} s stands there more than twice", times[i]));
         }
-        Ok(Signal { default: 0.0, times: times.into(), values: values.into() })
+        Ok(InputSignal { default: 0.0, times: times.into(), values: values.into() })
     }
 
     /// The value where nothing is connected.
@@ -48,11 +48,11 @@ impl Signal {
 
     /// Value and slope at `t`, on a piece, or where none is held on that of the points around.
     #[inline]
-    pub fn at(&self, t: f64, piece: Option<Piece>) -> (f64, f64) {
+    pub fn at(&self, t: f64, piece: Option<PointRange>) -> (f64, f64) {
         if self.times.is_empty() { (self.default, 0.0) } else { self.among_points(t, piece) }
     }
 
-    fn among_points(&self, t: f64, piece: Option<Piece>) -> (f64, f64) {
+    fn among_points(&self, t: f64, piece: Option<PointRange>) -> (f64, f64) {
         let n = self.times.len();
         match piece {
             Some((first, last)) if first == last => (self.values[first], 0.0),
@@ -69,7 +69,7 @@ impl Signal {
     }
 
     /// The line that begins at `t` or runs through it, if something is connected.
-    pub fn piece(&self, t: f64) -> Option<Piece> {
+    pub fn piece(&self, t: f64) -> Option<PointRange> {
         let n = self.times.len();
         if n == 0 {
             return None;
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn jumps_have_two_sides() {
-        let signal = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
+        let signal = InputSignal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
         assert_eq!(signal.next_corner(-1.0), Some(0.0));
         let on = |start: f64, t: f64| signal.at(t, signal.piece(start));
         assert_eq!((on(0.0, 0.5), on(0.0, 1.0)), ((0.5, 1.0), (1.0, 1.0)));
@@ -137,17 +137,17 @@ mod tests {
 
     #[test]
     fn points_on_a_line_are_no_corners() {
-        let signal = Signal::table(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 0.0]).unwrap();
+        let signal = InputSignal::table(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 0.0]).unwrap();
         assert_eq!(signal.next_corner(0.0), Some(2.0));
         assert!((0..5).all(|t| !signal.jumps_at(f64::from(t))));
-        let stair = Signal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
+        let stair = InputSignal::table(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0]).unwrap();
         assert_eq!([0.0, 1.0, 1.5, 2.0].map(|t| stair.jumps_at(t)), [false, true, false, false]);
     }
 
     #[test]
     fn refuses_what_is_no_function_of_time() {
-        assert!(Signal::table(&[1.0, 0.0], &[0.0, 0.0]).unwrap_err().contains("goes back"));
-        assert!(Signal::table(&[1.0, 1.0, 1.0], &[0.0; 3]).unwrap_err().contains("twice"));
-        assert!(Signal::table(&[1.0, f64::NAN], &[0.0; 2]).unwrap_err().contains("not finite"));
+        assert!(InputSignal::table(&[1.0, 0.0], &[0.0, 0.0]).unwrap_err().contains("goes back"));
+        assert!(InputSignal::table(&[1.0, 1.0, 1.0], &[0.0; 3]).unwrap_err().contains("twice"));
+        assert!(InputSignal::table(&[1.0, f64::NAN], &[0.0; 2]).unwrap_err().contains("not finite"));
     }
 }

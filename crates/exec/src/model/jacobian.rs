@@ -21,7 +21,7 @@ impl JacobianCode {
             let found = sparsity.column(column).binary_search(&row);
             sparsity.places(column).start + found.expect("what moves stands in the pattern")
         };
-        JacobianCode { routine: layout.watched_routine(program, &values), places: entries.iter().map(place).collect() }
+        JacobianCode { routine: layout.guarded_routine(program, &values), places: entries.iter().map(place).collect() }
     }
 }
 

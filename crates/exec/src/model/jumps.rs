@@ -1,4 +1,4 @@
-//! Jumps of sources where speeds are states: what stays as it is are sums of stored quantities, and the speeds follow.
+//! Jumps of sources where speeds are states: sums of stored quantities are conserved, and the speeds follow.
 
 use super::Model;
 use crate::bytecode::{Layout, Routine};
@@ -14,16 +14,16 @@ const SETTLED: f64 = 4.0 * f64::EPSILON;
 
 /// The states that jump, and the routine of the sums that do not.
 #[derive(Debug, Clone)]
-pub(super) struct Kept {
+pub(super) struct ConservedSums {
     states: Vec<usize>,
     sums: Routine,
 }
 
-impl Kept {
+impl ConservedSums {
     /// `None` where no source that jumps moves a storage that follows a state.
-    pub fn of(program: &Program, layout: &Layout) -> Option<Kept> {
+    pub fn of(program: &Program, layout: &Layout) -> Option<ConservedSums> {
         let (states, sums): (Vec<usize>, Vec<Value>) = program.kept.iter().map(|k| (k.0 as usize, k.1)).unzip();
-        (!states.is_empty()).then(|| Kept { sums: layout.routine(program, &sums), states })
+        (!states.is_empty()).then(|| ConservedSums { sums: layout.routine(program, &sums), states })
     }
 
     pub fn routine(&self) -> &Routine {
@@ -37,36 +37,38 @@ impl Model {
         let code = self.code.clone();
         let Some(kept) = &code.kept else { return Ok(Vec::new()) };
         self.place(t, x);
-        self.frame.run(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+        self.frame.run(&kept.sums).map_err(|error| self.failure(t, error))?;
         Ok(kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect())
     }
 
     /// Gives the states that jump the values at which the sums in the present mode are what they were; whether any moved.
-    pub(super) fn keep_sums(&mut self, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
+    pub(super) fn conserve_sums(&mut self, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
         let code = self.code.clone();
         let Some(kept) = &code.kept else { return Ok(false) };
         self.solve_sums(kept, t, x, before)
     }
 
-    fn solve_sums(&mut self, kept: &Kept, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
+    fn solve_sums(&mut self, kept: &ConservedSums, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
         let n = kept.states.len();
-        let (mut last, mut miss) = (f64::INFINITY, vec![0.0; n]);
+        let (mut last, mut residual) = (f64::INFINITY, vec![0.0; n]);
         for iteration in 0..ITERATIONS {
             let mut matrix = vec![0.0; n * n];
             for column in 0..n {
                 self.place(t, x);
                 self.still();
                 self.frame.d[self.code.layout.states as usize + kept.states[column]] = 1.0;
-                self.frame.run_along(&kept.sums).map_err(|trouble| self.failure(t, trouble))?;
+                self.frame.run_along(&kept.sums).map_err(|error| self.failure(t, error))?;
                 for (row, &register) in kept.sums.outputs.iter().enumerate() {
                     matrix[row * n + column] = self.frame.d[register as usize];
-                    miss[row] = self.frame.r[register as usize] - before[row];
+                    residual[row] = self.frame.r[register as usize] - before[row];
                 }
             }
-            if miss.iter().all(|m| *m == 0.0) {
+            if residual.iter().all(|m| *m == 0.0) {
                 return Ok(iteration > 0);
             }
-            let Some(step) = super::minimum_norm::step(&matrix, &miss, n).filter(|step| step.rank == n) else { break };
+            let Some(step) = super::minimum_norm::step(&matrix, &residual, n).filter(|step| step.rank == n) else {
+                break;
+            };
             let relative = |(&i, s): (&usize, &f64)| s.abs() / x[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
             let length = kept.states.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
             if length < NOISE && length >= 0.5 * last {
@@ -79,7 +81,7 @@ impl Model {
             last = length;
         }
         let what = "the speeds after a jump of a source".to_string();
-        let residual = miss.iter().fold(0.0f64, |most, m| most.max(m.abs()));
+        let residual = residual.iter().fold(0.0f64, |most, m| most.max(m.abs()));
         Err(Failure::NoConvergence { time: t, what, iterations: ITERATIONS, residual })
     }
 }

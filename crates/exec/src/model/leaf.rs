@@ -1,11 +1,12 @@
-//! Relations among states that hold whatever the laws of elements say, and moves that keep them.
+//! Relations among states that hold whatever the laws of elements say, and moves that keep them. Moves are integrated by
+//! extrapolation of the midpoint rule. Source: [HNW], II.9.
 //!
 //! A state may go wherever the junction structure lets its rate point, `Σ factor · X' = Σ coefficient · drive`, for any
 //! values of the drives. Starting from one state that is a leaf of the states, with fewer dimensions than states where
 //! relations hold. Closed forms of the relations are not needed: a direction is carried along the leaf by integrating what
 //! of it lies in the leaf.
 
-use super::start::Constraint;
+use super::start::ConstraintResidual;
 use super::{Model, minimum_norm};
 use crate::bytecode::Routine;
 use faer::Mat;
@@ -16,12 +17,12 @@ use std::ops::Range;
 const RANK: f64 = 1e-10;
 /// Error of a move, as a part of it.
 const ERROR: f64 = 1e-13;
-/// Pieces of a move, and columns of the extrapolation of one piece.
-const PIECES: usize = 100;
+/// Parts of a move, and columns of the extrapolation of one part.
+const PARTS: usize = 100;
 const COLUMNS: usize = 9;
-/// From this column on, a piece with more error than this is too long.
+/// From this column on, a part with more error than this is too long.
 const HOPELESS: (usize, f64) = (4, 1e-3);
-/// Pieces that are a smaller part of a move are too many.
+/// Least part of a move.
 const SHORTEST: f64 = 1e-4;
 /// Sums below this part of their terms are rounding.
 const CANCELLED: f64 = 1e-13;
@@ -31,16 +32,16 @@ const NOISE: f64 = 1e-14;
 /// The leaf that a state is on.
 pub(super) struct Leaf {
     routine: Routine,
-    rows: Vec<Row>,
+    rows: Vec<RelationRow>,
     drives: usize,
-    /// What a state counts as one of.
+    /// The scale of each state.
     pub size: Vec<f64>,
     /// The constraints on displacements, whose closed form is known.
-    pub constraints: Vec<Constraint>,
+    pub constraints: Vec<ConstraintResidual>,
 }
 
 /// Where the values of a row stand among the outputs of the routine: a factor and a quantity in turn; coefficients.
-struct Row {
+struct RelationRow {
     quantity: Range<usize>,
     /// The state that a quantity is, if it is one.
     state: Vec<Option<usize>>,
@@ -50,25 +51,25 @@ struct Row {
 
 /// Directions in which states may go: all of them, or the columns of a matrix that are orthonormal where each state counts
 /// in parts of its size.
-pub(super) enum Ways {
+pub(super) enum Directions {
     /// Every state by itself.
     All,
     /// Row by row, a row for each state.
-    Few { columns: usize, basis: Vec<f64>, size: Vec<f64> },
+    Basis { columns: usize, basis: Vec<f64>, size: Vec<f64> },
 }
 
-impl Ways {
+impl Directions {
     /// How many there are.
     pub fn count(&self, states: usize) -> usize {
         match self {
-            Ways::All => states,
-            Ways::Few { columns, .. } => *columns,
+            Directions::All => states,
+            Directions::Basis { columns, .. } => *columns,
         }
     }
 
-    /// Derivatives along the ways, from those by the states: row by row.
+    /// Derivatives along the directions, from those by the states: row by row.
     pub fn along(&self, jacobian: &[f64], states: usize) -> Vec<f64> {
-        let Ways::Few { columns, basis, size } = self else { return jacobian.to_vec() };
+        let Directions::Basis { columns, basis, size } = self else { return jacobian.to_vec() };
         // What cancels but for rounding is nothing: a row may hold no more.
         let entry = |row: &[f64], k: usize| -> f64 {
             let terms = (0..states).filter(|&j| row[j] != 0.0).map(|j| row[j] * size[j] * basis[j * columns + k]);
@@ -78,9 +79,9 @@ impl Ways {
         jacobian.chunks(states.max(1)).flat_map(|row| (0..*columns).map(move |k| entry(row, k))).collect()
     }
 
-    /// The states' part of a step along the ways.
+    /// The states' part of a step along the directions.
     pub fn step(&self, along: &[f64]) -> Vec<f64> {
-        let Ways::Few { columns, basis, size } = self else { return along.to_vec() };
+        let Directions::Basis { columns, basis, size } = self else { return along.to_vec() };
         let part = |(row, size): (&[f64], &f64)| row.iter().zip(along).map(|(b, a)| b * a).sum::<f64>() * size;
         if *columns == 0 {
             return vec![0.0; size.len()];
@@ -90,7 +91,7 @@ impl Ways {
 
     /// How far a step of the states goes along each way.
     pub fn parts(&self, step: &[f64]) -> Vec<f64> {
-        let Ways::Few { columns, basis, size } = self else { return step.to_vec() };
+        let Directions::Basis { columns, basis, size } = self else { return step.to_vec() };
         let scaled: Vec<f64> = step.iter().zip(size).map(|(s, size)| s / size).collect();
         let part = |k: usize| scaled.iter().enumerate().map(|(j, s)| basis[j * columns + k] * s).sum();
         (0..*columns).map(part).collect()
@@ -119,7 +120,7 @@ impl Model {
                 Op::State(i) => Some(i as usize),
                 _ => None,
             };
-            rows.push(Row {
+            rows.push(RelationRow {
                 quantity: first..second,
                 state: row.quantity.iter().map(state).collect(),
                 by: second..wanted.len(),
@@ -150,15 +151,15 @@ impl Model {
         size.into_iter().map(|s| if s > noise { s } else { least.min(1.0) }).collect()
     }
 
-    /// The ways from `x` along its leaf before any magnitude is known.
-    pub(super) fn first_ways(&mut self, t: f64, x: &[f64]) -> Option<Ways> {
+    /// The directions from `x` along its leaf before any magnitude is known.
+    pub(super) fn first_directions(&mut self, t: f64, x: &[f64]) -> Option<Directions> {
         let leaf = self.leaf_by(t, x, |_| vec![1.0; x.len()]);
-        self.ways(leaf.as_ref(), t, x)
+        self.directions(leaf.as_ref(), t, x)
     }
 
-    /// The ways from `x` along the leaf. `None` if something has no value there.
-    pub(super) fn ways(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Option<Ways> {
-        let Some(leaf) = leaf else { return Some(Ways::All) };
+    /// The directions from `x` along the leaf. `None` if something has no value there.
+    pub(super) fn directions(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Option<Directions> {
+        let Some(leaf) = leaf else { return Some(Directions::All) };
         let kept = self.kept(leaf, t, x)?;
         let n = x.len();
         let svd = kept.svd().ok()?;
@@ -167,7 +168,7 @@ impl Model {
         // A state that no way moves but by rounding stays.
         let entry = |(j, k): (usize, usize)| if v[(j, k)].abs() > CANCELLED { v[(j, k)] } else { 0.0 };
         let basis = (0..n).flat_map(|j| (rank..n).map(move |k| (j, k))).map(entry).collect();
-        Some(Ways::Few { columns: n - rank, basis, size: leaf.size.clone() })
+        Some(Directions::Basis { columns: n - rank, basis, size: leaf.size.clone() })
     }
 
     /// Where `x` comes to along `step`: there, or along the leaf. `None` if the way does not lead so far.
@@ -175,7 +176,7 @@ impl Model {
         let Some(leaf) = leaf else { return Some(x.iter().zip(step).map(|(x, s)| x + s).collect()) };
         let direction: Vec<f64> = step.iter().zip(&leaf.size).map(|(s, size)| s / size).collect();
         let (mut z, mut gone, mut piece) = (vec![0.0; x.len()], 0.0f64, 1.0f64);
-        for _ in 0..PIECES {
+        for _ in 0..PARTS {
             let length = piece.min(1.0 - gone);
             match self.piece(leaf, t, x, &direction, &z, length) {
                 Some((next, columns)) => {
@@ -234,7 +235,7 @@ impl Model {
         None
     }
 
-    /// The midpoint rule in `count` strides.
+    /// The midpoint rule in `count` substeps.
     #[allow(clippy::too_many_arguments, reason = "a point, a direction and a length")]
     fn midpoints(
         &mut self,
@@ -246,14 +247,14 @@ impl Model {
         length: f64,
         count: usize,
     ) -> Option<Vec<f64>> {
-        let stride = length / count as f64;
+        let substep = length / count as f64;
         let onward = |z: &[f64], rate: &[f64], by: f64| -> Vec<f64> {
             z.iter().zip(rate).map(|(z, rate)| z + by * rate).collect()
         };
-        let (mut before, mut here) = (z.to_vec(), onward(z, first, stride));
+        let (mut before, mut here) = (z.to_vec(), onward(z, first, substep));
         for _ in 1..count {
             let rate = self.within(leaf, t, x, direction, &here)?;
-            let next = onward(&before, &rate, 2.0 * stride);
+            let next = onward(&before, &rate, 2.0 * substep);
             before = std::mem::replace(&mut here, next);
         }
         Some(here)

@@ -1,24 +1,24 @@
 //! Which routines of a model run as machine code.
 
 use super::Model;
-use super::inputs::Signal;
+use super::inputs::InputSignal;
 use super::recorded::Recorded;
 use super::system::What;
-use crate::machine::{Code, Generator, MachineError};
+use crate::machine::{Generator, MachineCode, MachineError};
 use std::sync::Arc;
 
 /// Machine code of routines, where it has been made; that of what is recorded lies with it. Shared by copies of a model.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Codes {
-    rates: Option<Arc<Code>>,
-    along: Option<Arc<Code>>,
-    indicators: Option<Arc<Code>>,
-    jacobian: Option<Arc<Code>>,
+    rates: Option<Arc<MachineCode>>,
+    along: Option<Arc<MachineCode>>,
+    indicators: Option<Arc<MachineCode>>,
+    jacobian: Option<Arc<MachineCode>>,
 }
 
 impl Codes {
     /// The machine code of a routine, if there is any.
-    pub fn of<'c>(&'c self, recorded: &'c Recorded, what: What, along: bool) -> Option<&'c Arc<Code>> {
+    pub fn of<'c>(&'c self, recorded: &'c Recorded, what: What, along: bool) -> Option<&'c Arc<MachineCode>> {
         match (what, along) {
             (What::Rates, false) => self.rates.as_ref(),
             (What::Rates, true) => self.along.as_ref(),
@@ -37,7 +37,7 @@ impl Model {
         if self.codes.rates.is_none() {
             return false;
         }
-        if !self.run.held.is_empty() || self.inputs().iter().any(Signal::moves) {
+        if !self.run.delays_and_samples.is_empty() || self.inputs().iter().any(InputSignal::moves) {
             self.place_time(t);
         }
         let Model { codes, frame, code, run, .. } = self;

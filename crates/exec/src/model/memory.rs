@@ -3,12 +3,12 @@
 use super::Model;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
-use super::inputs::Piece;
+use super::inputs::PointRange;
 use crate::bytecode::{Followed, HeldConditions};
 use halfarrow_compiler::bond_graph::HeldKind;
 
-/// What a run remembers beside its state: which signs conditions have, which of several solutions laws follow, what delays
-/// and samples hold, which piece of an input table it is on, the constants that its start has fixed.
+/// What a run remembers beside its state: signs of event indicators, solutions that nonlinear laws follow, histories of delays
+/// and samples, intervals of input tables, the constants that its start has fixed.
 ///
 /// A model with the same setup goes on from it with the same bits, in the run that it was taken from or in another one.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,12 +43,12 @@ pub(super) struct Remembered {
     pub conserved: Vec<f64>,
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
-    pub held: Vec<DelayOrSample>,
+    pub delays_and_samples: Vec<DelayOrSample>,
     /// The piece of each input that holds.
-    pub pieces: Vec<Option<Piece>>,
+    pub pieces: Vec<Option<PointRange>>,
 }
 
-/// What a held signal remembers.
+/// The memory of a delay or a sample.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum DelayOrSample {
     Delay(Delay),
@@ -96,11 +96,11 @@ impl Model {
 
     /// Whether a block is solved by Newton and has an unknown `i`.
     pub(super) fn is_unknown(&self, block: usize, i: usize) -> bool {
-        self.frame.solvers[block].newton.memory.len() > i
+        self.frame.solvers[block].newton.previous.len() > i
     }
 
     /// Delays and samples as they are before a run.
-    pub(super) fn empty_held(&self) -> Vec<DelayOrSample> {
+    pub(super) fn empty_delays_and_samples(&self) -> Vec<DelayOrSample> {
         let code = &self.code;
         let time = |i: usize| code.layout.registers.get(&code.program.held[i].time).map(|&r| self.frame.r[r as usize]);
         let held = code.program.held.iter().enumerate().map(|(i, h)| {

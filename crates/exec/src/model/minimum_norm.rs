@@ -8,7 +8,7 @@ const RANK: f64 = 1e-11;
 
 /// The shortest of the steps that reduce `jacobian · step + residual` most; rows and columns are weighed so that the
 /// greatest entry of each is 1.
-pub(super) struct Step {
+pub(super) struct MinimumNormStep {
     /// The step.
     pub step: Vec<f64>,
     /// Rank of the Jacobian.
@@ -18,7 +18,7 @@ pub(super) struct Step {
 }
 
 /// Computes it; `jacobian` row by row. `None` if something is not finite or the singular values do not come out.
-pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option<Step> {
+pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option<MinimumNormStep> {
     let rows = residual.len();
     let weights: Vec<f64> = match columns {
         0 => vec![1.0; rows],
@@ -28,10 +28,15 @@ pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option
 }
 
 /// The same with the weights of the rows given.
-pub(super) fn weighed_step(jacobian: &[f64], residual: &[f64], columns: usize, weights: Vec<f64>) -> Option<Step> {
+pub(super) fn weighed_step(
+    jacobian: &[f64],
+    residual: &[f64],
+    columns: usize,
+    weights: Vec<f64>,
+) -> Option<MinimumNormStep> {
     let rows = residual.len();
     if rows == 0 || columns == 0 {
-        return Some(Step { step: vec![0.0; columns], rank: 0, weights });
+        return Some(MinimumNormStep { step: vec![0.0; columns], rank: 0, weights });
     }
     if jacobian.iter().chain(residual).any(|v| !v.is_finite()) {
         return None;
@@ -51,13 +56,13 @@ pub(super) fn weighed_step(jacobian: &[f64], residual: &[f64], columns: usize, w
         let mut x = Mat::from_fn(rows, 1, |i, _| -residual[i] * weights[i]);
         matrix.partial_piv_lu().solve_in_place(x.as_mut());
         let step = x.col(0).iter().zip(&sizes).map(|(s, size)| s * size).collect();
-        return Some(Step { step, rank, weights });
+        return Some(MinimumNormStep { step, rank, weights });
     }
     for k in (0..values.nrows()).filter(|&k| values[k] > limit) {
         let part = (0..rows).map(|i| -u[(i, k)] * residual[i] * weights[i]).sum::<f64>() / values[k];
         solution.iter_mut().enumerate().for_each(|(j, x)| *x += v[(j, k)] * part);
     }
-    Some(Step { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
+    Some(MinimumNormStep { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
 }
 
 fn greatest(values: &mut dyn Iterator<Item = f64>) -> f64 {

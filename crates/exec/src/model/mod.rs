@@ -35,11 +35,11 @@ pub use operations::Operations;
 pub use setup::Setup;
 pub use wide::WideModel;
 
-use crate::bytecode::{Frame, Hold, Trouble};
+use crate::bytecode::{Frame, Hold, SolveError};
 use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
-use inputs::Signal;
+use inputs::InputSignal;
 use machine::Codes;
 use memory::{DelayOrSample, Remembered};
 use recorded::Recorded;
@@ -107,7 +107,7 @@ impl Model {
             clock_event: None,
             conserved: vec![0.0; code.program.conserved.len()],
             scales: vec![0.0; n],
-            held: Vec::new(),
+            delays_and_samples: Vec::new(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -252,7 +252,7 @@ impl Model {
         self.run.pieces.fill(None);
         self.place_constant_inputs();
         self.forget_solutions();
-        self.run.held = self.empty_held();
+        self.run.delays_and_samples = self.empty_delays_and_samples();
     }
 
     fn follow(&mut self) {
@@ -266,8 +266,8 @@ impl Model {
         self.frame.parameters_changed();
         self.forget_solutions();
         let run = self.frame.run(&self.code.preamble);
-        run.map_err(|trouble| self.failure(f64::NAN, trouble))?;
-        self.broken = self.first_broken().map_err(|trouble| self.failure(f64::NAN, trouble))?;
+        run.map_err(|error| self.failure(f64::NAN, error))?;
+        self.broken = self.first_broken().map_err(|error| self.failure(f64::NAN, error))?;
         if let Some(failure) = self.violated_always() {
             return Err(failure);
         }
@@ -282,7 +282,7 @@ impl Model {
     }
 
     /// The number of the first assumption that does not hold.
-    fn first_broken(&mut self) -> Result<Option<usize>, Trouble> {
+    fn first_broken(&mut self) -> Result<Option<usize>, SolveError> {
         if self.code.program.assumptions.is_empty() {
             return Ok(None);
         }
@@ -302,7 +302,7 @@ impl Model {
     }
 
     /// What is connected to the inputs.
-    fn inputs(&self) -> &[Signal] {
+    fn inputs(&self) -> &[InputSignal] {
         &self.setup.given(self.run.mode).inputs
     }
 
@@ -321,7 +321,7 @@ impl Model {
         for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
             frame.r[layout.inputs as usize + i] = signal.at(t, *piece).0;
         }
-        for (i, held) in run.held.iter().enumerate() {
+        for (i, held) in run.delays_and_samples.iter().enumerate() {
             frame.r[layout.held as usize + i] = match held {
                 DelayOrSample::Delay(delay) => delay.at(t, run.crossed).0,
                 DelayOrSample::Sample(sample) => sample.value,
@@ -336,31 +336,31 @@ impl Model {
     }
 
     /// What stopped a routine, for the modeller.
-    fn failure(&self, time: f64, trouble: Trouble) -> Failure {
+    fn failure(&self, time: f64, error: SolveError) -> Failure {
         let block = |block: u32| &self.code.program.blocks[BlockId(block)];
         let what = |b: u32| first_of(block(b).elements());
         let unknown = |b: u32, unknown: usize| block(b).unknown(unknown).to_string();
-        match trouble {
-            Trouble::Vanished { watch } => {
-                let watch = &self.code.program.watches[watch as usize];
-                Failure::Vanished { time, what: first_of(&watch.elements), divisor: watch.divisor.clone() }
+        match error {
+            SolveError::Vanished { guard } => {
+                let guard = &self.code.program.pivot_guards[guard as usize];
+                Failure::Vanished { time, what: first_of(&guard.elements), divisor: guard.divisor.clone() }
             }
-            Trouble::Singular { block } => Failure::Singular { time, what: what(block) },
-            Trouble::NoConvergence { block, iterations, residual } => {
+            SolveError::Singular { block } => Failure::Singular { time, what: what(block) },
+            SolveError::NoConvergence { block, iterations, residual } => {
                 Failure::NoConvergence { time, what: what(block), iterations, residual }
             }
-            Trouble::NoSolution { block, nearest, residual } => {
+            SolveError::NoSolution { block, nearest, residual } => {
                 let name = unknown(block, 0);
                 let reason = format!(
                     "no value of {name} solves its equation; {name} = {nearest:.3} comes nearest and leaves {residual:.3e}"
                 );
                 Failure::OutOfDomain { time, what: what(block), reason }
             }
-            Trouble::Ended { block, unknown: index, from, to } => {
+            SolveError::Ended { block, unknown: index, from, to } => {
                 let leap = Leap { unknown: unknown(block, index), from, to };
                 Failure::Branch { time, what: what(block), leap: Box::new(leap) }
             }
-            Trouble::Bound { block, evaluations } => Failure::Bound { time, what: what(block), most: evaluations },
+            SolveError::Bound { block, evaluations } => Failure::Bound { time, what: what(block), most: evaluations },
         }
     }
 }

@@ -31,7 +31,7 @@ impl Operations {
 
     fn of(routine: &Routine) -> Operations {
         let mut counted = Operations::default();
-        // What is handed through or watched is not counted, blocks are below.
+        // What is handed through or guarded is not counted, blocks are below.
         let operations = routine.code.iter().filter_map(|i| if let Instruction::Op(o) = i { Some(o) } else { None });
         operations.for_each(|operation| counted.count(operation));
         routine.solves.iter().for_each(|solve| counted.solve(solve));

@@ -2,8 +2,8 @@
 
 use super::compiled::Mode;
 use super::{Model, RecordError};
-use crate::bytecode::{Abreast, Routine};
-use crate::machine::Code;
+use crate::bytecode::{BlockBatches, Routine};
+use crate::machine::MachineCode;
 use halfarrow_compiler::program::{BlockId, Value};
 use std::sync::Arc;
 
@@ -14,23 +14,23 @@ pub(super) struct Recorded {
     pub chosen: Vec<usize>,
     pub routine: Routine,
     /// Newton blocks of it that are solved together.
-    pub abreast: Option<Arc<Abreast>>,
+    pub batches: Option<Arc<BlockBatches>>,
     /// Newton blocks that it needs and no rate does.
     pub blocks: Vec<BlockId>,
     /// Its machine code, where it has been made.
-    pub code: Option<Arc<Code>>,
+    pub code: Option<Arc<MachineCode>>,
 }
 
 impl Recorded {
     pub fn new(mode: &Mode, chosen: Vec<usize>) -> Recorded {
         let value = |&i: &usize| mode.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = chosen.iter().filter_map(value).collect();
-        let routine = mode.layout.watched_routine(&mode.program, &wanted);
+        let routine = mode.layout.guarded_routine(&mode.program, &wanted);
         let of_rates = |block: &BlockId| mode.rates.solves.iter().any(|s| s.block == *block);
         let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
         let blocks = newton.filter(|block| !of_rates(block)).collect();
-        let abreast = Abreast::of(&mode.program, &mode.layout, &routine).map(Arc::new);
-        Recorded { chosen, routine, abreast, blocks, code: None }
+        let batches = BlockBatches::of(&mode.program, &mode.layout, &routine).map(Arc::new);
+        Recorded { chosen, routine, batches, blocks, code: None }
     }
 
     /// What is recorded where nothing is asked for.
@@ -85,8 +85,8 @@ impl Model {
 
     pub(super) fn reserve_recorded(&mut self) {
         self.frame.reserve(&self.recorded.routine);
-        for abreast in [&self.code.abreast, &self.recorded.abreast].into_iter().flatten() {
-            self.frame.reserve_abreast(abreast);
+        for batches in [&self.code.batches, &self.recorded.batches].into_iter().flatten() {
+            self.frame.reserve_batches(batches);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What is set before a run: values of parameters, what is connected to inputs.
 
 use super::compiled::{Compiled, Mode, ModeId};
-use super::inputs::Signal;
+use super::inputs::InputSignal;
 use super::{InputError, ParameterError};
 
 /// Parameters and inputs of a model, for each of its modes.
@@ -16,7 +16,7 @@ pub(super) struct Given {
     /// Values of parameters that have been set, in SI units.
     pub parameters: Vec<Option<f64>>,
     /// What is connected to each input.
-    pub inputs: Vec<Signal>,
+    pub inputs: Vec<InputSignal>,
 }
 
 impl Setup {
@@ -24,7 +24,7 @@ impl Setup {
     pub fn new(compiled: &Compiled) -> Setup {
         let given = |mode: &Mode| Given {
             parameters: vec![None; mode.program.parameters.len()],
-            inputs: mode.program.inputs.iter().map(|_| Signal::default()).collect(),
+            inputs: mode.program.inputs.iter().map(|_| InputSignal::default()).collect(),
         };
         Setup { modes: compiled.modes().map(given).collect() }
     }
@@ -62,7 +62,7 @@ impl Setup {
         times: &[f64],
         values: &[f64],
     ) -> Result<(), InputError> {
-        let signal = Signal::table(times, values);
+        let signal = InputSignal::table(times, values);
         let mut known = false;
         for (mode, given) in compiled.modes().zip(&mut self.modes) {
             let Some(index) = mode.program.inputs.iter().position(|i| i.name == input) else { continue };

@@ -18,7 +18,7 @@ const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
 /// Where unknowns begin that nothing determines yet: at zero; then beside it, where laws have a slope, later ones a bit more
 /// than those before.
-const BEGINNINGS: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3];
+const FIRST_GUESSES: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3];
 /// How far beside its guess an unknown may begin.
 const BESIDE: f64 = 1e-3;
 /// Part of the greatest derivative by an unknown that is what rounding left of one.
@@ -41,14 +41,14 @@ struct Unknowns {
 
 /// A group at the time of the start, with the routine that computes its residuals.
 #[derive(Clone, Copy)]
-struct Routed<'a> {
+struct GroupAtTime<'a> {
     t: f64,
     routine: &'a Routine,
     group: &'a StartGroup,
 }
 
 /// A constraint on displacements, with the routine that computes its residual.
-pub(super) struct Constraint {
+pub(super) struct ConstraintResidual {
     group: StartGroup,
     routine: Routine,
 }
@@ -75,11 +75,11 @@ impl Model {
             let settled = z == unknowns.z;
             z = unknowns.z;
             self.run.conserved.copy_from_slice(&z[states..]);
-            if self.run.held.is_empty() || settled {
+            if self.run.delays_and_samples.is_empty() || settled {
                 break;
             }
             // Held signals start with what the start makes of them.
-            self.begin_held(t, &z[..states]).map_err(StartError::Failure)?;
+            self.begin_delays_and_samples(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
         if self.scaled {
@@ -131,9 +131,11 @@ impl Model {
             return sizes;
         }
         let Ok((rates, jacobian)) = self.at_rest(t, x) else { return sizes };
-        let Some(ways) = self.first_ways(t, x) else { return sizes };
-        let Some(way) = minimum_norm::step(&ways.along(&jacobian, n), &rates, ways.count(n)) else { return sizes };
-        let step = ways.step(&way.step);
+        let Some(directions) = self.first_directions(t, x) else { return sizes };
+        let Some(way) = minimum_norm::step(&directions.along(&jacobian, n), &rates, directions.count(n)) else {
+            return sizes;
+        };
+        let step = directions.step(&way.step);
         let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
         let fastest =
             (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
@@ -269,11 +271,11 @@ impl Model {
 
     fn is_met(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> bool {
         let Some((residual, jacobian)) = self.linearised(t, routine, group, z) else { return false };
-        self.missed(group, z, &residual, &jacobian).is_empty()
+        self.unmet(group, z, &residual, &jacobian).is_empty()
     }
 
     /// Conditions of a group that are missed, as indices into it.
-    fn missed(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
+    fn unmet(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
         let n = group.unknowns.len();
         let asked = |i: usize| {
             let register = self.code.layout.registers.get(&self.code.program.start[group.conditions[i]].asked);
@@ -310,23 +312,23 @@ impl Model {
         let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
         let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
         let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
-        let routed = Routed { t, routine, group };
+        let at_time = GroupAtTime { t, routine, group };
         // What is determined already stays, if the rest can be met so; then everything may move.
         let mut first = None;
         let all_open = vec![true; open.len()];
         let rounds = if open.contains(&true) { vec![open.clone(), all_open] } else { vec![all_open] };
         for movable in rounds {
-            for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
+            for (k, first_guess) in FIRST_GUESSES.into_iter().enumerate() {
                 let mut z = all.z.clone();
-                let offset = |j: usize| if k < 4 { beginning } else { beginning * (1.0 + j as f64 / 16.0) };
+                let offset = |j: usize| if k < 4 { first_guess } else { first_guess * (1.0 + j as f64 / 16.0) };
                 for j in (0..open.len()).filter(|&j| open[j]) {
                     let u = group.unknowns[j] as usize;
                     // What is guessed begins there, or close beside it.
-                    z[u] += if all.guessed[u] && beginning.abs() > BESIDE { 0.0 } else { offset(j) };
+                    z[u] += if all.guessed[u] && first_guess.abs() > BESIDE { 0.0 } else { offset(j) };
                 }
                 if let Some(at) = self.linearised(t, routine, group, &z) {
-                    let (z, residual, jacobian) = self.nearest(routed, z, at, &movable);
-                    if self.missed(group, &z, &residual, &jacobian).is_empty() {
+                    let (z, residual, jacobian) = self.nearest(at_time, z, at, &movable);
+                    if self.unmet(group, &z, &residual, &jacobian).is_empty() {
                         all.z = z;
                         group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
                         return Ok(());
@@ -335,7 +337,7 @@ impl Model {
                         first.get_or_insert((z, residual, jacobian));
                     }
                 }
-                // Where nothing is open every beginning is the same.
+                // Where nothing is open every first guess is the same.
                 if !open.contains(&true) {
                     break;
                 }
@@ -351,16 +353,16 @@ impl Model {
         let weights: Vec<f64> = weights.iter().zip(group.conditions.iter().map(firm)).map(|(w, f)| w * f).collect();
         let movable = vec![true; open.len()];
         for _ in 0..10 * ITERATIONS {
-            if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), &movable, Some(&weights)) {
+            if !self.nearer(at_time, &mut z, (&mut residual, &mut jacobian), &movable, Some(&weights)) {
                 break;
             }
         }
-        if self.missed(group, &z, &residual, &jacobian).is_empty() {
+        if self.unmet(group, &z, &residual, &jacobian).is_empty() {
             all.z = z;
             group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
             return Ok(());
         }
-        Err(match self.conflict(routed, &z, (&residual, &jacobian), &weights) {
+        Err(match self.conflict(at_time, &z, (&residual, &jacobian), &weights) {
             Some(values) => StartError::Conflict(StartConflict { values, searched }),
             None => StartError::NotFound { conditions: names, searched },
         })
@@ -376,13 +378,13 @@ impl Model {
     /// Where damped steps of minimum norm lead, of the unknowns that may move.
     fn nearest(
         &mut self,
-        routed: Routed,
+        at_time: GroupAtTime,
         mut z: Vec<f64>,
         (mut residual, mut jacobian): (Vec<f64>, Vec<f64>),
         movable: &[bool],
     ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         for _ in 0..ITERATIONS {
-            if !self.nearer(routed, &mut z, (&mut residual, &mut jacobian), movable, None) {
+            if !self.nearer(at_time, &mut z, (&mut residual, &mut jacobian), movable, None) {
                 break;
             }
         }
@@ -392,7 +394,7 @@ impl Model {
     /// One damped step; whether it helped.
     fn nearer(
         &mut self,
-        Routed { t, routine, group }: Routed,
+        GroupAtTime { t, routine, group }: GroupAtTime,
         z: &mut Vec<f64>,
         (residual, jacobian): (&mut Vec<f64>, &mut Vec<f64>),
         movable: &[bool],
@@ -428,7 +430,7 @@ impl Model {
     /// What contradicts each other, if the point is as near as any to all conditions.
     fn conflict(
         &mut self,
-        Routed { t, group, .. }: Routed,
+        GroupAtTime { t, group, .. }: GroupAtTime,
         z: &[f64],
         (residual, jacobian): (&[f64], &[f64]),
         weights: &[f64],
@@ -460,11 +462,11 @@ impl Model {
     }
 
     /// The constraints on displacements.
-    pub(super) fn constraints(&mut self) -> Vec<Constraint> {
+    pub(super) fn constraints(&mut self) -> Vec<ConstraintResidual> {
         let firm = |c: &usize| self.code.program.start[*c].firm;
         let firm: Vec<usize> = (0..self.code.program.start.len()).filter(firm).collect();
         firm.into_iter()
-            .map(|c| Constraint {
+            .map(|c| ConstraintResidual {
                 group: StartGroup { conditions: vec![c], unknowns: self.code.program.start[c].reads.clone() },
                 routine: self.routine_for(&[self.code.program.start[c].residual]),
             })
@@ -473,9 +475,9 @@ impl Model {
 
     /// The constraint that is missed most at a state, by which part of what its displacements come to, if that is more
     /// than `most`; with its miss. `size` is what states count as one of.
-    pub(super) fn missed_constraint(
+    pub(super) fn unmet_constraint(
         &mut self,
-        constraints: &[Constraint],
+        constraints: &[ConstraintResidual],
         t: f64,
         x: &[f64],
         size: &[f64],
@@ -483,7 +485,7 @@ impl Model {
     ) -> Option<(String, f64)> {
         let z: Vec<f64> = x.iter().chain(&self.run.conserved.clone()).copied().collect();
         let mut worst: Option<(f64, String, f64)> = None;
-        for Constraint { group, routine } in constraints {
+        for ConstraintResidual { group, routine } in constraints {
             let name = self.code.program.start[group.conditions[0]].name.clone();
             let Some((miss, slopes)) = self.linearised(t, routine, group, &z) else { return Some((name, f64::NAN)) };
             let moved = |u: u32| z[u as usize].abs().max(size.get(u as usize).copied().unwrap_or(0.0));
@@ -545,7 +547,7 @@ impl Model {
                 self.frame.run_along(routine)
             }
         };
-        run.map_err(|trouble| self.failure(t, trouble))
+        run.map_err(|error| self.failure(t, error))
     }
 
     pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {

@@ -1,10 +1,10 @@
 //! The model as a system to integrate.
 
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Hold, Trouble};
+use crate::bytecode::{Hold, SolveError};
 use halfarrow_sim::{Failure, Sparsity, System};
 
-/// How far beside a state the slope is taken where it is infinite: this part of the state and of its change in a second.
+/// How far beside a state the derivative is taken where it is infinite: this part of the state and of its change in a second.
 const BESIDE: f64 = 1e-8;
 
 /// Which routine is run.
@@ -18,7 +18,7 @@ pub(super) enum What {
 }
 
 impl Model {
-    fn once(&mut self, what: What, along: bool) -> Result<bool, Trouble> {
+    fn once(&mut self, what: What, along: bool) -> Result<bool, SolveError> {
         let routine = match what {
             What::Rates => &self.code.rates,
             What::Recorded => &self.recorded.routine,
@@ -26,8 +26,8 @@ impl Model {
             What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
         };
         self.frame.begin(match what {
-            What::Rates => self.code.abreast.as_ref(),
-            What::Recorded => self.recorded.abreast.as_ref(),
+            What::Rates => self.code.batches.as_ref(),
+            What::Recorded => self.recorded.batches.as_ref(),
             What::Indicators | What::Jacobian => None,
         });
         match (self.codes.of(&self.recorded, what, along), along) {
@@ -39,13 +39,13 @@ impl Model {
         Ok(routine.outputs.iter().all(|&out| registers[out as usize].is_finite()))
     }
 
-    /// Runs a routine with conditions as held. Beyond a switch the held branch may have no value any more: then the
+    /// Runs a routine with conditions as held. Beyond a zero crossing the held branch may have no value any more: then the
     /// conditions are followed instead.
     pub(super) fn evaluate(&mut self, what: What, along: bool, t: f64) -> Result<(), Failure> {
         let first = self.once(what, along);
         let held = self.frame.conditions.state == Hold::Keep && !self.code.switching.is_empty();
         if !held || matches!(first, Ok(true)) {
-            return first.map(|_| ()).map_err(|trouble| self.failure(t, trouble));
+            return first.map(|_| ()).map_err(|error| self.failure(t, error));
         }
         self.frame.conditions.state = Hold::Follow;
         let second = self.once(what, along);
@@ -57,7 +57,7 @@ impl Model {
             self.once(what, along)
         };
         self.frame.conditions.state = Hold::Keep;
-        last.map(|_| ()).map_err(|trouble| self.failure(t, trouble))
+        last.map(|_| ()).map_err(|error| self.failure(t, error))
     }
 
     /// Runs the rates at `(t, x)` and leaves them in `dx`.
@@ -76,7 +76,7 @@ impl Model {
         for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
             frame.d[layout.inputs as usize + i] = signal.at(t, *piece).1;
         }
-        for (i, held) in run.held.iter().enumerate() {
+        for (i, held) in run.delays_and_samples.iter().enumerate() {
             let slope = if let DelayOrSample::Delay(delay) = held { delay.at(t, run.crossed).1 } else { 0.0 };
             frame.d[layout.held as usize + i] = slope;
         }
@@ -95,7 +95,7 @@ impl Model {
         self.derivative_along(t, x, jv)
     }
 
-    /// Derivative of the rates along the direction that is set. Where the slope of a law is infinite it is that a little
+    /// Derivative of the rates along the direction that is set. Where the derivative of a law is infinite it is that a little
     /// beside.
     fn derivative_along(&mut self, t: f64, x: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
         self.evaluate(What::Rates, true, t)?;

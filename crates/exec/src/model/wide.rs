@@ -5,7 +5,7 @@ use super::compiled::Mode;
 use super::recorded::Recorded;
 use super::system::What;
 use crate::bytecode::Routine;
-use crate::bytecode::{Frame, Lane, Line, Packed, WideFrame};
+use crate::bytecode::{Frame, HasFrame, Packed, Vector, WideFrame};
 use halfarrow_sim::wide::{LANES, Wide, WideSystem};
 use halfarrow_sim::{Events as _, Failure, HybridSystem, System as _};
 use std::sync::Arc;
@@ -61,7 +61,7 @@ impl WideModel {
     /// Takes up what the models of the lanes have been set to: parameters, constants and what follows from them.
     pub fn begin(&mut self) {
         for register in 0..self.code.layout.size as usize {
-            self.frame.r[register] = Line(std::array::from_fn(|lane| self.models[lane].frame.r[register]));
+            self.frame.r[register] = Vector(std::array::from_fn(|lane| self.models[lane].frame.r[register]));
         }
     }
 
@@ -69,8 +69,8 @@ impl WideModel {
     fn place(&mut self, t: &Wide, x: &[Wide]) {
         let WideModel { models, frame, code, .. } = self;
         let (states, time) = (code.layout.states as usize, code.layout.time as usize);
-        frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Line(*x));
-        frame.r[time] = Line(*t);
+        frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Vector(*x));
+        frame.r[time] = Vector(*t);
         if states == time + 1 {
             return; // no inputs, held signals or constants
         }
@@ -135,7 +135,7 @@ impl WideModel {
     }
 }
 
-impl Lane for Model {
+impl HasFrame for Model {
     #[inline]
     fn frame(&mut self) -> &mut Frame {
         self.rated = None;
@@ -158,6 +158,6 @@ impl WideSystem for WideModel {
 
     fn remembers(&self) -> bool {
         let newton = |routine: &Routine| routine.solves.iter().any(|solve| !solve.guess.is_empty());
-        newton(&self.code.rates) || newton(&self.recorded.routine) || !self.models[0].run.held.is_empty()
+        newton(&self.code.rates) || newton(&self.recorded.routine) || !self.models[0].run.delays_and_samples.is_empty()
     }
 }

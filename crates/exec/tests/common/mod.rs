@@ -6,7 +6,7 @@ use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::{
-    BreakBound, Condition, Conserved, Count, Equations, Form, Observed, State, StateKind, Step,
+    BreakBound, Conserved, Count, EquationStep, Equations, Form, InitialCondition, Observed, State, StateKind,
 };
 use halfarrow_compiler::ids::{Map, Table};
 use halfarrow_compiler::program::{Program, schedule};
@@ -23,9 +23,9 @@ pub struct Sketch {
     elements: Table<ElementId, Element>,
     states: Vec<State>,
     conserved: Vec<Conserved>,
-    steps: Vec<Step>,
+    steps: Vec<EquationStep>,
     observed: Vec<Observed>,
-    conditions: Vec<Condition>,
+    conditions: Vec<InitialCondition>,
 }
 
 impl Default for Sketch {
@@ -97,9 +97,9 @@ impl Sketch {
     }
     pub fn rate(&mut self, name: &str, value: Expr) {
         let symbol = self.x.symbol(&format!("{name}'"), Facts::default());
-        self.steps.push(Step::Assign { symbol, value });
+        self.steps.push(EquationStep::Assign { symbol, value });
     }
-    pub fn step(&mut self, step: Step) {
+    pub fn step(&mut self, step: EquationStep) {
         self.steps.push(step);
     }
     pub fn observe(&mut self, name: &str, value: Expr) {
@@ -112,7 +112,7 @@ impl Sketch {
     pub fn start(&mut self, name: &str, what: Expr, value: f64) {
         let value = self.number(value);
         let residual = self.x.sub(what, value);
-        self.conditions.push(Condition {
+        self.conditions.push(InitialCondition {
             residual,
             name: name.into(),
             value,

@@ -8,7 +8,7 @@ mod subject;
 use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
-use halfarrow_compiler::equations::{Form, Step};
+use halfarrow_compiler::equations::{EquationStep, Form};
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
@@ -285,12 +285,12 @@ impl Model {
         let Some(stiffness) = x.find_symbol("form.stiffness") else { return Ok(false) };
         let reads = |e: Expr| x.symbols_of(e).contains(&stiffness);
         Ok(equations.steps.iter().any(|step| match step {
-            Step::Assign { value, .. } => reads(*value),
-            Step::Linear { matrix, right, .. } => matrix.entries().iter().chain(right).any(|&e| reads(e)),
-            Step::Newton { body, residuals, .. } => {
+            EquationStep::Assign { value, .. } => reads(*value),
+            EquationStep::Linear { matrix, right, .. } => matrix.entries().iter().chain(right).any(|&e| reads(e)),
+            EquationStep::Newton { body, residuals, .. } => {
                 body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
             }
-            Step::Watch { .. } => false,
+            EquationStep::Guard { .. } => false,
         }))
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use halfarrow_compiler::algebra::{
     Expr, Exprs, ONE, PlainNames, SparseRow, Symbol, ZERO, ascii, back_substitute, eliminate, latex, unicode,
 };
-use halfarrow_compiler::equations::{Equations, Step};
+use halfarrow_compiler::equations::{EquationStep, Equations};
 use serde::Serialize;
 
 use crate::error::Problem;
@@ -106,11 +106,11 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
     let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
     for step in &equations.steps {
         match step {
-            Step::Assign { symbol, value } => {
+            EquationStep::Assign { symbol, value } => {
                 let value = x.substitute(*value, &known);
                 known.insert(*symbol, value);
             }
-            Step::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
                 if unknowns.len() > BLOCK {
                     return None;
                 }
@@ -142,8 +142,8 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
                     known.insert(symbol, value);
                 }
             }
-            Step::Newton { .. } => return None,
-            Step::Watch { .. } => {}
+            EquationStep::Newton { .. } => return None,
+            EquationStep::Guard { .. } => {}
         }
     }
     Some(known)

@@ -8,7 +8,8 @@ use halfarrow_compiler::algebra::{PlainNames, mathml};
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::equations::{
-    Cause, Form, StateKind, Style, print_certificate, print_dependent, print_meanings, print_sides, print_symbol, show,
+    AlgebraicRole, Form, StateKind, Style, print_certificate, print_dependent, print_meanings, print_sides,
+    print_symbol, show,
 };
 use halfarrow_draw::DrawOptions;
 
@@ -211,9 +212,9 @@ impl Model {
                 equations.states.iter().map(|s| (print_symbol(&shown, s.symbol, Style::MathMl), storage(s.kind)));
             let algebraic = equations.algebraic.iter().map(|a| {
                 let cause = match a.cause {
-                    Cause::Break => "break variable",
-                    Cause::Law(_) => "law",
-                    Cause::Multiplier(_) => "multiplier",
+                    AlgebraicRole::Break => "break variable",
+                    AlgebraicRole::Law(_) => "law",
+                    AlgebraicRole::Multiplier(_) => "multiplier",
                 };
                 (print_symbol(&shown, a.symbol, Style::MathMl), cause)
             });

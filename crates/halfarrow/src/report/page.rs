@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::curves::{LIBRARY, LIBRARY_STYLE, SCRIPT, data};
 use super::{Content, FormPart, FormText, PathRow};
-use crate::audited::Miss;
+use crate::audited::Deviation;
 use crate::compare::{CompareReport, Row};
 use crate::run::Simulated;
 use halfarrow_compiler::equations::Form;
@@ -329,7 +329,7 @@ fn audit(content: &Content) -> Markup {
 
 fn misses(done: &Simulated) -> Markup {
     let audit = &done.report.audit;
-    let kinds: [(&str, &Option<Miss>); 4] = [
+    let kinds: [(&str, &Option<Deviation>); 4] = [
         ("power of the junction structure", &audit.power),
         ("energy: stored less supplied and dissipated", &audit.energy),
         ("laws of junctions and elements", &audit.residual),

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::plan::Plan;
-use super::{Work, prepare};
-use crate::audited::{AuditReport, Audited, Miss};
+use super::{SweepContext, prepare};
+use crate::audited::{AuditReport, Audited, Deviation};
 use crate::run::Run;
 use crate::verdict::{Made, Verdict};
 
@@ -40,7 +40,7 @@ pub struct SetMiss {
 }
 
 /// Audits some of the sets, on all cores. Sets that fail are told by their rows.
-pub(super) fn sample_of(work: &Work<'_>, run: &Run) -> SweepAudit {
+pub(super) fn sample_of(work: &SweepContext<'_>, run: &Run) -> SweepAudit {
     let of = |set: usize| Some((set, audit_set(work, run, set)?));
     let found: Vec<(usize, AuditReport)> = sample(work.plan).into_par_iter().filter_map(of).collect();
     let count = |wanted: Verdict| found.iter().filter(|(_, audit)| audit.verdict == wanted).count();
@@ -60,7 +60,7 @@ pub(super) fn sample_of(work: &Work<'_>, run: &Run) -> SweepAudit {
     audit
 }
 
-fn audit_set(work: &Work<'_>, run: &Run, set: usize) -> Option<AuditReport> {
+fn audit_set(work: &SweepContext<'_>, run: &Run, set: usize) -> Option<AuditReport> {
     let structure = work.structures.get(work.structures.number(set).ok()?);
     let mut system = structure.system.clone();
     let mut x = prepare(&mut system, &structure.model, work.plan, set, run.start).ok()?;
@@ -88,9 +88,9 @@ impl AuditReport {
             (&mut self.residual, other.residual),
             (&mut self.rates, other.rates),
         ];
-        let excess = |m: &Miss| m.value - m.resolution;
+        let excess = |m: &Deviation| m.value - m.resolution;
         for (greatest, found) in pairs {
-            let above = |m: &Miss| greatest.as_ref().is_none_or(|g| excess(m) > excess(g) || m.value.is_nan());
+            let above = |m: &Deviation| greatest.as_ref().is_none_or(|g| excess(m) > excess(g) || m.value.is_nan());
             if let Some(miss) = found.filter(above) {
                 *greatest = Some(miss);
             }

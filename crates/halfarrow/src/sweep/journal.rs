@@ -13,7 +13,7 @@ use crate::error::Problem;
 
 /// The rows of a chunk.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct JournalChunk {
     /// Its number.
     pub chunk: usize,
     /// Number of rows.
@@ -99,7 +99,7 @@ impl Journal {
     }
 
     /// Adds a chunk.
-    pub fn add(&mut self, entry: &Entry) -> io::Result<()> {
+    pub fn add(&mut self, entry: &JournalChunk) -> io::Result<()> {
         let contents = bytes(entry);
         let mut all = Vec::with_capacity(contents.len() + 16);
         all.extend((contents.len() as u64).to_le_bytes());
@@ -114,13 +114,13 @@ impl Journal {
     }
 
     /// A chunk that is done.
-    pub fn entry(&mut self, chunk: usize) -> io::Result<Entry> {
+    pub fn entry(&mut self, chunk: usize) -> io::Result<JournalChunk> {
         let missing = || io::Error::other("a part of the results is missing");
         let place = self.places.get(&chunk).ok_or_else(missing)?.0;
         self.read_at(place)
     }
 
-    fn read_at(&mut self, place: u64) -> io::Result<Entry> {
+    fn read_at(&mut self, place: u64) -> io::Result<JournalChunk> {
         self.file.seek(SeekFrom::Start(place))?;
         let mut reader = BufReader::new(&self.file);
         let size = number(&mut reader)?;
@@ -162,7 +162,7 @@ fn number(reader: &mut impl Read) -> io::Result<u64> {
     Ok(u64::from_le_bytes(bytes))
 }
 
-fn bytes(entry: &Entry) -> Vec<u8> {
+fn bytes(entry: &JournalChunk) -> Vec<u8> {
     let mut all = Vec::new();
     for number in [entry.chunk as u64, entry.rows as u64, entry.values.len() as u64] {
         all.extend(number.to_le_bytes());
@@ -176,7 +176,7 @@ fn bytes(entry: &Entry) -> Vec<u8> {
     all
 }
 
-fn from_bytes(mut from: &[u8], columns: usize) -> Option<Entry> {
+fn from_bytes(mut from: &[u8], columns: usize) -> Option<JournalChunk> {
     let from = &mut from;
     let (chunk, rows, count) = (number(from).ok()? as usize, number(from).ok()? as usize, number(from).ok()? as usize);
     if count != rows.checked_mul(columns)? || from.len() < count * 8 {
@@ -190,16 +190,16 @@ fn from_bytes(mut from: &[u8], columns: usize) -> Option<Entry> {
         failures.push(SetFailure { set, reason: String::from_utf8(text.to_vec()).ok()? });
         *from = rest;
     }
-    Some(Entry { chunk, rows, values, failures })
+    Some(JournalChunk { chunk, rows, values, failures })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn entry(chunk: usize) -> Entry {
+    fn entry(chunk: usize) -> JournalChunk {
         let failures = vec![SetFailure { set: 2, reason: "no".into() }];
-        Entry { chunk, rows: 2, values: vec![1.0, f64::NAN, -0.0, chunk as f64], failures }
+        JournalChunk { chunk, rows: 2, values: vec![1.0, f64::NAN, -0.0, chunk as f64], failures }
     }
 
     fn open(out: &Path) -> Journal {

@@ -32,7 +32,7 @@ impl Run<'_> {
                     let what = stepper.events().indicator_name(indicator);
                     return Err(Failure::Chattering { time, what });
                 }
-                stepper.land(time, point);
+                stepper.accept_crossing(time, point);
                 Ok((time, true))
             }
         }

@@ -100,7 +100,7 @@ impl<'a> Run<'a> {
             let stop = self.next_stop(&mut *stepper.events());
             if S::DENSE && is_at(self.time, stop.time, self.time) {
                 self.skip_to(stepper, stop, point)?;
-            } else if self.piece(stepper, stop, point)? == Flow::HandOver {
+            } else if self.drive_to_stop(stepper, stop, point)? == Flow::HandOver {
                 return Ok(Flow::HandOver);
             }
         }
@@ -115,15 +115,15 @@ impl<'a> Run<'a> {
 
     /// Over to a stop that is where the run stands, to rounding.
     fn skip_to<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<(), Failure> {
-        let reason = self.reach(&mut *stepper.events(), stop.time, stop, false, point)?;
+        let reason = self.arrive(&mut *stepper.events(), stop.time, stop, false, point)?;
         self.report_progress()?;
         stepper.forget();
-        self.go_over(&mut *stepper.events(), reason, point)
+        self.handle_stop(&mut *stepper.events(), reason, point)
     }
 
     /// From here to the stop, or to a zero crossing before it.
-    fn piece<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<Flow, Failure> {
-        if stepper.set_off(self, stop.time, point)? == Flow::HandOver {
+    fn drive_to_stop<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<Flow, Failure> {
+        if stepper.begin_interval(self, stop.time, point)? == Flow::HandOver {
             return Ok(Flow::HandOver);
         }
         while self.time < stop.time {
@@ -144,7 +144,7 @@ impl<'a> Run<'a> {
         let end = stepper.step(self.time, self.next_sample(), stop.time, point)?;
         self.counts.steps += 1;
         let (end, crossed) = self.accept_step(stepper, end, point)?;
-        let reason = self.reach(&mut *stepper.events(), end, stop, crossed, point)?;
+        let reason = self.arrive(&mut *stepper.events(), end, stop, crossed, point)?;
         self.report_progress()?;
         if S::DENSE {
             self.samples_before(stepper, end)?;
@@ -152,7 +152,7 @@ impl<'a> Run<'a> {
         if let StopReason::TimeEvent { corner } = reason {
             stepper.before_event(corner)?;
         }
-        self.go_over(&mut *stepper.events(), reason, point)?;
+        self.handle_stop(&mut *stepper.events(), reason, point)?;
         if let StopReason::TimeEvent { corner } = reason {
             stepper.after_event(corner, point);
         }
@@ -160,7 +160,7 @@ impl<'a> Run<'a> {
     }
 
     /// A step to `(end, point)` is accepted; what happens there.
-    pub(crate) fn reach(
+    pub(crate) fn arrive(
         &mut self,
         events: &mut dyn Events,
         end: f64,
@@ -183,7 +183,7 @@ impl<'a> Run<'a> {
     }
 
     /// Goes over what happens where the run stands, and samples: on a grid what is true after it, else both.
-    pub(crate) fn go_over(
+    pub(crate) fn handle_stop(
         &mut self,
         events: &mut dyn Events,
         reason: StopReason,
@@ -217,12 +217,12 @@ impl<'a> Run<'a> {
     }
 
     /// Says how exact each state is kept.
-    pub(crate) fn tell_tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+    pub(crate) fn report_tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
         self.sink.tolerances(magnitudes, absolute);
     }
 
     /// Says that the run crawls.
-    pub(crate) fn tell_crawl(&mut self, crawl: &Crawl) {
+    pub(crate) fn report_crawl(&mut self, crawl: &Crawl) {
         self.sink.crawls(crawl);
     }
 

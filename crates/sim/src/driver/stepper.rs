@@ -26,9 +26,9 @@ pub(crate) enum Flow {
 
 /// A method at work on a run, between its events.
 ///
-/// The driver calls [`set_off`](Stepper::set_off) where the run stands, then for each step `step`, `accept` (or `land`
-/// at a zero crossing inside it), the events' own functions, `before_event` and `after_event` around a time event, and
-/// `supervise`.
+/// The driver calls [`begin_interval`](Stepper::begin_interval) where the run stands, then for each step `step`, `accept`
+/// (or `accept_crossing` at a zero crossing inside it), the events' own functions, `before_event` and `after_event` around a
+/// time event, and `supervise`.
 pub(crate) trait Stepper {
     /// Whether the solution is known inside a step. Then zero crossings are located and samples are taken there. Without it
     /// a step ends at the next sample, and a zero crossing counts from the end of the step in which it lies.
@@ -41,7 +41,7 @@ pub(crate) trait Stepper {
     ///
     /// # Errors
     /// What the system reports.
-    fn set_off(&mut self, run: &mut Run<'_>, stop: f64, point: &[f64]) -> Result<Flow, Failure> {
+    fn begin_interval(&mut self, run: &mut Run<'_>, stop: f64, point: &[f64]) -> Result<Flow, Failure> {
         let _ = (run, stop, point);
         Ok(Flow::GoOn)
     }
@@ -65,7 +65,7 @@ pub(crate) trait Stepper {
     }
 
     /// The same for a zero crossing, from which the run goes on.
-    fn land(&mut self, t: f64, point: &mut [f64]) {
+    fn accept_crossing(&mut self, t: f64, point: &mut [f64]) {
         self.interpolate(t, point);
     }
 

@@ -7,7 +7,7 @@ use crate::Failure;
 const PARTS: usize = 4;
 
 /// Halvings of the bracket of a crossing at most.
-const MOST_HALVINGS: usize = 80;
+const MOST_BISECTIONS: usize = 80;
 
 /// The first time in `(start, end]` at which an event indicator has another sign than that held, and which it is.
 /// `crossed` says for a time inside the step what [`Signs::crossed`] says of the state there. The time returned is just
@@ -30,14 +30,14 @@ pub(crate) fn first_crossing(
         let found = crossed(signs, time(part))?;
         seen.push(signs.values().to_vec());
         if found.is_some() {
-            return halve(signs, time(part - 1), time(part), found, &mut crossed);
+            return bisect(signs, time(part - 1), time(part), found, &mut crossed);
         }
-        for turn in turns(&seen) {
-            let turning = start + (end - start) * turn / PARTS as f64;
-            let found = crossed(signs, turning)?;
+        for turn in extrema(&seen) {
+            let extremum = start + (end - start) * turn / PARTS as f64;
+            let found = crossed(signs, extremum)?;
             if found.is_some() {
                 let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
-                return halve(signs, before, turning, found, &mut crossed);
+                return bisect(signs, before, extremum, found, &mut crossed);
             }
         }
     }
@@ -45,7 +45,7 @@ pub(crate) fn first_crossing(
 }
 
 /// Where, in parts, values turn round on their way to 0, judged by the parabola through the last three.
-fn turns(seen: &[Vec<f64>]) -> Vec<f64> {
+fn extrema(seen: &[Vec<f64>]) -> Vec<f64> {
     let [.., a, b, c] = seen else { return vec![] };
     let part = (seen.len() - 2) as f64;
     let turn = |((&a, &b), &c): ((&f64, &f64), &f64)| {
@@ -56,14 +56,14 @@ fn turns(seen: &[Vec<f64>]) -> Vec<f64> {
 }
 
 /// Halves the bracket until it is as short as times can be told apart.
-fn halve(
+fn bisect(
     signs: &mut Signs,
     mut before: f64,
     mut after: f64,
     mut found: Option<usize>,
     crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
 ) -> Result<Option<(f64, usize)>, Failure> {
-    for _ in 0..MOST_HALVINGS {
+    for _ in 0..MOST_BISECTIONS {
         let middle = before + 0.5 * (after - before);
         if middle <= before || middle >= after {
             break;

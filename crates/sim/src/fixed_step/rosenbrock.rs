@@ -15,7 +15,7 @@ pub(super) struct Rosenbrock {
     /// Where in the step each stage stands.
     nodes: &'static [f64],
     /// What each stage takes of the derivative by time.
-    drifts: &'static [f64],
+    time_weights: &'static [f64],
     /// Weights of the earlier stages in the state of each.
     stages: &'static [&'static [f64]],
     /// Weights of the earlier stages on the right side of each.
@@ -30,7 +30,7 @@ pub(super) struct Rosenbrock {
 pub(super) const LINEARLY_IMPLICIT_EULER: Rosenbrock = Rosenbrock {
     gamma: 1.0,
     nodes: &[0.0],
-    drifts: &[1.0],
+    time_weights: &[1.0],
     stages: &[&[]],
     right: &[&[]],
     weights: &[1.0],
@@ -41,7 +41,7 @@ pub(super) const LINEARLY_IMPLICIT_EULER: Rosenbrock = Rosenbrock {
 pub(super) const RODAS3: Rosenbrock = Rosenbrock {
     gamma: 0.5,
     nodes: &[0.0, 0.0, 1.0, 1.0],
-    drifts: &[0.5, 1.5, 0.0, 0.0],
+    time_weights: &[0.5, 1.5, 0.0, 0.0],
     stages: &[&[], &[0.0], &[2.0, 0.0], &[2.0, 0.0, 1.0]],
     right: &[&[], &[4.0], &[1.0, -1.0], &[1.0, -1.0, -8.0 / 3.0]],
     weights: &[2.0, 0.0, 1.0, 1.0],
@@ -93,8 +93,8 @@ impl LinearlyImplicit {
             for (i, own) in own.iter_mut().enumerate() {
                 let weights = method.right[stage].iter().enumerate();
                 let sum: f64 = weights.map(|(j, c)| c * earlier[j * n + i]).sum();
-                let drift = method.drifts[stage] * h * self.time_derivative[i];
-                *own = scale * (self.rates[i] + drift) + method.gamma * sum;
+                let by_time = method.time_weights[stage] * h * self.time_derivative[i];
+                *own = scale * (self.rates[i] + by_time) + method.gamma * sum;
             }
             self.matrix.solve(own);
         }

@@ -57,7 +57,7 @@ impl<'a> Collocated<'a> {
     /// Makes the method follow the tolerances, and says what they are.
     fn take_tolerances(&mut self, run: &mut Run<'_>) {
         self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
-        run.tell_tolerances(self.tolerances.magnitudes(), self.tolerances.absolute());
+        run.report_tolerances(self.tolerances.magnitudes(), self.tolerances.absolute());
     }
 
     /// Whether the event left the unknowns alone and the step that ended there would not have told their rates from its own.
@@ -78,7 +78,7 @@ impl Stepper for Collocated<'_> {
         events
     }
 
-    fn set_off(&mut self, run: &mut Run<'_>, stop: f64, point: &[f64]) -> Result<Flow, Failure> {
+    fn begin_interval(&mut self, run: &mut Run<'_>, stop: f64, point: &[f64]) -> Result<Flow, Failure> {
         let (time, (y, yp)) = (run.time, halves(point));
         let longest = (stop - time).min(self.most);
         self.longest = 0.0;
@@ -111,7 +111,7 @@ impl Stepper for Collocated<'_> {
 
     fn interpolate(&mut self, t: f64, point: &mut [f64]) {
         let (y, yp) = halves_mut(point);
-        self.radau.between(t, y);
+        self.radau.interpolate(t, y);
         self.radau.rates_between(t, yp);
     }
 
@@ -123,7 +123,7 @@ impl Stepper for Collocated<'_> {
         }
     }
 
-    fn land(&mut self, t: f64, point: &mut [f64]) {
+    fn accept_crossing(&mut self, t: f64, point: &mut [f64]) {
         self.sample(t, point);
     }
 

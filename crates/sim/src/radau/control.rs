@@ -32,7 +32,7 @@ impl Control {
     }
 
     /// The length of the step after one of `h` with this error, accepted if that is below 1.
-    pub(super) fn judge(&mut self, h: f64, error: f64, iterations: usize) -> f64 {
+    pub(super) fn next_step_size(&mut self, h: f64, error: f64, iterations: usize) -> f64 {
         let most = MOST_ITERATIONS as f64;
         let safety = SAFETY.min(SAFETY * (1.0 + 2.0 * most) / (iterations as f64 + 2.0 * most));
         let shrink = |shrink: f64| shrink.clamp(1.0 / LONGEST, 1.0 / SHORTEST);

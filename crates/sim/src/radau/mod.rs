@@ -42,7 +42,7 @@ const STRETCH: f64 = 1.0001;
 
 /// What the method did, beside steps and residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Work {
+pub(crate) struct RadauCounts {
     /// Accepted steps.
     pub(crate) accepted: usize,
     /// Steps whose error was too large.
@@ -59,7 +59,7 @@ pub(crate) struct Work {
     pub(crate) residuals: usize,
 }
 
-impl Work {
+impl RadauCounts {
     /// Adds it to the work of a run, but for steps and residuals.
     pub(crate) fn add_to(&self, counts: &mut Summary) {
         counts.rejected += self.rejected + self.given_up;
@@ -107,12 +107,12 @@ pub(crate) struct Radau {
     /// Columns of `∂F/∂y'` that hold anything.
     has_rate: Vec<bool>,
     matrices: Matrices,
-    jacobian: Age,
+    jacobian: JacobianAge,
     /// Step that the factors are made for.
     factored: Option<f64>,
     newton: newton::Convergence,
     control: Control,
-    work: Work,
+    work: RadauCounts,
 }
 
 /// A slope that moves an unknown in a step by so many times what it is taken from is steep, and so is one that is so many
@@ -125,7 +125,7 @@ fn finite(values: &[f64]) -> bool {
 
 /// Where the Jacobian was taken.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Age {
+enum JacobianAge {
     /// It has to be taken anew.
     Stale,
     /// At the start of an earlier step.
@@ -166,11 +166,11 @@ impl Radau {
             straight: false,
             has_rate: vec![false; size],
             matrices: Matrices::new(system.sparsity()),
-            jacobian: Age::Stale,
+            jacobian: JacobianAge::Stale,
             factored: None,
             newton: newton::Convergence::default(),
             control: Control::default(),
-            work: Work::default(),
+            work: RadauCounts::default(),
         };
         radau.set_tolerances(relative, absolute);
         radau
@@ -205,7 +205,7 @@ impl Radau {
         self.y.copy_from_slice(y);
         self.yp.copy_from_slice(yp);
         self.h = h;
-        self.jacobian = Age::Stale;
+        self.jacobian = JacobianAge::Stale;
     }
 
     pub(crate) fn time(&self) -> f64 {
@@ -291,7 +291,7 @@ impl Radau {
         Ok(())
     }
 
-    pub(crate) fn work(&self) -> Work {
+    pub(crate) fn work(&self) -> RadauCounts {
         self.work
     }
 
@@ -314,7 +314,7 @@ impl Radau {
             match self.attempt(system, h) {
                 Ok(newton_iterations) => {
                     let error = self.estimate(system, h);
-                    let next = self.control.judge(h, error, newton_iterations);
+                    let next = self.control.next_step_size(h, error, newton_iterations);
                     if error < 1.0 {
                         self.accept(if reaches { stop } else { self.t + h }, h, next);
                         return Ok(());
@@ -324,12 +324,12 @@ impl Radau {
                     self.h = next;
                     self.renew_jacobian();
                 }
-                Err(Trouble::Slow { shorten }) => {
+                Err(StepError::Slow { shorten }) => {
                     self.start_otherwise();
                     self.h = shorten * h;
                     (failure, slow) = (None, true);
                 }
-                Err(Trouble::Failed(reason)) => {
+                Err(StepError::Failed(reason)) => {
                     self.start_otherwise();
                     singular += usize::from(matches!(reason, Failure::Singular { .. }));
                     if singular >= MOST_SINGULAR {
@@ -365,19 +365,19 @@ impl Radau {
 
     /// A Jacobian of an earlier step may be the cause of the trouble.
     fn renew_jacobian(&mut self) {
-        if self.jacobian == Age::Old {
-            self.jacobian = Age::Stale;
+        if self.jacobian == JacobianAge::Old {
+            self.jacobian = JacobianAge::Stale;
         }
     }
 
     /// Solves the equations of a step; the number of iterations that took.
-    fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+    fn attempt(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, StepError> {
         self.renew(system)?;
         self.allow(h);
         self.refactor(system, h)?;
         match self.last.ends_at(self.t) {
             true => self.last.extrapolate(h, &mut self.z),
-            false => self.set_off(h),
+            false => self.begin_interval(h),
         }
         self.iterate(system, h)
     }
@@ -397,20 +397,20 @@ impl Radau {
     }
 
     /// Takes the Jacobian, if needed.
-    fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), Trouble> {
-        if self.jacobian == Age::Stale {
+    fn renew(&mut self, system: &mut dyn ImplicitSystem) -> Result<(), StepError> {
+        if self.jacobian == JacobianAge::Stale {
             let (y, yp) = (std::mem::take(&mut self.y), std::mem::take(&mut self.yp));
             let taken = self.take_jacobian(system, self.t, &y, &yp);
             (self.y, self.yp) = (y, yp);
-            taken.map_err(Trouble::Failed)?;
-            self.jacobian = Age::Fresh;
+            taken.map_err(StepError::Failed)?;
+            self.jacobian = JacobianAge::Fresh;
             self.factored = None;
         }
         Ok(())
     }
 
     /// Factors for a step of `h`, unless that is done.
-    fn refactor(&mut self, system: &dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+    fn refactor(&mut self, system: &dyn ImplicitSystem, h: f64) -> Result<(), StepError> {
         if self.factored != Some(h) {
             self.factored = None;
             let complex = c64::new(ALPHA / h, BETA / h);
@@ -419,7 +419,7 @@ impl Radau {
             factored.map_err(|no_pivot| {
                 let name = |unknown| format!("the step of {}", system.unknown_name(unknown));
                 let what = no_pivot.unknown.map_or("the equations of the step".into(), name);
-                Trouble::Failed(Failure::Singular { time: self.t, what })
+                StepError::Failed(Failure::Singular { time: self.t, what })
             })?;
             self.factored = Some(h);
         }
@@ -428,7 +428,7 @@ impl Radau {
 
     /// Increments in the first step: 0 where rates enter linearly, so that what is stiff may be off its slow motion; else
     /// along the rates at its start, as a law may have several solutions. The other way round after a failure.
-    fn set_off(&mut self, h: f64) {
+    fn begin_interval(&mut self, h: f64) {
         for (z, node) in self.z.iter_mut().zip(tableau::NODES) {
             for (i, z) in z.iter_mut().enumerate() {
                 *z = if self.straight && self.has_rate[i] { node * h * self.yp[i] } else { 0.0 };
@@ -472,7 +472,7 @@ impl Radau {
         let fast = self.newton.rate() <= FAST;
         let kept = fast && (1.0..=KEPT_CHANGE).contains(&(next / h));
         self.h = if kept { h } else { next };
-        self.jacobian = if fast { Age::Old } else { Age::Stale };
+        self.jacobian = if fast { JacobianAge::Old } else { JacobianAge::Stale };
     }
 }
 
@@ -487,7 +487,7 @@ pub(crate) fn solve(pattern: &Sparsity, matrix: &[f64], b: &mut [f64]) -> bool {
 }
 
 /// Why a step cannot be made as it is.
-enum Trouble {
+enum StepError {
     /// Newton converges too slowly or not at all.
     Slow {
         /// By how much the step has to be shortened.

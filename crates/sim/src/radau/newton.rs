@@ -1,7 +1,7 @@
 //! Simplified Newton for the increments of a step. Source: [HW], IV.8.
 
 use super::tableau::{BACK, NODES, STAGES, TRANSFORM};
-use super::{Radau, Trouble, norm};
+use super::{Radau, StepError, norm};
 use crate::{Failure, ImplicitSystem};
 
 /// Iterations at most.
@@ -37,7 +37,7 @@ impl Convergence {
 
 impl Radau {
     /// Iterates from the increments in `z`; the number of iterations.
-    pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, Trouble> {
+    pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, StepError> {
         self.newton = Convergence { rate: super::FAST, left: libm::pow(self.newton.left.max(f64::EPSILON), 0.8) };
         let (mut before, mut growth_before, mut wanted_before) = (0.0_f64, 0.0, f64::INFINITY);
         for iteration in 1..=MOST_ITERATIONS {
@@ -50,10 +50,10 @@ impl Radau {
                 let growth = size / before;
                 self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
                 growth_before = growth;
-                self.foresee(size, MOST_ITERATIONS - 1 - iteration)?;
+                self.predict_convergence(size, MOST_ITERATIONS - 1 - iteration)?;
             }
             if !size.is_finite() {
-                return Err(Trouble::Slow { shorten: 0.5 });
+                return Err(StepError::Slow { shorten: 0.5 });
             }
             before = size.max(f64::EPSILON);
             let stalled = wanted > STALLED * wanted_before || iteration == MOST_ITERATIONS;
@@ -64,26 +64,26 @@ impl Radau {
             }
             wanted_before = wanted;
         }
-        Err(Trouble::Slow { shorten: 0.5 })
+        Err(StepError::Slow { shorten: 0.5 })
     }
 
     /// Whether `remaining` more iterations will do after a correction of this size.
-    fn foresee(&mut self, size: f64, remaining: usize) -> Result<(), Trouble> {
+    fn predict_convergence(&mut self, size: f64, remaining: usize) -> Result<(), StepError> {
         let rate = self.newton.rate;
         if rate.is_nan() || rate >= DIVERGENT {
-            return Err(Trouble::Slow { shorten: 0.5 });
+            return Err(StepError::Slow { shorten: 0.5 });
         }
         self.newton.left = rate / (1.0 - rate);
         let expected = self.newton.left * size * libm::pow(rate, remaining as f64) / self.newton_tolerance;
         if expected >= 1.0 {
             let shorten = 0.8 * libm::pow(expected.clamp(1e-4, 20.0), -1.0 / (4.0 + remaining as f64));
-            return Err(Trouble::Slow { shorten });
+            return Err(StepError::Slow { shorten });
         }
         Ok(())
     }
 
     /// Computes the transformed correction of the increments.
-    fn correct(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<(), Trouble> {
+    fn correct(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<(), StepError> {
         for stage in 0..STAGES {
             self.stage_residual(system, h, stage)?;
         }
@@ -98,7 +98,7 @@ impl Radau {
     }
 
     /// Writes the residual of a stage.
-    fn stage_residual(&mut self, system: &mut dyn ImplicitSystem, h: f64, stage: usize) -> Result<(), Trouble> {
+    fn stage_residual(&mut self, system: &mut dyn ImplicitSystem, h: f64, stage: usize) -> Result<(), StepError> {
         let weights = self.inverse[stage];
         let [a, b, c] = &self.z;
         for i in 0..self.y.len() {
@@ -107,12 +107,12 @@ impl Radau {
         }
         let (t, out) = (self.t + NODES[stage] * h, &mut self.correction[stage]);
         if let Some(unknown) = self.trial.iter().position(|value| !value.is_finite()) {
-            return Err(Trouble::Failed(Failure::NotFinite { time: t, what: system.unknown_name(unknown) }));
+            return Err(StepError::Failed(Failure::NotFinite { time: t, what: system.unknown_name(unknown) }));
         }
         self.work.residuals += 1;
-        system.residual(t, &self.trial, &self.trial_rates, out).map_err(Trouble::Failed)?;
+        system.residual(t, &self.trial, &self.trial_rates, out).map_err(StepError::Failed)?;
         match out.iter().position(|value| !value.is_finite()) {
-            Some(row) => Err(Trouble::Failed(Failure::NotFinite { time: t, what: system.equation_name(row) })),
+            Some(row) => Err(StepError::Failed(Failure::NotFinite { time: t, what: system.equation_name(row) })),
             None => Ok(()),
         }
     }

@@ -223,7 +223,7 @@ fn errors(system: &mut Dense, steps: usize) -> [f64; 3] {
         (0..10).for_each(|_| drop(radau.iterate(system, h))); // to rounding, where there is no convergence any more
         radau.newton = newton::Convergence::default();
         radau.accept(end, h, h);
-        radau.jacobian = Age::Stale;
+        radau.jacobian = JacobianAge::Stale;
     }
     let (y, exact) = (radau.state(), swing(1.0, 1e-13));
     let error = |i: usize, j: usize| (y[i] - exact[i]).abs().max((y[j] - exact[j]).abs());

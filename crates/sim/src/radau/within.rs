@@ -3,7 +3,7 @@
 //! Its polynomial has order 3, that of the error estimate, and where the system is stiff nothing controls it. So where it
 //! will not do, the step is made again from its start to the time in question, which gives all digits of the method.
 
-use super::{Radau, Trouble, norm};
+use super::{Radau, StepError, norm};
 use crate::ImplicitSystem;
 
 /// Part of the tolerance that the polynomial may be off.
@@ -11,7 +11,7 @@ const ALLOWED: f64 = 0.5;
 
 impl Radau {
     /// Unknowns at a time inside the last step, by its polynomial.
-    pub(crate) fn between(&self, t: f64, y: &mut [f64]) {
+    pub(crate) fn interpolate(&self, t: f64, y: &mut [f64]) {
         if t >= self.t { y.copy_from_slice(&self.y) } else { self.last.state(t, y) }
     }
 
@@ -71,7 +71,7 @@ impl Radau {
     }
 
     /// Solves the equations of a step from the start of the last one to `t`, and stays at that start.
-    fn again(&mut self, system: &mut dyn ImplicitSystem, t: f64) -> Result<usize, Trouble> {
+    fn again(&mut self, system: &mut dyn ImplicitSystem, t: f64) -> Result<usize, StepError> {
         std::mem::swap(&mut self.y, self.last.start_values());
         self.t = self.last.start();
         let h = t - self.t;

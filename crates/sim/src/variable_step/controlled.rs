@@ -130,7 +130,7 @@ impl<'i, 's> Controlled<'i, 's> {
         let resume = self.resume.take();
         if let Some(Resume { step, bends: true }) = resume {
             self.corner = true;
-            return self.method.go_on(time, x, step.min(longest));
+            return self.method.continue_at(time, x, step.min(longest));
         }
         if let Some(Resume { step, .. }) = resume {
             self.shared.system().rates(time, x, &mut rates)?;
@@ -176,7 +176,7 @@ impl<'i, 's> Controlled<'i, 's> {
         if known && !x.is_empty() {
             there.iter_mut().zip(&here).for_each(|(there, here)| *there -= here);
             let state = system.state_name(self.tolerances.greatest_part(&there, x));
-            run.tell_crawl(&Crawl { time, steps, step, state });
+            run.report_crawl(&Crawl { time, steps, step, state });
         }
     }
 
@@ -202,7 +202,7 @@ impl Stepper for Controlled<'_, '_> {
         self.shared.events()
     }
 
-    fn set_off(&mut self, run: &mut Run<'_>, stop: f64, x: &[f64]) -> Result<Flow, Failure> {
+    fn begin_interval(&mut self, run: &mut Run<'_>, stop: f64, x: &[f64]) -> Result<Flow, Failure> {
         let guessed = self.tolerances.guess(&mut *self.shared.system(), run.time, x, stop - run.time)?;
         if guessed {
             return Ok(self.hand_over(HandOver::Grown));
@@ -228,11 +228,11 @@ impl Stepper for Controlled<'_, '_> {
     }
 
     fn interpolate(&mut self, t: f64, x: &mut [f64]) {
-        self.method.between(t, x);
+        self.method.interpolate(t, x);
     }
 
     fn sample(&mut self, t: f64, x: &mut [f64]) {
-        self.method.inside(t, x);
+        self.method.interpolate_to_end_accuracy(t, x);
     }
 
     fn shorten(&mut self, t: f64) -> bool {

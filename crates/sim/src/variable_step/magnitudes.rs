@@ -23,7 +23,7 @@ const WEAK: f64 = 1e-6;
 const POWERS: usize = 16;
 
 /// A nonzero of the Jacobian: row, column and absolute value, in 1/s once row and column are measured alike.
-type Entry = (usize, usize, f64);
+type Nonzero = (usize, usize, f64);
 
 /// Magnitudes of the states of a system that starts at `(t, x)`, `span` s before the end of its run: what it tells, what is
 /// there, and what its motion makes of the others. 0 where nothing is known.
@@ -112,7 +112,7 @@ fn entries(
     t: f64,
     x: &[f64],
     rates: &mut [f64],
-) -> Result<Vec<Entry>, Failure> {
+) -> Result<Vec<Nonzero>, Failure> {
     let mut entries = vec![];
     system.rates(t, x, rates)?;
     jacobian.visit(system, t, x, |row, column, _, value| {
@@ -126,7 +126,7 @@ fn entries(
 /// How the states act on each other.
 struct Couplings {
     /// Sorted by column.
-    entries: Vec<Entry>,
+    entries: Vec<Nonzero>,
     /// First entry of each column, and the end of the last.
     starts: Vec<usize>,
     /// Nonzeros beside the diagonal, row by row.
@@ -139,7 +139,7 @@ struct Couplings {
 }
 
 impl Couplings {
-    fn new(mut entries: Vec<Entry>, interval: f64, states: usize) -> Couplings {
+    fn new(mut entries: Vec<Nonzero>, interval: f64, states: usize) -> Couplings {
         entries.sort_unstable_by_key(|&(row, column, _)| (column, row));
         let starts = (0..=states).map(|column| entries.partition_point(|entry| entry.1 < column)).collect();
         let (mut neighbours, mut own) = (vec![0; states], vec![0.0; states]);
@@ -150,7 +150,7 @@ impl Couplings {
         Couplings { entries, starts, neighbours, own, shortest, interval }
     }
 
-    fn column(&self, column: usize) -> &[Entry] {
+    fn column(&self, column: usize) -> &[Nonzero] {
         &self.entries[self.starts[column]..self.starts[column + 1]]
     }
 
@@ -234,8 +234,8 @@ impl Couplings {
 
     /// Pairs of states that act on each other, the strongest first, as long as they close no ring.
     fn strongest(&self) -> Vec<(usize, usize)> {
-        let strength = |&(a, b, action): &Entry| (a > b).then(|| (a, b, (action * self.action(b, a)).sqrt()));
-        let mut pairs: Vec<Entry> = self.entries.iter().filter_map(strength).filter(|pair| pair.2 > 0.0).collect();
+        let strength = |&(a, b, action): &Nonzero| (a > b).then(|| (a, b, (action * self.action(b, a)).sqrt()));
+        let mut pairs: Vec<Nonzero> = self.entries.iter().filter_map(strength).filter(|pair| pair.2 > 0.0).collect();
         pairs.sort_by(|a, b| b.2.total_cmp(&a.2).then((a.0, a.1).cmp(&(b.0, b.1))));
         let mut greatest = vec![0.0_f64; self.own.len()];
         for &(a, b, strength) in &pairs {
@@ -276,7 +276,7 @@ fn root(group: &mut [usize], mut state: usize) -> usize {
 }
 
 /// The reciprocal of the spectral radius of a matrix of absolute values, by the growth of its powers.
-fn shortest_time(entries: &[Entry], states: usize) -> f64 {
+fn shortest_time(entries: &[Nonzero], states: usize) -> f64 {
     let mut powers = vec![1.0; states];
     let mut growth = 0.0;
     for iteration in 0..POWERS {

@@ -31,7 +31,7 @@ trait Integrator {
     fn resume(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
 
     /// The same at `(t, x)` where it is known that the rates do not jump.
-    fn go_on(&mut self, t: f64, x: &[f64], h: f64) -> Result<(), Failure> {
+    fn continue_at(&mut self, t: f64, x: &[f64], h: f64) -> Result<(), Failure> {
         let mut rates = vec![0.0; x.len()];
         self.end_rates(&mut rates)?;
         self.resume(t, x, &rates, h)
@@ -56,14 +56,14 @@ trait Integrator {
     fn end_rates(&self, dx: &mut [f64]) -> Result<(), Failure>;
 
     /// The state at a time inside the last step, to the accuracy of the step.
-    fn between(&mut self, t: f64, x: &mut [f64]);
+    fn interpolate(&mut self, t: f64, x: &mut [f64]);
 
     /// The state at a time inside the last step, to the accuracy of its end.
-    fn inside(&mut self, t: f64, x: &mut [f64]) {
-        self.between(t, x);
+    fn interpolate_to_end_accuracy(&mut self, t: f64, x: &mut [f64]) {
+        self.interpolate(t, x);
     }
 
-    /// Makes the last step again so that it ends at a time inside it, if [`between`](Integrator::between) is less exact
+    /// Makes the last step again so that it ends at a time inside it, if [`interpolate`](Integrator::interpolate) is less exact
     /// than its end. `false` if that is not so, or cannot be done.
     fn shorten(&mut self, t: f64) -> bool {
         let _ = t;
@@ -87,7 +87,7 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
     let mut step = None;
     loop {
         let atol = tolerances.clone();
-        run.tell_tolerances(atol.magnitudes(), &atol.absolute(1.0));
+        run.report_tolerances(atol.magnitudes(), &atol.absolute(1.0));
         let kept = step.take();
         let mut drive = |integrator: &mut dyn Integrator, first, stiffness| {
             let mut stepper = Controlled::new(run, shared, integrator, &mut tolerances, stiffness).from(first);

@@ -53,13 +53,13 @@ impl Integrator for OnStates<'_> {
     fn end_rates(&self, dx: &mut [f64]) -> Result<(), Failure> {
         self.shared.system().rates(self.radau.time(), self.radau.state(), dx)
     }
-    fn between(&mut self, t: f64, x: &mut [f64]) {
-        self.radau.between(t, x);
+    fn interpolate(&mut self, t: f64, x: &mut [f64]) {
+        self.radau.interpolate(t, x);
     }
-    fn inside(&mut self, t: f64, x: &mut [f64]) {
+    fn interpolate_to_end_accuracy(&mut self, t: f64, x: &mut [f64]) {
         let exact = !self.radau.meets_tolerance(t) && self.radau.visit(&mut self.system, t, x, &mut self.rates);
         if !exact {
-            self.radau.between(t, x);
+            self.radau.interpolate(t, x);
         }
     }
     fn shorten(&mut self, t: f64) -> bool {

@@ -3,7 +3,7 @@
 use super::tolerances::Tolerances;
 use crate::System;
 
-/// Accepted steps between two looks.
+/// Accepted steps between two checks.
 const EVERY: usize = 10;
 
 /// Step times spectral radius beyond which only stability can limit the step: on oscillations that accuracy limits it
@@ -11,7 +11,7 @@ const EVERY: usize = 10;
 const STABILITY_LIMIT: f64 = 2.0;
 
 /// Looks in a row that must find stiffness.
-const LOOKS: usize = 4;
+const CHECKS: usize = 4;
 
 /// Steps still to come below which a change of method does not pay.
 const WORTH_A_CHANGE: f64 = 200.0;
@@ -19,7 +19,7 @@ const WORTH_A_CHANGE: f64 = 200.0;
 /// Follows the spectral radius of the Jacobian by power iteration, one product a look.
 pub(super) struct Stiffness {
     steps: usize,
-    looks: usize,
+    checks: usize,
     vector: Vec<f64>,
     product: Vec<f64>,
 }
@@ -30,7 +30,7 @@ impl Stiffness {
         let start =
             |(i, magnitude): (usize, &f64)| magnitude * (1.0 + (i % 7) as f64) * if i % 2 == 0 { 1.0 } else { -1.0 };
         let vector: Vec<f64> = tolerances.magnitudes().iter().enumerate().map(start).collect();
-        Stiffness { steps: 0, looks: 0, product: vec![0.0; vector.len()], vector }
+        Stiffness { steps: 0, checks: 0, product: vec![0.0; vector.len()], vector }
     }
 
     /// Takes notice of an accepted step of length `h` to `(t, x)`, `remaining` s before the next stop. `true` if the
@@ -48,8 +48,8 @@ impl Stiffness {
             return false;
         }
         let radius = self.radius(system, tolerances, t, x).unwrap_or(0.0);
-        self.looks = if h * radius > STABILITY_LIMIT { self.looks + 1 } else { 0 };
-        self.looks >= LOOKS && remaining > WORTH_A_CHANGE * h
+        self.checks = if h * radius > STABILITY_LIMIT { self.checks + 1 } else { 0 };
+        self.checks >= CHECKS && remaining > WORTH_A_CHANGE * h
     }
 
     /// Growth of the vector under the Jacobian; `None` where that cannot be had.

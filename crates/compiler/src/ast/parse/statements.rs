@@ -494,13 +494,13 @@ impl Parser<'_> {
         Some(Constraint { name, left, right, doc })
     }
 
-    fn domain(&mut self) -> Option<Domain> {
+    fn domain(&mut self) -> Option<DomainBlock> {
         let name = self.name("the name of the domain")?;
         let pseudo = self.is_word("pseudo").then(|| self.span());
         self.eat_word("pseudo");
         let doc = self.doc();
         let body = self.expect_block();
-        Some(Domain { name, pseudo, doc, body })
+        Some(DomainBlock { name, pseudo, doc, body })
     }
 
     fn when(&mut self, start: Span) -> When {

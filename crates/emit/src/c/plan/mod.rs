@@ -9,12 +9,12 @@ use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program;
 use halfarrow_compiler::program::{
-    Assumption, Block, BlockId, Cause, Code, ConditionId, ConditionKind, DomainKind, Holds, Program, Reads, Routine,
-    Value,
+    Assumption, Block, BlockId, Code, ConditionId, ConditionKind, DomainKind, EventTrigger, Holds, Program, Reads,
+    Routine, Value,
 };
 
 use super::blocks::elimination_room;
-use super::cost::{Cost, Work};
+use super::cost::{Cost, OperationCount};
 use super::flags::Flags;
 use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
@@ -98,12 +98,12 @@ pub(super) struct Sizes {
 /// What functions cost.
 #[derive(Debug, Clone, Default)]
 struct Works {
-    rates: Work,
-    observe: Work,
-    switching: Work,
-    sources: Work,
-    tangent: Work,
-    clock: Work,
+    rates: OperationCount,
+    observe: OperationCount,
+    switching: OperationCount,
+    sources: OperationCount,
+    directional: OperationCount,
+    clock: OperationCount,
 }
 
 /// Values of parameters alone, from where the preamble leaves them.
@@ -123,16 +123,16 @@ fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value
 impl<'a> Plan<'a> {
     pub fn new(export: &'a Export<'a>, name: &str) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
-        let of = |wanted: fn(Cause) -> bool| -> Vec<ConditionId> {
-            program.conditions.iter().filter(|(_, c)| wanted(c.cause)).map(|(id, _)| id).collect()
+        let of = |wanted: fn(EventTrigger) -> bool| -> Vec<ConditionId> {
+            program.conditions.iter().filter(|(_, c)| wanted(c.trigger)).map(|(id, _)| id).collect()
         };
         let mut plan = Plan {
             export,
             program,
             name: name.to_string(),
             functions: String::new(),
-            switches: of(|cause| cause == Cause::State),
-            clocks: of(|cause| matches!(cause, Cause::Clock | Cause::Curve)),
+            switches: of(|trigger| trigger == EventTrigger::State),
+            clocks: of(|trigger| matches!(trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime)),
             delays: delays(export)?,
             samples: held(program, HeldKind::Sample),
             newton: Vec::new(),
@@ -194,14 +194,14 @@ impl<'a> Plan<'a> {
         text += &along(&mut writer, "ha_clock_code", clock, &routines.clock, runs);
         let run = Moving { time: ALONG_TIME, inputs: true, held: true, states: true, ..Moving::default() };
         text += &along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run);
-        let tangent = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_rates_along", ALONG, &routines.rates, tangent);
+        let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
+        text += &along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional);
         if self.export.method.is_linearly_implicit() {
-            let drift = Moving { time: ALONG_TIME, held: true, ..Moving::default() };
-            text += &along(&mut writer, "ha_rates_drift", ALONG, &routines.rates, drift);
+            let time_derivative = Moving { time: ALONG_TIME, held: true, ..Moving::default() };
+            text += &along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative);
         }
         if self.export.derivatives {
-            text += &along(&mut writer, "ha_observe_along", ALONG, &routines.observe, tangent);
+            text += &along(&mut writer, "ha_observe_along", ALONG, &routines.observe, directional);
         }
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
         for (name, routine) in &routines.starts {
@@ -218,13 +218,13 @@ impl<'a> Plan<'a> {
         let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
         let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
         let preamble = writer.function("ha_preamble_code", shape, (&preamble, &routines.kept()), (&[], &[]));
-        let work = |routine: &Routine| Work::of(program, &routine.code);
+        let work = |routine: &Routine| OperationCount::of(program, &routine.code);
         self.works = Works {
             rates: work(&routines.rates),
             observe: work(&routines.observe),
             switching: work(&routines.switching),
             sources: work(&routines.sources),
-            tangent: work(&routines.rates).along(),
+            directional: work(&routines.rates).along(),
             clock: work(&routines.clock).along(),
         };
         self.newton = used.clone();
@@ -366,7 +366,14 @@ impl<'a> Plan<'a> {
             text += &piece(include_str!("../runtime/lu.c"));
         }
         if !self.newton.is_empty() {
-            text += &piece(include_str!("../runtime/newton.c"));
+            text += &piece(concat!(
+                include_str!("../runtime/newton/workspace.c"),
+                include_str!("../runtime/newton/correction.c"),
+                include_str!("../runtime/newton/floating.c"),
+                include_str!("../runtime/newton/damped.c"),
+                include_str!("../runtime/newton/continuation.c"),
+                include_str!("../runtime/newton/search.c"),
+            ));
         }
         text += &piece(include_str!("../runtime/tables.c"));
         text += &real::wide(&filled(include_str!("../runtime/conditions.c")), size);
@@ -409,8 +416,8 @@ impl<'a> Plan<'a> {
     pub fn flags(&self) -> Flags {
         let Plan { export, program: p, .. } = *self;
         let held = !p.held.is_empty();
-        let drift = export.method.is_linearly_implicit();
-        let always = |d: &program::Domain| p.values.reads(d.argument) == Reads::PARAMETERS;
+        let time_derivative = export.method.is_linearly_implicit();
+        let always = |d: &program::LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
         Flags {
             single: export.real == Real::Float,
             states: !p.states.is_empty(),
@@ -424,7 +431,7 @@ impl<'a> Plan<'a> {
             floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
             piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
             clocks: !self.clocks.is_empty(),
-            curves: self.clocks.iter().any(|&c| p.conditions[c].cause == Cause::Curve),
+            curves: self.clocks.iter().any(|&c| p.conditions[c].trigger == EventTrigger::CurvedTime),
             switches: !self.switches.is_empty(),
             held,
             delays: !self.delays.is_empty(),
@@ -439,10 +446,10 @@ impl<'a> Plan<'a> {
             domains: !p.domains.is_empty(),
             domains_always: p.domains.iter().any(always),
             assumptions: !p.assumptions.is_empty(),
-            tangent: self.has_tangent(),
+            directional_derivative: self.has_directional_derivative(),
             derivatives: export.derivatives,
-            drift,
-            time_passes: drift || held,
+            time_derivative,
+            time_passes: time_derivative || held,
             linear_constant: self.sizes.factored > 0,
             solves_start: self.solves_start(),
             guesses: !p.guesses.is_empty(),
@@ -456,7 +463,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Whether the rates have a function for their derivatives.
-    pub fn has_tangent(&self) -> bool {
+    pub fn has_directional_derivative(&self) -> bool {
         self.export.derivatives || self.export.method.is_implicit()
     }
 
@@ -494,13 +501,13 @@ impl<'a> Plan<'a> {
         let mut step = match method {
             Method::ImplicitMidpoint => {
                 let groups = self.column_groups().len() as u64;
-                let mut one = w.rates.clone() + w.tangent.clone() * groups;
+                let mut one = w.rates.clone() + w.directional.clone() * groups;
                 one.operations += n * n * n + 4 * n * n;
                 one * 20
             }
             Method::LinearlyImplicitEuler | Method::Rosenbrock => {
                 let (groups, stages) = (self.column_groups().len() as u64, method.stages() as u64);
-                let mut all = w.rates.clone() * stages + w.tangent.clone() * (groups + 1);
+                let mut all = w.rates.clone() * stages + w.directional.clone() * (groups + 1);
                 all.operations += n * n * n + 4 * n * n + stages * (2 * n * n + (2 * stages + 4) * n);
                 all
             }
@@ -512,15 +519,22 @@ impl<'a> Plan<'a> {
             }
         };
         step = step + w.switching.clone() + w.observe.clone();
-        let follows = |blocks: &[BlockId], work: &Work| if blocks.is_empty() { Work::default() } else { work.clone() };
+        let follows = |blocks: &[BlockId], work: &OperationCount| {
+            if blocks.is_empty() { OperationCount::default() } else { work.clone() }
+        };
         let followed = follows(&self.rates_blocks, &w.rates) + follows(&self.shown_blocks, &w.observe);
-        let sources =
-            if self.delays.is_empty() { Work::default() } else { w.rates.clone() + w.sources.clone().along() };
+        let sources = if self.delays.is_empty() {
+            OperationCount::default()
+        } else {
+            w.rates.clone() + w.sources.clone().along()
+        };
         step = step + followed.clone() + sources.clone();
         let held = self.program.held.len() as u64;
-        let curves = self.clocks.iter().filter(|&&c| self.program.conditions[c].cause == Cause::Curve).count() as u64;
+        let curves =
+            self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()
+                as u64;
         let looks = 2 + curves * (2 * 4000 + 4 * 2200);
-        let clock = if self.clocks.is_empty() { Work::default() } else { w.clock.clone() * looks };
+        let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
         let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
         let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
         Cost::new(step, jump, self)

@@ -35,8 +35,8 @@ impl Routines {
         };
         Routines {
             preamble: p.preamble(&p.determined(&[])),
-            rates: p.watched_routine(&rates),
-            observe: p.watched_routine(&shown.collect::<Vec<_>>()),
+            rates: p.guarded_routine(&rates),
+            observe: p.guarded_routine(&shown.collect::<Vec<_>>()),
             switching: p.routine(&operands(&plan.switches)),
             clock: p.routine(&operands(&plan.clocks)),
             sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),

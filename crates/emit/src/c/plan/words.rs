@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::{Outside, math};
-use halfarrow_compiler::program::{BlockId, Cause, ConditionId, ConditionKind};
+use halfarrow_compiler::program::{BlockId, ConditionId, ConditionKind, EventTrigger};
 
 use super::super::patterns::FULL_AT_MOST;
 use super::super::start::Group;
@@ -56,7 +56,7 @@ impl Plan<'_> {
                 lines(
                     self.clocks
                         .iter()
-                        .map(|&c| u8::from(program.conditions[c].cause == Cause::Clock).to_string())
+                        .map(|&c| u8::from(program.conditions[c].trigger == EventTrigger::LinearTime).to_string())
                         .collect(),
                 ),
             ),
@@ -278,7 +278,7 @@ fn tableau(method: Method) -> (String, String) {
 /// What linearly implicit methods have besides: γ, parts of the derivative by time, weights of earlier stages on the right
 /// side of each, and which stages stand where the one before does.
 fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
-    let (gamma, drifts, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
+    let (gamma, time_weights, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
         Method::Rosenbrock => (
             0.5,
             &[0.5, 1.5, 0.0, 0.0],
@@ -290,7 +290,7 @@ fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
     let repeats: Vec<&str> = repeats.iter().map(|&repeats| if repeats { "1" } else { "0" }).collect();
     [
         ("GAMMA", number(gamma)),
-        ("DRIFTS", list(drifts)),
+        ("TIME_WEIGHTS", list(time_weights)),
         ("RIGHT_WEIGHTS", rows(&right)),
         ("REPEATS", repeats.join(", ")),
     ]

@@ -148,7 +148,7 @@ int MODEL_rates(MODEL *m, ha_wide t, const double *x, double *dx);
 /* Outputs. */
 int MODEL_observe(MODEL *m, ha_wide t, const double *x, double *y);
 
-//if tangent
+//if directional_derivative
 /* Derivatives of the rates along a direction v of the states, exactly. */
 int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double *dv);
 

@@ -5,12 +5,12 @@
 static int ha_method(ha_model *m, ha_wide t, double h, const double *x)
 {
     static const double nodes[] = {NODES};
-    static const double drifts[] = {DRIFTS};
+    static const double time_weights[] = {TIME_WEIGHTS};
     static const int repeats[] = {REPEATS};
     static const double states[][STAGES] = {WEIGHTS};
     static const double right[][STAGES] = {RIGHT_WEIGHTS};
     const double scale = h * GAMMA;
-    int status = ha_drift(m, t, x, m->correction);
+    int status = ha_time_derivative(m, t, x, m->correction);
     int stage;
     int i;
     int j;
@@ -32,8 +32,8 @@ static int ha_method(ha_model *m, ha_wide t, double h, const double *x)
             }
         }
         for (i = 0; i < HA_NX; ++i) {
-            const double drift = drifts[stage] * h * m->correction[i];
-            const double rate = scale * (m->middle[i] + drift);
+            const double by_time = time_weights[stage] * h * m->correction[i];
+            const double rate = scale * (m->middle[i] + by_time);
             double sum = -0.0;
             for (j = 0; j < stage; ++j) {
                 const double part = right[stage][j] * m->stages[j * HA_NX + i];

@@ -158,7 +158,7 @@ static void ha_let_time_pass(ha_model *m, ha_wide t)
 }
 
 //end
-//if tangent
+//if directional_derivative
 /* Code for derivatives along e. */
 typedef int ha_along_code(ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates);
 
@@ -186,7 +186,7 @@ static int ha_slopes_at(ha_model *m, ha_wide t, const double *x, ha_along_code *
 }
 
 /* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead. */
-static int ha_slopes(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
+static int ha_derivative_along(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
 {
     const double *dx = m->along_out;
     int status = ha_slopes_at(m, t, x, code, dv);
@@ -217,19 +217,19 @@ int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double 
 //if held
     ha_place(m, t);
 //end
-    return ha_slopes(m, t, x, ha_rates_along, dv);
+    return ha_derivative_along(m, t, x, ha_rates_along, dv);
 }
 
 //end
-//if drift
+//if time_derivative
 /* Derivatives of the rates by time, states and inputs at rest. */
-static int ha_drift(ha_model *m, ha_wide t, const double *x, double *dv)
+static int ha_time_derivative(ha_model *m, ha_wide t, const double *x, double *dv)
 {
     ha_let_time_pass(m, t);
 //if held
     ha_place(m, t);
 //end
-    return ha_slopes(m, t, x, ha_rates_drift, dv);
+    return ha_derivative_along(m, t, x, ha_rates_by_time, dv);
 }
 
 //end

@@ -2,7 +2,7 @@
 
 use super::super::minimum_norm;
 use super::ImplicitModel;
-use crate::bytecode::Trouble;
+use crate::bytecode::SolveError;
 use halfarrow_sim::{Failure, System as _};
 
 /// Passes of Newton on states of the minimal form.
@@ -22,7 +22,7 @@ impl ImplicitModel {
     pub(super) fn guess(&mut self, t: f64) -> Result<(), Failure> {
         let ImplicitModel { reference, form, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.of_guesses).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.of_guesses).map_err(|error| reference.failure(t, error))?;
         for (&(block, i), &register) in map.guesses.iter().zip(&map.of_guesses.outputs) {
             let value = reference.frame.r[register as usize];
             if value.is_finite() {
@@ -40,7 +40,7 @@ impl ImplicitModel {
         }
         let ImplicitModel { reference, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.of_known).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.of_known).map_err(|error| reference.failure(t, error))?;
         for (&i, &register) in map.known.iter().zip(&map.of_known.outputs) {
             let value = reference.frame.r[register as usize];
             if value.is_finite() {
@@ -55,10 +55,10 @@ impl ImplicitModel {
     pub(super) fn infer(&mut self, t: f64, y: &mut [f64]) -> Result<(), Failure> {
         let ImplicitModel { reference, map, x, .. } = self;
         reference.place(t, x);
-        reference.frame.run(&map.common_there).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run(&map.common_there).map_err(|error| reference.failure(t, error))?;
         let wanted: Vec<f64> = map.common_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
         let (rows, columns) = (wanted.len(), self.map.unknown.len());
-        let (mut matrix, mut miss) = (vec![0.0; rows * columns], vec![0.0; rows]);
+        let (mut matrix, mut residual) = (vec![0.0; rows * columns], vec![0.0; rows]);
         let still = vec![0.0; y.len()];
         self.map.unknown.iter().for_each(|&i| y[i] = 0.0);
         let mut before = f64::INFINITY;
@@ -67,10 +67,10 @@ impl ImplicitModel {
                 self.place(t, y, &still);
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.states as usize + self.map.unknown[column]] = 1.0;
-                self.form.frame.run_along(&self.map.common).map_err(|trouble| self.form.failure(t, trouble))?;
+                self.form.frame.run_along(&self.map.common).map_err(|error| self.form.failure(t, error))?;
                 for (row, &register) in self.map.common.outputs.iter().enumerate() {
                     matrix[row * columns + column] = self.form.frame.d[register as usize];
-                    miss[row] = self.form.frame.r[register as usize] - wanted[row];
+                    residual[row] = self.form.frame.r[register as usize] - wanted[row];
                 }
             }
             // What does not read them, or only by what rounding leaves of terms that cancel, says nothing about them.
@@ -80,14 +80,14 @@ impl ImplicitModel {
             }
             for row in 0..rows {
                 let slopes = &mut matrix[row * columns..][..columns];
-                let good = miss[row].is_finite() && slopes.iter().all(|s| s.is_finite());
+                let good = residual[row].is_finite() && slopes.iter().all(|s| s.is_finite());
                 if !good || slopes.iter().zip(&greatest).all(|(s, most)| s.abs() <= CANCELLED * most) {
                     slopes.fill(0.0);
-                    miss[row] = 0.0;
+                    residual[row] = 0.0;
                 }
             }
             // Most of what they carry is linear in them: the second step is rounding then.
-            let Some(step) = minimum_norm::step(&matrix, &miss, columns) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, columns) else { break };
             let relative = |(&i, s): (&usize, &f64)| s.abs() / y[i].abs().max(s.abs()).max(f64::MIN_POSITIVE);
             let length = self.map.unknown.iter().zip(&step.step).map(relative).fold(0.0, f64::max);
             if !length.is_finite() || length < NOISE && length >= 0.5 * before {
@@ -109,7 +109,7 @@ impl ImplicitModel {
         if free > 0 {
             let ImplicitModel { reference, map, x, .. } = self;
             reference.place(t, x);
-            reference.frame.run(&map.carried_there).map_err(|trouble| reference.failure(t, trouble))?;
+            reference.frame.run(&map.carried_there).map_err(|error| reference.failure(t, error))?;
             let wanted: Vec<f64> = map.carried_there.outputs.iter().map(|&r| reference.frame.r[r as usize]).collect();
             // What a bond carries is linear in the rates: one step of Newton.
             let mut matrix = vec![0.0; free * free];
@@ -119,7 +119,7 @@ impl ImplicitModel {
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.rates as usize + self.map.free[column]] = 1.0;
                 let run = self.form.frame.run_along(&self.map.carried);
-                run.map_err(|trouble: Trouble| self.form.failure(t, trouble))?;
+                run.map_err(|error: SolveError| self.form.failure(t, error))?;
                 for (row, &register) in self.map.carried.outputs.iter().enumerate() {
                     matrix[row * free + column] = self.form.frame.d[register as usize];
                     if column == 0 {
@@ -157,7 +157,7 @@ impl ImplicitModel {
         reference.let_time_pass(t);
         let states = reference.code.layout.states as usize;
         reference.frame.d[states..states + dx.len()].copy_from_slice(&dx);
-        reference.frame.run_along(&map.of_known).map_err(|trouble| reference.failure(t, trouble))?;
+        reference.frame.run_along(&map.of_known).map_err(|error| reference.failure(t, error))?;
         for (&i, &register) in map.known.iter().zip(&map.of_known.outputs) {
             if map.equations.differential[i] && !map.equations.explicit[i] {
                 yp[i] = reference.frame.d[register as usize];
@@ -165,20 +165,20 @@ impl ImplicitModel {
         }
         let columns = self.map.unknown.len();
         for _ in 0..if columns == 0 { 0 } else { REFINEMENTS } {
-            let (mut matrix, mut miss) = (vec![0.0; open.len() * columns], vec![0.0; open.len()]);
+            let (mut matrix, mut residual) = (vec![0.0; open.len() * columns], vec![0.0; open.len()]);
             for column in 0..columns {
                 self.place(t, y, yp);
                 self.form.still();
                 self.form.frame.d[self.form.code.layout.states as usize + self.map.unknown[column]] = 1.0;
                 let form = &mut self.form;
-                form.frame.run_along(&form.code.rates).map_err(|trouble| form.failure(t, trouble))?;
+                form.frame.run_along(&form.code.rates).map_err(|error| form.failure(t, error))?;
                 for (row, &i) in open.iter().enumerate() {
                     let register = form.code.rates.outputs[i] as usize;
                     matrix[row * columns + column] = form.frame.d[register];
-                    miss[row] = form.frame.r[register];
+                    residual[row] = form.frame.r[register];
                 }
             }
-            let Some(step) = minimum_norm::step(&matrix, &miss, columns) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, columns) else { break };
             self.map.unknown.iter().zip(&step.step).for_each(|(&i, s)| y[i] += s);
         }
         let mut out = vec![0.0; n];
@@ -225,7 +225,7 @@ impl ImplicitModel {
         let mut before = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             self.run_rates(t, &whole, &rates, &mut out)?;
-            let miss: Vec<f64> = rows.iter().map(|&row| out[row]).collect();
+            let residual: Vec<f64> = rows.iter().map(|&row| out[row]).collect();
             let k = rows.len();
             let mut matrix = vec![0.0; k * k];
             for (column, &unknown) in rows.iter().enumerate() {
@@ -237,7 +237,7 @@ impl ImplicitModel {
                 along[unknown] = 0.0;
                 (0..k).for_each(|row| matrix[row * k + column] = slope[rows[row]]);
             }
-            let Some(step) = minimum_norm::step(&matrix, &miss, k) else { break };
+            let Some(step) = minimum_norm::step(&matrix, &residual, k) else { break };
             let length = step.step.iter().map(|s| s.abs()).fold(0.0, f64::max);
             if step.rank < k {
                 // Rates that the equations hold only differentiated.
@@ -261,7 +261,7 @@ impl ImplicitModel {
     /// The state of the reference from the unknowns, both in the mode that ends here.
     pub(super) fn follow_back(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(), Failure> {
         self.place(t, y, yp);
-        self.form.frame.run(&self.map.of_states).map_err(|trouble| self.form.failure(t, trouble))?;
+        self.form.frame.run(&self.map.of_states).map_err(|error| self.form.failure(t, error))?;
         for (&k, &register) in self.map.states.iter().zip(&self.map.of_states.outputs) {
             self.x[k] = self.form.frame.r[register as usize];
         }

@@ -221,7 +221,7 @@ where
         if self.explicit { self.restart(t, x, dx, h) } else { Ok(()) }
     }
 
-    fn go_on(&mut self, t: f64, x: &[f64], h: f64) -> Result<(), Failure> {
+    fn continue_at(&mut self, t: f64, x: &[f64], h: f64) -> Result<(), Failure> {
         if !self.explicit {
             return Ok(());
         }
@@ -274,7 +274,7 @@ where
         &self.x
     }
 
-    fn between(&mut self, t: f64, x: &mut [f64]) {
+    fn interpolate(&mut self, t: f64, x: &mut [f64]) {
         let solver = self.solver.as_ref().expect(STARTED);
         let inside = t.clamp(self.start, solver.state().t);
         match solver.interpolate_inplace(inside, &mut self.between) {

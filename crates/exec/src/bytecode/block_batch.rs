@@ -1,12 +1,12 @@
-//! Newton blocks of one shape, several at once: each lane solves one of them.
+//! SIMD batches of Newton blocks of one shape: each lane solves one of them.
 //!
-//! Only the usual way of [`newton`](super::newton) is gone here: a solution is followed, every step is taken whole, the
-//! matrix is symmetric and definite. It takes the same operations in the same order, hence gives the same bits. A block
-//! that needs anything else is left to the solver of single blocks.
+//! This is the fast path of [`newton`](super::newton): a solution is followed, every step is undamped, the Jacobian is
+//! symmetric and definite. It takes the same operations in the same order, hence gives the same bits. A block that needs
+//! anything else is left to the solver of single blocks.
 
 use super::frame::{Frame, Solver};
 use super::instruction::{Register, Routine, Solve};
-use super::newton::{FINISHED, NEAR, SETTLED};
+use super::newton::{CLOSE_TO_ROUNDING, CONTRACTION, CONVERGED};
 use super::packed::Packed;
 use super::registers::Layout;
 use super::wide::{self, WideFrame};
@@ -18,43 +18,43 @@ use std::sync::Arc;
 /// Blocks that are solved at once: as many as it takes to keep the processor busy, since each step of an elimination
 /// waits for the one before.
 const LANES: usize = 16;
-type Line = wide::Line<LANES>;
+type Vector = wide::Vector<LANES>;
 
 /// Iterations at most.
 const ITERATIONS: usize = 8;
-/// Evaluations of a block that may come to pass here.
+/// Evaluations of a block at most.
 const EVALUATIONS: usize = ITERATIONS + 1;
-/// Blocks of more unknowns are left alone.
+/// Blocks of more unknowns are solved one at a time.
 const LARGEST: usize = 32;
 /// Fewer blocks are solved one at a time.
 const FEWEST: usize = 3;
 
-/// The blocks of a routine that are solved together.
+/// The blocks of a routine that are solved in batches.
 #[derive(Debug, Default)]
-pub(crate) struct Abreast {
-    groups: Vec<Group>,
+pub(crate) struct BlockBatches {
+    groups: Vec<BlockGroup>,
     /// The group of each block that has one.
     of: BTreeMap<u32, usize>,
 }
 
-/// Blocks of one shape, of which none reads what another finds, with what they read there before the first.
+/// Blocks of one shape, of which none reads the solution of another; all that they read is known before the first.
 #[derive(Debug)]
-struct Group {
+struct BlockGroup {
     /// Number of unknowns.
     size: usize,
     members: Vec<Member>,
-    /// Which memory the first lanes have.
+    /// Which of the [`FollowedLanes`] the first lanes have.
     first: usize,
     /// The inner code of all of them: guesses, then what is read from outside, then what is computed.
     packed: Packed,
     /// Where the entries of the matrix stand, which are the first outputs; residuals follow.
     pattern: Arc<Pattern>,
-    rows: Vec<Row>,
+    rows: Vec<UpperRow>,
 }
 
 /// A row of `U`, and what elimination by it does.
 #[derive(Debug)]
-struct Row {
+struct UpperRow {
     /// The entry of the matrix on the diagonal.
     diagonal: Option<usize>,
     /// Where its places right of the diagonal begin.
@@ -75,26 +75,26 @@ struct Member {
 }
 
 /// What a block computes, whatever it reads: inputs in the order in which it reads them.
-struct Shape {
+struct BlockShape {
     size: usize,
     /// The code, with inputs for all that it reads from outside.
     code: Code,
     pattern: Arc<Pattern>,
 }
 
-impl Abreast {
+impl BlockBatches {
     /// The groups of a routine; `None` if there are none.
-    pub fn of(program: &Program, layout: &Layout, routine: &Routine) -> Option<Abreast> {
+    pub fn of(program: &Program, layout: &Layout, routine: &Routine) -> Option<BlockBatches> {
         let mut defined_at = vec![0; routine.source.values.len()];
         let mut solves = routine.solves.iter();
         // Shape, position of the first and members.
-        let mut open: Vec<(Shape, usize, Vec<Member>)> = Vec::new();
+        let mut open: Vec<(BlockShape, usize, Vec<Member>)> = Vec::new();
         for (at, step) in routine.source.steps.iter().enumerate() {
             step.defines().iter().for_each(|out| defined_at[out.0 as usize] = at);
             let Step::Solve(solve) = step else { continue };
             let there = solves.next().expect("as many solve blocks on registers");
             let Method::Newton { outer, .. } = &solve.method else { continue };
-            let Some((shape, read)) = Shape::of(program, solve) else { continue };
+            let Some((shape, read)) = BlockShape::of(program, solve) else { continue };
             let known = |a: &Arg| if let Arg::Local(local) = a { Some(defined_at[local.0 as usize]) } else { None };
             let last = outer.iter().filter_map(known).max();
             let place = |a: Arg| match a {
@@ -107,7 +107,7 @@ impl Abreast {
                 inputs: read.iter().map(|&a| place(a)).collect(),
                 outer: there.outer.clone(),
             };
-            let alike = |(other, since, _): &&mut (Shape, usize, Vec<Member>)| {
+            let alike = |(other, since, _): &&mut (BlockShape, usize, Vec<Member>)| {
                 other.is(&shape) && last.is_none_or(|last| last < *since)
             };
             match open.iter_mut().rev().find(alike) {
@@ -117,23 +117,23 @@ impl Abreast {
         }
         let mut first = 0;
         let together = open.into_iter().filter(|(_, _, members)| members.len() >= FEWEST);
-        let groups: Vec<Group> = together
+        let groups: Vec<BlockGroup> = together
             .map(|(shape, _, members)| {
                 let lanes = members.len().div_ceil(LANES);
                 first += lanes;
-                Group::of(shape, members, first - lanes)
+                BlockGroup::of(shape, members, first - lanes)
             })
             .collect();
         let members = groups.iter().enumerate().flat_map(|(g, group)| group.members.iter().map(move |m| (m, g)));
         let of: BTreeMap<u32, usize> = members.map(|(member, g)| (member.block as u32, g)).collect();
-        (!groups.is_empty()).then_some(Abreast { groups, of })
+        (!groups.is_empty()).then_some(BlockBatches { groups, of })
     }
 }
 
-impl Shape {
+impl BlockShape {
     /// The shape, and what the block reads from outside, in the order of the inputs; `None` if the block may take another
     /// way than the usual one, whatever its values.
-    fn of(program: &Program, solve: &program::Solve) -> Option<(Shape, Vec<Arg>)> {
+    fn of(program: &Program, solve: &program::Solve) -> Option<(BlockShape, Vec<Arg>)> {
         let Method::Newton { code, .. } = &solve.method else { return None };
         let size = solve.unknowns.len();
         let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
@@ -161,16 +161,16 @@ impl Shape {
         let (right, matrix) = code.outputs.split_at(size);
         let outputs = matrix.iter().chain(right).map(|&a| named(a)).collect();
         let code = Code { steps, outputs, values: vec![None; code.values.len()] };
-        Some((Shape { size, code, pattern: Arc::clone(&solve.pattern) }, read))
+        Some((BlockShape { size, code, pattern: Arc::clone(&solve.pattern) }, read))
     }
 
-    fn is(&self, other: &Shape) -> bool {
+    fn is(&self, other: &BlockShape) -> bool {
         self.size == other.size && self.pattern == other.pattern && self.code == other.code
     }
 }
 
-impl Group {
-    fn of(shape: Shape, members: Vec<Member>, first: usize) -> Group {
+impl BlockGroup {
+    fn of(shape: BlockShape, members: Vec<Member>, first: usize) -> BlockGroup {
         let n = shape.size;
         let fixed = (n + members[0].inputs.len()) as u32;
         let slot = |a: Arg| match a {
@@ -196,111 +196,111 @@ impl Group {
             let right = columns[i].iter().map(|&j| (j, entry(i, j))).collect();
             let after = |a: usize| columns[i][a + 1..].iter().map(|&j| place(columns[i][a], j)).collect();
             let below = (0..columns[i].len()).map(after).collect();
-            Row { diagonal: entry(i, i), start: starts[i], right, below }
+            UpperRow { diagonal: entry(i, i), start: starts[i], right, below }
         };
         let rows = (0..n).map(row).collect();
-        Group { size: n, members, first, packed, pattern: shape.pattern, rows }
+        BlockGroup { size: n, members, first, packed, pattern: shape.pattern, rows }
     }
 }
 
-/// The solutions that lanes follow, and the entries of the Jacobian there.
+/// The previous solutions of lanes, and the entries of the Jacobian there.
 #[derive(Debug, Clone, Default)]
-struct Memory {
-    /// The blocks, and the versions of their memories that these are.
+struct FollowedLanes {
+    /// The blocks, and the versions of their previous solutions that these are.
     of: [(usize, u64); LANES],
-    kept: Vec<Line>,
-    base: Vec<Line>,
+    start: Vec<Vector>,
+    start_jacobian: Vec<Vector>,
 }
 
-/// Working space: one number for each lane in every place.
+/// Workspace: one number for each lane in every place.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Space {
+pub(crate) struct BatchWorkspace {
     registers: WideFrame<LANES>,
-    /// What lanes remember, for each time that a group is gone through with all lanes.
-    memories: Vec<Memory>,
+    /// The solutions that lanes follow, one set for each batch of a group.
+    followed_lanes: Vec<FollowedLanes>,
     /// Which of them is in use.
-    memory: usize,
-    x: Vec<Line>,
-    size: Vec<Line>,
-    step: Vec<Line>,
-    next: Vec<Line>,
-    lead: Vec<Line>,
-    opening: Vec<Line>,
+    lanes_in_use: usize,
+    x: Vec<Vector>,
+    scale: Vec<Vector>,
+    correction: Vec<Vector>,
+    simplified: Vec<Vector>,
+    first_correction: Vec<Vector>,
+    first_right: Vec<Vector>,
     /// Factors: above the diagonal, row by row, and the inverse diagonal.
-    upper: Vec<Line>,
-    inverse: Vec<Line>,
+    upper: Vec<Vector>,
+    inverse: Vec<Vector>,
     /// Solutions, and the entries of the Jacobian there.
-    found: Vec<Line>,
-    jacobian: Vec<Line>,
-    /// Where each group was tried last.
+    found: Vec<Vector>,
+    jacobian: Vec<Vector>,
+    /// The turn in which each group was tried last.
     tried: Vec<u64>,
     /// Evaluations of routines so far.
     pub turn: u64,
 }
 
-impl Space {
+impl BatchWorkspace {
     /// Makes room for the groups of a routine.
-    pub fn reserve(&mut self, abreast: &Abreast) {
-        let most = |of: &dyn Fn(&Group) -> usize| abreast.groups.iter().map(of).max().unwrap_or(0);
+    pub fn reserve(&mut self, batches: &BlockBatches) {
+        let most = |of: &dyn Fn(&BlockGroup) -> usize| batches.groups.iter().map(of).max().unwrap_or(0);
         let (n, entries) = (most(&|g| g.size), most(&|g| g.pattern.len()));
         let upper = most(&|g| g.rows.iter().map(|row| row.right.len()).sum());
         self.registers.reserve(most(&|g| g.packed.slots.max(g.size + g.members[0].inputs.len())));
-        for line in [
+        for vector in [
             &mut self.x,
-            &mut self.size,
-            &mut self.step,
-            &mut self.next,
-            &mut self.lead,
-            &mut self.opening,
+            &mut self.scale,
+            &mut self.correction,
+            &mut self.simplified,
+            &mut self.first_correction,
+            &mut self.first_right,
             &mut self.inverse,
             &mut self.found,
         ] {
-            line.resize(line.len().max(n), Line::default());
+            vector.resize(vector.len().max(n), Vector::default());
         }
-        self.upper.resize(self.upper.len().max(upper), Line::default());
-        self.jacobian.resize(self.jacobian.len().max(entries), Line::default());
-        self.tried.resize(self.tried.len().max(abreast.groups.len()), 0);
-        let memories = most(&|g| g.first + g.members.len().div_ceil(LANES));
-        self.memories.resize(self.memories.len().max(memories), Memory::default());
-        for memory in &mut self.memories {
-            memory.kept.resize(memory.kept.len().max(n), Line::default());
-            memory.base.resize(memory.base.len().max(entries), Line::default());
+        self.upper.resize(self.upper.len().max(upper), Vector::default());
+        self.jacobian.resize(self.jacobian.len().max(entries), Vector::default());
+        self.tried.resize(self.tried.len().max(batches.groups.len()), 0);
+        let followed_lanes = most(&|g| g.first + g.members.len().div_ceil(LANES));
+        self.followed_lanes.resize(self.followed_lanes.len().max(followed_lanes), FollowedLanes::default());
+        for memory in &mut self.followed_lanes {
+            memory.start.resize(memory.start.len().max(n), Vector::default());
+            memory.start_jacobian.resize(memory.start_jacobian.len().max(entries), Vector::default());
         }
     }
 }
 
 impl Frame {
     /// Solves the group of a block, if it has one that has not been tried in this turn.
-    pub(super) fn solve_abreast(&mut self, solve: &Solve) {
-        let Some(abreast) = &self.abreast else { return };
-        let Some(&number) = abreast.of.get(&solve.block.0) else { return };
-        if std::mem::replace(&mut self.space.tried[number], self.space.turn) == self.space.turn {
+    pub(super) fn solve_batch(&mut self, solve: &Solve) {
+        let Some(batches) = &self.batches else { return };
+        let Some(&number) = batches.of.get(&solve.block.0) else { return };
+        if std::mem::replace(&mut self.workspace.tried[number], self.workspace.turn) == self.workspace.turn {
             return;
         }
-        let abreast = abreast.clone();
-        let group = &abreast.groups[number];
+        let batches = batches.clone();
+        let group = &batches.groups[number];
         let arch = pulp::Arch::new();
-        let Frame { r, solvers, space, .. } = self;
+        let Frame { r, solvers, workspace, .. } = self;
         for (members, memory) in group.members.chunks(LANES).zip(group.first..) {
             let follows = |m: &Member| {
                 let newton = &solvers[m.block].newton;
-                newton.following && newton.most / 4 > EVALUATIONS
+                newton.following && newton.evaluation_limit / 4 > EVALUATIONS
             };
             if members.iter().filter(|m| follows(m)).count() < FEWEST {
                 continue;
             }
             let mut good: [bool; LANES] = std::array::from_fn(|l| members.get(l).is_some_and(follows));
-            space.memory = memory;
-            space.gather(group, members, r, solvers);
-            arch.dispatch(Usual { space, group, good: &mut good });
-            space.hand_over(group, members, r, solvers, &good);
+            workspace.lanes_in_use = memory;
+            workspace.gather(group, members, r, solvers);
+            arch.dispatch(FastPath { workspace, group, good: &mut good });
+            workspace.scatter(group, members, r, solvers, &good);
         }
     }
 }
 
-impl Space {
-    /// Takes up what the blocks read, and where they are; lanes without a block do as the first.
-    fn gather(&mut self, group: &Group, members: &[Member], r: &[f64], solvers: &[Solver]) {
+impl BatchWorkspace {
+    /// Gathers what the blocks read, and their previous solutions; lanes without a block do as the first.
+    fn gather(&mut self, group: &BlockGroup, members: &[Member], r: &[f64], solvers: &[Solver]) {
         let n = group.size;
         for lane in 0..LANES {
             let member = members.get(lane).unwrap_or(&members[0]);
@@ -308,20 +308,20 @@ impl Space {
             for (place, &input) in member.inputs.iter().enumerate() {
                 self.registers.r[n + place][lane] = r[input as usize];
             }
-            let memory = &mut self.memories[self.memory];
+            let memory = &mut self.followed_lanes[self.lanes_in_use];
             let present = (member.block, newton.version);
             if memory.of[lane] != present {
                 memory.of[lane] = present;
-                (0..n).for_each(|i| memory.kept[i][lane] = newton.memory[i]);
-                for (base, &kept) in memory.base.iter_mut().zip(&newton.jacobian_memory) {
-                    base[lane] = kept;
+                (0..n).for_each(|i| memory.start[i][lane] = newton.previous[i]);
+                for (entry, &previous) in memory.start_jacobian.iter_mut().zip(&newton.previous_jacobian) {
+                    entry[lane] = previous;
                 }
             }
         }
     }
 
-    /// Gives the blocks what has been found.
-    fn hand_over(&self, group: &Group, members: &[Member], r: &[f64], solvers: &mut [Solver], good: &[bool; LANES]) {
+    /// Scatters the solutions found to their blocks.
+    fn scatter(&self, group: &BlockGroup, members: &[Member], r: &[f64], solvers: &mut [Solver], good: &[bool; LANES]) {
         let n = group.size;
         for (lane, member) in members.iter().enumerate().filter(|(lane, _)| good[*lane]) {
             let newton = &mut solvers[member.block].newton;
@@ -335,59 +335,59 @@ impl Space {
     }
 }
 
-/// The usual way, to be gone with the vectors of the machine.
-struct Usual<'a> {
-    space: &'a mut Space,
-    group: &'a Group,
+/// The fast path, to be compiled for the SIMD vectors of the machine.
+struct FastPath<'a> {
+    workspace: &'a mut BatchWorkspace,
+    group: &'a BlockGroup,
     good: &'a mut [bool; LANES],
 }
 
-impl pulp::WithSimd for Usual<'_> {
+impl pulp::WithSimd for FastPath<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        *self.good = self.space.solve(self.group, *self.good);
+        *self.good = self.workspace.solve(self.group, *self.good);
     }
 }
 
-const NONE: Line = wide::Line([0.0; LANES]);
+const NONE: Vector = wide::Vector([0.0; LANES]);
 
 #[inline(always)]
-fn each(value: impl Fn(usize) -> f64) -> Line {
-    wide::Line(std::array::from_fn(value))
+fn each(value: impl Fn(usize) -> f64) -> Vector {
+    wide::Vector(std::array::from_fn(value))
 }
 
 /// 1 where something holds, 0 elsewhere: truth values that stay in the vectors of the machine.
 #[inline(always)]
-fn truth(holds: impl Fn(usize) -> bool) -> Line {
+fn truth(holds: impl Fn(usize) -> bool) -> Vector {
     each(|l| if holds(l) { 1.0 } else { 0.0 })
 }
 
 /// The greater one; as `f64::max` where neither is NaN.
 #[inline(always)]
-fn greater(a: &Line, b: &Line) -> Line {
+fn greater(a: &Vector, b: &Vector) -> Vector {
     each(|l| if b[l] > a[l] { b[l] } else { a[l] })
 }
 
-/// What a step is measured by: the magnitude of its unknown, its own, or the least number.
+/// What a correction is scaled by: the magnitude of its unknown, its own, or the least number.
 #[inline(always)]
-fn scale(size: &Line, step: &Line) -> Line {
+fn scale(size: &Vector, step: &Vector) -> Vector {
     each(|l| {
         let most = if step[l] > size[l] { step[l] } else { size[l] };
         if most > f64::MIN_POSITIVE { most } else { f64::MIN_POSITIVE }
     })
 }
 
-impl Space {
-    /// Which lanes have come to their solution, which is left in `found`.
+impl BatchWorkspace {
+    /// Which lanes have converged; their solutions are left in `found`.
     #[inline(always)]
-    fn solve(&mut self, group: &Group, used: [bool; LANES]) -> [bool; LANES] {
+    fn solve(&mut self, group: &BlockGroup, used: [bool; LANES]) -> [bool; LANES] {
         let n = group.size;
         let mut good = truth(|l| used[l]);
-        for (i, kept) in self.memories[self.memory].kept[..n].iter().enumerate() {
-            self.x[i] = *kept;
-            self.size[i] = each(|l| kept[l].abs());
+        for (i, start) in self.followed_lanes[self.lanes_in_use].start[..n].iter().enumerate() {
+            self.x[i] = *start;
+            self.scale[i] = each(|l| start[l].abs());
         }
         let mut solved = [false; LANES];
         self.evaluate(group, false);
@@ -397,7 +397,7 @@ impl Space {
             if there.contains(&1.0) {
                 good = each(|l| if there[l] != 0.0 { 0.0 } else { good[l] });
                 if iteration > 0 {
-                    self.goes_on(group, iteration - 1, &mut there);
+                    self.is_continuation(group, iteration - 1, &mut there);
                 }
                 self.keep(group, &mut there);
                 (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
@@ -408,21 +408,21 @@ impl Space {
             self.factor(group, &mut good);
             self.right(group);
             if iteration == 0 {
-                self.opening[..n].copy_from_slice(&self.next[..n]);
+                self.first_right[..n].copy_from_slice(&self.simplified[..n]);
             }
             self.back(group);
-            self.step[..n].copy_from_slice(&self.next[..n]);
+            self.correction[..n].copy_from_slice(&self.simplified[..n]);
             if iteration == 0 {
-                self.lead[..n].copy_from_slice(&self.next[..n]);
+                self.first_correction[..n].copy_from_slice(&self.simplified[..n]);
             }
             let mut size = NONE;
             for i in 0..n {
-                let step = each(|l| self.step[i][l].abs());
-                let scale = scale(&self.size[i], &step);
+                let step = each(|l| self.correction[i][l].abs());
+                let scale = scale(&self.scale[i], &step);
                 good = each(|l| if step[l] < f64::INFINITY { good[l] } else { 0.0 });
                 if iteration == 0 {
                     // What rests is measured otherwise.
-                    good = each(|l| if (step[l] == 0.0) & (self.size[i][l] == 0.0) { 0.0 } else { good[l] });
+                    good = each(|l| if (step[l] == 0.0) & (self.scale[i][l] == 0.0) { 0.0 } else { good[l] });
                 }
                 size = greater(&size, &each(|l| step[l] / scale[l]));
             }
@@ -431,30 +431,30 @@ impl Space {
             self.back(group);
             let mut next = NONE;
             for i in 0..n {
-                let (step, after) = (each(|l| self.step[i][l].abs()), each(|l| self.next[i][l].abs()));
-                let scale = scale(&self.size[i], &step);
+                let (step, after) = (each(|l| self.correction[i][l].abs()), each(|l| self.simplified[i][l].abs()));
+                let scale = scale(&self.scale[i], &step);
                 good = each(|l| if after[l] < f64::INFINITY { good[l] } else { 0.0 });
                 next = greater(&next, &each(|l| after[l] / scale[l]));
             }
             let shrinks = truth(|l| (next[l] <= 0.75 * size[l]) | (size[l] <= 2.0 * f64::EPSILON));
-            let near = truth(|l| (next[l] <= NEAR * size[l]) | (size[l] <= SETTLED));
-            let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= FINISHED * size[l]));
+            let near = truth(|l| (next[l] <= CONTRACTION * size[l]) | (size[l] <= CLOSE_TO_ROUNDING));
+            let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= CONVERGED * size[l]));
             let done = truth(|l| (finished[l] != 0.0) | (size[l] <= 4.0 * f64::EPSILON));
             good = each(|l| good[l] * shrinks[l]);
             if iteration == 0 {
-                // A first step that leaves much to do is no usual one.
+                // A first step that does not contract is not for the fast path.
                 good = each(|l| good[l] * near[l]);
             }
             for i in 0..n {
-                let trial = each(|l| self.x[i][l] + self.step[i][l]);
-                let moved = each(|l| if finished[l] != 0.0 { trial[l] + self.next[i][l] } else { trial[l] });
-                let size = greater(&self.size[i], &each(|l| trial[l].abs()));
-                self.size[i] = greater(&size, &each(|l| moved[l].abs()));
+                let trial = each(|l| self.x[i][l] + self.correction[i][l]);
+                let moved = each(|l| if finished[l] != 0.0 { trial[l] + self.simplified[i][l] } else { trial[l] });
+                let size = greater(&self.scale[i], &each(|l| trial[l].abs()));
+                self.scale[i] = greater(&size, &each(|l| moved[l].abs()));
                 self.x[i] = moved;
             }
             let mut there = each(|l| good[l] * done[l]);
             if there.contains(&1.0) {
-                self.goes_on(group, iteration, &mut there);
+                self.is_continuation(group, iteration, &mut there);
                 self.keep(group, &mut there);
                 (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
                 good = each(|l| if done[l] != 0.0 { 0.0 } else { good[l] });
@@ -466,9 +466,9 @@ impl Space {
         solved
     }
 
-    /// Takes note of the lanes that are where they should be, if all is finite there.
+    /// Keeps the solutions of the lanes that have converged, if all is finite there.
     #[inline(always)]
-    fn keep(&mut self, group: &Group, there: &mut Line) {
+    fn keep(&mut self, group: &BlockGroup, there: &mut Vector) {
         for &slot in &group.packed.outputs {
             let value = &self.registers.r[slot as usize];
             *there = each(|l| if value[l].abs() < f64::INFINITY { there[l] } else { 0.0 });
@@ -482,12 +482,12 @@ impl Space {
         }
     }
 
-    /// Runs the inner code at `x`, or a step from there.
+    /// Runs the inner code at `x`, or a correction from there.
     #[inline(always)]
-    fn evaluate(&mut self, group: &Group, trial: bool) {
+    fn evaluate(&mut self, group: &BlockGroup, trial: bool) {
         for i in 0..group.size {
             self.registers.r[i] = match trial {
-                true => each(|l| self.x[i][l] + self.step[i][l]),
+                true => each(|l| self.x[i][l] + self.correction[i][l]),
                 false => self.x[i],
             };
         }
@@ -497,7 +497,7 @@ impl Space {
 
     /// Greatest residual.
     #[inline(always)]
-    fn residual(&self, group: &Group) -> Line {
+    fn residual(&self, group: &BlockGroup) -> Vector {
         let slots = &group.packed.outputs[group.pattern.len()..];
         slots.iter().fold(NONE, |most, &slot| {
             let value = &self.registers.r[slot as usize];
@@ -505,11 +505,11 @@ impl Space {
         })
     }
 
-    /// Puts the right-hand side of the Newton step into `next`.
+    /// Puts the right-hand side of the correction into `simplified`.
     #[inline(always)]
-    fn right(&mut self, group: &Group) {
+    fn right(&mut self, group: &BlockGroup) {
         let slots = &group.packed.outputs[group.pattern.len()..];
-        for (next, &slot) in self.next.iter_mut().zip(slots) {
+        for (next, &slot) in self.simplified.iter_mut().zip(slots) {
             let value = &self.registers.r[slot as usize];
             *next = each(|l| 0.0 - value[l]);
         }
@@ -517,7 +517,7 @@ impl Space {
 
     /// Factors the matrix, as `Lu` does; `good` loses those that are not definite.
     #[inline(always)]
-    fn factor(&mut self, group: &Group, good: &mut Line) {
+    fn factor(&mut self, group: &BlockGroup, good: &mut Vector) {
         let n = group.size;
         let entry =
             |this: &Self, e: Option<usize>| e.map_or(NONE, |e| this.registers.r[group.packed.outputs[e] as usize]);
@@ -565,72 +565,73 @@ impl Space {
         }
     }
 
-    /// Replaces `next` by the solution.
+    /// Replaces `simplified` by the solution.
     #[inline(always)]
-    fn back(&mut self, group: &Group) {
+    fn back(&mut self, group: &BlockGroup) {
         let n = group.size;
         if n == 1 {
-            self.next[0] = each(|l| self.next[0][l] / self.inverse[0][l]);
+            self.simplified[0] = each(|l| self.simplified[0][l] / self.inverse[0][l]);
             return;
         }
-        self.next[..n].iter_mut().for_each(|b| *b = each(|l| b[l] + 0.0));
+        self.simplified[..n].iter_mut().for_each(|b| *b = each(|l| b[l] + 0.0));
         for (k, row) in group.rows.iter().enumerate() {
-            let done = self.next[k];
+            let done = self.simplified[k];
             for (u, &(j, _)) in self.upper[row.start..].iter().zip(&row.right) {
-                self.next[j] = each(|l| self.next[j][l] - u[l] * done[l]);
+                self.simplified[j] = each(|l| self.simplified[j][l] - u[l] * done[l]);
             }
         }
-        for (next, inverse) in self.next[..n].iter_mut().zip(&self.inverse) {
+        for (next, inverse) in self.simplified[..n].iter_mut().zip(&self.inverse) {
             *next = each(|l| next[l] * inverse[l] + 0.0);
         }
-        // What an unknown takes off those before it, from the last one on.
+        // Back substitution, from the last unknown on.
         for (k, row) in group.rows.iter().enumerate().rev() {
-            let mut value = self.next[k];
+            let mut value = self.simplified[k];
             for (u, &(j, _)) in self.upper[row.start..][..row.right.len()].iter().zip(&row.right).rev() {
-                let done = &self.next[j];
+                let done = &self.simplified[j];
                 value = each(|l| value[l] - u[l] * done[l]);
             }
-            self.next[k] = value;
+            self.simplified[k] = value;
         }
     }
 
-    /// Whether each solution is without doubt the one that goes on from where the lane began; `last` iteration.
+    /// Whether each solution is without doubt the continuation of the previous one; `last` iteration.
     #[inline(always)]
-    fn goes_on(&mut self, group: &Group, last: usize, good: &mut Line) {
+    fn is_continuation(&mut self, group: &BlockGroup, last: usize, good: &mut Vector) {
         let n = group.size;
-        let mut most = wide::Line([SETTLED; LANES]);
+        let mut most = wide::Vector([CLOSE_TO_ROUNDING; LANES]);
         let mut off = NONE;
         for i in 0..n {
-            let lead = each(|l| self.lead[i][l].abs());
-            let scale = scale(&self.size[i], &lead);
-            most = greater(&most, &each(|l| lead[l] / scale[l]));
-            let kept = &self.memories[self.memory].kept[i];
-            self.next[i] = each(|l| self.x[i][l] - kept[l]);
+            let first = each(|l| self.first_correction[i][l].abs());
+            let scale = scale(&self.scale[i], &first);
+            most = greater(&most, &each(|l| first[l] / scale[l]));
+            let start = &self.followed_lanes[self.lanes_in_use].start[i];
+            self.simplified[i] = each(|l| self.x[i][l] - start[l]);
         }
-        self.widen(n, &mut off, good);
-        // With the first Jacobian it would be the first step again.
+        self.widen_distance(n, &mut off, good);
+        // With the first Jacobian it would be the first correction again.
         if last > 0 {
-            self.next[..n].copy_from_slice(&self.opening[..n]);
+            self.simplified[..n].copy_from_slice(&self.first_right[..n]);
             self.back(group);
-            self.widen(n, &mut off, good);
+            self.widen_distance(n, &mut off, good);
         }
-        self.next[..n].fill(wide::Line([-0.0; LANES]));
-        for (base, (row, column)) in self.memories[self.memory].base.iter().zip(group.pattern.places()) {
-            let lead = &self.lead[column];
-            self.next[row] = each(|l| self.next[row][l] + base[l] * lead[l]);
+        self.simplified[..n].fill(wide::Vector([-0.0; LANES]));
+        let entries = self.followed_lanes[self.lanes_in_use].start_jacobian.iter();
+        for (entry, (row, column)) in entries.zip(group.pattern.places()) {
+            let first = &self.first_correction[column];
+            self.simplified[row] = each(|l| self.simplified[row][l] + entry[l] * first[l]);
         }
         self.back(group);
-        self.widen(n, &mut off, good);
+        self.widen_distance(n, &mut off, good);
         *good = each(|l| if off[l] <= 0.5 * most[l] { good[l] } else { 0.0 });
     }
 
-    /// How far `next` is from the first step; `good` loses those of which nobody knows.
+    /// Scaled distance of `simplified` from the first correction; `good` loses those where it is not finite.
     #[inline(always)]
-    fn widen(&self, n: usize, off: &mut Line, good: &mut Line) {
+    fn widen_distance(&self, n: usize, off: &mut Vector, good: &mut Vector) {
         for i in 0..n {
-            let lead = &self.lead[i];
-            let scale = scale(&self.size[i], &each(|l| lead[l].abs()));
-            let away = each(|l| (self.next[i][l] - lead[l]).abs() / scale[l]);
+            let first = &self.first_correction[i];
+            let scale = scale(&self.scale[i], &each(|l| first[l].abs()));
+            let away = each(|l| (self.simplified[i][l] - first[l]).abs() / scale[l]);
             *good = each(|l| if away[l] < f64::INFINITY { good[l] } else { 0.0 });
             *off = greater(off, &away);
         }
@@ -645,7 +646,7 @@ mod tests {
     use halfarrow_compiler::equations::Form;
     use std::sync::Arc;
 
-    /// A ladder of resistors with a compliance in every so manieth section.
+    /// A ladder of resistors with a compliance in every `every`th section.
     fn mesh(sections: usize, every: usize, law: &str) -> Program {
         let mut text = String::from("model Mesh\nparam g = 1, c = 0.1\ninput u = 1\nSe:source(u) -> 1:s0\n");
         for k in 1..=sections {
@@ -660,12 +661,12 @@ mod tests {
         compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir
     }
 
-    fn frame(program: &Program, layout: &Layout, routine: &Routine, abreast: Option<&Abreast>) -> Frame {
+    fn frame(program: &Program, layout: &Layout, routine: &Routine, batches: Option<&BlockBatches>) -> Frame {
         let preamble = layout.preamble(program);
         let mut frame = Frame::new(program, layout, layout.size);
         frame.reserve(routine);
         frame.reserve(&preamble);
-        abreast.into_iter().for_each(|a| frame.reserve_abreast(a));
+        batches.into_iter().for_each(|a| frame.reserve_batches(a));
         frame.run(&preamble).unwrap();
         frame.r[layout.inputs as usize] = 1.0;
         frame
@@ -675,10 +676,10 @@ mod tests {
     fn same_bits(program: &Program) -> usize {
         let layout = Layout::new(program, &[]);
         let wanted: Vec<_> = program.states.iter().map(|s| s.rate).collect();
-        let routine = layout.watched_routine(program, &wanted);
-        let abreast = Arc::new(Abreast::of(program, &layout, &routine).expect("blocks of one shape"));
+        let routine = layout.guarded_routine(program, &wanted);
+        let batches = Arc::new(BlockBatches::of(program, &layout, &routine).expect("blocks of one shape"));
         let mut alone = frame(program, &layout, &routine, None);
-        let mut together = frame(program, &layout, &routine, Some(&abreast));
+        let mut together = frame(program, &layout, &routine, Some(&batches));
         let n = program.states.len();
         let (mut seed, mut on_lanes) = (1.0f64, 0);
         let mut x = vec![0.0; n];
@@ -692,7 +693,7 @@ mod tests {
                 frame.r[layout.states as usize..][..n].copy_from_slice(&x);
             }
             let versions: Vec<bool> = together.solvers.iter().map(|s| s.newton.following).collect();
-            together.begin(Some(&abreast));
+            together.begin(Some(&batches));
             together.solvers.iter_mut().for_each(|s| s.newton.evaluations = usize::MAX);
             let (a, b) = (alone.run(&routine), together.run(&routine));
             assert_eq!(a, b, "turn {turn}");

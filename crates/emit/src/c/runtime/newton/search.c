@@ -1,0 +1,159 @@
+//if newton_single
+/* Distances from tiny to huge. */
+static const double ha_scan_distances[] = {
+DISTANCES
+};
+
+/* The residual of one equation at a point; whether it is finite. */
+static int ha_residual_at(ha_model *m, ha_newton *w, double at, double *residual)
+{
+    int finite;
+    w->trial[0] = at;
+    finite = ha_evaluate(m, w, w->trial);
+    *residual = w->right[0];
+    return finite;
+}
+
+static int ha_is_below(double a)
+{
+    return a < 0.0 || (a == 0.0 && 1.0 / a < 0.0);
+}
+
+/* Bisects an interval at whose ends the residual differs in sign. A pole is no root. */
+static int ha_bisect_residual(ha_model *m, ha_newton *w, double a, double ra, double b, double rb)
+{
+    const double jump = fabs(ra) < fabs(rb) ? fabs(ra) : fabs(rb);
+    int halving;
+    for (halving = 0; halving < 200; ++halving) {
+        const double middle = 0.5 * (a + b);
+        double r;
+        if (middle == a || middle == b) {
+            break;
+        }
+        if (!ha_residual_at(m, w, middle, &r)) {
+            return 0;
+        }
+        if (ha_is_below(r) == ha_is_below(ra)) {
+            a = middle;
+            ra = r;
+        } else {
+            b = middle;
+            rb = r;
+        }
+    }
+    if (!(fabs(ra) < fabs(rb))) {
+        a = b;
+        ra = rb;
+    }
+    if (fabs(ra) > jump) {
+        return 0;
+    }
+    w->start[0] = a;
+    w->evaluations = 0;
+    return ha_iterate(m, w, HA_DAMPED);
+}
+
+/* One equation in one unknown: a root anywhere, those near the previous solution first. */
+static int ha_scan(ha_model *m, ha_newton *w)
+{
+    const int points = (int)(sizeof ha_scan_distances / sizeof ha_scan_distances[0]);
+    const double middle = w->previous[0];
+    double at[2] = {0.0, 0.0};
+    double residual[2] = {0.0, 0.0};
+    int there[2] = {0, 0};
+    int i;
+    int side;
+    ha_fill(w->offset, 0.0, w->n);
+    for (i = 0; i < points; ++i) {
+        for (side = 0; side < 2; ++side) {
+            const double way = side == 0 ? ha_scan_distances[i] : -ha_scan_distances[i];
+            const double here = middle + way;
+            double r;
+            const int finite = ha_residual_at(m, w, here, &r);
+            const int before = there[side];
+            const double a = at[side];
+            const double ra = residual[side];
+            at[side] = here;
+            residual[side] = r;
+            there[side] = finite;
+            if (finite && before && ha_is_below(r) != ha_is_below(ra) && ha_bisect_residual(m, w, a, ra, here, r)) {
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+//end
+/* Any root. */
+static int ha_search(ha_model *m, ha_newton *w)
+{
+    static const double starts[] = {0.0, 1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3};
+    int i;
+    ha_copy(w->start, w->previous, w->n);
+    if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+        return 1;
+    }
+    for (i = 0; i < 7; ++i) {
+        ha_fill(w->start, starts[i], w->n);
+        if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+            return 1;
+        }
+    }
+//if newton_single
+    return w->n == 1 && ha_scan(m, w);
+//else
+    return 0;
+//end
+}
+
+/* The root of a block that continues its previous solution, at a start or an event any root; o: what the block reads. */
+static int ha_find_root(ha_model *m, int number, const double *o, double *x)
+{
+    ha_newton w = ha_newton_of(m, number);
+    int status;
+    ha_copy(w.outer, o, w.block->reads);
+    ha_copy(w.present, o, w.block->reads);
+    ha_fill(w.floor, 0.0, w.n);
+    status = ha_continue_root(m, &w);
+    if (status != MODEL_OK && w.following) {
+//if newton_single
+        /* Is there a solution elsewhere, or none at all? */
+        if (status == MODEL_NO_CONVERGENCE && w.n == 1 && ha_scan(m, &w)) {
+            status = MODEL_BRANCH;
+        }
+//end
+        return status;
+    }
+    if (status != MODEL_OK && !ha_search(m, &w)) {
+        return status;
+    }
+    ha_copy(w.jacobian, w.matrix, w.entries);
+    ha_copy(x, w.x, w.n);
+    return MODEL_OK;
+}
+
+//if newton
+/* The same with the rates of the unknowns, by the implicit function theorem; e: rates of what the block reads. */
+static int ha_root_along(ha_model *m, int number, const double *o, const double *e, double *x, double *dx)
+{
+    const int status = ha_find_root(m, number, o, x);
+    ha_newton w;
+    int i;
+    if (status != MODEL_OK) {
+        return status;
+    }
+    w = ha_newton_of(m, number);
+    w.block->code(m, o, x, w.right, w.matrix);
+    w.block->along(m, o, e, x, w.right);
+    if (!ha_lu_factor(&w.lu, w.matrix)) {
+        return MODEL_SINGULAR;
+    }
+    for (i = 0; i < w.n; ++i) {
+        dx[i] = -w.right[i];
+    }
+    ha_lu_solve(&w.lu, dx);
+    return MODEL_OK;
+}
+
+//end

@@ -1,0 +1,140 @@
+
+/* ---- nonlinear equations: Newton's method, damped by the restricted natural monotonicity test, and continuation, which
+ * keeps a run on one solution. P. Deuflhard, "Newton Methods for Nonlinear Problems", 2004, chapters 3 and 5. ---- */
+
+typedef struct {
+    /* Where the entries of the Jacobian stand, and the number of values read from outside. */
+    const ha_pattern *pattern;
+    int reads;
+    /* First place of its memory in m->memory. */
+    int memory;
+    void (*code)(ha_model *m, const double *o, const double *g, double *right, double *matrix);
+    /* Of what the residuals are the sums, in magnitude. */
+    void (*terms)(ha_model *m, const double *o, const double *g, double *terms);
+//if newton
+    void (*along)(ha_model *m, const double *o, const double *e, const double *g, double *rates);
+//end
+} ha_block;
+
+BLOCK_TABLE
+/* What a solution is sought with: parts of the memory and of the workspace of the model. */
+typedef struct {
+    const ha_block *block;
+    int n;
+    /* For each row of the Jacobian its first entry, for each entry its column, and the number of entries. */
+    const int *starts;
+    const int *columns;
+    int entries;
+    int following;
+    int limit;
+    int evaluations;
+    /* Whether the first step, undamped, contracted by 1/4. */
+    int contracts;
+    /* The previous solution, what the block read there, and its Jacobian. */
+    double *previous;
+    double *previous_outer;
+    double *previous_jacobian;
+    /* The solution found last, what the block read there, and its Jacobian. */
+    double *x;
+    double *outer;
+    double *jacobian;
+    /* Newton correction at x, trial point, and simplified correction there: with the Jacobian at x. */
+    double *correction;
+    double *trial;
+    double *simplified;
+    /* Scale of norms: greatest magnitude of each unknown so far. */
+    double *scale;
+    /* What is subtracted from the residuals: the Newton homotopy F(x) = (1 - s) F(previous). */
+    double *offset;
+    double *previous_residual;
+    /* Where the iteration starts: the last root on the path; its Jacobian is start_jacobian. */
+    double *start;
+    double *saved_start;
+    /* The first correction, and its right-hand side. */
+    double *first_correction;
+    double *first_right;
+    /* Magnitudes of the unknowns. */
+    double *magnitude;
+    double *right;
+    double *present;
+    double *start_jacobian;
+    double *matrix;
+    /* For unknowns that no equation determines: see ha_floats. */
+    double *terms;
+    double *units;
+    double *loose;
+    double *order;
+    double *rest;
+    double *unseen;
+    /* Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them. */
+    double *floor;
+    ha_lu lu;
+} ha_newton;
+
+static double *ha_take(double **place, int n)
+{
+    double *taken = *place;
+    *place += n;
+    return taken;
+}
+
+static ha_newton ha_newton_of(ha_model *m, int number)
+{
+    const ha_block *block = &ha_blocks[number];
+    const int n = block->pattern->n;
+    const int entries = ha_entries(block->pattern);
+    const int reads = block->reads;
+    double *place = m->memory + block->memory;
+    ha_newton w;
+    w.block = block;
+    w.n = n;
+    w.starts = block->pattern->starts;
+    w.columns = block->pattern->columns;
+    w.entries = entries;
+    w.following = m->following[number];
+    w.limit = w.following ? m->most_evaluations : 20000;
+    w.evaluations = 0;
+    w.contracts = 0;
+    w.previous = ha_take(&place, n);
+    w.previous_outer = ha_take(&place, reads);
+    w.previous_jacobian = ha_take(&place, entries);
+    w.x = ha_take(&place, n);
+    w.outer = ha_take(&place, reads);
+    w.jacobian = ha_take(&place, entries);
+    place = m->work;
+    w.correction = ha_take(&place, n);
+    w.trial = ha_take(&place, n);
+    w.simplified = ha_take(&place, n);
+    w.scale = ha_take(&place, n);
+    w.offset = ha_take(&place, n);
+    w.previous_residual = ha_take(&place, n);
+    w.start = ha_take(&place, n);
+    w.saved_start = ha_take(&place, n);
+    w.first_correction = ha_take(&place, n);
+    w.first_right = ha_take(&place, n);
+    w.magnitude = ha_take(&place, n);
+    w.right = ha_take(&place, n);
+    w.present = ha_take(&place, reads);
+    w.start_jacobian = ha_take(&place, entries);
+    w.matrix = ha_take(&place, entries);
+    w.terms = ha_take(&place, n);
+    w.units = ha_take(&place, n);
+    w.order = ha_take(&place, n);
+    w.rest = ha_take(&place, n);
+    w.floor = ha_take(&place, n);
+    w.loose = ha_take(&place, n * n);
+    w.unseen = ha_take(&place, n * n);
+    w.lu = ha_lu_at(place, m->order, block->pattern);
+    return w;
+}
+
+/* The solution found last becomes the previous one, and is followed. */
+static void ha_newton_accept(ha_model *m, int number)
+{
+    const ha_newton w = ha_newton_of(m, number);
+    ha_copy(w.previous, w.x, w.n);
+    ha_copy(w.previous_outer, w.outer, w.block->reads);
+    ha_copy(w.previous_jacobian, w.jacobian, w.entries);
+    m->following[number] = 1;
+}
+

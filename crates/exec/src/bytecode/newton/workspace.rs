@@ -1,0 +1,184 @@
+//! The state and the workspace of a Newton block.
+
+use crate::bytecode::floating::Floating;
+
+/// Evaluations of a block at most at the start and after jumps.
+const EVALUATIONS_AT_START: usize = 20_000;
+/// Evaluations of a block at most at any other time, unless a bound is set.
+pub(crate) const EVALUATIONS: usize = 2_000;
+
+/// State and workspace of a Newton block. Vectors have one entry per unknown, matrices those of the pattern.
+#[derive(Debug, Clone)]
+pub(crate) struct Newton {
+    /// The previous solution, from which the next one starts: part of the model's state.
+    pub previous: Vec<f64>,
+    /// Whether it is an accepted solution, which is followed.
+    pub following: bool,
+    /// Counts its changes, from 1 on.
+    pub(in crate::bytecode) version: u64,
+    /// What the block read there, and its Jacobian: part of the model's state too.
+    pub(super) previous_outer: Vec<f64>,
+    pub(in crate::bytecode) previous_jacobian: Vec<f64>,
+    /// The last solution found, what the block read there, and its Jacobian.
+    pub x: Vec<f64>,
+    pub(in crate::bytecode) outer: Vec<f64>,
+    pub(in crate::bytecode) jacobian: Vec<f64>,
+    /// Whether these continue the previous solution as it is, with the present parameters and conditions.
+    pub fresh: bool,
+    /// Evaluations at most while following.
+    pub(in crate::bytecode) evaluation_limit: usize,
+    pub(in crate::bytecode) evaluations: usize,
+    /// The Newton correction at `x`.
+    pub(super) correction: Vec<f64>,
+    /// The point that is tried.
+    pub(super) trial: Vec<f64>,
+    /// The simplified correction at the trial point; right-hand sides elsewhere.
+    pub(in crate::bytecode) simplified: Vec<f64>,
+    /// Scale of norms: greatest magnitude of each unknown so far.
+    pub(super) scale: Vec<f64>,
+    /// Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them.
+    pub(in crate::bytecode) floor: Vec<f64>,
+    /// What is subtracted from the residuals: the Newton homotopy `F(x) = (1 - s) F(previous)`.
+    pub(in crate::bytecode) offset: Vec<f64>,
+    /// Residuals at the previous solution.
+    pub(super) previous_residual: Vec<f64>,
+    /// Where the iteration starts: the last root on the path.
+    pub(in crate::bytecode) start: Vec<f64>,
+    /// The start, while another path is looked at.
+    pub(super) saved_start: Vec<f64>,
+    /// The first correction: to first order the change of the solution.
+    pub(super) first_correction: Vec<f64>,
+    /// Its right-hand side.
+    pub(super) first_right: Vec<f64>,
+    /// The Jacobian at the start, if that is a root.
+    pub(super) start_jacobian: Vec<f64>,
+    /// Magnitudes of the unknowns: the previous solution, or where the iteration from there led.
+    pub(in crate::bytecode) magnitude: Vec<f64>,
+    /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
+    pub(super) contracts: bool,
+    /// Unknowns that no equation determines.
+    pub floating: Floating,
+}
+
+/// The state of a Newton block in a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Followed {
+    previous: Vec<f64>,
+    following: bool,
+    /// What the block read at the accepted solution, and its Jacobian there.
+    outer: Vec<f64>,
+    jacobian: Vec<f64>,
+    /// Unknowns that have floated.
+    floated: Vec<bool>,
+}
+
+impl Newton {
+    /// Room for so many unknowns and entries of the Jacobian.
+    pub fn new(size: usize, entries: usize) -> Newton {
+        let (line, matrix) = (vec![0.0; size], vec![0.0; entries]);
+        Newton {
+            previous: line.clone(),
+            version: 1,
+            following: false,
+            previous_outer: Vec::new(),
+            previous_jacobian: matrix.clone(),
+            x: line.clone(),
+            outer: Vec::new(),
+            jacobian: matrix.clone(),
+            fresh: false,
+            evaluation_limit: EVALUATIONS,
+            evaluations: 0,
+            correction: line.clone(),
+            trial: line.clone(),
+            simplified: line.clone(),
+            scale: line.clone(),
+            floor: line.clone(),
+            offset: line.clone(),
+            previous_residual: line.clone(),
+            start: line.clone(),
+            saved_start: line.clone(),
+            first_correction: line.clone(),
+            first_right: line.clone(),
+            magnitude: line,
+            start_jacobian: matrix,
+            contracts: false,
+            floating: Floating::new(size),
+        }
+    }
+
+    /// Makes room for so many values that the block reads.
+    pub fn reserve(&mut self, outer: usize) {
+        self.outer.resize(outer, 0.0);
+        self.previous_outer.resize(outer, 0.0);
+    }
+
+    /// Forgets the run.
+    pub fn forget(&mut self) {
+        self.previous.fill(0.0);
+        self.version += 1;
+        self.floating.ever.fill(false);
+        self.leave();
+    }
+
+    /// Any solution may come next.
+    pub fn leave(&mut self) {
+        (self.following, self.fresh) = (false, false);
+    }
+
+    /// The next solution starts where unknown `i` has this value.
+    pub fn start_at(&mut self, i: usize, value: f64) {
+        (self.previous[i], self.fresh) = (value, false);
+        self.version += 1;
+    }
+
+    /// Evaluations at most while following.
+    pub fn bound(&mut self, most: usize) {
+        (self.evaluation_limit, self.fresh) = (most, false);
+    }
+
+    /// The solution found last becomes the previous one, and is followed.
+    pub fn accept(&mut self) {
+        self.version += 1;
+        self.floating.accept();
+        self.previous.copy_from_slice(&self.x);
+        self.previous_outer.copy_from_slice(&self.outer);
+        self.previous_jacobian.copy_from_slice(&self.jacobian);
+        (self.following, self.fresh) = (true, false);
+    }
+
+    /// The state, to be restored.
+    pub fn followed(&self) -> Followed {
+        Followed {
+            previous: self.previous.clone(),
+            following: self.following,
+            outer: self.previous_outer.clone(),
+            jacobian: self.previous_jacobian.clone(),
+            floated: self.floating.ever.clone(),
+        }
+    }
+
+    /// Restores a state.
+    pub fn follow_from(&mut self, from: &Followed) {
+        self.version += 1;
+        self.previous.copy_from_slice(&from.previous);
+        self.previous_outer.copy_from_slice(&from.outer);
+        self.previous_jacobian.copy_from_slice(&from.jacobian);
+        self.floating.ever.copy_from_slice(&from.floated);
+        (self.following, self.fresh) = (from.following, false);
+    }
+
+    /// The next iteration starts at the previous solution.
+    pub(super) fn start_at_previous(&mut self) {
+        self.offset.fill(0.0);
+        self.start.copy_from_slice(&self.previous);
+        self.start_jacobian.copy_from_slice(&self.previous_jacobian);
+    }
+
+    pub(super) fn limit(&self) -> usize {
+        if self.following { self.evaluation_limit } else { EVALUATIONS_AT_START }
+    }
+
+    pub(in crate::bytecode) fn exhausted(&self) -> bool {
+        self.evaluations >= self.limit()
+    }
+}
