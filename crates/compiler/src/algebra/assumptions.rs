@@ -158,7 +158,7 @@ impl Exprs {
     /// The expression in parameters alone, the other symbols at an arbitrary point.
     fn at_arbitrary_point(&mut self, e: Expr) -> Expr {
         let others = self.symbols_of(e).into_iter().filter(|&s| self.facts(s).given.is_none());
-        let point: Vec<(Symbol, Rational)> = others.map(|s| (s, arbitrary(self.name(s)))).collect();
+        let point: Vec<(Symbol, Rational)> = others.map(|s| (s, arbitrary(self.label(s)))).collect();
         let point = point.into_iter().map(|(s, value)| (s, self.number(value))).collect();
         self.substitute(e, &point)
     }

@@ -330,15 +330,7 @@ impl Wanted {
                 self.virtual_speeds.iter().filter(|v| v.junction == junction).map(|v| v.speed).collect()
             }
             None => {
-                let name = &graph.elements[junction].name;
-                let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
-                let mut fresh = |suffix: &str| {
-                    let name = format!("{name}.{suffix}");
-                    let taken = x.find_symbol(&name).is_some();
-                    x.symbol(&if taken { format!("{name}*") } else { name }, Default::default())
-                };
-                let speed = fresh(own);
-                let reaction = fresh(&format!("{conjugate}*"));
+                let (speed, reaction) = kept_variable(x, graph, junction, flow);
                 self.why.insert(speed, why);
                 self.virtual_speeds.push(Virtual { junction, speed, reaction });
                 vec![speed]
@@ -357,10 +349,10 @@ impl Wanted {
 
     /// The `prefer`s that are not met, by their numbers.
     fn unmet(&self, x: &Exprs, ports: &Ports) -> Vec<usize> {
-        let own = |s: Symbol| x.name(s).trim_end_matches('*');
+        let own = |s: Symbol| x.untwinned(s);
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
-        let kept: BTreeSet<&str> = independent.chain(ports.virtual_speeds.iter().map(|v| v.speed)).map(own).collect();
-        let missed = |asked: &[Symbol]| !asked.is_empty() && !asked.iter().any(|&s| kept.contains(own(s)));
+        let kept: BTreeSet<Symbol> = independent.chain(ports.virtual_speeds.iter().map(|v| v.speed)).map(own).collect();
+        let missed = |asked: &[Symbol]| !asked.is_empty() && !asked.iter().any(|&s| kept.contains(&own(s)));
         (0..self.asked.len()).filter(|&i| missed(&self.asked[i])).collect()
     }
 
@@ -368,6 +360,19 @@ impl Wanted {
         let inside = |e: &ElementId| members.binary_search(e).is_ok();
         self.independent.iter().any(|p| inside(&p.element)) || self.virtual_speeds.iter().any(|v| inside(&v.junction))
     }
+}
+
+/// The common variable of a junction as it is kept, and what acts on it: a twin of that variable, where the graph has it.
+fn kept_variable(x: &mut Exprs, graph: &BondGraph, junction: ElementId, flow: bool) -> (Symbol, Symbol) {
+    let element = &graph.elements[junction];
+    let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
+    let name = format!("{}.{own}", element.name);
+    let variables = element.ports.iter().map(|p| &graph.bonds[p.bond]).map(|b| if flow { b.flow } else { b.effort });
+    let speed = match x.find_symbol(&name).filter(|&s| variables.into_iter().any(|own| own == s)) {
+        Some(common) => x.twin(common),
+        None => x.fresh(&name, Default::default()),
+    };
+    (speed, x.reaction(speed, &format!("{}.{conjugate}", element.name)))
 }
 
 /// Whether a port belongs to a storage whose co-energy variable is a flow (or an effort).

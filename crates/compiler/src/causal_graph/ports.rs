@@ -212,11 +212,7 @@ impl Net {
             let bond = &graph.bonds[port.bond];
             let (mut effort, mut flow) = (bond.effort, bond.flow);
             if self.column.contains_key(&effort) {
-                let twin = |x: &mut Exprs, s: Symbol| {
-                    let name = format!("{}*", x.name(s));
-                    x.symbol(&name, Default::default())
-                };
-                (effort, flow) = (twin(x, effort), twin(x, flow));
+                (effort, flow) = (x.twin(effort), x.twin(flow));
                 for (own, common) in [(effort, bond.effort), (flow, bond.flow)] {
                     let mut row = vec![(self.of(own), one), (self.of(common), minus)];
                     row.sort_by_key(|e| e.0);

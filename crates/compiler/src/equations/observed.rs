@@ -14,7 +14,7 @@ use crate::unit::Unit;
 /// The name of a state: its variable, or the output or `let` that says the same.
 pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> String {
     let same = meaning.and_then(|m| d.graph.outputs.iter().chain(&d.graph.lets).find(|n| n.value == m));
-    let own = d.x.name(symbol).trim_end_matches('*');
+    let own = d.x.name(symbol);
     same.map_or_else(|| own.to_string(), |n| n.name.clone())
 }
 

@@ -8,11 +8,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::Closure;
-use super::breaks::name_of;
+use super::breaks::place_of;
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
 use super::{Cause, StateKind};
-use crate::algebra::{Expr, Facts, Symbol};
+use crate::algebra::{Expr, Facts, Symbol, SymbolKind};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, Parameter, ParameterId, PortRef, StorageLaw, Variable};
 use crate::causal_graph::CausalGraph;
 use crate::causal_paths::numeric::sample;
@@ -163,9 +163,8 @@ impl Assembled<'_> {
         let k = d.x.mul(&[stiffness, rate, rate, inertia]);
         let c = d.x.mul(&[two, damping, root, rate, inertia]);
         let relation = if along { relation } else { d.x.neg(relation) };
-        let carried = name_of(d, multiplier);
-        let place = carried.rsplit_once('.').map_or(carried.as_str(), |(place, _)| place);
-        let spring = d.x.fresh(&format!("{place}.spring"), Facts::default());
+        let place = place_of(d, multiplier).map_or_else(|| d.graph.elements[element].name.clone(), |(place, _)| place);
+        let spring = d.x.made_of(SymbolKind::Spring(multiplier), &format!("{place}.spring"));
         let force = d.x.sym(spring);
         let damped = d.x.mul(&[c, relation]);
         let carried = d.x.add(&[force, damped]);

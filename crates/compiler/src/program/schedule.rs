@@ -199,7 +199,7 @@ impl Schedule<'_> {
     }
 
     fn names_of(&self, variables: &[Symbol]) -> Vec<String> {
-        variables.iter().map(|&s| self.graph.exprs.name(s).trim_end_matches('*').to_string()).collect()
+        variables.iter().map(|&s| self.graph.exprs.name(s).to_string()).collect()
     }
 
     fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {
@@ -408,7 +408,7 @@ fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
 
 /// A domain, if all that it reads is evaluated.
 fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::Domain) -> Option<Domain> {
-    let name = |s: Symbol| graph.exprs.name(s).trim_end_matches('*').to_string();
+    let name = |s: Symbol| graph.exprs.name(s).to_string();
     let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
     defined.then(|| Domain {
         given: name(domain.symbol),

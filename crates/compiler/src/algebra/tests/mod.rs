@@ -5,6 +5,7 @@ mod laws;
 mod numbers;
 mod random;
 mod reader;
+mod symbols;
 mod text;
 mod together;
 mod zero;
