@@ -133,16 +133,23 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     }
 }
 
-/// The values of the graph, those that sources give first, then inputs and held signals, then all others; and how many sources
+/// The values of the graph, those that sources give first, then inputs and signals, then all others; and how many sources
 /// give.
 fn suspects(graph: &BondGraph, names: &[String]) -> (Vec<usize>, usize) {
+    let inputs = graph.inputs.values().map(|i| i.name.as_str());
+    let signals = graph.signals.values().map(|s| s.name.as_str()).chain(graph.held.values().map(|h| h.name.as_str()));
+    let signals: BTreeSet<&str> = inputs.chain(signals).collect();
     let given = |e: &Element| match e.kind {
         Kind::EffortSource { .. } => Some(format!("{}.e", e.name)),
         Kind::FlowSource { .. } => Some(format!("{}.f", e.name)),
         _ => None,
     };
     let given: BTreeSet<String> = graph.elements.values().filter_map(given).collect();
-    let rank = |name: &String| if given.contains(name) { 0 } else { 1 + usize::from(name.contains('.')) };
+    let rank = |name: &String| match name {
+        source if given.contains(source) => 0,
+        signal if signals.contains(signal.as_str()) => 1,
+        _ => 2,
+    };
     let mut all: Vec<usize> = (0..names.len()).collect();
     all.sort_by_cached_key(|&i| rank(&names[i]));
     (all, names.iter().filter(|name| given.contains(*name)).count())

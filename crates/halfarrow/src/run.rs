@@ -5,7 +5,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::bond_graph::Kind;
+use halfarrow_compiler::bond_graph::{Kind, ParameterKind};
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Program, schedule};
@@ -690,32 +690,38 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
 /// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does
 /// not tell: a pendulum swings without a spring.
 pub(crate) fn set_spring_rate(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
-    let Some(rate) = system.program().parameters.iter().position(|p| p.name == "form.rate") else { return Ok(()) };
+    let Some(rate) = system.program().parameter_of(ParameterKind::FastestRate) else { return Ok(()) };
     let (Some(fastest), Some(own)) = (system.fastest_rate(0.0, x), system.parameter(rate)) else { return Ok(()) };
     if fastest <= own {
         return Ok(());
     }
-    system.set_form_parameter("form.rate", fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
+    system.set_form_parameter(rate, fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
 }
 
 /// Connects the inputs of a run, and sets the springs that it asks for.
 fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
     connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
-    for (name, value) in [("form.stiffness", run.stiffness), ("form.damping", run.damping)] {
-        let Some(value) = value else { continue };
-        let known = system.program().parameters.iter().any(|p| p.name == name);
-        let below = if name == "form.stiffness" { value <= 0.0 } else { value < 0.0 };
-        if !known || below || !value.is_finite() {
-            let option = name.trim_start_matches("form.");
-            let reason = match known {
-                true => format!("{option} is {value}: it has to be a finite number above zero"),
-                false => format!("{option} is an option of the form stiff"),
-            };
-            return Err(Problem::BadOption { reason });
-        }
-        system.set_parameter(name, value).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+    set_spring(system, ParameterKind::SpringStiffness, "stiffness", run.stiffness)?;
+    set_spring(system, ParameterKind::SpringDamping, "damping", run.damping)
+}
+
+/// Sets what an option says of the springs.
+fn set_spring(
+    system: &mut exec::ImplicitModel,
+    kind: ParameterKind,
+    option: &str,
+    value: Option<f64>,
+) -> Result<(), Problem> {
+    let Some(value) = value else { return Ok(()) };
+    let bad = |reason| Problem::BadOption { reason };
+    let Some(index) = system.program().parameter_of(kind) else {
+        return Err(bad(format!("{option} is an option of the form stiff")));
+    };
+    let below = if kind == ParameterKind::SpringStiffness { value <= 0.0 } else { value < 0.0 };
+    if below || !value.is_finite() {
+        return Err(bad(format!("{option} is {value}: it has to be a finite number above zero")));
     }
-    Ok(())
+    system.set_form_parameter(index, value).map_err(|e| bad(e.to_string()))
 }
 
 /// A form with algebraic unknowns or free rates is integrated by one method only.

@@ -13,6 +13,7 @@ use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
 use super::{Cause, StateKind};
 use crate::algebra::{Expr, Facts, Symbol, SymbolKind};
+use crate::bond_graph::ParameterKind::{self, Declared, FastestRate, SpringDamping, SpringStiffness};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, Parameter, ParameterId, PortRef, StorageLaw, Variable};
 use crate::causal_graph::CausalGraph;
 use crate::causal_paths::numeric::sample;
@@ -38,13 +39,19 @@ pub fn parameters(open: &mut CausalGraph) -> Springs {
     let damping = graph.exprs.int(1);
     let rate = graph.exprs.float(fastest);
     Springs {
-        stiffness: parameter(graph, "form.stiffness", stiffness, "stiffness of relaxed constraints"),
-        damping: parameter(graph, "form.damping", damping, "damping of relaxed constraints"),
-        rate: parameter(graph, "form.rate", rate, "fastest rate of the model without its constraints"),
+        stiffness: parameter(graph, SpringStiffness, stiffness),
+        damping: parameter(graph, SpringDamping, damping),
+        rate: parameter(graph, FastestRate, rate),
     }
 }
 
-fn parameter(graph: &mut BondGraph, name: &str, value: Expr, doc: &str) -> Symbol {
+fn parameter(graph: &mut BondGraph, kind: ParameterKind, value: Expr) -> Symbol {
+    let (name, doc) = match kind {
+        SpringStiffness => ("form.stiffness", "stiffness of relaxed constraints"),
+        SpringDamping => ("form.damping", "damping of relaxed constraints"),
+        FastestRate => ("form.rate", "fastest rate of the model without its constraints"),
+        Declared => unreachable!("the model declares it"),
+    };
     let facts = Facts { nonzero: true, positive: true, given: Some(value) };
     let symbol = graph.exprs.symbol(name, facts);
     let meaning = Meaning::Parameter(ParameterId::new(graph.parameters.len()));
@@ -54,6 +61,7 @@ fn parameter(graph: &mut BondGraph, name: &str, value: Expr, doc: &str) -> Symbo
         symbol,
         value,
         constant: false,
+        kind,
         unit: None,
         doc: doc.to_string(),
         span: Span::default(),

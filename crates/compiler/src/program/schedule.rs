@@ -118,6 +118,7 @@ impl Schedule<'_> {
                 name: p.name.clone(),
                 default: default.expect("every parameter has been given its value"),
                 constant: p.constant,
+                kind: p.kind,
                 unit: p.unit.clone(),
             })
             .collect()
@@ -296,6 +297,7 @@ impl Schedule<'_> {
                     name: o.name.clone(),
                     value: o.value.clone().map(|e| lower.value(e)),
                     unit: o.unit.clone(),
+                    kind: o.kind,
                     default: o.default,
                 })
                 .collect(),
