@@ -6,7 +6,9 @@ use std::ops::ControlFlow;
 use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
-use halfarrow_sim::{Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit};
+use halfarrow_sim::{
+    Affected, Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
+};
 use serde::Serialize;
 
 use crate::run::Recording;
@@ -183,7 +185,7 @@ impl Book {
     /// Keeps the values at `t`.
     fn keep(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
         if let Some(what) = self.not_finite(values) {
-            return Err(Failure::NotFinite { time: t, what: what.to_string() });
+            return Err(Failure::NotFinite { time: t, what: Affected::variable(what.to_string()) });
         }
         // A part of the run never ends between the two samples of a jump.
         if self.times.len() >= CHUNK && self.times.last() != Some(&t) {
@@ -268,8 +270,9 @@ impl Audited<'_, exec::Model> {
         // It has no value, which is why it is looked at; what has one is written.
         let _ = self.model.observe(*t, x, &mut values);
         match self.book.not_finite(&values) {
-            Some(name) if name != what => {
-                Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") }
+            Some(name) if *what != Affected::variable(name.to_string()) => {
+                let what = Affected::Through(name.to_string(), Box::new(what.clone()));
+                Failure::NotFinite { time: *time, what }
             }
             _ => failure,
         }
