@@ -1,6 +1,6 @@
 //! The pool of shared expressions.
 
-use super::assumptions::Notes;
+use super::assumptions::Assumptions;
 use super::fingerprint::{Fingerprint, mix};
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
@@ -43,6 +43,7 @@ pub struct Exprs {
     pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
     pub(super) slope_tables: FxHashMap<TableId, TableId>,
     pub(super) short_forms: ShortForms,
+    pub(super) assumptions: Assumptions,
 }
 
 /// An expression with what is known of it from birth.
@@ -59,8 +60,6 @@ pub(super) struct Entry {
     /// The product without its number; itself if it has none.
     pub monomial: Expr,
     pub fingerprint: Fingerprint,
-    /// What was said of it that the values of parameters decide.
-    pub notes: Notes,
 }
 
 impl Default for Exprs {
@@ -77,6 +76,7 @@ impl Default for Exprs {
             derivatives: FxHashMap::default(),
             slope_tables: FxHashMap::default(),
             short_forms: ShortForms::default(),
+            assumptions: Assumptions::default(),
         };
         for n in [0, 1, -1] {
             pool.int(n);
@@ -191,11 +191,11 @@ impl Exprs {
             symbols: self.symbols_of_node(&node),
             monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),
             fingerprint: self.fingerprint_of(&node),
-            notes: Notes::default(),
             node,
         };
         let id = u32::try_from(self.entries.len()).expect("fewer than 2^32 expressions");
         self.entries.push(entry);
+        self.assumptions.cover(self.entries.len());
         let entries = &self.entries;
         self.ids.insert_unique(hash, id, |&id| entries[id as usize].hash);
         Expr(id)

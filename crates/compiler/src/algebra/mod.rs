@@ -34,7 +34,7 @@ mod text;
 mod together;
 mod zero;
 
-pub use assumptions::{Assumption, Holds};
+pub use assumptions::{Assumption, Assumptions, Holds};
 pub use cost::Cost;
 pub use elimination::{
     BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,

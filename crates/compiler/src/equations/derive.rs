@@ -48,7 +48,9 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     let conserved = if momenta { conserved::eliminate(&mut assembled, causal) } else { Vec::new() };
+    let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
+    assembled.d.x.forget_unwatched(&before);
     let draft = Draft { conserved, relations, ..Draft::of(assembled, Vec::new()) };
     finish(causal, causal, form, draft)
 }
