@@ -83,7 +83,7 @@ pub fn typeset(expr: &str) -> String {
     while let Some(c) = rest.chars().next() {
         let word = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
         let length = if c.is_alphabetic() || c == '_' {
-            out.push_str(&unicode_name(&rest[..word]));
+            out.push_str(&unicode_name(&rest[..word], 0));
             word
         } else if c.is_ascii_digit() {
             let end = number_end(rest);

@@ -8,7 +8,7 @@ use halfarrow_compiler::algebra::{Expr, Function};
 use halfarrow_compiler::equations::EquationStep;
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
-use halfarrow_sim::{Events as _, Failure, System};
+use halfarrow_sim::{Affected, Events as _, Failure, System};
 
 fn rates(model: &mut Model, t: f64, x: &[f64]) -> Vec<f64> {
     let mut dx = vec![0.0; x.len()];
@@ -220,7 +220,7 @@ fn a_rate_without_a_value_names_its_state() {
     let log = s.call(Function::Log, x);
     s.rate("body.p", log);
     let failure = s.model().rates(1.0, &[-1.0], &mut [0.0]).unwrap_err();
-    assert_eq!(failure, Failure::NotFinite { time: 1.0, what: "the rate of body.p".into() });
+    assert_eq!(failure, Failure::NotFinite { time: 1.0, what: Affected::Rate("body.p".into()) });
 }
 
 /// What only outputs need is not computed while integrating.

@@ -101,6 +101,7 @@ fn blocks_are_differentiated_by_inputs_time_and_parameters() {
             name: format!("d{}", entry.column),
             value: Ok(entry.value),
             unit: None,
+            kind: halfarrow_compiler::equations::ObservedKind::Named,
             default: false,
         });
     }

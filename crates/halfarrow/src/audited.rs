@@ -6,7 +6,9 @@ use std::ops::ControlFlow;
 use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
-use halfarrow_sim::{Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit};
+use halfarrow_sim::{
+    Affected, Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
+};
 use serde::Serialize;
 
 use crate::run::Recording;
@@ -81,8 +83,9 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked: Vec<String> = model.recorded().iter().map(|&i| observed[i].name.clone()).collect();
-        let available = |name: &String| observed.iter().any(|o| o.name == *name && o.value.is_ok());
-        let names: Vec<String> = wanted(graph).into_iter().filter(available).collect();
+        let available: BTreeSet<&str> =
+            observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.as_str()).collect();
+        let names: Vec<String> = wanted(graph).into_iter().filter(|name| available.contains(name.as_str())).collect();
         let all: Vec<&str> = names.iter().chain(&asked).map(String::as_str).collect();
         let count = all.len();
         // Every name is known to have a value, so this cannot fail.
@@ -133,16 +136,23 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     }
 }
 
-/// The values of the graph, those that sources give first, then inputs and held signals, then all others; and how many sources
+/// The values of the graph, those that sources give first, then inputs and signals, then all others; and how many sources
 /// give.
 fn suspects(graph: &BondGraph, names: &[String]) -> (Vec<usize>, usize) {
+    let inputs = graph.inputs.values().map(|i| i.name.as_str());
+    let signals = graph.signals.values().map(|s| s.name.as_str()).chain(graph.held.values().map(|h| h.name.as_str()));
+    let signals: BTreeSet<&str> = inputs.chain(signals).collect();
     let given = |e: &Element| match e.kind {
         Kind::EffortSource { .. } => Some(format!("{}.e", e.name)),
         Kind::FlowSource { .. } => Some(format!("{}.f", e.name)),
         _ => None,
     };
     let given: BTreeSet<String> = graph.elements.values().filter_map(given).collect();
-    let rank = |name: &String| if given.contains(name) { 0 } else { 1 + usize::from(name.contains('.')) };
+    let rank = |name: &String| match name {
+        source if given.contains(source) => 0,
+        signal if signals.contains(signal.as_str()) => 1,
+        _ => 2,
+    };
     let mut all: Vec<usize> = (0..names.len()).collect();
     all.sort_by_cached_key(|&i| rank(&names[i]));
     (all, names.iter().filter(|name| given.contains(*name)).count())
@@ -176,7 +186,7 @@ impl Book {
     /// Keeps the values at `t`.
     fn keep(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
         if let Some(what) = self.not_finite(values) {
-            return Err(Failure::NotFinite { time: t, what: what.to_string() });
+            return Err(Failure::NotFinite { time: t, what: Affected::variable(what.to_string()) });
         }
         // A part of the run never ends between the two samples of a jump.
         if self.times.len() >= CHUNK && self.times.last() != Some(&t) {
@@ -261,8 +271,9 @@ impl Audited<'_, exec::Model> {
         // It has no value, which is why it is looked at; what has one is written.
         let _ = self.model.observe(*t, x, &mut values);
         match self.book.not_finite(&values) {
-            Some(name) if name != what => {
-                Failure::NotFinite { time: *time, what: format!("{name}, and with it {what},") }
+            Some(name) if *what != Affected::variable(name.to_string()) => {
+                let what = Affected::Through(name.to_string(), Box::new(what.clone()));
+                Failure::NotFinite { time: *time, what }
             }
             _ => failure,
         }

@@ -10,13 +10,19 @@ use crate::error::Error;
 use crate::loops::Count;
 use crate::model::Model;
 
+/// Writes the name of a form.
+pub(crate) fn by_name<S: serde::Serializer>(form: &Form, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(form.name())
+}
+
 /// What `halfarrow equations` tells.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsReport {
     /// Name of the model.
     pub model: String,
-    /// The form, as on the command line.
-    pub form: &'static str,
+    /// The form, by its name on the command line.
+    #[serde(serialize_with = "by_name")]
+    pub form: Form,
     /// The states, in order.
     pub states: Vec<StateReport>,
     /// Unknowns without a rate, in order.
@@ -106,7 +112,7 @@ impl Model {
         let equations = &shown.equations;
         Ok(EquationsReport {
             model: equations.graph.name.clone(),
-            form: form.name(),
+            form,
             unknowns: states.iter().map(|s| s.name.clone()).chain(implicit).collect(),
             states,
             algebraic,

@@ -298,8 +298,9 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
 struct OneName<'a>(&'a Exprs);
 
 impl Names for OneName<'_> {
-    fn ascii(&self, symbol: Symbol) -> String {
-        self.0.name(symbol).trim_end_matches('*').to_string()
+    fn called(&self, symbol: Symbol) -> (String, usize) {
+        let (of, rates) = self.0.undotted(symbol);
+        (self.0.name(of).to_string(), rates)
     }
     fn place(&self, symbol: Symbol) -> halfarrow_compiler::algebra::Place {
         PlainNames(self.0).place(symbol)

@@ -5,14 +5,14 @@ use std::fmt;
 use std::ops::ControlFlow;
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::bond_graph::Kind;
+use halfarrow_compiler::bond_graph::{Element, Kind, ParameterKind, PortRef, Storage};
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
 use halfarrow_sim::{
-    AbsoluteTolerance, Crawl, Events as _, Failure, ImplicitSystem as _, Method, Options, Sink, Summary,
+    AbsoluteTolerance, Affected, Crawl, Events as _, Failure, ImplicitSystem as _, Method, Options, Sink, Summary,
 };
 use halfarrow_trace::Trace;
 use serde::Serialize;
@@ -425,20 +425,31 @@ impl Model {
     /// else is given.
     fn blame_start(&self, failure: Failure) -> Failure {
         let Failure::NotFinite { time: 0.0, what } = &failure else { return failure };
-        let element = self
-            .graph
-            .elements
-            .values()
-            .find(|e| what.strip_prefix(e.name.as_str()).is_some_and(|rest| rest.starts_with('.')));
-        let not_given = element.and_then(|element| match &element.kind {
+        let (variable, behind) = match what {
+            Affected::Variables(names) => (names.first(), String::new()),
+            Affected::Through(variable, other) => (Some(variable), format!(" and with it {other},")),
+            Affected::Rate(_) | Affected::Other(_) => return failure,
+        };
+        let Some((element, storage, start)) = variable.and_then(|name| self.starts_empty(name)) else { return failure };
+        let stored = self.graph.exprs.name(storage.stored[0]);
+        let names =
+            if let Affected::Variables(_) = what { what.to_string() } else { variable.cloned().unwrap_or_default() };
+        let why = format!("{names}, where {stored} starts at 0 since `{}` gives no `{start}`,", element.name);
+        Failure::NotFinite { time: 0.0, what: Affected::Other(why + &behind) }
+    }
+
+    /// The storage of which a variable has this name, if the model gives it no start value; and what would give it one.
+    fn starts_empty(&self, name: &str) -> Option<(&Element, &Storage, &'static str)> {
+        let graph = &self.graph;
+        let is_of =
+            |port: PortRef| ["e", "f", "p", "q"].iter().any(|v| format!("{}.{v}", graph.port_name(port)) == name);
+        let ports = |element, e: &Element| (0..e.ports.len() as u32).map(move |port| PortRef { element, port });
+        let (_, element) = graph.elements.iter().find(|(id, e)| ports(*id, e).any(is_of))?;
+        match &element.kind {
             Kind::Inertance(storage) if storage.initial.is_empty() => Some((element, storage, "p0")),
             Kind::Compliance(storage) if storage.initial.is_empty() => Some((element, storage, "q0")),
             _ => None,
-        });
-        let Some((element, storage, start)) = not_given else { return failure };
-        let stored = self.graph.exprs.name(storage.stored[0]);
-        let what = format!("{what}, where {stored} starts at 0 since `{}` gives no `{start}`,", element.name);
-        Failure::NotFinite { time: 0.0, what }
+        }
     }
 
     /// A run that stopped with nothing recorded.
@@ -690,32 +701,38 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
 /// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does
 /// not tell: a pendulum swings without a spring.
 pub(crate) fn set_spring_rate(system: &mut exec::ImplicitModel, x: &[f64]) -> Result<(), Problem> {
-    let Some(rate) = system.program().parameters.iter().position(|p| p.name == "form.rate") else { return Ok(()) };
+    let Some(rate) = system.program().parameter_of(ParameterKind::FastestRate) else { return Ok(()) };
     let (Some(fastest), Some(own)) = (system.fastest_rate(0.0, x), system.parameter(rate)) else { return Ok(()) };
     if fastest <= own {
         return Ok(());
     }
-    system.set_form_parameter("form.rate", fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
+    system.set_form_parameter(rate, fastest).map_err(|e| Problem::BadOption { reason: e.to_string() })
 }
 
 /// Connects the inputs of a run, and sets the springs that it asks for.
 fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
     connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
-    for (name, value) in [("form.stiffness", run.stiffness), ("form.damping", run.damping)] {
-        let Some(value) = value else { continue };
-        let known = system.program().parameters.iter().any(|p| p.name == name);
-        let below = if name == "form.stiffness" { value <= 0.0 } else { value < 0.0 };
-        if !known || below || !value.is_finite() {
-            let option = name.trim_start_matches("form.");
-            let reason = match known {
-                true => format!("{option} is {value}: it has to be a finite number above zero"),
-                false => format!("{option} is an option of the form stiff"),
-            };
-            return Err(Problem::BadOption { reason });
-        }
-        system.set_parameter(name, value).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+    set_spring(system, ParameterKind::SpringStiffness, "stiffness", run.stiffness)?;
+    set_spring(system, ParameterKind::SpringDamping, "damping", run.damping)
+}
+
+/// Sets what an option says of the springs.
+fn set_spring(
+    system: &mut exec::ImplicitModel,
+    kind: ParameterKind,
+    option: &str,
+    value: Option<f64>,
+) -> Result<(), Problem> {
+    let Some(value) = value else { return Ok(()) };
+    let bad = |reason| Problem::BadOption { reason };
+    let Some(index) = system.program().parameter_of(kind) else {
+        return Err(bad(format!("{option} is an option of the form stiff")));
+    };
+    let below = if kind == ParameterKind::SpringStiffness { value <= 0.0 } else { value < 0.0 };
+    if below || !value.is_finite() {
+        return Err(bad(format!("{option} is {value}: it has to be a finite number above zero")));
     }
-    Ok(())
+    system.set_form_parameter(index, value).map_err(|e| bad(e.to_string()))
 }
 
 /// A form with algebraic unknowns or free rates is integrated by one method only.

@@ -17,7 +17,7 @@ fn compared(name: &str, to: f64) -> CompareReport {
     load(name).compare(&compare, &mut |_, _| true).expect("a table")
 }
 
-fn row<'r>(report: &'r CompareReport, form: &str) -> &'r Row {
+fn row<'r>(report: &'r CompareReport, form: Form) -> &'r Row {
     report.rows.iter().find(|row| row.form == form).expect("a row")
 }
 
@@ -26,16 +26,16 @@ fn every_form_has_a_row_whose_numbers_hold() {
     let report = compared("pendulum", 2.0);
     let model = load("pendulum");
     assert!(report.reference.confirmed_to < 1e-9, "{:?}", report.reference);
-    let forms: Vec<&str> = report.rows.iter().map(|row| row.form).collect();
+    let forms: Vec<&str> = report.rows.iter().map(|row| row.form.name()).collect();
     assert_eq!(forms, ["minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff"]);
     for row in &report.rows {
-        let equations = model.equations(Form::named(row.form).expect("a form")).expect("equations");
+        let equations = model.equations(row.form).expect("equations");
         let counts = (equations.counts.differential, equations.counts.algebraic, equations.index);
         assert_eq!((row.differential, row.algebraic, row.index), (Some(counts.0), Some(counts.1), Some(counts.2)));
         assert_eq!(row.reason, None, "{}", row.form);
         assert!(row.flops.is_some_and(|n| n > 0) && row.steps.is_some_and(|n| n > 0), "{}", row.form);
         assert!(row.seconds_per_second.is_some_and(|s| s > 0.0), "{}", row.form);
-        if row.form != "stiff" {
+        if row.form != Form::Stiff {
             assert!(
                 row.max_error.is_some_and(|e| e < 1e-8),
                 "{}: {:?} {:?}",
@@ -48,20 +48,20 @@ fn every_form_has_a_row_whose_numbers_hold() {
         let exact = |solver: &str| row.runs.iter().filter(|r| r.solver == solver).map(|r| r.error).collect::<Vec<_>>();
         for solver in ["explicit", "bdf", "radau"] {
             let errors = exact(solver);
-            for pair in errors.iter().zip(errors.iter().skip(3)).filter(|_| row.form != "stiff") {
+            for pair in errors.iter().zip(errors.iter().skip(3)).filter(|_| row.form != Form::Stiff) {
                 assert!(pair.1 < &(0.1 * pair.0), "{} {solver}: {errors:?}", row.form);
             }
         }
     }
     // An explicit equation of one speed takes fewer operations than five equations.
-    assert!(row(&report, "minimal").flops < row(&report, "break").flops);
-    assert_eq!(row(&report, "minimal").times_minimal, Some(1.0));
+    assert!(row(&report, Form::Minimal).flops < row(&report, Form::Break).flops);
+    assert_eq!(row(&report, Form::Minimal).times_minimal, Some(1.0));
 }
 
 #[test]
 fn stiff_springs_converge_with_order_one() {
     let report = compared("pendulum", 2.0);
-    let stiff = row(&report, "stiff");
+    let stiff = row(&report, Form::Stiff);
     let order = stiff.order.expect("an order");
     assert!((0.9..1.1).contains(&order), "{order}: {:?}", stiff.convergence);
     assert!(stiff.convergence.len() > 3);
@@ -84,7 +84,7 @@ fn a_form_that_does_not_apply_says_why() {
 #[test]
 fn jumps_and_switches_are_met_by_all_forms() {
     let report = compared("source_jumps", 1.0);
-    for row in report.rows.iter().filter(|row| row.differential.is_some() && row.form != "stiff") {
+    for row in report.rows.iter().filter(|row| row.differential.is_some() && row.form != Form::Stiff) {
         assert!(row.max_error.is_some_and(|e| e < 1e-8), "{}: {:?} {:?}", row.form, row.max_error, row.max_error_in);
     }
 }

@@ -102,7 +102,7 @@ fn a_pole_stops_the_run_with_the_name_of_its_source() {
         for every in [None, Some(0.25)] {
             let stopped = run(&model, &Run { form, every, ..Run::default() }).expect_err("1/0 at its end");
             let Failure::NotFinite { time, what } = &stopped.failure else { panic!("{}", stopped.failure) };
-            assert!(*time == 1.0 && what.contains("s.e"), "{}", stopped.failure);
+            assert!(*time == 1.0 && what.to_string().contains("s.e"), "{}", stopped.failure);
             let finite = stopped.trace.columns.iter().flat_map(|c| &c.values).all(|v| v.is_finite());
             assert!(finite && stopped.report.audit.verdict != Verdict::Refused, "what came before is kept");
         }

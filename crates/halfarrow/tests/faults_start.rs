@@ -306,6 +306,16 @@ fn fault_at_start(text: &str) -> String {
     }
 }
 
+/// The storage whose variable has no value is the one that is blamed, be its name the beginning of another's.
+#[test]
+fn a_value_that_is_not_finite_is_blamed_on_the_storage_that_has_it() {
+    let text = "model M\nC:gas(k = 2)\nC:gas2(e = 1/q)\n1:a -> I:m(2)\na -> gas\na -> gas2\n";
+    let Err(stopped) = model(text).simulate(&Run::default(), &mut |_| true) else { panic!("1/0") };
+    let said = stopped.to_string();
+    let told = "gas2.e, where gas2.q starts at 0 since `gas2` gives no `q0`, is not a finite number";
+    assert!(said.contains(told), "{said}");
+}
+
 const FORMS: [Form; 4] = [Form::Minimal, Form::Kane, Form::Break, Form::Lagrange];
 
 /// Storages that start from something, beside others of which nothing is said: those are empty, in every form.

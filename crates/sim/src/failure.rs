@@ -9,8 +9,8 @@ pub enum Failure {
     NotFinite {
         /// When, in s; NaN, here and below, if it is so at any time.
         time: f64,
-        /// Which value, such as `the rate of body.p`.
-        what: String,
+        /// Which value.
+        what: Affected,
     },
     /// A block of linear equations has no unique solution: a pivot vanished and there is no other choice.
     Singular {
@@ -127,6 +127,43 @@ pub struct Leap {
     pub from: f64,
     /// Its value in another solution.
     pub to: f64,
+}
+
+/// What is not finite.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Affected {
+    /// Variables, by their names.
+    Variables(Vec<String>),
+    /// The rate of a state, by its name.
+    Rate(String),
+    /// A variable, by its name, and something else with it.
+    Through(String, Box<Affected>),
+    /// Something else, in words.
+    Other(String),
+}
+
+impl Affected {
+    /// A variable.
+    pub fn variable(name: String) -> Affected {
+        Affected::Variables(vec![name])
+    }
+}
+
+impl fmt::Display for Affected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Affected::Variables(names) => f.write_str(&names.join(", ")),
+            Affected::Rate(state) => write!(f, "the rate of {state}"),
+            Affected::Through(variable, other) => write!(f, "{variable}, and with it {other},"),
+            Affected::Other(words) => f.write_str(words),
+        }
+    }
+}
+
+impl From<&str> for Affected {
+    fn from(words: &str) -> Affected {
+        Affected::Other(words.to_string())
+    }
 }
 
 impl Failure {

@@ -10,7 +10,7 @@ use semi_explicit::SemiExplicit;
 use crate::driver::Run;
 use crate::shared::Shared;
 use crate::simulate::{check_start, counted_in};
-use crate::{Failure, HybridImplicitSystem, ImplicitSystem, Method, Options, Sink, Stopped, Summary, halves};
+use crate::{Affected, Failure, HybridImplicitSystem, ImplicitSystem, Method, Options, Sink, Stopped, Summary, halves};
 
 /// Integrates `system` in implicit form from the unknowns `y` and their rates `yp` at `options.from` to `options.to`, and
 /// leaves the last ones reached in `y` and `yp`. The method is [`Method::Radau`](crate::Method::Radau), or [`Method::Bdf`] for semi-explicit
@@ -82,8 +82,8 @@ fn check_point(system: &dyn HybridImplicitSystem, time: f64, point: &[f64]) -> R
     let Some(value) = point.iter().position(|value| !value.is_finite()) else { return Ok(()) };
     let unknowns = system.unknowns();
     let what = match value < unknowns {
-        true => system.unknown_name(value),
-        false => format!("the rate of {}", system.unknown_name(value - unknowns)),
+        true => Affected::variable(system.unknown_name(value)),
+        false => Affected::Rate(system.unknown_name(value - unknowns)),
     };
     Err(Failure::NotFinite { time, what })
 }

@@ -25,7 +25,7 @@ pub mod wide;
 
 pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary, tick};
 pub use events::Events;
-pub use failure::{Failure, Leap};
+pub use failure::{Affected, Failure, Leap};
 pub use implicit::simulate_implicit;
 pub use implicit_system::{HybridImplicitSystem, ImplicitSystem, halves, halves_mut};
 pub use options::{AbsoluteTolerance, Method, Options};

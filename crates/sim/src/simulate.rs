@@ -3,7 +3,7 @@
 use crate::driver::{Run, Sink, Stopped, Summary};
 use crate::fixed_step::{FixedStep, Ticks};
 use crate::shared::{Counted, Shared};
-use crate::{Failure, HybridSystem, Method, Options, System};
+use crate::{Affected, Failure, HybridSystem, Method, Options, System};
 
 /// Integrates `system` from the state `x` at `options.from` to `options.to`, and leaves the last state reached in `x`.
 ///
@@ -55,7 +55,7 @@ pub(crate) fn counted_in(end: Result<Summary, Stopped>, system: &Counted<'_>) ->
 /// Whether all states are finite where a run starts.
 pub(crate) fn check_start<S: System + ?Sized>(system: &S, time: f64, x: &[f64]) -> Result<(), Failure> {
     match x.iter().position(|value| !value.is_finite()) {
-        Some(state) => Err(Failure::NotFinite { time, what: system.state_name(state) }),
+        Some(state) => Err(Failure::NotFinite { time, what: Affected::variable(system.state_name(state)) }),
         None => Ok(()),
     }
 }

@@ -6,7 +6,7 @@
 use crate::driver::{Grid, Run, Stop, StopReason};
 use crate::fixed_step::{FixedMethod, Tableau, target};
 use crate::simulate::check_start;
-use crate::{Failure, HybridSystem, Method, Options, Sink, Stopped, Summary};
+use crate::{Affected, Failure, HybridSystem, Method, Options, Sink, Stopped, Summary};
 
 /// Runs at once.
 pub const LANES: usize = 16;
@@ -165,7 +165,7 @@ impl<'a> Batch<'a> {
     fn arrive(&mut self, i: usize, x: &mut [Wide]) -> Option<f64> {
         let target = self.lanes[i].target;
         if let Some(state) = self.trial.iter().position(|value| !value[i].is_finite()) {
-            let what = self.system.lane(i).state_name(state);
+            let what = Affected::variable(self.system.lane(i).state_name(state));
             self.fail(i, Failure::NotFinite { time: target, what });
             return None;
         }

@@ -178,7 +178,7 @@ fn equations_text(report: &EquationsReport) -> String {
         text += "\n";
     }
     report.certificate.iter().for_each(|line| text += &format!("{line}\n"));
-    if report.form != "minimal" {
+    if report.form != Form::Minimal {
         let (n, index) = (&report.counts, report.index);
         text += &format!("\n{} differential, {} algebraic, index {index}\n", n.differential, n.algebraic);
     }

@@ -187,9 +187,7 @@ impl Eliminator {
                 continue;
             };
             open.remove(&column);
-            if quality >= Quality::DoubtfulParameters {
-                self.watch(x, row as usize, column);
-            }
+            self.decide(x, row as usize, column, quality);
             for touched in self.eliminate_column(x, row as usize, column) {
                 self.stamps[touched] += 1;
                 if open.contains(&touched) {
@@ -221,10 +219,8 @@ impl Eliminator {
 
     /// Eliminates a column by a row that holds it.
     pub fn eliminate_by(&mut self, x: &mut Exprs, column: usize, row: u32) {
-        if let Some(e) = coefficient(&self.rows[row as usize], column)
-            && quality(x, e).0 >= Quality::DoubtfulParameters
-        {
-            self.watch(x, row as usize, column);
+        if let Some(e) = coefficient(&self.rows[row as usize], column) {
+            self.decide(x, row as usize, column, quality(x, e).0);
         }
         for touched in self.eliminate_column(x, row as usize, column) {
             self.stamps[touched] += 1;
@@ -268,8 +264,12 @@ impl Eliminator {
         self.column_rows[column].clone()
     }
 
-    fn watch(&mut self, x: &mut Exprs, row: usize, column: usize) {
-        if let Some(e) = coefficient(&self.rows[row], column) {
+    /// A pivot is taken: what it is known by counts from now on, or it is watched.
+    fn decide(&mut self, x: &mut Exprs, row: usize, column: usize, quality: Quality) {
+        let Some(e) = coefficient(&self.rows[row], column) else { return };
+        if quality < Quality::DoubtfulParameters {
+            let _ = x.nonzero(e);
+        } else {
             x.assume_nonzero(e);
             // What is defined may be written shorter.
             let short = x.simplify(e);
@@ -364,7 +364,7 @@ fn quality(x: &Exprs, e: Expr) -> (Quality, u32) {
         return (Quality::Number, 0);
     }
     let varies = x.depends_on_any(e, &|s| x.facts(s).given.is_none());
-    let quality = match (varies, x.nonzero(e)) {
+    let quality = match (varies, x.is_known_nonzero(e)) {
         (false, true) => Quality::Parameters,
         (true, true) => Quality::Nonzero,
         (false, false) => Quality::DoubtfulParameters,

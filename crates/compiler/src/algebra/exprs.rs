@@ -1,12 +1,13 @@
 //! The pool of shared expressions.
 
-use super::assumptions::Notes;
+use super::assumptions::Assumptions;
 use super::fingerprint::{Fingerprint, mix};
-use super::node::{Comparison, Expr, Facts, Function, Node, Symbol};
+use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
 use super::short_forms::ShortForms;
 use super::symbol_sets::{SetId, SymbolSets};
+use super::symbols::{SymbolEntry, SymbolKind, Texts};
 use super::table::{Table1d, TableId};
 use hashbrown::HashTable;
 use rustc_hash::FxHashMap;
@@ -32,17 +33,17 @@ use std::fmt;
 pub struct Exprs {
     pub(super) entries: Vec<Entry>,
     ids: HashTable<u32>,
-    symbols: Vec<SymbolEntry>,
-    by_name: HashTable<u32>,
-    /// The names of all symbols, one after the other.
-    names: String,
-    /// The same with their numbers padded, so that `q2` comes before `q10`.
-    orders: Vec<u8>,
+    pub(super) symbols: Vec<SymbolEntry>,
+    pub(super) by_label: HashTable<u32>,
+    /// All symbols that are made of others.
+    pub(super) made: FxHashMap<SymbolKind, Symbol>,
+    pub(super) texts: Texts,
     pub(super) sets: SymbolSets,
     pub(super) tables: Vec<Table1d>,
     pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
     pub(super) slope_tables: FxHashMap<TableId, TableId>,
     pub(super) short_forms: ShortForms,
+    pub(super) assumptions: Assumptions,
 }
 
 /// An expression with what is known of it from birth.
@@ -59,19 +60,6 @@ pub(super) struct Entry {
     /// The product without its number; itself if it has none.
     pub monomial: Expr,
     pub fingerprint: Fingerprint,
-    /// What was said of it that the values of parameters decide.
-    pub notes: Notes,
-}
-
-#[derive(Clone)]
-struct SymbolEntry {
-    /// Where it ends in `names`, and in `orders`; it starts where the one before it ends.
-    ends: (u32, u32),
-    /// From the name.
-    hash: u64,
-    /// The symbol as an expression, once there is one.
-    expr: Option<Expr>,
-    facts: Facts,
 }
 
 impl Default for Exprs {
@@ -80,14 +68,15 @@ impl Default for Exprs {
             entries: Vec::new(),
             ids: HashTable::new(),
             symbols: Vec::new(),
-            by_name: HashTable::new(),
-            names: String::new(),
-            orders: Vec::new(),
+            by_label: HashTable::new(),
+            made: FxHashMap::default(),
+            texts: Texts::default(),
             sets: SymbolSets::default(),
             tables: Vec::new(),
             derivatives: FxHashMap::default(),
             slope_tables: FxHashMap::default(),
             short_forms: ShortForms::default(),
+            assumptions: Assumptions::default(),
         };
         for n in [0, 1, -1] {
             pool.int(n);
@@ -110,63 +99,6 @@ pub const ONE: Expr = Expr(1);
 pub const MINUS_ONE: Expr = Expr(2);
 
 impl Exprs {
-    /// The symbol of that name. The facts hold if it is new; a name always means the same symbol.
-    pub fn symbol(&mut self, name: &str, facts: Facts) -> Symbol {
-        let hash = hash_name(name);
-        if let Some(known) = self.named(name, hash) {
-            return known;
-        }
-        let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
-        self.names.push_str(name);
-        push_natural_order(&mut self.orders, name);
-        let place = |len: usize| u32::try_from(len).expect("names of less than 4 GiB");
-        let ends = (place(self.names.len()), place(self.orders.len()));
-        self.symbols.push(SymbolEntry { ends, hash, expr: None, facts });
-        let symbols = &self.symbols;
-        self.by_name.insert_unique(hash, id, |&id| symbols[id as usize].hash);
-        Symbol(id)
-    }
-
-    /// A new symbol of that name, or of that name with the first free number from 2 behind it.
-    pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
-        let free = |x: &Exprs, name: &str| x.find_symbol(name).is_none();
-        if free(self, name) {
-            return self.symbol(name, facts);
-        }
-        let numbered = (2..).map(|n| format!("{name}_{n}")).find(|name| free(self, name));
-        self.symbol(&numbered.expect("numbers without end"), facts)
-    }
-
-    /// The symbol of that name, if there is one.
-    pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
-        self.named(name, hash_name(name))
-    }
-
-    fn named(&self, name: &str, hash: u64) -> Option<Symbol> {
-        self.by_name.find(hash, |&id| self.name(Symbol(id)) == name).map(|&id| Symbol(id))
-    }
-
-    /// The name of a symbol.
-    pub fn name(&self, symbol: Symbol) -> &str {
-        let (start, end) = self.ends(symbol);
-        &self.names[start.0 as usize..end.0 as usize]
-    }
-
-    fn ends(&self, symbol: Symbol) -> ((u32, u32), (u32, u32)) {
-        let at = symbol.0 as usize;
-        (if at == 0 { (0, 0) } else { self.symbols[at - 1].ends }, self.symbols[at].ends)
-    }
-
-    /// What is known of a symbol.
-    pub fn facts(&self, symbol: Symbol) -> Facts {
-        self.symbols[symbol.0 as usize].facts
-    }
-
-    /// How many symbols there are; their ids are the numbers below.
-    pub fn symbol_count(&self) -> usize {
-        self.symbols.len()
-    }
-
     /// How many expressions there are; their ids are the numbers below, those of the parts before those of the whole.
     pub fn len(&self) -> usize {
         self.entries.len()
@@ -175,16 +107,6 @@ impl Exprs {
     /// Never: 0, 1 and -1 are always there.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
-    }
-
-    /// The symbol as an expression.
-    pub fn sym(&mut self, symbol: Symbol) -> Expr {
-        if let Some(known) = self.symbols[symbol.0 as usize].expr {
-            return known;
-        }
-        let e = self.intern(Node::Symbol(symbol));
-        self.symbols[symbol.0 as usize].expr = Some(e);
-        e
     }
 
     /// An integer.
@@ -253,11 +175,6 @@ impl Exprs {
         &self.entries[e.0 as usize]
     }
 
-    pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
-        let (start, end) = self.ends(symbol);
-        &self.orders[start.1 as usize..end.1 as usize]
-    }
-
     /// The entry of a node that is in canonical form.
     pub(super) fn intern(&mut self, node: Node) -> Expr {
         let hash = self.hash_of(&node);
@@ -274,11 +191,11 @@ impl Exprs {
             symbols: self.symbols_of_node(&node),
             monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),
             fingerprint: self.fingerprint_of(&node),
-            notes: Notes::default(),
             node,
         };
         let id = u32::try_from(self.entries.len()).expect("fewer than 2^32 expressions");
         self.entries.push(entry);
+        self.assumptions.cover(self.entries.len());
         let entries = &self.entries;
         self.ids.insert_unique(hash, id, |&id| entries[id as usize].hash);
         Expr(id)
@@ -343,25 +260,5 @@ fn hash_number(value: &Rational) -> u64 {
             let parts = [value.numerator(), value.denominator()];
             parts.iter().flat_map(|p| p.to_signed_bytes_le()).fold(0xb16, |h, b| mix(h, u64::from(b)))
         }
-    }
-}
-
-fn hash_name(name: &str) -> u64 {
-    name.bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
-}
-
-fn push_natural_order(order: &mut Vec<u8>, name: &str) {
-    let mut rest = name.as_bytes();
-    while let Some(&first) = rest.first() {
-        if !first.is_ascii_digit() {
-            order.push(first);
-            rest = &rest[1..];
-            continue;
-        }
-        let len = rest.iter().take_while(|b| b.is_ascii_digit()).count();
-        // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
-        order.extend([b'0', len.min(255) as u8]);
-        order.extend_from_slice(&rest[..len]);
-        rest = &rest[len..];
     }
 }

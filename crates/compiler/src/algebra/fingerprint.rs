@@ -94,7 +94,7 @@ impl Exprs {
         if let (true, Some(given)) = (GIVEN.contains(&lane), facts.given) {
             return self.at(given, lane);
         }
-        let key = self.name(symbol).bytes().fold(0x51, |h, b| mix(h, u64::from(b)));
+        let key = self.label(symbol).bytes().fold(0x51, |h, b| mix(h, u64::from(b)));
         let value = random(lane, key);
         Some(if facts.positive { field::pow(value, field::INTO_ROOTED) } else { value })
     }

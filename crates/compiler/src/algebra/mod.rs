@@ -28,12 +28,13 @@ mod share;
 mod short_forms;
 mod simplify;
 mod symbol_sets;
+mod symbols;
 mod table;
 mod text;
 mod together;
 mod zero;
 
-pub use assumptions::{Assumption, Holds};
+pub use assumptions::{Assumption, Assumptions, Holds};
 pub use cost::Cost;
 pub use elimination::{
     BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,
@@ -46,6 +47,7 @@ pub use rational::Rational;
 pub use residue::Residue;
 pub use share::Shared;
 pub use symbol_sets::Symbols;
+pub use symbols::{SymbolKind, dotted};
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
 pub use text::{
     Names, Place, PlainNames, Sort, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode, unicode_name,

@@ -194,7 +194,7 @@ impl Point<'_> {
         if let (true, Some(given)) = (self.given, facts.given) {
             return self.value(given, values, constants);
         }
-        let seed = self.pool.name(symbol).bytes().fold(self.number, |h, b| super::fingerprint::mix(h, u64::from(b)));
+        let seed = self.pool.label(symbol).bytes().fold(self.number, |h, b| super::fingerprint::mix(h, u64::from(b)));
         let size = 300_000 + (seed >> 20) % 1_400_000;
         // The first two points have all signs alike, for functions that need that.
         let negative = match self.number {

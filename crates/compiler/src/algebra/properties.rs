@@ -1,7 +1,7 @@
 //! What is known of an expression without a value for its symbols: sign, and whether it is defined everywhere.
 
-use super::assumptions::Notes;
-use super::exprs::Exprs;
+use super::assumptions::Decided;
+use super::exprs::{Entry, Exprs};
 use super::node::{Expr, Function, Node};
 use super::rational::Rational;
 use super::table::Outside;
@@ -57,10 +57,8 @@ impl Signs {
 /// See the fields.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Properties {
-    /// The signs its values may have.
-    pub signs: Signs,
-    /// It has a finite value for all finite values of its symbols.
-    pub total: bool,
+    /// Of itself: the signs that its values may have, and whether it has a finite value for all values of its symbols.
+    pub known: Known,
     /// It holds corners or jumps, so that a value at a few points says nothing of the others.
     pub piecewise: bool,
     /// It holds roots, so that a fingerprint of zero is no proof.
@@ -69,91 +67,110 @@ pub(super) struct Properties {
     pub opaque: [bool; 2],
 }
 
+/// What is known of a value: its signs, and whether it is defined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Known {
+    pub signs: Signs,
+    pub total: bool,
+}
+
+impl Known {
+    /// Whether divisors that do not vanish tell no more of it.
+    fn is_settled(self) -> bool {
+        self.total && self.signs.within(Signs::NOT_ZERO)
+    }
+}
+
 impl Exprs {
     /// Whether the expression is known never to be zero.
     pub fn nonzero(&self, e: Expr) -> bool {
-        self.claims(e, Signs::NOT_ZERO, Notes::NOT_ZERO)
+        self.claims(e, Signs::NOT_ZERO, Decided::NOT_ZERO)
+    }
+
+    /// The same, to choose by: nothing is decided by it yet.
+    pub fn is_known_nonzero(&self, e: Expr) -> bool {
+        self.signs(e).within(Signs::NOT_ZERO)
     }
 
     /// Whether the expression is known to be above zero.
     pub fn positive(&self, e: Expr) -> bool {
-        self.claims(e, Signs::PLUS, Notes::POSITIVE)
+        self.claims(e, Signs::PLUS, Decided::POSITIVE)
     }
 
     /// Whether the expression is known not to be below zero.
     pub fn nonnegative(&self, e: Expr) -> bool {
-        self.claims(e, Signs::NOT_MINUS, Notes::NOT_NEGATIVE)
-    }
-
-    /// Whether the signs of an expression are among these; if so that is noted.
-    fn claims(&self, e: Expr, signs: Signs, note: u8) -> bool {
-        let entry = self.entry(e);
-        let known = entry.properties.signs.within(signs);
-        if known {
-            entry.notes.add(note);
-        }
-        known
+        self.claims(e, Signs::NOT_MINUS, Decided::NOT_NEGATIVE)
     }
 
     /// Whether the expression is known to have a finite value for all values of its symbols.
     pub fn total(&self, e: Expr) -> bool {
-        self.entry(e).properties.total
+        let known = self.known(e).total;
+        if known {
+            self.assumptions.decide(e, Decided::TOTAL);
+        }
+        known
     }
 
-    /// From now on the expression counts as defined and nonzero: it is watched while the program runs. Its factors are
-    /// nonzero too.
-    pub fn assume_nonzero(&mut self, e: Expr) {
-        self.short_forms.forget();
-        self.assume_total(e);
-        let monomial = self.entry(e).monomial;
-        let (_, primitive) = self.primitive(monomial);
-        for e in [e, monomial, primitive] {
-            let entry = &mut self.entries[e.0 as usize];
-            if !entry.properties.signs.within(Signs::NOT_ZERO) {
-                entry.notes.add(Notes::WATCHED);
-            }
-            entry.properties.signs = entry.properties.signs.and(Signs::NOT_ZERO);
+    /// Whether the signs of an expression are among these; if so that has been decided.
+    fn claims(&self, e: Expr, signs: Signs, decided: u8) -> bool {
+        let known = self.signs(e).within(signs);
+        if known {
+            self.assumptions.decide(e, decided);
         }
-        let mut parts = Vec::new();
-        match self.node(monomial) {
-            Node::Mul(factors) => parts.extend_from_slice(factors),
-            Node::Pow(base, _) => parts.push(*base),
-            _ => {}
-        }
-        for part in parts {
-            self.assume_nonzero(part);
-        }
+        known
     }
 
-    /// What is finite has finite parts; only what a condition chooses may be undefined.
-    fn assume_total(&mut self, e: Expr) {
-        let chosen =
-            |x: &Exprs, e: Expr| matches!(x.node(e), Node::Select(..) | Node::Call(Function::Min | Function::Max, _));
-        let mut open = vec![e];
-        while let Some(e) = open.pop() {
-            if !self.total(e) && !chosen(self, e) {
-                self.entries[e.0 as usize].properties.total = true;
-                self.node(e).for_each_child(|c| open.push(c));
-            }
-        }
-    }
-
+    /// The signs that an expression may have. Nothing is decided by looking at them.
     pub(super) fn signs(&self, e: Expr) -> Signs {
-        self.entry(e).properties.signs
+        self.known(e).signs
+    }
+
+    /// What is known of an expression, by itself and by divisors that do not vanish.
+    fn known(&self, e: Expr) -> Known {
+        let own = self.entry(e).properties.known;
+        if own.is_settled() || !self.assumptions.has_divisors() {
+            return own;
+        }
+        let mut found = self.assumptions.found();
+        if let Some(&known) = found.get(&e) {
+            return known;
+        }
+        let open = |p: Expr| !self.entry(p).properties.known.is_settled() && !found.contains_key(&p);
+        for part in self.below(&[e], &open) {
+            let of = |c: Expr| found.get(&c).copied().unwrap_or(self.entry(c).properties.known);
+            let known = self.known_by(part, &of);
+            found.insert(part, known);
+        }
+        found[&e]
+    }
+
+    /// What is known of an expression if this is known of its parts.
+    fn known_by(&self, e: Expr, of: &dyn Fn(Expr) -> Known) -> Known {
+        let Entry { node, properties, .. } = self.entry(e);
+        let mut signs = properties.known.signs.and(self.signs_of(node, &|c| of(c).signs));
+        if self.assumptions.is_divisor(e) {
+            signs = signs.and(Signs::NOT_ZERO);
+        }
+        let mut parts_total = true;
+        node.for_each_child(|c| parts_total &= of(c).total);
+        let total = properties.known.total || self.assumptions.is_defined(e);
+        Known { signs, total: total || parts_total && self.total_of(node, &|c| of(c).signs) }
     }
 
     pub(super) fn properties_of(&self, node: &Node) -> Properties {
-        let mut total = self.total_of(node);
+        let of = |e: Expr| self.entry(e).properties.known;
+        let mut total = self.total_of(node, &|c| of(c).signs);
         let (mut piecewise, mut radical, mut opaque) =
             (is_piecewise(node), self.is_radical(node), self.opaque_of(node));
         node.for_each_child(|c| {
             let p = &self.entry(c).properties;
-            total &= p.total;
+            total &= p.known.total;
             piecewise |= p.piecewise;
             radical |= p.radical;
             opaque = [opaque[0] | p.opaque[0], opaque[1] | p.opaque[1]];
         });
-        Properties { signs: self.signs_of(node, &|e| self.signs(e)), total, piecewise, radical, opaque }
+        let signs = self.signs_of(node, &|c| of(c).signs);
+        Properties { known: Known { signs, total }, piecewise, radical, opaque }
     }
 
     fn is_radical(&self, node: &Node) -> bool {
@@ -161,19 +178,25 @@ impl Exprs {
     }
 
     /// Whether a node is defined and finite wherever its parts are.
-    fn total_of(&self, node: &Node) -> bool {
+    fn total_of(&self, node: &Node, of: &dyn Fn(Expr) -> Signs) -> bool {
         match node {
-            Node::Pow(base, n) => match self.is_number(*n) {
-                Some(n) if n.is_integer() => n.signum() >= 0 || self.nonzero(*base),
-                Some(n) if n.signum() > 0 => self.nonnegative(*base),
-                Some(_) => self.positive(*base),
-                None => self.positive(*base),
-            },
             Node::Call(Function::Tan | Function::Asin | Function::Acos, _) => false,
-            Node::Call(Function::Log | Function::Log10, x) => self.positive(x[0]),
-            Node::Call(Function::Mod, x) => self.nonzero(x[1]),
             Node::Table(t, _) | Node::TableSlope(t, _) => self.table1d(*t).outside() != Outside::Error,
-            _ => true,
+            _ => self.needed_for_a_value(node).is_none_or(|(part, signs)| of(part).within(signs)),
+        }
+    }
+
+    /// The signs that a part of a node has to have for the node to have a value wherever its parts have one.
+    pub(super) fn needed_for_a_value(&self, node: &Node) -> Option<(Expr, Signs)> {
+        match *node {
+            Node::Pow(base, n) => match self.is_number(n) {
+                Some(n) if n.is_integer() => (n.signum() < 0).then_some((base, Signs::NOT_ZERO)),
+                Some(n) if n.signum() > 0 => Some((base, Signs::NOT_MINUS)),
+                _ => Some((base, Signs::PLUS)),
+            },
+            Node::Call(Function::Log | Function::Log10, ref x) => Some((x[0], Signs::PLUS)),
+            Node::Call(Function::Mod, ref x) => Some((x[1], Signs::NOT_ZERO)),
+            _ => None,
         }
     }
 

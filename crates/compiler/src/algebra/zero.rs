@@ -1,6 +1,6 @@
 //! Whether an expression is zero whatever its symbols are.
 
-use super::assumptions::Notes;
+use super::assumptions::Decided;
 use super::exprs::Exprs;
 use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
@@ -28,7 +28,7 @@ impl Exprs {
     pub fn is_zero_given(&self, e: Expr) -> bool {
         let zero = self.is_zero_in(e, true);
         if zero && !self.is_zero(e) {
-            self.note_zero(e);
+            self.decide_zero(e);
         }
         zero
     }
@@ -76,7 +76,7 @@ impl Exprs {
     fn note_positive_symbols(&self, e: Expr) {
         for part in self.below(&[e], &|e| !self.is_constant(e)) {
             if matches!(self.node(part), Node::Symbol(s) if self.facts(*s).positive) {
-                self.entry(part).notes.add(Notes::POSITIVE);
+                self.assumptions.decide(part, Decided::POSITIVE);
             }
         }
     }

@@ -73,7 +73,7 @@ impl<'a> Builder<'a, '_> {
             self.fault(Diagnostic::error(codes::L010, title, e.span, format!("this is {number}")));
             return None;
         }
-        let _ = self.exprs.positive(value.expr); // as was just seen
+        self.exprs.decide_positive(value.expr);
         Some(value.expr)
     }
 
@@ -140,7 +140,7 @@ impl<'a> Builder<'a, '_> {
     fn is_left_out(&self, gain: Expr) -> bool {
         let zero = self.value_of(gain) == Some(0.0);
         if zero {
-            self.exprs.note_zero(gain);
+            self.exprs.decide_zero(gain);
         }
         zero
     }
@@ -166,7 +166,7 @@ impl<'a> Builder<'a, '_> {
         let time = match filter {
             Some(arg) => self.positive(cx, &arg.value, "the time constant of a filter")?,
             None if self.value_of(kp.expr).is_some_and(|v| v != 0.0) => {
-                let _ = self.exprs.nonzero(kp.expr); // divided by
+                self.exprs.decide_nonzero(kp.expr);
                 let ten = self.exprs.int(FILTER_RATIO);
                 let scaled = self.exprs.mul(&[ten, kp.expr]);
                 self.exprs.div(kd.expr, scaled)

@@ -6,7 +6,7 @@ use super::builder::{Builder, OpenSignal, Value};
 use super::dimension::Quantity;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
 use super::value::Reading;
-use super::{Input, Meaning, Named, Parameter, Signal};
+use super::{Input, Meaning, Named, Parameter, ParameterKind, Signal};
 use crate::algebra::{Expr, Facts};
 use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -259,7 +259,16 @@ impl<'a> Builder<'a, '_> {
         let written = d.unit.or(d.replaced_unit).or(unit_of_literal(e));
         let unit = written.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
-        let parameter = Parameter { name, symbol, value: value.expr, constant, unit, doc, span: d.span };
+        let parameter = Parameter {
+            name,
+            symbol,
+            value: value.expr,
+            constant,
+            kind: ParameterKind::Declared,
+            unit,
+            doc,
+            span: d.span,
+        };
         let id = self.parameters.push(parameter);
         self.numbers.push(number);
         self.mean(symbol, Meaning::Parameter(id), value.quantity.clone());

@@ -6,7 +6,7 @@ use super::dimension::Quantity;
 use super::flatten::Word;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
 use super::value::Reading;
-use crate::algebra::{Expr, Facts, Symbol};
+use crate::algebra::{Expr, Symbol, SymbolKind};
 use crate::ast;
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
@@ -414,11 +414,10 @@ impl<'a> Builder<'a, '_> {
 
     /// The symbol of the rate of another.
     pub fn rate_symbol(&mut self, symbol: Symbol) -> Symbol {
-        let name = format!("{}'", self.exprs.name(symbol));
-        if let Some(known) = self.exprs.find_symbol(&name) {
+        if let Some(known) = self.exprs.find_made_of(SymbolKind::Rate(symbol)) {
             return known;
         }
-        let rate = self.exprs.symbol(&name, Facts::default());
+        let rate = self.exprs.rate(symbol);
         let quantity = self.quantity(symbol).over(&Quantity::of(Dim::SECOND));
         self.mean(rate, Meaning::Rate(symbol), quantity);
         if let Some(Meaning::Signal(id)) = self.meaning(symbol) {

@@ -324,12 +324,27 @@ pub struct Parameter {
     pub value: Expr,
     /// Whether it is a `const`.
     pub constant: bool,
+    /// What it is.
+    pub kind: ParameterKind,
     /// Unit as written.
     pub unit: Option<Unit>,
     /// Documentation.
     pub doc: String,
     /// Where it is declared.
     pub span: Span,
+}
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// One of the model.
+    Declared,
+    /// Of the form `stiff`: the square of the ratio of the springs' frequency to the fastest rate.
+    SpringStiffness,
+    /// Of the form `stiff`: the damping of the springs, in parts of critical damping.
+    SpringDamping,
+    /// Of the form `stiff`: the fastest rate of the model without its constraints, in 1/s.
+    FastestRate,
 }
 
 /// An input.

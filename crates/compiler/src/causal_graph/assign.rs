@@ -74,6 +74,7 @@ impl Part<'_> {
         point: &mut NumericPoint,
     ) -> Result<Solved, Vec<Diagnostic>> {
         let mark = strokes.mark();
+        let before = self.x.assumed();
         let solved = self.assign_with_fewest_breaks(strokes)?;
         let (graph, members) = (self.graph, self.members);
         let cost = digits::cost(self.x, graph, &solved, point);
@@ -81,11 +82,15 @@ impl Part<'_> {
             return Ok(solved);
         }
         self.laws.clear();
+        let with_solved = self.x.assumed();
+        self.x.suppose(before.clone());
         let (_, wishes) = self.solve(&Strokes::new(graph), false);
-        let Some(by_size) = solve_part_by_size(self.x, graph, members, &wishes, point) else { return Ok(solved) };
-        if digits::cost(self.x, graph, &by_size, point) >= cost {
+        self.x.suppose(before);
+        let by_size = solve_part_by_size(self.x, graph, members, &wishes, point);
+        let Some(by_size) = by_size.filter(|found| digits::cost(self.x, graph, found, point) < cost) else {
+            self.x.suppose(with_solved);
             return Ok(solved);
-        }
+        };
         strokes.undo(mark);
         draw_truth(graph, strokes, members, &by_size);
         Ok(by_size)
@@ -94,6 +99,7 @@ impl Part<'_> {
     /// Assigns the part; laws on causal loops are turned so that the fewest break variables are left.
     fn assign_with_fewest_breaks(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let mark = strokes.mark();
+        let assumed = self.x.assumed();
         let solved = self.assign(strokes)?;
         if self.members.len() > TURNED_AT_MOST || !strokes.is_complete(self.members) {
             return Ok(solved);
@@ -112,6 +118,7 @@ impl Part<'_> {
         let best = self.best_laws(strokes, &drawn, &turnable, before);
         strokes.undo(mark);
         self.laws = best.iter().map(|(&p, &here)| (p, causality_of(here))).collect();
+        self.x.suppose(assumed);
         self.assign(strokes)
     }
 
@@ -144,8 +151,7 @@ impl Part<'_> {
         };
         let given = self.x.sym(given);
         let residual = self.x.sub(given, law);
-        self.x.solve_for(residual, wanted)?;
-        Some(self.x.linear_in(residual, &[wanted]).is_some())
+        self.x.tried(|x| x.solve_for(residual, wanted).map(|_| x.linear_in(residual, &[wanted]).is_some()))
     }
 
     /// The causality of laws that leaves the smallest loops, found by trial on the strokes.
@@ -214,7 +220,7 @@ impl Part<'_> {
         let mark = strokes.mark();
         let drawn = self.propagate(strokes);
         let plain = drawn && !forced && !self.wanted.concerns(members) && is_plain(self.x, graph, members);
-        if plain && let Some((definitions, watched)) = whole_truth(self.x, graph, members, strokes) {
+        if plain && let Some((definitions, watched)) = self.x.if_found(|x| whole_truth(x, graph, members, strokes)) {
             let ports = local::roles(graph, members, &|p| strokes.at(p));
             return Ok(Solved { ports, definitions, watched, ..Solved::default() });
         }
@@ -330,15 +336,7 @@ impl Wanted {
                 self.virtual_speeds.iter().filter(|v| v.junction == junction).map(|v| v.speed).collect()
             }
             None => {
-                let name = &graph.elements[junction].name;
-                let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
-                let mut fresh = |suffix: &str| {
-                    let name = format!("{name}.{suffix}");
-                    let taken = x.find_symbol(&name).is_some();
-                    x.symbol(&if taken { format!("{name}*") } else { name }, Default::default())
-                };
-                let speed = fresh(own);
-                let reaction = fresh(&format!("{conjugate}*"));
+                let (speed, reaction) = kept_variable(x, graph, junction, flow);
                 self.why.insert(speed, why);
                 self.virtual_speeds.push(Virtual { junction, speed, reaction });
                 vec![speed]
@@ -357,10 +355,10 @@ impl Wanted {
 
     /// The `prefer`s that are not met, by their numbers.
     fn unmet(&self, x: &Exprs, ports: &Ports) -> Vec<usize> {
-        let own = |s: Symbol| x.name(s).trim_end_matches('*');
+        let own = |s: Symbol| x.untwinned(s);
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
-        let kept: BTreeSet<&str> = independent.chain(ports.virtual_speeds.iter().map(|v| v.speed)).map(own).collect();
-        let missed = |asked: &[Symbol]| !asked.is_empty() && !asked.iter().any(|&s| kept.contains(own(s)));
+        let kept: BTreeSet<Symbol> = independent.chain(ports.virtual_speeds.iter().map(|v| v.speed)).map(own).collect();
+        let missed = |asked: &[Symbol]| !asked.is_empty() && !asked.iter().any(|&s| kept.contains(&own(s)));
         (0..self.asked.len()).filter(|&i| missed(&self.asked[i])).collect()
     }
 
@@ -368,6 +366,19 @@ impl Wanted {
         let inside = |e: &ElementId| members.binary_search(e).is_ok();
         self.independent.iter().any(|p| inside(&p.element)) || self.virtual_speeds.iter().any(|v| inside(&v.junction))
     }
+}
+
+/// The common variable of a junction as it is kept, and what acts on it: a twin of that variable, where the graph has it.
+fn kept_variable(x: &mut Exprs, graph: &BondGraph, junction: ElementId, flow: bool) -> (Symbol, Symbol) {
+    let element = &graph.elements[junction];
+    let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
+    let name = format!("{}.{own}", element.name);
+    let variables = element.ports.iter().map(|p| &graph.bonds[p.bond]).map(|b| if flow { b.flow } else { b.effort });
+    let speed = match x.find_symbol(&name).filter(|&s| variables.into_iter().any(|own| own == s)) {
+        Some(common) => x.twin(common),
+        None => x.fresh(&name, Default::default()),
+    };
+    (speed, x.reaction(speed, &format!("{}.{conjugate}", element.name)))
 }
 
 /// Whether a port belongs to a storage whose co-energy variable is a flow (or an effort).
@@ -462,16 +473,19 @@ impl Part<'_> {
                 }
             }
         }
+        let before = self.x.assumed();
         let mut first = solve_part(self.x, graph, members, &wishes);
         let reading = self.sources_of_rates(&first);
         if !reading.is_empty() {
             wishes.sources_as_laws = reading;
+            self.x.suppose(before.clone());
             first = solve_part(self.x, graph, members, &wishes);
         }
         let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
         if !speeds.is_empty() {
             wishes.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
             if !wishes.virtual_speeds.is_empty() {
+                self.x.suppose(before);
                 return (solve_part(self.x, graph, members, &wishes), wishes);
             }
         }

@@ -25,7 +25,13 @@ pub(super) fn solve_part_by_size(
     point: &NumericPoint,
 ) -> Option<Solved> {
     let net = Net::new(x, graph, members, wishes);
-    let mut choice = Choice::new(x, graph, &net, point);
+    let outputs = x.tried(|x| chosen(x, graph, &net, wishes, point));
+    express(x, &net, outputs, wishes, point)
+}
+
+/// The roles of the ports, inputs and outputs chosen by size.
+fn chosen(x: &mut Exprs, graph: &BondGraph, net: &Net, wishes: &Wishes, point: &NumericPoint) -> BTreeMap<usize, Role> {
+    let mut choice = Choice::new(x, graph, net, point);
     choice.work.eliminate(x, &net.inner);
     let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
     for p in net.ports_where(|o| matches!(o, Offer::Imposed(_))) {
@@ -39,7 +45,7 @@ pub(super) fn solve_part_by_size(
     for p in net.storage_order(wishes) {
         outputs.insert(p, if independent.contains(&p) { Role::Independent } else { Role::Dependent });
     }
-    express(x, &net, outputs, wishes, point)
+    outputs
 }
 
 /// Expresses the outputs so chosen, in whatever order has the simplest pivots: what is divided by then vanishes only
@@ -55,11 +61,15 @@ fn express(
     let columns: Vec<usize> = wanted.map(|(&p, &role)| net.ports[p].output(role)).collect();
     let both: Vec<usize> = net.inner.iter().chain(&columns).copied().collect();
     for classes in [vec![both], vec![net.inner.clone(), columns.clone()]] {
-        let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len()).near(point.clone());
-        classes.iter().for_each(|class| _ = work.eliminate(x, class));
-        let done = work.finish();
-        if columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c)) {
-            return Some(net.solved(x, done, &outputs, wishes));
+        let expressed = x.if_found(|x| {
+            let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len()).near(point.clone());
+            classes.iter().for_each(|class| _ = work.eliminate(x, class));
+            let done = work.finish();
+            let all = columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c));
+            all.then(|| net.solved(x, done, &outputs, wishes))
+        });
+        if expressed.is_some() {
+            return expressed;
         }
     }
     None

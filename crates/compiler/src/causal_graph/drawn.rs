@@ -9,7 +9,7 @@ use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
 use super::strokes::{Strokes, parts};
 use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local};
-use crate::algebra::Symbol;
+use crate::algebra::{Assumptions, Symbol};
 use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortCausality, PortRef};
 use crate::ids::Table;
 
@@ -19,6 +19,7 @@ use crate::ids::Table;
 pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> CausalGraph {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
+    x.forget_unwatched(&Assumptions::default());
     let mut ports = Ports::default();
     let drawn = |port: PortRef| sits_at(graph, strokes, port);
     let mut kept = BTreeSet::new();
@@ -38,6 +39,7 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     }
     if !kept.is_empty() {
         keep(causal, &kept, &mut ports);
+        causal.ports.watched.iter().for_each(|&divisor| x.assume_nonzero(divisor));
         ports.watched.extend(&causal.ports.watched);
     }
     ports.ports.sort_by_key(|p| p.port);
@@ -89,6 +91,7 @@ fn keep(causal: &CausalGraph, members: &BTreeSet<ElementId>, ports: &mut Ports) 
 pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
+    x.forget_unwatched(&Assumptions::default());
     let mut ports = Ports::default();
     for members in parts(graph) {
         let solved = solve_part(&mut x, graph, &members, &wishes(causal, &members));

@@ -212,11 +212,7 @@ impl Net {
             let bond = &graph.bonds[port.bond];
             let (mut effort, mut flow) = (bond.effort, bond.flow);
             if self.column.contains_key(&effort) {
-                let twin = |x: &mut Exprs, s: Symbol| {
-                    let name = format!("{}*", x.name(s));
-                    x.symbol(&name, Default::default())
-                };
-                (effort, flow) = (twin(x, effort), twin(x, flow));
+                (effort, flow) = (x.twin(effort), x.twin(flow));
                 for (own, common) in [(effort, bond.effort), (flow, bond.flow)] {
                     let mut row = vec![(self.of(own), one), (self.of(common), minus)];
                     row.sort_by_key(|e| e.0);
@@ -363,10 +359,11 @@ impl Net {
         let mut defined = vec![false; self.symbols.len()];
         done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
         let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
-        let regular = regular_rows(x, &done);
+        let regular = x.if_found(|x| regular_rows(x, &done));
         let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
         if all && regular.is_none() && done.degenerate.is_empty() {
-            solved.short = matched_rows(x, &self.rows, &done).map(|rows| rows.into_iter().map(named).collect());
+            solved.short =
+                x.if_found(|x| matched_rows(x, &self.rows, &done)).map(|rows| rows.into_iter().map(named).collect());
         }
         solved.definitions.extend(reduced_rows(x, &done, regular.as_ref()).into_iter().map(named));
         let free = |&c: &usize| !defined[c];

@@ -36,22 +36,22 @@ impl Display for CausalGraph {
                 f,
                 "  {:<12} {role:<20} gives {}, takes {}",
                 graph.port_name(state.port),
-                x.name(state.input),
-                x.name(state.output)
+                x.label(state.input),
+                x.label(state.output)
             )?;
         }
-        section(f, "virtual speeds", self.ports.virtual_speeds.iter().map(|v| graph.exprs.name(v.speed).to_string()))?;
+        section(f, "virtual speeds", self.ports.virtual_speeds.iter().map(|v| graph.exprs.label(v.speed).to_string()))?;
         let mut x = graph.exprs.clone();
         let mut definitions: Vec<String> = Vec::new();
         for (symbol, combination) in &self.ports.definitions {
-            definitions.push(format!("{} = {}", graph.exprs.name(*symbol), sum(&mut x, combination)));
+            definitions.push(format!("{} = {}", graph.exprs.label(*symbol), sum(&mut x, combination)));
         }
         definitions.sort();
         section(f, "junction structure", definitions)?;
         let plain = |e: &Expr| ascii(&graph.exprs, *e, &PlainNames(&graph.exprs));
         section(f, "divided by", self.ports.watched.iter().map(plain))?;
         section(f, "zero at the given parameters", self.ports.degenerate.iter().map(plain))?;
-        section(f, "undetermined", self.ports.undetermined.iter().map(|&s| graph.exprs.name(s).to_string()))
+        section(f, "undetermined", self.ports.undetermined.iter().map(|&s| graph.exprs.label(s).to_string()))
     }
 }
 

@@ -46,9 +46,8 @@ fn ports(causal: &CausalGraph) -> Result<(), String> {
     }
     for state in &causal.ports.ports {
         let bond = &graph.bonds[graph.bond_of(state.port)];
-        let base = |s: Symbol| graph.exprs.name(s).trim_end_matches('*');
-        let own: BTreeSet<&str> = [bond.effort, bond.flow].map(base).into();
-        if own != [state.input, state.output].map(base).into() {
+        let own: BTreeSet<Symbol> = [bond.effort, bond.flow].into();
+        if own != [state.input, state.output].map(|s| graph.exprs.untwinned(s)).into() {
             return Err(format!("{} does not have effort and flow of its bond", graph.port_name(state.port)));
         }
     }
@@ -57,7 +56,7 @@ fn ports(causal: &CausalGraph) -> Result<(), String> {
 
 /// Definitions lead to no input, and none leads back to itself.
 fn definitions(causal: &CausalGraph) -> Result<(), String> {
-    let name = |s: Symbol| causal.graph.exprs.name(s);
+    let name = |s: Symbol| causal.graph.exprs.label(s);
     let of = &causal.ports.definitions;
     if let Some(state) = causal.ports.ports.iter().find(|p| p.role != Role::Redundant && of.contains_key(&p.input)) {
         return Err(format!("`{}` is given by its element and by the junctions", name(state.input)));

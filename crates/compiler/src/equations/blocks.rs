@@ -239,7 +239,7 @@ fn short(x: &mut Exprs, e: Expr, work: u64) -> Expr {
     }
     let flat = x.expand(e);
     let flat = x.simplify(flat);
-    let cost = |e| (!x.nonzero(e), x.written_length(e));
+    let cost = |e| (!x.is_known_nonzero(e), x.written_length(e));
     if cost(flat) < cost(own) { flat } else { own }
 }
 

@@ -6,7 +6,7 @@ use super::along::Closure;
 use super::definitions::Definitions;
 use super::{AlgebraicRole, BreakBound};
 use crate::algebra::Symbol;
-use crate::bond_graph::{BondId, Meaning, PortRef};
+use crate::bond_graph::{BondId, Kind, Meaning, PortRef};
 use crate::causal_graph::Stroke;
 use crate::causal_graph::break_set::{break_set, cyclic_components, restrict};
 use crate::causal_graph::signals::{NodeId, signal_graph};
@@ -91,30 +91,35 @@ impl Web {
 
 /// How an unknown is named: by the element that it belongs to.
 pub fn name_of(d: &Definitions, symbol: Symbol) -> String {
-    let own = d.x.name(symbol).trim_end_matches('*').to_string();
-    let (bond, variable) = match d.meaning(symbol) {
-        Some(Meaning::Effort(bond)) => (bond, "e"),
-        Some(Meaning::Flow(bond)) => (bond, "f"),
-        _ => return own,
+    match place_of(d, symbol) {
+        Some((place, variable)) => format!("{place}.{variable}"),
+        None => d.x.name(symbol).to_string(),
+    }
+}
+
+/// The bond, element or port that an effort or flow is named by, and which of the two it is.
+pub fn place_of(d: &Definitions, symbol: Symbol) -> Option<(String, &'static str)> {
+    let variable = d.x.untwinned(symbol);
+    let (bond, letter) = match d.meaning(variable)? {
+        Meaning::Effort(bond) => (bond, "e"),
+        Meaning::Flow(bond) => (bond, "f"),
+        _ => return None,
     };
     let bond = &d.graph.bonds[bond];
-    if !bond.name.is_empty() {
-        return format!("{}.{variable}", bond.name);
-    }
-    let common = |p: &PortRef| {
-        use crate::bond_graph::Kind::{One, Zero};
-        matches!((&d.graph.elements[p.element].kind, variable), (Zero, "e") | (One, "f"))
-    };
+    let common =
+        |p: &PortRef| matches!((&d.graph.elements[p.element].kind, letter), (Kind::Zero, "e") | (Kind::One, "f"));
     let outer = |p: &PortRef| !d.graph.elements[p.element].kind.is_inner();
     let ends = [bond.from, bond.to];
-    match ends.iter().find(|p| outer(p)).or_else(|| ends.iter().find(|p| common(p))) {
-        Some(port) => {
-            let element = &d.graph.elements[port.element];
-            let name = &element.ports[port.port as usize].name;
-            let place =
-                if outer(port) && !name.is_empty() { format!("{}.{name}", element.name) } else { element.name.clone() };
-            format!("{place}.{variable}")
-        }
-        None => own,
+    if variable != symbol {
+        // What two elements share is called after the one that the half arrow points at.
+        return ends.iter().all(outer).then(|| (d.graph.port_name(bond.to), letter));
     }
+    if !bond.name.is_empty() {
+        return Some((bond.name.clone(), letter));
+    }
+    let place = match ends.iter().find(|p| outer(p)) {
+        Some(&port) => d.graph.port_name(port),
+        None => d.graph.elements[ends.iter().find(|p| common(p))?.element].name.clone(),
+    };
+    Some((place, letter))
 }

@@ -110,8 +110,7 @@ impl<'a> Definitions<'a> {
 
     /// The symbol that stands for the time derivative of another.
     pub fn rate_symbol(&mut self, symbol: Symbol) -> Symbol {
-        let name = format!("{}'", self.x.name(symbol));
-        self.x.symbol(&name, Default::default())
+        self.x.rate(symbol)
     }
 
     /// Whether an expression keeps its value during a run: it reads parameters only.
@@ -170,7 +169,7 @@ impl<'a> Definitions<'a> {
             return Ok(self.x.sym(rate));
         }
         if self.free.contains(&symbol) {
-            return Err(Unavailable::NeedsRateOfUnknown(self.x.name(symbol).trim_end_matches('*').to_string()));
+            return Err(Unavailable::NeedsRateOfUnknown(self.x.name(symbol).to_string()));
         }
         let Some(&definition) = self.of.get(&symbol) else { return Err(Unavailable::Unsolvable) };
         let rate = self.rate_symbol(symbol);

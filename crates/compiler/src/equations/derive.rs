@@ -48,7 +48,9 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     let conserved = if momenta { conserved::eliminate(&mut assembled, causal) } else { Vec::new() };
+    let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
+    assembled.d.x.forget_unwatched(&before);
     let draft = Draft { conserved, relations, ..Draft::of(assembled, Vec::new()) };
     finish(causal, causal, form, draft)
 }
@@ -256,7 +258,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
 
 /// The variable of the bond that two elements share, for the one that the second of them has of its own.
 fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
-    d.x.name(symbol).strip_suffix('*').and_then(|base| d.x.find_symbol(base)).unwrap_or(symbol)
+    d.x.untwinned(symbol)
 }
 
 /// The algebraic unknowns, and what vanishes: for free rates first, then for these.
@@ -378,7 +380,7 @@ fn lost_in_itself(d: &Definitions) -> Option<Symbol> {
 }
 
 fn through_itself(graph: &BondGraph, x: &Exprs, symbol: Symbol) -> Diagnostics {
-    let name = x.name(symbol).trim_end_matches('*');
+    let name = x.name(symbol);
     let span = span_of_symbols(graph, &[symbol]);
     Diagnostic::error(codes::E002, format!("{name} is only defined through itself"), span, "it acts here")
         .note("a source reads an effort or flow that exists only as the answer to that source")
@@ -387,7 +389,7 @@ fn through_itself(graph: &BondGraph, x: &Exprs, symbol: Symbol) -> Diagnostics {
 }
 
 fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable) -> Diagnostics {
-    let name = x.name(symbol).trim_end_matches(['\'', '*']).to_string();
+    let name = x.name(x.undotted(symbol).0).to_string();
     let input = match reason {
         Unavailable::NeedsRateOf(input) => input.clone(),
         Unavailable::Unsolvable => return through_itself(graph, x, symbol),
@@ -428,7 +430,7 @@ fn needs_rate_of_unknown(graph: &BondGraph, symbol: Symbol, name: &str, unknown:
 
 fn no_solution(d: &Definitions, insoluble: &Insoluble) -> Diagnostics {
     let graph = d.graph;
-    let name = |&s: &Symbol| d.x.name(s).trim_end_matches('*').to_string();
+    let name = |&s: &Symbol| d.x.name(s).to_string();
     let unknowns: Vec<String> = insoluble.unknowns.iter().map(name).collect();
     let first = insoluble.elements.first();
     let mut fault = Diagnostic::error(

@@ -1,9 +1,12 @@
 //! The formulations.
 
+use std::fmt;
+
 /// A formulation, `method.md`, section 4.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Form {
     /// One explicit ODE per degree of freedom, nothing else.
+    #[default]
     Minimal,
     /// One explicit ODE for each independent speed, dependent ones eliminated, without momenta as states.
     Kane,
@@ -45,5 +48,11 @@ impl Form {
     /// The form of that name.
     pub fn named(name: &str) -> Option<Form> {
         Form::ALL.into_iter().find(|form| form.name() == name)
+    }
+}
+
+impl fmt::Display for Form {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }

@@ -67,22 +67,21 @@ impl LinearForms {
     }
 
     fn with_names(&mut self, x: &mut Exprs, symbol: Symbol, unknowns: &[Symbol], mut form: LinearForm) -> LinearForm {
-        let variable = x.name(symbol).to_string();
         let longest = if unknowns.len() < MANY { NAMED } else { NAMED_OF_MANY };
         for (&k, coefficient) in &mut form.coefficients {
             if x.written_length(*coefficient) > longest {
-                let name = format!("{variable}.by.{}", x.name(unknowns[k]));
-                *coefficient = self.name(x, &name, *coefficient);
+                let gain = x.gain(symbol, unknowns[k]);
+                *coefficient = self.name(x, gain, *coefficient);
             }
         }
         if x.written_length(form.rest) > longest {
-            form.rest = self.name(x, &format!("{variable}.bias"), form.rest);
+            let bias = x.bias(symbol);
+            form.rest = self.name(x, bias, form.rest);
         }
         form
     }
 
-    fn name(&mut self, x: &mut Exprs, name: &str, value: Expr) -> Expr {
-        let symbol = x.fresh(name, Default::default());
+    fn name(&mut self, x: &mut Exprs, symbol: Symbol, value: Expr) -> Expr {
         self.named.push((symbol, value));
         x.sym(symbol)
     }

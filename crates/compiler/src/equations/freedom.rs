@@ -39,7 +39,7 @@ pub(super) fn conditions(
         let own = d.x.sym(symbol);
         weak.push(InitialCondition {
             residual: d.x.sub(own, value),
-            name: d.x.name(symbol).trim_end_matches('*').to_string(),
+            name: d.x.name(symbol).to_string(),
             value,
             firm: false,
             weak: true,

@@ -7,7 +7,7 @@ use petgraph::unionfind::UnionFind;
 use super::definitions::{Definition, Definitions};
 use super::rows::Rows;
 use super::{StateKind, Unavailable};
-use crate::algebra::{Expr, Exprs, Node, Symbol};
+use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
 use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 
@@ -169,7 +169,7 @@ impl<'a> Assembled<'a> {
 
     fn gives_what_it_imposes(&self, causal: &CausalGraph, state: &PortState) -> bool {
         let effort = causal.graph.bonds[causal.graph.bond_of(state.port)].effort;
-        let gives_effort = state.input == effort || is_twin_of(&self.d.x, state.input, effort);
+        let gives_effort = self.d.x.untwinned(state.input) == effort;
         imposes_effort(&causal.graph, state.port).is_none_or(|imposes| imposes == gives_effort)
     }
 
@@ -224,7 +224,7 @@ impl<'a> Assembled<'a> {
         if [bond.effort, bond.flow].contains(&state.input) {
             return e;
         }
-        let effort_in = is_twin_of(&self.d.x, state.output, bond.effort);
+        let effort_in = self.d.x.untwinned(state.output) == bond.effort;
         let (effort, flow) = if effort_in { (state.output, state.input) } else { (state.input, state.output) };
         let (effort, flow) = (self.d.x.sym(effort), self.d.x.sym(flow));
         self.d.x.substitute(e, &BTreeMap::from([(bond.effort, effort), (bond.flow, flow)]))
@@ -523,7 +523,7 @@ impl<'a> Assembled<'a> {
         (element, place): (ElementId, String),
         followers: Vec<Follower>,
     ) -> (Expr, Expr) {
-        let pi = self.d.x.fresh(&format!("{place}.pi"), Default::default());
+        let pi = self.d.x.made_of(SymbolKind::Momentum(z), &format!("{place}.pi"));
         let state = self.d.x.sym(pi);
         self.balance(pi, state, rate, &[]);
         if let Some(balance) = self.balances.last_mut() {
@@ -676,8 +676,4 @@ pub(super) fn groups(
         groups.entry(set.find(cells.len() + k)).or_default().1.push(*v);
     }
     groups.into_values().collect()
-}
-
-fn is_twin_of(x: &Exprs, symbol: Symbol, of: Symbol) -> bool {
-    x.name(symbol).strip_suffix('*') == Some(x.name(of))
 }

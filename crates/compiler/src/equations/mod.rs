@@ -268,8 +268,35 @@ pub struct Observed {
     pub value: Result<Expr, Unavailable>,
     /// SI unit, where known.
     pub unit: Option<Unit>,
+    /// What it is.
+    pub kind: ObservedKind,
     /// Whether it is recorded without being asked for: states and outputs.
     pub default: bool,
+}
+
+/// What a variable is that can be recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ObservedKind {
+    /// An effort: of a bond, or that of a constraint.
+    Effort,
+    /// A flow.
+    Flow,
+    /// What an inertance stores.
+    Momentum,
+    /// What a compliance stores.
+    Displacement,
+    /// A sum of stored quantities that is a state.
+    Sum,
+    /// The force of a spring in the place of a constraint.
+    Spring,
+    /// How far a constraint is from being met: it has no value but for errors.
+    Drift,
+    /// An integrated signal.
+    Signal,
+    /// An input.
+    Input,
+    /// An output or a `let`.
+    Named,
 }
 
 /// Why a variable has no value.

@@ -383,7 +383,7 @@ impl FreshNames {
         let graph = d.graph;
         let elements = graph.elements.values().map(|e| e.name.as_str());
         let named = graph.outputs.iter().chain(&graph.lets).map(|n| n.name.as_str());
-        let symbols = (0..d.x.symbol_count() as u32).map(|s| d.x.name(Symbol(s)));
+        let symbols = (0..d.x.symbol_count() as u32).map(|s| d.x.label(Symbol(s)));
         let taken: BTreeSet<&str> = elements.chain(named).chain(symbols).collect();
         let free = |letter: &&str| {
             let numbered = |name: &&str| {

@@ -6,15 +6,15 @@ use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
 use super::definitions::Definitions;
-use super::{Guess, InitialCondition, Observed, State, Unavailable};
-use crate::algebra::{Expr, Symbol};
-use crate::bond_graph::{BondGraph, Kind};
+use super::{Guess, InitialCondition, Observed, ObservedKind, State, StateKind, Unavailable};
+use crate::algebra::{Expr, Symbol, SymbolKind};
+use crate::bond_graph::{BondGraph, Kind, Meaning};
 use crate::unit::Unit;
 
 /// The name of a state: its variable, or the output or `let` that says the same.
 pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> String {
     let same = meaning.and_then(|m| d.graph.outputs.iter().chain(&d.graph.lets).find(|n| n.value == m));
-    let own = d.x.name(symbol).trim_end_matches('*');
+    let own = d.x.name(symbol);
     same.map_or_else(|| own.to_string(), |n| n.name.clone())
 }
 
@@ -23,48 +23,72 @@ pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
     let mut all: Vec<Observed> = Vec::new();
     let mut taken: HashTable<usize> = HashTable::new();
     let hash = |name: &str| FxBuildHasher.hash_one(name);
-    let mut add = |name: String, value, unit, default| {
+    let mut add = |name: String, value, unit, kind, default| {
         let at = hash(&name);
         if taken.find(at, |&i| all[i].name == name).is_none() {
             taken.insert_unique(at, all.len(), |&i| hash(&all[i].name));
-            all.push(Observed { name, value, unit, default });
+            all.push(Observed { name, value, unit, kind, default });
         }
     };
     for state in states {
         let value = d.x.sym(state.symbol);
-        add(state.name.clone(), Ok(value), state.unit.clone(), true);
+        add(state.name.clone(), Ok(value), state.unit.clone(), kind_of(d, state), true);
     }
     let graph = d.graph;
     for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
         for named in list {
             let value = value_of(d, named.value);
-            add(named.name.clone(), value, named.unit.clone(), default);
+            add(named.name.clone(), value, named.unit.clone(), ObservedKind::Named, default);
         }
     }
     for constraint in &graph.constraints {
         let value = value_of(d, constraint.multiplier);
-        add(format!("{}.e", constraint.name), value, None, false);
+        add(format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
         if constraint.holonomic {
             let drift = value_of(d, constraint.expr);
-            add(format!("{}.drift", constraint.name), drift, None, false);
+            add(format!("{}.drift", constraint.name), drift, None, ObservedKind::Drift, false);
         }
     }
-    for (name, symbol) in variables(graph) {
+    for (name, kind, symbol) in variables(graph) {
         let e = d.x.sym(symbol);
         let value = value_of(d, e);
         let unit: Option<Unit> = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
-        add(name, value, unit, false);
+        add(name, value, unit, kind, false);
     }
     for signal in graph.signals.values() {
         let e = d.x.sym(signal.symbol);
         let value = value_of(d, e);
-        add(signal.name.clone(), value, signal.unit.clone(), false);
+        add(signal.name.clone(), value, signal.unit.clone(), ObservedKind::Signal, false);
     }
     for input in graph.inputs.values() {
         let e = d.x.sym(input.symbol);
-        add(input.name.clone(), Ok(e), input.unit.clone(), false);
+        add(input.name.clone(), Ok(e), input.unit.clone(), ObservedKind::Input, false);
     }
     all
+}
+
+/// What a state is.
+fn kind_of(d: &Definitions, state: &State) -> ObservedKind {
+    let junction = match state.kind {
+        StateKind::Storage(Some(element)) => Some(&d.graph.elements[element].kind),
+        _ => None,
+    };
+    match (d.x.kind(state.symbol), d.meaning(d.x.untwinned(state.symbol))) {
+        (SymbolKind::Momentum(_), _) => ObservedKind::Sum,
+        (SymbolKind::Spring(_), _) => ObservedKind::Spring,
+        (_, Some(Meaning::Effort(_))) => ObservedKind::Effort,
+        (_, Some(Meaning::Flow(_))) => ObservedKind::Flow,
+        (_, Some(Meaning::Stored(port))) => stored_kind(&d.graph.elements[port.element].kind),
+        _ => match junction {
+            Some(Kind::Zero) => ObservedKind::Effort,
+            Some(Kind::One) => ObservedKind::Flow,
+            _ => ObservedKind::Signal,
+        },
+    }
+}
+
+fn stored_kind(storage: &Kind) -> ObservedKind {
+    if matches!(storage, Kind::Inertance(_)) { ObservedKind::Momentum } else { ObservedKind::Displacement }
 }
 
 /// An expression as something to evaluate, or the reason why it has no value.
@@ -90,22 +114,23 @@ fn is_outside(d: &Definitions, symbol: Symbol) -> bool {
 }
 
 /// Names of all efforts, flows and stored quantities, with their symbols.
-fn variables(graph: &BondGraph) -> Vec<(String, Symbol)> {
+fn variables(graph: &BondGraph) -> Vec<(String, ObservedKind, Symbol)> {
+    use ObservedKind::{Effort, Flow};
     let mut all = Vec::new();
     for element in graph.elements.values() {
         let name = &element.name;
         let bond = |port: usize| &graph.bonds[element.ports[port].bond];
         match &element.kind {
-            Kind::Zero => all.push((format!("{name}.e"), bond(0).effort)),
-            Kind::One => all.push((format!("{name}.f"), bond(0).flow)),
+            Kind::Zero => all.push((format!("{name}.e"), Effort, bond(0).effort)),
+            Kind::One => all.push((format!("{name}.f"), Flow, bond(0).flow)),
             kind => {
                 for (index, port) in element.ports.iter().enumerate() {
                     let place = if port.name.is_empty() { name.clone() } else { format!("{name}.{}", port.name) };
-                    all.push((format!("{place}.e"), bond(index).effort));
-                    all.push((format!("{place}.f"), bond(index).flow));
+                    all.push((format!("{place}.e"), Effort, bond(index).effort));
+                    all.push((format!("{place}.f"), Flow, bond(index).flow));
                     match kind {
-                        Kind::Inertance(storage) => all.push((format!("{place}.p"), storage.stored[index])),
-                        Kind::Compliance(storage) => all.push((format!("{place}.q"), storage.stored[index])),
+                        Kind::Inertance(s) => all.push((format!("{place}.p"), stored_kind(kind), s.stored[index])),
+                        Kind::Compliance(s) => all.push((format!("{place}.q"), stored_kind(kind), s.stored[index])),
                         _ => {}
                     }
                 }
@@ -113,8 +138,8 @@ fn variables(graph: &BondGraph) -> Vec<(String, Symbol)> {
         }
     }
     for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
-        all.push((format!("{}.e", bond.name), bond.effort));
-        all.push((format!("{}.f", bond.name), bond.flow));
+        all.push((format!("{}.e", bond.name), Effort, bond.effort));
+        all.push((format!("{}.f", bond.name), Flow, bond.flow));
     }
     all
 }

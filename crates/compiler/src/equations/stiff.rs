@@ -8,11 +8,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::Closure;
-use super::breaks::name_of;
+use super::breaks::place_of;
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
 use super::{AlgebraicRole, StateKind};
-use crate::algebra::{Expr, Facts, Symbol};
+use crate::algebra::{Expr, Facts, Symbol, SymbolKind};
+use crate::bond_graph::ParameterKind::{self, Declared, FastestRate, SpringDamping, SpringStiffness};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, Parameter, ParameterId, PortRef, StorageLaw, Variable};
 use crate::causal_graph::CausalGraph;
 use crate::causal_paths::numeric::sample;
@@ -38,13 +39,19 @@ pub fn parameters(open: &mut CausalGraph) -> Springs {
     let damping = graph.exprs.int(1);
     let rate = graph.exprs.float(fastest);
     Springs {
-        stiffness: parameter(graph, "form.stiffness", stiffness, "stiffness of relaxed constraints"),
-        damping: parameter(graph, "form.damping", damping, "damping of relaxed constraints"),
-        rate: parameter(graph, "form.rate", rate, "fastest rate of the model without its constraints"),
+        stiffness: parameter(graph, SpringStiffness, stiffness),
+        damping: parameter(graph, SpringDamping, damping),
+        rate: parameter(graph, FastestRate, rate),
     }
 }
 
-fn parameter(graph: &mut BondGraph, name: &str, value: Expr, doc: &str) -> Symbol {
+fn parameter(graph: &mut BondGraph, kind: ParameterKind, value: Expr) -> Symbol {
+    let (name, doc) = match kind {
+        SpringStiffness => ("form.stiffness", "stiffness of relaxed constraints"),
+        SpringDamping => ("form.damping", "damping of relaxed constraints"),
+        FastestRate => ("form.rate", "fastest rate of the model without its constraints"),
+        Declared => unreachable!("the model declares it"),
+    };
     let facts = Facts { nonzero: true, positive: true, given: Some(value) };
     let symbol = graph.exprs.symbol(name, facts);
     let meaning = Meaning::Parameter(ParameterId::new(graph.parameters.len()));
@@ -54,6 +61,7 @@ fn parameter(graph: &mut BondGraph, name: &str, value: Expr, doc: &str) -> Symbo
         symbol,
         value,
         constant: false,
+        kind,
         unit: None,
         doc: doc.to_string(),
         span: Span::default(),
@@ -163,9 +171,8 @@ impl Assembled<'_> {
         let k = d.x.mul(&[stiffness, rate, rate, inertia]);
         let c = d.x.mul(&[two, damping, root, rate, inertia]);
         let relation = if along { relation } else { d.x.neg(relation) };
-        let carried = name_of(d, multiplier);
-        let place = carried.rsplit_once('.').map_or(carried.as_str(), |(place, _)| place);
-        let spring = d.x.fresh(&format!("{place}.spring"), Facts::default());
+        let place = place_of(d, multiplier).map_or_else(|| d.graph.elements[element].name.clone(), |(place, _)| place);
+        let spring = d.x.made_of(SymbolKind::Spring(multiplier), &format!("{place}.spring"));
         let force = d.x.sym(spring);
         let damped = d.x.mul(&[c, relation]);
         let carried = d.x.add(&[force, damped]);

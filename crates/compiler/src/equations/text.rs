@@ -6,8 +6,8 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{AlgebraicRole, Dependent, DisplayEquation, EquationStep, Shown, ShownDefinition, places};
 use crate::algebra::{
-    Expr, Exprs, Names, Place, Sort, Symbol, ascii, latex, latex_name, mathml, mathml_name, mathml_owner, unicode,
-    unicode_name,
+    Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, mathml, mathml_name, mathml_owner,
+    unicode, unicode_name,
 };
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
 use crate::causal_paths::Refusal;
@@ -138,7 +138,7 @@ pub fn print_certificate(shown: &Shown) -> Vec<String> {
 }
 
 fn names_of(graph: &BondGraph, symbol: Symbol) -> String {
-    graph.exprs.name(symbol).trim_end_matches('*').to_string()
+    graph.exprs.name(symbol).to_string()
 }
 
 /// One expression in the names of these equations.
@@ -205,65 +205,54 @@ impl<'a> Written<'a> {
         Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, rate_of, sources, places }
     }
 
-    /// The name for people, and whether it is the rate of what has the name.
-    fn name(&self, symbol: Symbol) -> (String, bool) {
+    /// The name that an output or `let` gives, or what a source is called, for people.
+    fn for_people(&self, symbol: Symbol) -> (String, usize) {
         if let Some(source) = self.sources.get(&symbol) {
-            return (source.clone(), false);
+            return (source.clone(), 0);
         }
-        let own = self.x.name(symbol);
-        let (base, rate) = match self.states.get(&symbol) {
-            Some(&(name, rate)) => (name, rate),
-            None => match own.strip_suffix('\'') {
-                Some(base) => (base, true),
-                None => (own, false),
-            },
-        };
-        let of = if rate { self.rate_of.get(&symbol).copied() } else { Some(symbol) };
+        let (name, rates) = self.called(symbol);
+        let of = if rates == 0 { Some(symbol) } else { self.rate_of.get(&symbol).copied() };
         let alias = of.and_then(|s| self.aliases.get(&s));
-        (alias.map_or(base, String::as_str).trim_end_matches('*').to_string(), rate)
+        (alias.cloned().unwrap_or(name), rates)
     }
 }
 
 impl Names for Written<'_> {
-    fn ascii(&self, symbol: Symbol) -> String {
+    fn called(&self, symbol: Symbol) -> (String, usize) {
         match self.states.get(&symbol) {
-            Some((name, true)) => format!("{name}'"),
-            Some((name, false)) => (*name).to_string(),
-            None => self.x.name(symbol).trim_end_matches('*').to_string(),
+            Some(&(name, rate)) => (name.to_string(), rate.into()),
+            None => {
+                let (of, rates) = self.x.undotted(symbol);
+                (self.x.name(of).to_string(), rates)
+            }
         }
     }
 
     fn unicode(&self, symbol: Symbol) -> String {
-        let (name, rate) = self.name(symbol);
-        let name = match subscripted(&name) {
-            Some((variable, element)) => format!("{}_{element}", unicode_name(variable)),
-            None => unicode_name(&name),
-        };
-        if rate { format!("{name}'") } else { name }
+        let (name, rates) = self.for_people(symbol);
+        match subscripted(&name) {
+            Some((variable, element)) => dotted(&format!("{}_{element}", unicode_name(variable, 0)), rates),
+            None => unicode_name(&name, rates),
+        }
     }
 
     fn latex(&self, symbol: Symbol) -> String {
-        let (name, rate) = self.name(symbol);
+        let (name, rates) = self.for_people(symbol);
         match subscripted(&name) {
             Some((variable, element)) => {
-                let variable = latex_name(variable);
-                let variable = if rate { format!("\\dot{{{variable}}}") } else { variable };
-                format!("{variable}_{{\\mathrm{{{}}}}}", element.replace('_', "\\_"))
+                format!("{}_{{\\mathrm{{{}}}}}", latex_name(variable, rates), element.replace('_', "\\_"))
             }
-            None if rate => latex_name(&format!("{name}'")),
-            None => latex_name(&name),
+            None => latex_name(&name, rates),
         }
     }
 
     fn mathml(&self, symbol: Symbol) -> String {
-        let (name, rate) = self.name(symbol);
-        let mark = if rate { "'" } else { "" };
+        let (name, rates) = self.for_people(symbol);
         match subscripted(&name) {
             Some((variable, element)) => {
-                let variable = mathml_name(&format!("{variable}{mark}"));
-                format!("<msub>{variable}{}</msub>", mathml_owner(element))
+                format!("<msub>{}{}</msub>", mathml_name(variable, rates), mathml_owner(element))
             }
-            None => mathml_name(&format!("{name}{mark}")),
+            None => mathml_name(&name, rates),
         }
     }
 

@@ -27,9 +27,9 @@ fn names(equations: &Equations) -> Result<(), String> {
     once(equations.conserved.iter().map(|c| &c.name), |name| format!("two constants are called `{name}`"))?;
     once(equations.observed.iter().map(|o| &o.name), |name| format!("two variables are called `{name}`"))?;
     // The two ends of a bond that two elements share have one name: they are one variable.
-    let own = |symbol| equations.graph.exprs.name(symbol).trim_end_matches('*');
+    let own = |symbol| equations.graph.exprs.untwinned(symbol);
     let states = equations.states.iter().map(|s| (s.name.as_str(), own(s.symbol)));
-    let mut known: BTreeMap<&str, &str> = states.collect();
+    let mut known: BTreeMap<&str, Symbol> = states.collect();
     for unknown in &equations.algebraic {
         if known.insert(&unknown.name, own(unknown.symbol)).is_some_and(|other| other != own(unknown.symbol)) {
             return Err(format!("two unknowns are called `{}`", unknown.name));
@@ -39,7 +39,7 @@ fn names(equations: &Equations) -> Result<(), String> {
 }
 
 fn symbols(equations: &Equations) -> Result<(), String> {
-    let name = |s: &Symbol| format!("`{}` is unknown or defined twice", equations.graph.exprs.name(*s));
+    let name = |s: &Symbol| format!("`{}` is unknown or defined twice", equations.graph.exprs.label(*s));
     let conserved = equations.conserved.iter().map(|c| c.symbol);
     let defined = equations.steps.iter().flat_map(EquationStep::defined);
     let all: Vec<Symbol> = equations.unknowns().into_iter().chain(conserved).chain(defined).collect();

@@ -134,7 +134,7 @@ impl<'a> Lowering<'a> {
             Node::Pi => self.constant(std::f64::consts::PI),
             Node::Symbol(symbol) => self
                 .defined(*symbol)
-                .unwrap_or_else(|| panic!("{} is read before a step defines it", exprs.name(*symbol))),
+                .unwrap_or_else(|| panic!("{} is read before a step defines it", exprs.label(*symbol))),
             Node::Add(terms) => self.sum(e, terms),
             Node::Mul(factors) => self.product(e, factors, false),
             Node::Pow(base, exponent) => {

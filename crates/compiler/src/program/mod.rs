@@ -44,8 +44,8 @@ use std::sync::Arc;
 
 pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
-use crate::bond_graph::HeldKind;
-pub use crate::equations::{DomainKind, Unavailable};
+use crate::bond_graph::{HeldKind, ParameterKind};
+pub use crate::equations::{DomainKind, ObservedKind, Unavailable};
 use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::sparse::{SparseMatrix, SymbolicFactors};
@@ -129,6 +129,8 @@ pub struct Parameter {
     pub default: Value,
     /// Whether it cannot be set.
     pub constant: bool,
+    /// What it is.
+    pub kind: ParameterKind,
     /// SI unit, where known.
     pub unit: Option<Unit>,
 }
@@ -219,8 +221,17 @@ pub struct Observed {
     pub value: Result<Value, Unavailable>,
     /// SI unit, where known.
     pub unit: Option<Unit>,
+    /// What it is.
+    pub kind: ObservedKind,
     /// Whether it is recorded without being asked for.
     pub default: bool,
+}
+
+impl Program {
+    /// The parameter that is this, by its number, if there is one.
+    pub fn parameter_of(&self, kind: ParameterKind) -> Option<usize> {
+        self.parameters.iter().position(|p| p.kind == kind)
+    }
 }
 
 /// A condition on the start of a run: `residual = 0`.

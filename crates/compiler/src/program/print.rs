@@ -2,6 +2,7 @@
 //! guess of an unknown there.
 
 use super::{Arg, Block, Code, EventTrigger, Method, Op, Program, Routine, Solve, Step, Value};
+use crate::algebra::dotted;
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::fmt;
@@ -21,7 +22,7 @@ impl fmt::Display for Program {
         let what = if self.implicit.is_some() { "rates and residuals" } else { "rates" };
         let explicit = |i: usize| self.implicit.as_ref().is_none_or(|all| all.explicit[i]);
         let told = |(i, state): (usize, &super::State)| match explicit(i) {
-            true => format!("{}'", state.name),
+            true => dotted(&state.name, 1),
             false => "0".to_string(),
         };
         let told: Vec<String> = self.states.iter().enumerate().map(told).collect();
@@ -64,7 +65,7 @@ impl Names {
                 Op::Held(i) => program.held[i as usize].name.clone(),
                 Op::Conserved(i) => program.conserved[i as usize].clone(),
                 Op::State(i) => program.states[i as usize].name.clone(),
-                Op::Rate(i) => format!("{}'", program.states[i as usize].name),
+                Op::Rate(i) => dotted(&program.states[i as usize].name, 1),
                 _ => unreachable!("not given"),
             };
             given.insert(value, name);

@@ -123,6 +123,7 @@ impl Schedule<'_> {
                 name: p.name.clone(),
                 default: default.expect("every parameter has been given its value"),
                 constant: p.constant,
+                kind: p.kind,
                 unit: p.unit.clone(),
             })
             .collect()
@@ -212,7 +213,7 @@ impl Schedule<'_> {
     }
 
     fn names_of(&self, variables: &[Symbol]) -> Vec<String> {
-        variables.iter().map(|&s| self.graph.exprs.name(s).trim_end_matches('*').to_string()).collect()
+        variables.iter().map(|&s| self.graph.exprs.name(s).to_string()).collect()
     }
 
     fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {
@@ -309,6 +310,7 @@ impl Schedule<'_> {
                     name: o.name.clone(),
                     value: o.value.clone().map(|e| lower.value(e)),
                     unit: o.unit.clone(),
+                    kind: o.kind,
                     default: o.default,
                 })
                 .collect(),
@@ -421,7 +423,7 @@ fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
 
 /// A domain, if all that it reads is evaluated.
 fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::LawDomain) -> Option<LawDomain> {
-    let name = |s: Symbol| graph.exprs.name(s).trim_end_matches('*').to_string();
+    let name = |s: Symbol| graph.exprs.name(s).to_string();
     let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
     defined.then(|| LawDomain {
         given: name(domain.symbol),

@@ -2,8 +2,8 @@
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, Symbol};
 use halfarrow_compiler::bond_graph::{
-    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, Kind, Meaning, Parameter, ParameterId, Port, PortRef,
-    ResistorLaw, Signal, SignalId, Storage, StorageLaw, Variable,
+    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, Kind, Meaning, Parameter, ParameterId, ParameterKind,
+    Port, PortRef, ResistorLaw, Signal, SignalId, Storage, StorageLaw, Variable,
 };
 use halfarrow_compiler::causal_graph::{CausalGraph, Ports, Stroke};
 use halfarrow_compiler::ids::{Id, Map, Table};
@@ -97,7 +97,16 @@ impl Builder<'_> {
             let symbol = self.symbol(name, facts, Meaning::Parameter(ParameterId::new(at)));
             let (name, doc) = (name.clone(), String::new());
             let span = Span::default();
-            self.graph.parameters.push(Parameter { name, symbol, value, constant: false, unit: None, doc, span });
+            self.graph.parameters.push(Parameter {
+                name,
+                symbol,
+                value,
+                constant: false,
+                kind: ParameterKind::Declared,
+                unit: None,
+                doc,
+                span,
+            });
         }
         for (at, name) in list(&self.example["sources"]).enumerate() {
             let default = self.graph.exprs.int(0);

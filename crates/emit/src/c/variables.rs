@@ -1,5 +1,6 @@
 //! What the locals of a function are: variables of the model, where they have a name.
 
+use halfarrow_compiler::algebra::dotted;
 use halfarrow_compiler::program::{Code, Program, Value};
 use rustc_hash::FxHashMap;
 
@@ -18,7 +19,7 @@ impl Variables {
     /// All that can be recorded, and the rates of the states.
     pub fn of(program: &Program, givens: &Givens) -> Variables {
         let recorded = program.observed.iter().filter_map(|o| Some((o.name.clone(), o.value.clone().ok()?)));
-        let rates = program.states.iter().map(|s| (format!("{}'", s.name), s.rate));
+        let rates = program.states.iter().map(|s| (dotted(&s.name, 1), s.rate));
         let mut variables = Variables::default();
         for (name, value) in recorded.chain(rates) {
             if !program.values.op(value).is_given() && !givens.is_timely(value) {

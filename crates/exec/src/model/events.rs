@@ -3,7 +3,7 @@
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::Hold;
-use halfarrow_sim::{Events, Failure};
+use halfarrow_sim::{Affected, Events, Failure};
 
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
@@ -207,7 +207,7 @@ impl Events for Model {
             // What a modeller computes for himself may be infinite, what a law gives may not.
             Some(value) if out[value].is_infinite() => self.explain(t).map_or(Ok(()), Err)?,
             Some(value) => {
-                let not_finite = Failure::NotFinite { time: t, what: self.observed_name(value) };
+                let not_finite = Failure::NotFinite { time: t, what: Affected::variable(self.observed_name(value)) };
                 return Err(self.explain(t).unwrap_or(not_finite));
             }
             None => {}

@@ -4,7 +4,7 @@ use super::Model;
 use super::system::What;
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Entry, Program, Value};
-use halfarrow_sim::{Failure, Sparsity, System};
+use halfarrow_sim::{Affected, Failure, Sparsity, System};
 
 /// The code of the derivatives, and where in the pattern each of them stands.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Model {
             None => Ok(true),
             Some(place) => {
                 let row = self.code.sparsity.entries().nth(place).map_or(0, |(row, _)| row);
-                let what = format!("the derivative of the rate of {}", self.state_name(row));
+                let what = Affected::Other(format!("the derivative of the rate of {}", self.state_name(row)));
                 Err(Failure::NotFinite { time: t, what })
             }
         }

@@ -5,6 +5,7 @@ use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
 use crate::machine::MachineCode;
 use halfarrow_compiler::program::{BlockId, Value};
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// A choice of what is recorded. Never changed; shared by copies of a model.
@@ -47,10 +48,11 @@ impl Model {
     /// The first name that is unknown or has no value.
     pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
         let observed = &self.code.program.observed;
+        let mut index_of: FxHashMap<&str, usize> = FxHashMap::default();
+        observed.iter().enumerate().for_each(|(i, o)| _ = index_of.entry(&o.name).or_insert(i));
         let mut chosen = Vec::with_capacity(names.len());
         for &name in names {
-            let found = observed.iter().position(|o| o.name == name);
-            let index = found.ok_or_else(|| RecordError::Unknown(name.to_string()))?;
+            let index = *index_of.get(name).ok_or_else(|| RecordError::Unknown(name.to_string()))?;
             if let Err(why) = &observed[index].value {
                 return Err(RecordError::Unavailable(name.to_string(), why.clone()));
             }

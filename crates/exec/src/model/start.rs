@@ -4,7 +4,7 @@ use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
 use crate::bytecode::Routine;
 use halfarrow_compiler::program::{StartGroup, Value};
-use halfarrow_sim::Failure;
+use halfarrow_sim::{Affected, Failure};
 use std::collections::BTreeMap;
 
 /// A start condition is met if it is missed by less than this fraction of the terms it is made of.
@@ -309,7 +309,7 @@ impl Model {
         all: &mut Unknowns,
     ) -> Result<(), StartError> {
         let names: Vec<String> = group.conditions.iter().map(|&c| self.code.program.start[c].name.clone()).collect();
-        let without_value = Failure::NotFinite { time: t, what: names.join(", ") };
+        let without_value = Failure::NotFinite { time: t, what: Affected::Variables(names.clone()) };
         let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
         let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
         let at_time = GroupAtTime { t, routine, group };

@@ -2,7 +2,7 @@
 
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, SolveError};
-use halfarrow_sim::{Failure, Sparsity, System};
+use halfarrow_sim::{Affected, Failure, Sparsity, System};
 
 /// How far beside a state the derivative is taken where it is infinite: this part of the state and of its change in a second.
 const BESIDE: f64 = 1e-8;
@@ -107,7 +107,7 @@ impl Model {
         match self.take_derivatives(jv) {
             None => Ok(()),
             Some(state) => {
-                let what = format!("the derivative of the rate of {}", self.state_name(state));
+                let what = Affected::Other(format!("the derivative of the rate of {}", self.state_name(state)));
                 Err(Failure::NotFinite { time: t, what })
             }
         }
@@ -161,7 +161,7 @@ impl System for Model {
         for (state, (dx, &register)) in dx.iter_mut().zip(&self.code.rates.outputs).enumerate() {
             *dx = self.frame.r[register as usize];
             if !dx.is_finite() {
-                let what = format!("the rate of {}", self.state_name(state));
+                let what = Affected::Rate(self.state_name(state));
                 return Err(self.explain(t).unwrap_or(Failure::NotFinite { time: t, what }));
             }
         }

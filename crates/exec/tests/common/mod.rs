@@ -3,10 +3,13 @@
 
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
 use halfarrow_compiler::bond_graph::NoFiles;
-use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter};
+use halfarrow_compiler::bond_graph::{
+    BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter, ParameterKind,
+};
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::{
-    BreakBound, Conserved, Count, EquationStep, Equations, Form, InitialCondition, Observed, State, StateKind,
+    BreakBound, Conserved, Count, EquationStep, Equations, Form, InitialCondition, Observed, ObservedKind, State,
+    StateKind,
 };
 use halfarrow_compiler::ids::{Map, Table};
 use halfarrow_compiler::program::{Program, schedule};
@@ -61,7 +64,16 @@ impl Sketch {
     pub fn parameter(&mut self, name: &str, value: Expr) -> Expr {
         let (symbol, e) = self.symbol(name);
         let (unit, doc, span) = (None, String::new(), Span::default());
-        self.parameters.push(Parameter { name: name.into(), symbol, value, constant: false, unit, doc, span });
+        self.parameters.push(Parameter {
+            name: name.into(),
+            symbol,
+            value,
+            constant: false,
+            kind: ParameterKind::Declared,
+            unit,
+            doc,
+            span,
+        });
         e
     }
     pub fn input(&mut self, name: &str, default: f64) -> Expr {
@@ -103,10 +115,22 @@ impl Sketch {
         self.steps.push(step);
     }
     pub fn observe(&mut self, name: &str, value: Expr) {
-        self.observed.push(Observed { name: name.into(), value: Ok(value), unit: None, default: true });
+        self.observed.push(Observed {
+            name: name.into(),
+            value: Ok(value),
+            unit: None,
+            kind: ObservedKind::Named,
+            default: true,
+        });
     }
     pub fn hidden(&mut self, name: &str, value: Expr) {
-        self.observed.push(Observed { name: name.into(), value: Ok(value), unit: None, default: false });
+        self.observed.push(Observed {
+            name: name.into(),
+            value: Ok(value),
+            unit: None,
+            kind: ObservedKind::Named,
+            default: false,
+        });
     }
     /// `what` has a value at the start.
     pub fn start(&mut self, name: &str, what: Expr, value: f64) {

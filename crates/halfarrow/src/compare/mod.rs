@@ -8,12 +8,14 @@ mod subject;
 use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
-use halfarrow_compiler::equations::{EquationStep, Form};
+use halfarrow_compiler::bond_graph::ParameterKind;
+use halfarrow_compiler::equations::{EquationStep, Form, ObservedKind};
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
 use crate::audited::AuditReport;
 use crate::clock::Moment;
+use crate::equations::by_name;
 use crate::error::{Error, Problem};
 use crate::input::Input;
 use crate::model::Model;
@@ -21,7 +23,7 @@ use crate::run::{Run, Start};
 use crate::verdict::Verdict;
 use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
 use reference::{Apart, POINTS, Reference};
-use subject::{Settings, Subject, is_over};
+use subject::{Settings, Subject, Variable, is_over};
 
 /// Tolerance of the runs whose agreement is told.
 const TIGHT: f64 = 1e-11;
@@ -91,8 +93,9 @@ pub struct ReferenceReport {
 /// A form.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Row {
-    /// The form, as on the command line.
-    pub form: &'static str,
+    /// The form, by its name on the command line.
+    #[serde(serialize_with = "by_name")]
+    pub form: Form,
     /// Why it does not apply, or did not come to the end.
     pub reason: Option<String>,
     /// Number of differential equations; integrated signals are not counted.
@@ -235,7 +238,7 @@ impl Model {
             let mut go_on = || progress(0.05 + 0.45 * i as f64 / count, form.name());
             let until = budget.share(LADDERS, Form::ALL.len() - i);
             let effort = Effort { error: compare.error, patience, until };
-            let mut measured = Measured { row: Row { form: form.name(), ..Row::default() }, ..Measured::default() };
+            let mut measured = Measured { row: Row { form, ..Row::default() }, ..Measured::default() };
             match subject {
                 Err(reason) => measured.row.reason = Some(reason),
                 Ok(_) if form == Form::Stiff && self.has_springs()? => {
@@ -282,8 +285,9 @@ impl Model {
     fn has_springs(&self) -> Result<bool, Error> {
         let equations = self.equations_in(Form::Stiff)?;
         let x = &equations.graph.exprs;
-        let Some(stiffness) = x.find_symbol("form.stiffness") else { return Ok(false) };
-        let reads = |e: Expr| x.symbols_of(e).contains(&stiffness);
+        let mut parameters = equations.graph.parameters.values();
+        let Some(spring) = parameters.find(|p| p.kind == ParameterKind::SpringStiffness) else { return Ok(false) };
+        let reads = |e: Expr| x.symbols_of(e).contains(&spring.symbol);
         Ok(equations.steps.iter().any(|step| match step {
             EquationStep::Assign { value, .. } => reads(*value),
             EquationStep::Linear { matrix, right, .. } => matrix.entries().iter().chain(right).any(|&e| reads(e)),
@@ -500,7 +504,7 @@ fn timed(rung: &Rung) -> TimedRun {
 
 /// Times as multiples of that of the minimal form.
 fn relate(rows: &mut [Row]) {
-    let minimal = rows.iter().find(|row| row.form == Form::Minimal.name()).and_then(|row| row.seconds_per_second);
+    let minimal = rows.iter().find(|row| row.form == Form::Minimal).and_then(|row| row.seconds_per_second);
     for row in rows {
         row.times_minimal = row.seconds_per_second.zip(minimal).map(|(own, minimal)| own / minimal);
     }
@@ -519,7 +523,7 @@ fn notes(report: &CompareReport) -> Vec<String> {
         let warnings = row.audit.iter().flat_map(|audit| &audit.warnings);
         notes.extend(warnings.map(|warning| format!("warning: {}: {warning}", row.form)));
     }
-    for row in report.rows.iter().filter(|row| row.form == "stiff" && row.differential.is_some()) {
+    for row in report.rows.iter().filter(|row| row.form == Form::Stiff && row.differential.is_some()) {
         if row.convergence.is_empty() {
             notes.push(
                 "stiff: there is no constraint to put a spring in the place of; its equations are those of lagrange"
@@ -527,8 +531,9 @@ fn notes(report: &CompareReport) -> Vec<String> {
             );
         }
     }
-    let higher = |row: &&Row| row.index.is_some_and(|index| index > 1) && row.reason.is_none() && row.form != "stiff";
-    let higher: Vec<&str> = report.rows.iter().filter(higher).map(|row| row.form).collect();
+    let higher =
+        |row: &&Row| row.index.is_some_and(|index| index > 1) && row.reason.is_none() && row.form != Form::Stiff;
+    let higher: Vec<&str> = report.rows.iter().filter(higher).map(|row| row.form.name()).collect();
     if !higher.is_empty() {
         let forms = higher.join(", ");
         notes.push(format!(
@@ -541,9 +546,9 @@ fn notes(report: &CompareReport) -> Vec<String> {
 
 /// The variables that the motion is: states and stored quantities.
 fn motion(minimal: &Subject) -> Vec<String> {
-    let stored = |name: &String| name.ends_with(".q") || name.ends_with(".p");
+    let stored = |v: &Variable| matches!(v.kind, ObservedKind::Momentum | ObservedKind::Displacement);
     let mut motion = minimal.states();
-    motion.extend(minimal.variables().into_iter().map(|v| v.0).filter(stored));
+    motion.extend(minimal.variables().into_iter().filter(stored).map(|v| v.name));
     motion.sort();
     motion.dedup();
     motion
@@ -596,7 +601,7 @@ impl CompareReport {
     /// The forms whose results are not to be used, as the audit found.
     pub fn refused(&self) -> Vec<&'static str> {
         let refused = |row: &&Row| row.audit.as_ref().is_some_and(|audit| audit.verdict == Verdict::Refused);
-        self.rows.iter().filter(refused).map(|row| row.form).collect()
+        self.rows.iter().filter(refused).map(|row| row.form.name()).collect()
     }
 }
 

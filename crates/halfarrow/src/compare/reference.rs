@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::equations::{Form, ObservedKind};
 use halfarrow_sim::{Method, Stopped};
 use halfarrow_trace::Trace;
 
-use super::subject::{Settings, Subject, is_over};
+use super::subject::{Settings, Subject, Variable, is_over};
 use crate::clock::Moment;
 
 /// Tolerance of the reference.
@@ -51,7 +51,7 @@ impl Reference {
         until: Option<Moment>,
     ) -> Result<Reference, Box<Stopped>> {
         let known = minimal.variables();
-        let names: Vec<&str> = known.iter().map(|v| v.0.as_str()).collect();
+        let names: Vec<&str> = known.iter().map(|v| v.name.as_str()).collect();
         let settings = |method| Settings { method, rtol: TIGHTEST, to, until };
         let run = |subject: &Subject, method, names: &[&str]| {
             subject.sampled(settings(method), to / POINTS, names).map_err(Box::new)
@@ -63,7 +63,7 @@ impl Reference {
             let common: Vec<&str> = names
                 .iter()
                 .copied()
-                .filter(|n| motion.iter().any(|m| m == n) && theirs.iter().any(|v| v.0 == *n))
+                .filter(|n| motion.iter().any(|m| m == n) && theirs.iter().any(|v| v.name == *n))
                 .collect();
             run(subject, Method::Radau, &common).ok().map(|trace| (*form, trace))
         });
@@ -95,14 +95,14 @@ impl Reference {
     }
 
     /// Names of the variables that it knows among these.
-    pub(super) fn common<'n>(&self, names: &'n [(String, String)]) -> Vec<&'n str> {
-        names.iter().map(|v| v.0.as_str()).filter(|name| self.columns.contains_key(*name)).collect()
+    pub(super) fn common<'n>(&self, names: &'n [Variable]) -> Vec<&'n str> {
+        names.iter().map(|v| v.name.as_str()).filter(|name| self.columns.contains_key(*name)).collect()
     }
 
     /// The motion among these names.
-    pub(super) fn motion<'n>(&self, names: &'n [(String, String)]) -> Vec<&'n str> {
+    pub(super) fn motion<'n>(&self, names: &'n [Variable]) -> Vec<&'n str> {
         let moves = |name: &&str| self.columns.get(*name).is_some_and(|column| column.motion);
-        names.iter().map(|v| v.0.as_str()).filter(moves).collect()
+        names.iter().map(|v| v.name.as_str()).filter(moves).collect()
     }
 
     /// How far a run is off: in its motion, or in all variables.
@@ -125,26 +125,38 @@ impl Reference {
 /// `least` is how great variables of the graph count as at least: what is zero but for rounding has no magnitude of its own.
 fn columns(
     trace: &Trace,
-    known: &[(String, String)],
+    known: &[Variable],
     motion: &[String],
     least: &BTreeMap<String, f64>,
 ) -> BTreeMap<String, Column> {
     let greatest = |values: &[f64]| values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-    let mut of_unit: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut of_unit: BTreeMap<Like, f64> = BTreeMap::new();
     for (column, variable) in trace.columns.iter().zip(known) {
-        let most = of_unit.entry(kind(variable)).or_default();
+        let most = of_unit.entry(Like::of(variable)).or_default();
         *most = most.max(greatest(&column.values));
     }
-    let column = |(column, variable): (&halfarrow_trace::Column, &(String, String))| {
-        let name = &variable.0;
-        let floor = least.get(name).copied().unwrap_or(0.0).max(FLOOR * of_unit[kind(variable)]);
+    let column = |(column, variable): (&halfarrow_trace::Column, &Variable)| {
+        let name = &variable.name;
+        let floor = least.get(name).copied().unwrap_or(0.0).max(FLOOR * of_unit[&Like::of(variable)]);
         let scale = greatest(&column.values).max(floor).max(f64::MIN_POSITIVE / f64::EPSILON);
         (name.clone(), Column { values: column.values.clone(), scale, motion: motion.contains(name) })
     };
     trace.columns.iter().zip(known).map(column).collect()
 }
 
-/// What variables are of like size with: those of their unit; without units those of the same letter.
-fn kind((name, unit): &(String, String)) -> &str {
-    if unit.is_empty() { name.rsplit_once('.').map_or("", |parts| parts.1) } else { unit }
+/// What variables are of like size with: those of their unit; without units those of their kind.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Like<'v> {
+    Unit(&'v str),
+    Kind(ObservedKind),
+}
+
+impl Like<'_> {
+    fn of(variable: &Variable) -> Like<'_> {
+        match variable.kind {
+            _ if !variable.unit.is_empty() => Like::Unit(&variable.unit),
+            ObservedKind::Signal | ObservedKind::Input => Like::Kind(ObservedKind::Named),
+            kind => Like::Kind(kind),
+        }
+    }
 }

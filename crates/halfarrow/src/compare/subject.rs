@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use halfarrow_compiler::bond_graph::BondGraph;
-use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::equations::{Form, ObservedKind};
+use halfarrow_compiler::program::Observed;
 use halfarrow_exec::{self as exec, Operations};
 use halfarrow_sim::{
     Events as _, Failure, ImplicitSystem, Method, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
@@ -26,6 +27,15 @@ pub(super) struct Subject<'m> {
     graph: &'m BondGraph,
     form: Form,
     system: Ready,
+}
+
+/// A variable that all forms have.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Variable {
+    pub name: String,
+    /// SI unit; empty where it is not known.
+    pub unit: String,
+    pub kind: ObservedKind,
 }
 
 /// How a form is integrated.
@@ -149,17 +159,15 @@ impl Subject<'_> {
         }
     }
 
-    /// Everything that can be recorded and has a value of its own, which the drift of a constraint has not: name, SI unit.
-    pub(super) fn variables(&self) -> Vec<(String, String)> {
+    /// Everything that can be recorded and has a value of its own, which the drift of a constraint has not.
+    pub(super) fn variables(&self) -> Vec<Variable> {
         let program = match &self.system {
             Ready::Explicit(system, _) => system.program(),
             Ready::Implicit(system, ..) => system.program(),
         };
-        let unit =
-            |o: &halfarrow_compiler::program::Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
-        let drifts: Vec<String> = self.graph.constraints.iter().map(|c| format!("{}.drift", c.name)).collect();
-        let known = program.observed.iter().filter(|o| o.value.is_ok() && !drifts.contains(&o.name));
-        known.map(|o| (o.name.clone(), unit(o))).collect()
+        let known = program.observed.iter().filter(|o| o.value.is_ok() && o.kind != ObservedKind::Drift);
+        let unit = |o: &Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
+        known.map(|o| Variable { name: o.name.clone(), unit: unit(o), kind: o.kind }).collect()
     }
 
     /// Names of the states.

@@ -190,14 +190,14 @@ fn headings(names: &[&str], counts: &str) -> Markup {
 }
 
 fn described(form: Form) -> &'static str {
-    match form.name() {
-        "minimal" => "Minimal form: independent variables, nothing else",
-        "kane" => "Kane’s form: an equation for each independent speed",
-        "inverted" => "Inverted form: storages on zero-order paths in derivative causality",
-        "break" => "Classical form: break variables and multipliers",
-        "relaxed" => "Classical form with relaxed causality: resistors first",
-        "lagrange" => "Lagrange’s form: a multiplier for every constraint",
-        _ => "Stiff form: a spring with a damper for every constraint",
+    match form {
+        Form::Minimal => "Minimal form: independent variables, nothing else",
+        Form::Kane => "Kane’s form: an equation for each independent speed",
+        Form::Inverted => "Inverted form: storages on zero-order paths in derivative causality",
+        Form::Break => "Classical form: break variables and multipliers",
+        Form::Relaxed => "Classical form with relaxed causality: resistors first",
+        Form::Lagrange => "Lagrange’s form: a multiplier for every constraint",
+        Form::Stiff => "Stiff form: a spring with a damper for every constraint",
     }
 }
 

@@ -1,8 +1,8 @@
 //! When a run is sampled and shown.
 
 use super::{Grid, Run, Stepper};
-use crate::Failure;
 use crate::events::Events;
+use crate::{Affected, Failure};
 
 /// Where samples are taken.
 pub(super) enum Samples {
@@ -65,7 +65,7 @@ impl Run<'_> {
     pub(super) fn record(&mut self, events: &mut dyn Events, label: f64, t: f64, point: &[f64]) -> Result<(), Failure> {
         events.observe(t, point, &mut self.values)?;
         if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: events.observed_name(value) });
+            return Err(Failure::NotFinite { time: t, what: Affected::variable(events.observed_name(value)) });
         }
         self.hand_over(label);
         Ok(())

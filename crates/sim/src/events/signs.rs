@@ -1,7 +1,7 @@
 //! Signs of event indicators, and where they change.
 
 use super::Events;
-use crate::Failure;
+use crate::{Affected, Failure};
 
 /// The sign of each event indicator during the present mode.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,7 +42,7 @@ impl Signs {
         }
         events.event_indicators(t, point, &mut self.values)?;
         if let Some(indicator) = self.values.iter().position(|value| value.is_nan()) {
-            return Err(Failure::NotFinite { time: t, what: events.indicator_name(indicator) });
+            return Err(Failure::NotFinite { time: t, what: Affected::Other(events.indicator_name(indicator)) });
         }
         Ok(self.held.iter().zip(&self.values).position(|(&held, &value)| held != (value > 0.0)))
     }

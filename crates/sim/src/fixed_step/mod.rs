@@ -9,7 +9,7 @@ mod matrix;
 mod rosenbrock;
 mod ticks;
 
-use crate::{Failure, Sparsity, System};
+use crate::{Affected, Failure, Sparsity, System};
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 pub(crate) use ticks::{Ticks, target};
@@ -139,7 +139,7 @@ impl FixedStep {
             (None, None) => {}
         }
         if let Some(state) = self.trial.iter().position(|value| !value.is_finite()) {
-            return Err(Failure::NotFinite { time: t + h, what: system.state_name(state) });
+            return Err(Failure::NotFinite { time: t + h, what: Affected::variable(system.state_name(state)) });
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::tableau::{BACK, NODES, STAGES, TRANSFORM};
 use super::{Radau, StepError, norm};
-use crate::{Failure, ImplicitSystem};
+use crate::{Affected, Failure, ImplicitSystem};
 
 /// Iterations at most.
 pub(super) const MOST_ITERATIONS: usize = 7;
@@ -107,12 +107,17 @@ impl Radau {
         }
         let (t, out) = (self.t + NODES[stage] * h, &mut self.correction[stage]);
         if let Some(unknown) = self.trial.iter().position(|value| !value.is_finite()) {
-            return Err(StepError::Failed(Failure::NotFinite { time: t, what: system.unknown_name(unknown) }));
+            return Err(StepError::Failed(Failure::NotFinite {
+                time: t,
+                what: Affected::variable(system.unknown_name(unknown)),
+            }));
         }
         self.work.residuals += 1;
         system.residual(t, &self.trial, &self.trial_rates, out).map_err(StepError::Failed)?;
         match out.iter().position(|value| !value.is_finite()) {
-            Some(row) => Err(StepError::Failed(Failure::NotFinite { time: t, what: system.equation_name(row) })),
+            Some(row) => {
+                Err(StepError::Failed(Failure::NotFinite { time: t, what: Affected::Other(system.equation_name(row)) }))
+            }
             None => Ok(()),
         }
     }

@@ -1,10 +1,12 @@
 //! Laws of the kernel, one line each. Names that start with a capital are positive parameters.
 
+mod assumptions;
 mod eliminate;
 mod laws;
 mod numbers;
 mod random;
 mod reader;
+mod symbols;
 mod text;
 mod together;
 mod zero;

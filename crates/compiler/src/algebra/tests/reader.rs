@@ -11,6 +11,10 @@ pub fn read(x: &mut Exprs, text: &str) -> Expr {
 }
 
 pub fn symbol(x: &mut Exprs, name: &str) -> Symbol {
+    if let Some(of) = name.strip_suffix('\'') {
+        let of = symbol(x, of);
+        return x.rate(of);
+    }
     let two = x.int(2);
     let positive = name.starts_with(|c: char| c.is_uppercase());
     x.symbol(name, Facts { positive, nonzero: positive, given: positive.then_some(two) })

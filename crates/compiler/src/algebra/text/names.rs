@@ -2,26 +2,36 @@
 
 use super::super::exprs::Exprs;
 use super::super::node::Symbol;
+use super::super::symbols::dotted;
 use super::super::table::TableId;
 
 /// How symbols and tables are written, and in what order they stand in a product.
 pub trait Names {
+    /// What it is called, and of what is called so how many time derivatives it is.
+    fn called(&self, symbol: Symbol) -> (String, usize);
+
     /// In the model language.
-    fn ascii(&self, symbol: Symbol) -> String;
+    fn ascii(&self, symbol: Symbol) -> String {
+        let (name, rates) = self.called(symbol);
+        dotted(&name, rates)
+    }
 
     /// In Unicode text.
     fn unicode(&self, symbol: Symbol) -> String {
-        unicode_name(&self.ascii(symbol))
+        let (name, rates) = self.called(symbol);
+        unicode_name(&name, rates)
     }
 
     /// In LaTeX.
     fn latex(&self, symbol: Symbol) -> String {
-        latex_name(&self.ascii(symbol))
+        let (name, rates) = self.called(symbol);
+        latex_name(&name, rates)
     }
 
     /// In MathML.
     fn mathml(&self, symbol: Symbol) -> String {
-        mathml_name(&self.ascii(symbol))
+        let (name, rates) = self.called(symbol);
+        mathml_name(&name, rates)
     }
 
     /// Where it stands among others.
@@ -61,15 +71,16 @@ pub enum Sort {
     Rate,
 }
 
-/// Symbols by their own names, factors in the order in which they were made, parameters first.
+/// Symbols by their labels, factors in the order in which they were made, parameters first.
 pub struct PlainNames<'a>(
     /// The pool of the symbols.
     pub &'a Exprs,
 );
 
 impl Names for PlainNames<'_> {
-    fn ascii(&self, symbol: Symbol) -> String {
-        self.0.name(symbol).to_owned()
+    fn called(&self, symbol: Symbol) -> (String, usize) {
+        let (of, rates) = self.0.undotted(symbol);
+        (self.0.label(of).to_owned(), rates)
     }
 
     fn place(&self, symbol: Symbol) -> Place {
@@ -115,17 +126,16 @@ const GREEK: [(&str, char, &str); 34] = [
     ("iota", 'ι', "iota"),
 ];
 
-/// A name of the model language in Unicode: `phi_1'` is `φ_1'`, `omega2` is `ω2`.
-pub fn unicode_name(name: &str) -> String {
-    let (name, marks) = split_marks(name);
+/// A name of the model language in Unicode, with its time derivatives: `phi_1` once is `φ_1'`, `omega2` is `ω2`.
+pub fn unicode_name(name: &str, rates: usize) -> String {
     let words: Vec<String> =
         name.split('.').map(|part| part.split('_').map(unicode_word).collect::<Vec<_>>().join("_")).collect();
-    words.join(".") + marks
+    dotted(&words.join("."), rates)
 }
 
-/// A name of the model language in LaTeX: `phi_1'` is `\dot{\varphi}_{1}`, `w.f` is `f_{\mathrm{w}}`.
-pub fn latex_name(name: &str) -> String {
-    let (name, marks) = split_marks(name);
+/// A name of the model language in LaTeX, with its time derivatives: `phi_1` once is `\dot{\varphi}_{1}`, `w.f` is
+/// `f_{\mathrm{w}}`.
+pub fn latex_name(name: &str, rates: usize) -> String {
     let (owner, own) = match name.rsplit_once('.') {
         Some((owner, own)) => (Some(owner), own),
         None => (None, name),
@@ -137,7 +147,7 @@ pub fn latex_name(name: &str) -> String {
     below.extend(parts.map(latex_subscript));
     below.extend(owner.map(|o| o.split(['.', '_']).map(latex_subscript).collect::<Vec<_>>().join("\\,")));
     let base = latex_word(letters);
-    let base = match marks.len() {
+    let base = match rates {
         0 => base,
         1 => format!("\\dot{{{base}}}"),
         2 => format!("\\ddot{{{base}}}"),
@@ -146,9 +156,9 @@ pub fn latex_name(name: &str) -> String {
     if below.is_empty() { base } else { format!("{base}_{{{}}}", below.join(",")) }
 }
 
-/// A name of the model language in MathML: `phi_1'` is φ with a dot and the subscript 1, `w.f` is f with the subscript w.
-pub fn mathml_name(name: &str) -> String {
-    let (name, marks) = split_marks(name);
+/// A name of the model language in MathML, with its time derivatives: `phi_1` once is φ with a dot and the subscript 1,
+/// `w.f` is f with the subscript w.
+pub fn mathml_name(name: &str, rates: usize) -> String {
     let (owner, own) = match name.rsplit_once('.') {
         Some((owner, own)) => (Some(owner), own),
         None => (None, name),
@@ -160,7 +170,7 @@ pub fn mathml_name(name: &str) -> String {
     below.extend(parts.map(mathml_subscript));
     below.extend(owner.map(mathml_owner));
     let base = mathml_word(letters);
-    let base = match marks.len() {
+    let base = match rates {
         0 => base,
         n => format!("<mover>{base}<mo stretchy=\"false\">{}</mo></mover>", "˙".repeat(n)),
     };
@@ -191,11 +201,6 @@ fn mathml_subscript(word: &str) -> String {
         true => mathml_word(word),
         false => mathml_owner(word),
     }
-}
-
-fn split_marks(name: &str) -> (&str, &str) {
-    let end = name.trim_end_matches('\'').len();
-    name.split_at(end)
 }
 
 fn split_digits(word: &str) -> (&str, &str) {

@@ -3,6 +3,7 @@
 use super::super::exprs::Exprs;
 use super::super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::super::rational::Rational;
+use super::super::symbols::dotted;
 use super::names::{Names, Place, Sort};
 
 /// A formula as it is laid out.
@@ -81,7 +82,7 @@ impl Shaper<'_> {
             Node::Not(a) => Shape::Not(self.boxed(*a)),
             Node::Select(c, a, b) => Shape::Choice(self.boxed(*c), self.boxed(*a), self.boxed(*b)),
             Node::Table(t, a) => Shape::Table(self.names.table(*t), self.boxed(*a)),
-            Node::TableSlope(t, a) => Shape::Table(self.names.table(*t) + "'", self.boxed(*a)),
+            Node::TableSlope(t, a) => Shape::Table(dotted(&self.names.table(*t), 1), self.boxed(*a)),
         };
         (false, shape)
     }

@@ -103,13 +103,14 @@ impl ImplicitModel {
         }
     }
 
-    /// As [`Model::set_parameter`], for a parameter that the form alone has; the minimal form keeps its state.
+    /// As [`Model::set_parameter`], for a parameter that the form alone has, by its number; the minimal form keeps its state.
     ///
     /// # Errors
     /// As [`Model::set_parameter`].
-    pub fn set_form_parameter(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+    pub fn set_form_parameter(&mut self, index: usize, value: f64) -> Result<(), ParameterError> {
         self.begun = false;
-        self.form.set_parameter(name, value)
+        let name = self.form.program().parameters[index].name.clone();
+        self.form.set_parameter(&name, value)
     }
 
     /// The present value of a parameter of the form, by its number.

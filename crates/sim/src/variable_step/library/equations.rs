@@ -10,7 +10,7 @@ use diffsol::{
 
 use crate::jacobian::Jacobian;
 use crate::shared::Shared;
-use crate::{Failure, System};
+use crate::{Affected, Failure, System};
 
 /// `x' = f(t, x)` as the library wants it, with matrices of type `M`.
 pub(super) struct Equations<'s, M: Matrix> {
@@ -78,9 +78,7 @@ impl<'s, M: Matrix<T = f64>> Equations<'s, M> {
             return out.fill(f64::NAN); // follows from an earlier failure
         }
         let called = call(system, out).and_then(|()| match bad(out) {
-            Some(state) => {
-                Err(Failure::NotFinite { time: t, what: format!("the rate of {}", system.state_name(state)) })
-            }
+            Some(state) => Err(Failure::NotFinite { time: t, what: Affected::Rate(system.state_name(state)) }),
             None => Ok(()),
         });
         if let Err(failure) = called {

@@ -13,7 +13,7 @@ use diffsol::{
 use super::Integrator;
 use super::tolerances::Tolerances;
 use crate::shared::Shared;
-use crate::{Failure, Summary, System};
+use crate::{Affected, Failure, Summary, System};
 use equations::Equations;
 use sparse_lu::SparseLu;
 
@@ -161,7 +161,7 @@ where
         let (time, y) = (solver.state().t, solver.state().y);
         let escaped = (0..self.x.len()).find(|&state| !y.get_index(state).is_finite());
         if let Some(state) = escaped.filter(|_| !shared.has_failure()) {
-            shared.keep(Failure::NotFinite { time, what: shared.system().state_name(state) });
+            shared.keep(Failure::NotFinite { time, what: Affected::variable(shared.system().state_name(state)) });
         }
         (escaped.is_none() && !(explicit && shared.has_failure())).then_some(time)
     }

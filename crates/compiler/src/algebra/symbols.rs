@@ -1,0 +1,267 @@
+//! Named quantities: what each is, and what it is called.
+
+use super::exprs::Exprs;
+use super::fingerprint::mix;
+use super::node::{Expr, Facts, Node, Symbol};
+
+/// What a symbol is, seen from the one that it is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SymbolKind {
+    /// A quantity in its own right: of the modeller, of a bond, of a storage.
+    Own,
+    /// The same variable once more: that of the second of two elements on one bond, or that of a junction whose variable
+    /// is kept without a storage.
+    Twin(Symbol),
+    /// What acts where this common variable of a junction is kept without a storage: nothing.
+    Reaction(Symbol),
+    /// The time derivative.
+    Rate(Symbol),
+    /// A sum of stored quantities, kept for this variable.
+    Momentum(Symbol),
+    /// The force of the spring that stands in the place of this multiplier.
+    Spring(Symbol),
+    /// What an unknown does to a variable of its loop.
+    Gain {
+        /// The variable.
+        of: Symbol,
+        /// The unknown.
+        by: Symbol,
+    },
+    /// What a variable of a loop is where all unknowns of the loop are zero.
+    Bias(Symbol),
+}
+
+/// A symbol of the pool.
+#[derive(Clone)]
+pub(super) struct SymbolEntry {
+    /// Where its label, its name and its order stand in the texts of the pool.
+    label: Place,
+    name: Place,
+    order: Place,
+    /// From the label.
+    pub hash: u64,
+    kind: SymbolKind,
+    /// The symbol as an expression, once there is one.
+    expr: Option<Expr>,
+    facts: Facts,
+}
+
+/// From where to where something stands in a text.
+type Place = (u32, u32);
+
+/// What symbols are called, one after the other.
+#[derive(Clone, Default)]
+pub(super) struct Texts {
+    labels: String,
+    /// Labels with their numbers padded, so that `q2` comes before `q10`.
+    orders: Vec<u8>,
+}
+
+impl Texts {
+    fn push(&mut self, label: &str) -> Place {
+        let start = place(self.labels.len());
+        self.labels.push_str(label);
+        (start, place(self.labels.len()))
+    }
+
+    fn push_order(&mut self, label: &str) -> Place {
+        let start = place(self.orders.len());
+        push_natural_order(&mut self.orders, label);
+        (start, place(self.orders.len()))
+    }
+
+    fn at(&self, (start, end): Place) -> &str {
+        &self.labels[start as usize..end as usize]
+    }
+}
+
+fn place(length: usize) -> u32 {
+    u32::try_from(length).expect("names of less than 4 GiB")
+}
+
+/// A name with the sign of its time derivatives: `phi` and 1 are `phi'`.
+pub fn dotted(name: &str, rates: usize) -> String {
+    const RATE: &str = "'";
+    [name, &RATE.repeat(rates)].concat()
+}
+
+/// A name that another symbol has, told apart by marks.
+fn marked(name: &str, marks: usize) -> String {
+    const SAME_NAME: &str = "*";
+    [name, &SAME_NAME.repeat(marks)].concat()
+}
+
+impl Exprs {
+    /// The quantity of that name. The facts hold if it is new; a name always means the same symbol.
+    pub fn symbol(&mut self, name: &str, facts: Facts) -> Symbol {
+        self.find_symbol(name).unwrap_or_else(|| self.add_symbol(name, name, SymbolKind::Own, facts))
+    }
+
+    /// A new quantity of that name, or of that name with the first free number from 2 behind it.
+    pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
+        let name = self.free_name(name);
+        self.add_symbol(&name, &name, SymbolKind::Own, facts)
+    }
+
+    /// The symbol that is this; if it is new it is called so, or so with the first free number from 2 behind it.
+    pub fn made_of(&mut self, kind: SymbolKind, name: &str) -> Symbol {
+        self.find_made_of(kind).unwrap_or_else(|| {
+            let name = self.free_name(name);
+            self.add_symbol(&name, &name, kind, Facts::default())
+        })
+    }
+
+    /// The same variable once more, with the same name.
+    pub fn twin(&mut self, of: Symbol) -> Symbol {
+        let name = self.name(of).to_string();
+        self.marked_symbol(SymbolKind::Twin(of), &name)
+    }
+
+    /// What acts where a variable is kept without a storage; its name may belong to another variable.
+    pub fn reaction(&mut self, kept: Symbol, name: &str) -> Symbol {
+        self.marked_symbol(SymbolKind::Reaction(kept), name)
+    }
+
+    fn marked_symbol(&mut self, kind: SymbolKind, name: &str) -> Symbol {
+        self.find_made_of(kind).unwrap_or_else(|| {
+            let mut labels = (1..).map(|marks| marked(name, marks));
+            let label = labels.find(|label| self.find_symbol(label).is_none()).expect("marks without end");
+            self.add_symbol(&label, name, kind, Facts::default())
+        })
+    }
+
+    /// The symbol of the time derivative of another.
+    pub fn rate(&mut self, of: Symbol) -> Symbol {
+        let kind = SymbolKind::Rate(of);
+        self.find_made_of(kind).unwrap_or_else(|| {
+            let (label, name) = (dotted(self.label(of), 1), dotted(self.name(of), 1));
+            self.add_symbol(&label, &name, kind, Facts::default())
+        })
+    }
+
+    /// What an unknown of a loop does to one of its variables, as a symbol.
+    pub fn gain(&mut self, of: Symbol, by: Symbol) -> Symbol {
+        let name = format!("{}.by.{}", self.name(of), self.name(by));
+        self.made_of(SymbolKind::Gain { of, by }, &name)
+    }
+
+    /// What a variable of a loop is where all unknowns of the loop are zero, as a symbol.
+    pub fn bias(&mut self, of: Symbol) -> Symbol {
+        let name = format!("{}.bias", self.name(of));
+        self.made_of(SymbolKind::Bias(of), &name)
+    }
+
+    fn free_name(&self, name: &str) -> String {
+        let free = |name: &String| self.find_symbol(name).is_none();
+        let numbered = (2..).map(|n| format!("{name}_{n}"));
+        std::iter::once(name.to_string()).chain(numbered).find(free).expect("numbers without end")
+    }
+
+    fn add_symbol(&mut self, label: &str, name: &str, kind: SymbolKind, facts: Facts) -> Symbol {
+        let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
+        let at = self.texts.push(label);
+        let name = match label.strip_prefix(name) {
+            Some(_) => (at.0, at.0 + place(name.len())),
+            None => self.texts.push(name),
+        };
+        let order = self.texts.push_order(label);
+        let hash = hash_label(label);
+        self.symbols.push(SymbolEntry { label: at, name, order, hash, kind, expr: None, facts });
+        let symbols = &self.symbols;
+        self.by_label.insert_unique(hash, id, |&id| symbols[id as usize].hash);
+        if kind != SymbolKind::Own {
+            self.made.insert(kind, Symbol(id));
+        }
+        Symbol(id)
+    }
+
+    /// The symbol of that name, if there is one; of those that share a name the first.
+    pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
+        let found = self.by_label.find(hash_label(name), |&id| self.label(Symbol(id)) == name);
+        found.map(|&id| Symbol(id))
+    }
+
+    /// The symbol that is this, if there is one.
+    pub fn find_made_of(&self, kind: SymbolKind) -> Option<Symbol> {
+        self.made.get(&kind).copied()
+    }
+
+    /// What a symbol is.
+    pub fn kind(&self, symbol: Symbol) -> SymbolKind {
+        self.symbols[symbol.0 as usize].kind
+    }
+
+    /// The variable of the bond or junction that a symbol is: the one that it is the twin of, else itself.
+    pub fn untwinned(&self, symbol: Symbol) -> Symbol {
+        match self.kind(symbol) {
+            SymbolKind::Twin(of) => self.untwinned(of),
+            _ => symbol,
+        }
+    }
+
+    /// What a symbol is a time derivative of, and how often it is differentiated.
+    pub fn undotted(&self, symbol: Symbol) -> (Symbol, usize) {
+        match self.kind(symbol) {
+            SymbolKind::Rate(of) => {
+                let (of, rates) = self.undotted(of);
+                (of, rates + 1)
+            }
+            _ => (symbol, 0),
+        }
+    }
+
+    /// What people call a symbol. Twins have one name, and what acts on a kept variable may have that of another.
+    pub fn name(&self, symbol: Symbol) -> &str {
+        self.texts.at(self.symbols[symbol.0 as usize].name)
+    }
+
+    /// The name with marks that tell it apart from all others.
+    pub fn label(&self, symbol: Symbol) -> &str {
+        self.texts.at(self.symbols[symbol.0 as usize].label)
+    }
+
+    /// What is known of a symbol.
+    pub fn facts(&self, symbol: Symbol) -> Facts {
+        self.symbols[symbol.0 as usize].facts
+    }
+
+    /// How many symbols there are; their ids are the numbers below.
+    pub fn symbol_count(&self) -> usize {
+        self.symbols.len()
+    }
+
+    /// The symbol as an expression.
+    pub fn sym(&mut self, symbol: Symbol) -> Expr {
+        if let Some(known) = self.symbols[symbol.0 as usize].expr {
+            return known;
+        }
+        let e = self.intern(Node::Symbol(symbol));
+        self.symbols[symbol.0 as usize].expr = Some(e);
+        e
+    }
+
+    pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
+        let (start, end) = self.symbols[symbol.0 as usize].order;
+        &self.texts.orders[start as usize..end as usize]
+    }
+}
+
+fn hash_label(label: &str) -> u64 {
+    label.bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
+}
+
+fn push_natural_order(order: &mut Vec<u8>, name: &str) {
+    let mut rest = name.as_bytes();
+    while let Some(&first) = rest.first() {
+        if !first.is_ascii_digit() {
+            order.push(first);
+            rest = &rest[1..];
+            continue;
+        }
+        let len = rest.iter().take_while(|b| b.is_ascii_digit()).count();
+        // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
+        order.extend([b'0', len.min(255) as u8]);
+        order.extend_from_slice(&rest[..len]);
+        rest = &rest[len..];
+    }
+}
