@@ -83,8 +83,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked: Vec<String> = model.recorded().iter().map(|&i| observed[i].name.clone()).collect();
-        let available: BTreeSet<&str> =
-            observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.as_str()).collect();
+        let available: BTreeSet<&str> = observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.as_str()).collect();
         let names: Vec<String> = wanted(graph).into_iter().filter(|name| available.contains(name.as_str())).collect();
         let all: Vec<&str> = names.iter().chain(&asked).map(String::as_str).collect();
         let count = all.len();

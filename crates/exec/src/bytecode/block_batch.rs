@@ -4,6 +4,7 @@
 //! symmetric and definite. It takes the same operations in the same order, hence gives the same bits. A block that needs
 //! anything else is left to the solver of single blocks.
 
+use super::elimination::{BatchFactors, UpperPattern};
 use super::frame::{Frame, Solver};
 use super::instruction::{Register, Routine, Solve};
 use super::newton::{CLOSE_TO_ROUNDING, CONTRACTION, CONVERGED};
@@ -49,20 +50,7 @@ struct BlockGroup {
     packed: Packed,
     /// Where the entries of the matrix stand, which are the first outputs; residuals follow.
     pattern: Arc<Pattern>,
-    rows: Vec<UpperRow>,
-}
-
-/// A row of `U`, and what elimination by it does.
-#[derive(Debug)]
-struct UpperRow {
-    /// The entry of the matrix on the diagonal.
-    diagonal: Option<usize>,
-    /// Where its places right of the diagonal begin.
-    start: usize,
-    /// These: column, and the entry of the matrix that stands there.
-    right: Vec<(usize, Option<usize>)>,
-    /// For each of them, in the row of that column, where the places of the columns after it stand.
-    below: Vec<Vec<usize>>,
+    rows: UpperPattern,
 }
 
 #[derive(Debug)]
@@ -180,25 +168,7 @@ impl BlockGroup {
             Arg::Given(_) => unreachable!("inputs stand for what is given"),
         };
         let packed = Packed::of(&shape.code, fixed, &[], slot);
-        let entry = |i: usize, j: usize| shape.pattern.entry(i, j);
-        // What elimination fills.
-        let mut full: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| entry(i, j).is_some()).collect()).collect();
-        for k in 0..n {
-            let row: Vec<usize> = (k + 1..n).filter(|&j| full[k][j]).collect();
-            for &i in &row {
-                row.iter().filter(|&&j| j >= i).for_each(|&j| full[i][j] = true);
-            }
-        }
-        let columns: Vec<Vec<usize>> = (0..n).map(|i| (i + 1..n).filter(|&j| full[i][j]).collect()).collect();
-        let starts: Vec<usize> = (0..n).map(|i| columns[..i].iter().map(Vec::len).sum()).collect();
-        let place = |i: usize, j: usize| starts[i] + columns[i].iter().position(|&c| c == j).expect("filled");
-        let row = |i: usize| {
-            let right = columns[i].iter().map(|&j| (j, entry(i, j))).collect();
-            let after = |a: usize| columns[i][a + 1..].iter().map(|&j| place(columns[i][a], j)).collect();
-            let below = (0..columns[i].len()).map(after).collect();
-            UpperRow { diagonal: entry(i, i), start: starts[i], right, below }
-        };
-        let rows = (0..n).map(row).collect();
+        let rows = UpperPattern::of(&shape.pattern);
         BlockGroup { size: n, members, first, packed, pattern: shape.pattern, rows }
     }
 }
@@ -226,9 +196,7 @@ pub(crate) struct BatchWorkspace {
     simplified: Vec<Vector>,
     first_correction: Vec<Vector>,
     first_right: Vec<Vector>,
-    /// Factors: above the diagonal, row by row, and the inverse diagonal.
-    upper: Vec<Vector>,
-    inverse: Vec<Vector>,
+    factors: BatchFactors<LANES>,
     /// Solutions, and the entries of the Jacobian there.
     found: Vec<Vector>,
     jacobian: Vec<Vector>,
@@ -243,7 +211,6 @@ impl BatchWorkspace {
     pub fn reserve(&mut self, batches: &BlockBatches) {
         let most = |of: &dyn Fn(&BlockGroup) -> usize| batches.groups.iter().map(of).max().unwrap_or(0);
         let (n, entries) = (most(&|g| g.size), most(&|g| g.pattern.len()));
-        let upper = most(&|g| g.rows.iter().map(|row| row.right.len()).sum());
         self.registers.reserve(most(&|g| g.packed.slots.max(g.size + g.members[0].inputs.len())));
         for vector in [
             &mut self.x,
@@ -252,12 +219,11 @@ impl BatchWorkspace {
             &mut self.simplified,
             &mut self.first_correction,
             &mut self.first_right,
-            &mut self.inverse,
             &mut self.found,
         ] {
             vector.resize(vector.len().max(n), Vector::default());
         }
-        self.upper.resize(self.upper.len().max(upper), Vector::default());
+        batches.groups.iter().for_each(|group| self.factors.reserve(&group.rows));
         self.jacobian.resize(self.jacobian.len().max(entries), Vector::default());
         self.tried.resize(self.tried.len().max(batches.groups.len()), 0);
         let followed_lanes = most(&|g| g.first + g.members.len().div_ceil(LANES));
@@ -515,83 +481,17 @@ impl BatchWorkspace {
         }
     }
 
-    /// Factors the matrix, as `Lu` does; `good` loses those that are not definite.
+    /// Factors the matrix; `good` loses those that are not definite.
     #[inline(always)]
     fn factor(&mut self, group: &BlockGroup, good: &mut Vector) {
-        let n = group.size;
-        let entry =
-            |this: &Self, e: Option<usize>| e.map_or(NONE, |e| this.registers.r[group.packed.outputs[e] as usize]);
-        if n == 1 {
-            let a = entry(self, group.rows[0].diagonal);
-            let size = each(|l| a[l].abs());
-            let weight = each(|l| size[l] / if size[l] > f64::MIN_POSITIVE { size[l] } else { f64::MIN_POSITIVE });
-            *good = each(|l| {
-                let stands = (weight[l] > f64::EPSILON) & (weight[l] < f64::INFINITY);
-                if stands { good[l] } else { 0.0 }
-            });
-            self.inverse[0] = a;
-            return;
-        }
-        for (i, row) in group.rows.iter().enumerate() {
-            self.inverse[i] = entry(self, row.diagonal);
-            for (upper, &(_, e)) in self.upper[row.start..].iter_mut().zip(&row.right) {
-                *upper = e.map_or(NONE, |e| self.registers.r[group.packed.outputs[e] as usize]);
-            }
-        }
-        let first = self.inverse[0];
-        let sign = each(|l| 1f64.copysign(first[l]));
-        let least = f64::EPSILON * n as f64;
-        for (k, row) in group.rows.iter().enumerate() {
-            let (pivot, diagonal) = (self.inverse[k], entry(self, row.diagonal));
-            *good = each(|l| {
-                let (size, entry) = (sign[l] * pivot[l], sign[l] * diagonal[l]);
-                let stands = (size > 0.0) & (size > least * entry) & (size < f64::INFINITY);
-                if stands { good[l] } else { 0.0 }
-            });
-            let inverse = each(|l| 1.0 / pivot[l]);
-            for (a, (&(i, _), below)) in row.right.iter().zip(&row.below).enumerate() {
-                let u = self.upper[row.start + a];
-                let factor = each(|l| u[l] * inverse[l]);
-                self.inverse[i] = each(|l| self.inverse[i][l] - factor[l] * u[l]);
-                for (&at, other) in below.iter().zip(row.start + a + 1..) {
-                    let other = self.upper[other];
-                    self.upper[at] = each(|l| self.upper[at][l] - factor[l] * other[l]);
-                }
-            }
-            for u in &mut self.upper[row.start..][..row.right.len()] {
-                *u = each(|l| u[l] * inverse[l]);
-            }
-            self.inverse[k] = inverse;
-        }
+        let BatchWorkspace { factors, registers, .. } = self;
+        factors.factor(&group.rows, |e| registers.r[group.packed.outputs[e] as usize], good);
     }
 
     /// Replaces `simplified` by the solution.
     #[inline(always)]
     fn back(&mut self, group: &BlockGroup) {
-        let n = group.size;
-        if n == 1 {
-            self.simplified[0] = each(|l| self.simplified[0][l] / self.inverse[0][l]);
-            return;
-        }
-        self.simplified[..n].iter_mut().for_each(|b| *b = each(|l| b[l] + 0.0));
-        for (k, row) in group.rows.iter().enumerate() {
-            let done = self.simplified[k];
-            for (u, &(j, _)) in self.upper[row.start..].iter().zip(&row.right) {
-                self.simplified[j] = each(|l| self.simplified[j][l] - u[l] * done[l]);
-            }
-        }
-        for (next, inverse) in self.simplified[..n].iter_mut().zip(&self.inverse) {
-            *next = each(|l| next[l] * inverse[l] + 0.0);
-        }
-        // Back substitution, from the last unknown on.
-        for (k, row) in group.rows.iter().enumerate().rev() {
-            let mut value = self.simplified[k];
-            for (u, &(j, _)) in self.upper[row.start..][..row.right.len()].iter().zip(&row.right).rev() {
-                let done = &self.simplified[j];
-                value = each(|l| value[l] - u[l] * done[l]);
-            }
-            self.simplified[k] = value;
-        }
+        self.factors.solve(&group.rows, &mut self.simplified);
     }
 
     /// Whether each solution is without doubt the continuation of the previous one; `last` iteration.

@@ -4,6 +4,7 @@
 //! A residual at the rounding of its terms is a solution. What the equations tell of the unknowns is solved for, of the
 //! rest the shortest change is taken: it stays where it was.
 
+use super::elimination::RankRevealing;
 use super::frame::{Frame, entries};
 use super::instruction::{Operation, Solve};
 use super::newton::CLOSE_TO_ROUNDING;
@@ -25,14 +26,10 @@ const SHARE: f64 = 0.1;
 pub(crate) struct Floating {
     /// What the residuals are the sums of, in magnitude.
     terms: Vec<f64>,
-    /// The matrix, a row in units of rounding, a column in magnitudes of its unknown.
-    matrix: Vec<f64>,
-    /// Directions that the equations say nothing of, one after the other.
-    free: Vec<f64>,
-    right: Vec<f64>,
+    /// The linear equations of a step.
+    equations: RankRevealing,
+    /// Magnitudes of the unknowns.
     size: Vec<f64>,
-    /// The unknown in each place.
-    order: Vec<usize>,
     /// Which unknowns float at the root found last.
     pub now: Vec<bool>,
     /// Which have floated in an accepted solution.
@@ -41,14 +38,10 @@ pub(crate) struct Floating {
 
 impl Floating {
     pub fn new(size: usize) -> Floating {
-        let (line, square) = (vec![0.0; size], vec![0.0; size * size]);
         Floating {
-            terms: line.clone(),
-            matrix: square.clone(),
-            free: square,
-            right: line.clone(),
-            size: line,
-            order: vec![0; size],
+            terms: vec![0.0; size],
+            equations: RankRevealing::new(size),
+            size: vec![0.0; size],
             now: vec![false; size],
             ever: vec![false; size],
         }
@@ -61,99 +54,20 @@ impl Floating {
 
     /// Greatest residual in units of its rounding; infinite if something is not finite.
     fn rest(&self) -> f64 {
-        self.right.iter().fold(0.0, |most, r| if r.is_finite() { r.abs().max(most) } else { f64::INFINITY })
-    }
-
-    /// Eliminates with the greatest pivots there are, down to those at rounding; how many there are.
-    fn eliminate(&mut self) -> usize {
-        let n = self.order.len();
-        for k in 0..n {
-            let (mut row, mut column, mut most) = (k, k, 1.0f64);
-            for i in k..n {
-                for j in k..n {
-                    let size = self.matrix[i * n + j].abs();
-                    if size > most {
-                        (row, column, most) = (i, j, size);
-                    }
-                }
-            }
-            if most <= 1.0 {
-                return k;
-            }
-            self.exchange(k, row, column);
-            for i in k + 1..n {
-                let factor = self.matrix[i * n + k] / self.matrix[k * n + k];
-                for j in k + 1..n {
-                    self.matrix[i * n + j] -= factor * self.matrix[k * n + j];
-                }
-                self.right[i] -= factor * self.right[k];
-            }
-        }
-        n
-    }
-
-    fn exchange(&mut self, k: usize, row: usize, column: usize) {
-        let n = self.order.len();
-        for j in 0..n {
-            self.matrix.swap(k * n + j, row * n + j);
-        }
-        for i in 0..n {
-            self.matrix.swap(i * n + k, i * n + column);
-        }
-        self.right.swap(k, row);
-        self.order.swap(k, column);
+        self.equations.right.iter().fold(0.0, |most, r| if r.is_finite() { r.abs().max(most) } else { f64::INFINITY })
     }
 
     /// Whether after elimination the least pivot tells no more digits of its unknown than a step needs to be settled.
     fn is_weak(&self, rank: usize) -> bool {
-        let n = self.order.len();
-        rank < n || self.matrix[n * n - 1].abs() < 1.0 / CLOSE_TO_ROUNDING
+        rank < self.now.len() || self.equations.least_pivot() < 1.0 / CLOSE_TO_ROUNDING
     }
 
     /// Replaces the right side by the shortest step, in places, and tells which unknowns float.
     fn shortest(&mut self, rank: usize) {
-        let n = self.order.len();
-        self.right[rank..].fill(0.0);
-        back(&self.matrix, n, rank, &mut self.right);
-        self.now.fill(false);
-        for place in rank..n {
-            let (known, free) = self.free.split_at_mut((place - rank) * n);
-            let free = &mut free[..n];
-            free.fill(0.0);
-            free.iter_mut().take(rank).enumerate().for_each(|(i, v)| *v = -self.matrix[i * n + place]);
-            back(&self.matrix, n, rank, free);
-            free[place] = 1.0;
-            known.chunks_exact(n).for_each(|other| take_off(free, other));
-            let length = dot(free, free).sqrt();
-            free.iter_mut().for_each(|v| *v /= length);
-            take_off(&mut self.right, free);
-            for (v, &unknown) in free.iter().zip(&self.order) {
-                self.now[unknown] |= v.abs() >= SHARE;
-            }
-        }
+        let Floating { equations, now, .. } = self;
+        now.fill(false);
+        equations.shortest(rank, |unknown, share| now[unknown] |= share.abs() >= SHARE);
     }
-}
-
-/// Solves the triangle of the first `rank` places.
-fn back(matrix: &[f64], n: usize, rank: usize, b: &mut [f64]) {
-    for i in (0..rank).rev() {
-        let row = &matrix[i * n..][..rank];
-        let (here, known) = b[i..rank].split_at_mut(1);
-        row[i + 1..].iter().zip(known).for_each(|(a, known)| here[0] -= a * *known);
-        here[0] /= row[i];
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    a.iter().zip(b).for_each(|(a, b)| sum += a * b);
-    sum
-}
-
-/// Takes off what lies along a direction of length 1.
-fn take_off(from: &mut [f64], along: &[f64]) {
-    let share = dot(from, along);
-    from.iter_mut().zip(along).for_each(|(v, a)| *v -= share * a);
 }
 
 impl Frame {
@@ -182,10 +96,10 @@ impl Frame {
             self.measure(solve);
             let floating = self.floating_of(solve);
             let rest = floating.rest();
-            if !floating.matrix.iter().all(|a| a.is_finite()) || rest > SHRINKS * before && rest > 1.0 {
+            if !floating.equations.matrix.iter().all(|a| a.is_finite()) || rest > SHRINKS * before && rest > 1.0 {
                 return false;
             }
-            let rank = floating.eliminate();
+            let rank = floating.equations.eliminate();
             if !floating.is_weak(rank) {
                 return false;
             }
@@ -195,8 +109,8 @@ impl Frame {
             }
             let newton = &mut self.solvers[solve.block.0 as usize].newton;
             let floating = &newton.floating;
-            for (place, &unknown) in floating.order.iter().enumerate() {
-                newton.x[unknown] += floating.right[place] * floating.size[unknown];
+            for (&unknown, step) in floating.equations.order.iter().zip(&floating.equations.right) {
+                newton.x[unknown] += step * floating.size[unknown];
             }
             before = rest;
         }
@@ -251,16 +165,15 @@ impl Frame {
             let size = newton.x[j].abs().max(newton.previous[j].abs());
             let unknown = if largest > 0.0 { largest } else { 1.0 };
             floating.size[j] = if size > 0.0 { size } else { unknown };
-            floating.order[j] = j;
         }
-        floating.matrix.fill(0.0);
+        floating.equations.clear();
         for (i, &right) in solve.right.iter().enumerate() {
             let rounding = ROUNDING * terms[right as usize];
             floating.terms[i] = if rounding > 0.0 { rounding } else { f64::MIN_POSITIVE };
-            floating.right[i] = (newton.offset[i] - r[right as usize]) / floating.terms[i];
+            floating.equations.right[i] = (newton.offset[i] - r[right as usize]) / floating.terms[i];
         }
         for ((i, j), entry) in solve.pattern.places().zip(entries(solve, r)) {
-            floating.matrix[i * n + j] = entry * floating.size[j] / floating.terms[i];
+            floating.equations.matrix[i * n + j] = entry * floating.size[j] / floating.terms[i];
         }
     }
 

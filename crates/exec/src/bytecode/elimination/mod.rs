@@ -1,9 +1,13 @@
 //! Elimination: linear equations of solve blocks, solved without taking memory.
 
+mod batch;
 mod full;
+mod rank;
 mod sparse;
 
+pub(crate) use batch::{BatchFactors, UpperPattern};
 pub(crate) use full::Lu;
+pub(crate) use rank::RankRevealing;
 
 use halfarrow_compiler::program::Block;
 use sparse::SparseLu;
