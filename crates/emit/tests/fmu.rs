@@ -231,11 +231,13 @@ fn states_at_rest_have_the_magnitude_to_which_they_grow() {
     assert!(nominal(&one));
 }
 
-/// Parameters that are set one after the other may fit only together; where they do not, the end of the initialization or
-/// the next step is refused with the reason.
+/// Parameters that are set one after the other may fit only together; where they do not, the end of the initialization, the
+/// next step or the event at which they are tuned is refused with the reason.
 #[test]
 fn parameters_for_which_the_equations_are_others_are_refused() {
-    let written = written(&export_program(read_program(&common::difference()), Method::Rk4, 1e-3, true), Version::V2);
+    let program = read_program(&common::difference());
+    let states = program.states.len();
+    let written = written(&export_program(program, Method::Rk4, 1e-3, true), Version::V2);
     let folder = common::folder("structure_fmu");
     for file in written.files.iter().filter(|f| f.path.starts_with("sources/")).chain(&fmu::headers(Version::V2)) {
         std::fs::write(folder.join(file.path.trim_start_matches("sources/")), &file.bytes).expect("a file");
@@ -251,6 +253,8 @@ fn parameters_for_which_the_equations_are_others_are_refused() {
         format!("-DGUID=\"{}\"", of("", "guid")),
         format!("-DA={}", of("a", "valueReference")),
         format!("-DB={}", of("b", "valueReference")),
+        format!("-DR={}", of("r", "valueReference")),
+        format!("-DSTATES={states}"),
     ];
     std::fs::write(folder.join("structure.c"), include_str!("common/structure.c")).expect("a file");
     common::cc("cc", &folder, |c| {

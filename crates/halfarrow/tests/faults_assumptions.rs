@@ -128,6 +128,43 @@ fn signs_that_were_used_are_assumed_and_no_others() {
     }
 }
 
+/// Gyrators whose moduli were divided by in an attempt that was given up: the equations hold for all of them.
+#[test]
+fn what_was_tried_and_given_up_refuses_no_value() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/two_class3_C/model.bond");
+    let text = std::fs::read_to_string(path).unwrap();
+    for (a, b) in [(4.0, 4.0), (0.0, 4.0), (1.5, 0.0)] {
+        let mut model = program(&text);
+        model.set_parameters([("a", a), ("b", b)]).unwrap();
+        assert!(model.broken().is_none(), "a = {a}, b = {b}: {:?}", model.broken());
+        let vary = [format!("a=list(1.5,{a:?})"), format!("b=list(4,{b:?})")];
+        let vary: Vec<&str> = vary.iter().map(String::as_str).collect();
+        let model = Model::from_text("model.bond", &text, &[]).unwrap();
+        let (report, rows) = sweep(&model, &vary, "f1", Method::Fixed(FixedMethod::Rk4));
+        assert_eq!(report.failed, 0, "{report:?}");
+        let wanted = alone(&text, &[set("a", a), set("b", b)], "f1", Method::Fixed(FixedMethod::Rk4)).expect("a run");
+        let found = rows.last().unwrap()[3];
+        assert!((found - wanted).abs() <= 1e-12, "a = {a}, b = {b}: {found}, alone {wanted}");
+    }
+}
+
+/// A time of a delay that is above zero by the values of its parameters only is above zero whenever they are set.
+#[test]
+fn compound_times_stay_above_zero() {
+    let text = "model Late\nparam a = 0.3, b = 0.1\n1:x -> I:m(1, f0 = 1)\nx -> R:r(0.2)\n\
+                let late = delay(m.f, a - b)\nSe:back(-late) -> x\n";
+    let mut model = program(text);
+    model.set_parameter("b", 0.2).unwrap();
+    assert!(model.broken().is_none());
+    model.set_parameter("b", 0.4).unwrap();
+    let failure = model.broken().expect("a - b is below zero");
+    assert!(matches!(&failure, Failure::Structure { assumed } if assumed == "a - b is above zero"), "{failure:?}");
+    assert!(model.initialise(0.0).is_err());
+    let model = Model::from_text("model.bond", text, &[]).unwrap();
+    let (report, rows) = sweep(&model, &["b=list(0.1,0.4)"], "m.f", Method::Fixed(FixedMethod::Rk4));
+    assert_eq!((report.failed, rows[0][2].is_finite(), rows[1][2].is_finite()), (1, true, false), "{rows:?}");
+}
+
 #[test]
 fn a_controller_without_a_gain_gets_it() {
     let text = "model Controlled\nparam kp = 3, ki = 0, kd = 0\n1:a -> I:m(1, f0 = 1)\na -> R:r(0.2)\n\
