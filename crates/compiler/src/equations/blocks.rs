@@ -303,9 +303,15 @@ pub fn is_singular(x: &mut Exprs, matrix: &SparseMatrix<Expr>) -> bool {
     if x.is_regular_given(&full) {
         return false;
     }
+    let before = x.assumed();
     let rows = matrix.rows().map(|row| row.map(|(k, &e)| (k, e)).filter(|e| !x.is_zero_given(e.1)).collect());
     let rows: Vec<SparseRow> = rows.map(SparseRow).collect();
-    rank_given(x, n, rows) < n
+    let singular = rank_given(x, n, rows) < n;
+    if !singular {
+        // A run chooses its own pivots.
+        x.suppose(before);
+    }
+    singular
 }
 
 /// The elements whose efforts, flows or stored quantities these are, junctions left out.
