@@ -17,7 +17,7 @@ fn compared(name: &str, to: f64) -> CompareReport {
     load(name).compare(&compare, &mut |_, _| true).expect("a table")
 }
 
-fn row<'r>(report: &'r CompareReport, form: Form) -> &'r Row {
+fn row(report: &CompareReport, form: Form) -> &Row {
     report.rows.iter().find(|row| row.form == form).expect("a row")
 }
 
