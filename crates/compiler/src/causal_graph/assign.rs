@@ -27,8 +27,14 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     let mut undrawn = BTreeSet::new();
     let mut point = start_point(&x, graph);
     for members in parts(graph) {
-        let mut part =
-            Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new(), kept: Vec::new() };
+        let mut part = ConnectedPart {
+            x: &mut x,
+            graph,
+            wanted: &wanted,
+            members: &members,
+            laws: BTreeMap::new(),
+            kept: Vec::new(),
+        };
         match part.assign_well_conditioned(&mut strokes, &mut point) {
             Ok(solved) => {
                 undrawn.extend(solved.undetermined.iter().copied());
@@ -51,7 +57,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
 }
 
 /// One connected part under assignment, with the causality chosen for some of its algebraic laws.
-struct Part<'a> {
+struct ConnectedPart<'a> {
     x: &'a mut Exprs,
     graph: &'a BondGraph,
     wanted: &'a Wanted,
@@ -66,7 +72,7 @@ const TRIED_TOGETHER: usize = 8;
 /// Parts with more elements than this keep the causality that propagation gives.
 const TURNED_AT_MOST: usize = 600;
 
-impl Part<'_> {
+impl ConnectedPart<'_> {
     /// Assigns the part; where the causality so found costs digits at the start, inputs are chosen by size instead.
     fn assign_well_conditioned(
         &mut self,
@@ -413,7 +419,7 @@ fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
     found
 }
 
-impl Part<'_> {
+impl ConnectedPart<'_> {
     /// Sequential causality assignment. `false` if it meets a contradiction; then the strokes are partial.
     fn propagate(&mut self, strokes: &mut Strokes) -> bool {
         let graph = self.graph;
@@ -531,7 +537,8 @@ fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
 pub(super) fn sequential(graph: &BondGraph, members: &[ElementId]) -> Option<Table<BondId, Stroke>> {
     let mut x = graph.exprs.clone();
     let wanted = Wanted::default();
-    let mut part = Part { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
+    let mut part =
+        ConnectedPart { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
     let mut strokes = Strokes::new(graph);
     contradiction::force_strokes(graph, &mut strokes, members).ok()?;
     part.propagate(&mut strokes).then(|| strokes.table())

@@ -8,7 +8,7 @@ use super::definitions::{Definition, Definitions};
 use super::rows::Rows;
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
-use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
+use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, IntegratedSignal, Storage, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 
 /// A state of the minimal form before it is ordered.
@@ -570,7 +570,7 @@ impl<'a> Assembled<'a> {
 
 impl Assembled<'_> {
     /// A signal that repeats a stored quantity, read from it: with the same start value or a constant distance to it.
-    fn repeated(&mut self, signal: &Signal) -> Option<Expr> {
+    fn repeated(&mut self, signal: &IntegratedSignal) -> Option<Expr> {
         let &Node::Symbol(rate) = self.d.x.node(signal.rate) else { return None };
         let (&stored, _) = self.d.stored.iter().find(|(_, r)| **r == rate)?;
         let own = self.d.x.sym(stored);
