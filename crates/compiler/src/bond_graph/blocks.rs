@@ -1,4 +1,4 @@
-//! IntegratedSignal blocks unfolded: `pid` and `tf` to integrated signals, `delay` and `sample` to held ones, `table` to a table.
+//! Signal blocks unfolded: `pid` and `tf` to integrated signals, `delay` and `sample` to held ones, `table` to a table.
 
 use super::builder::{BlockInput, Builder, OpenBlock, Value};
 use super::csv;
