@@ -167,7 +167,12 @@ impl Differentiation {
     }
 
     /// `F(u, x) = 0` gives `(∂F/∂u) u' = -(∂F/∂x) x'`, at the solution: the matrix, and the right-hand side.
-    fn right_of_newton(&mut self, block: BlockId, residuals: &[Value], jacobian: &Matrix) -> (Matrix, Vec<SparseGradient>) {
+    fn right_of_newton(
+        &mut self,
+        block: BlockId,
+        residuals: &[Value],
+        jacobian: &Matrix,
+    ) -> (Matrix, Vec<SparseGradient>) {
         let n = residuals.len();
         let mut there: FxHashMap<Value, Value> = FxHashMap::default();
         for unknown in 0..n {
@@ -236,7 +241,13 @@ impl Differentiation {
     }
 
     /// Solves for the gradients of all unknowns, column by column, with one factorisation.
-    fn solved(&mut self, block: BlockId, matrix: &Arc<Matrix>, right: &[SparseGradient], shared: Option<Value>) -> Vec<SparseGradient> {
+    fn solved(
+        &mut self,
+        block: BlockId,
+        matrix: &Arc<Matrix>,
+        right: &[SparseGradient],
+        shared: Option<Value>,
+    ) -> Vec<SparseGradient> {
         let elements = self.blocks[block].elements().to_string();
         let zero = self.values.number(0.0);
         let mut gradients: Vec<Vec<(u32, Value)>> = vec![Vec::new(); right.len()];

@@ -6,9 +6,9 @@ use super::op::Op;
 use super::sharing::share;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, HeldSignal, Holds, Implicit, Input,
-    LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess, State,
-    Value, first_of, verify,
+    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, HeldSignal, Holds, Implicit,
+    Input, LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess,
+    State, Value, first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
