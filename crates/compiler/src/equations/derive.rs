@@ -14,7 +14,7 @@ use super::stiff::parameters;
 use super::verify::verify;
 use super::{
     Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Relations, State, StateKind, Unavailable,
-    conserved, display, domains, index, observed, relations,
+    conserved, domains, expansion, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -287,9 +287,9 @@ fn without_cancelling_terms(
     if cancelling.is_empty() {
         return;
     }
-    let named = display::named_sources(d);
+    let named = expansion::named_sources(d);
     let rates = states.iter().map(|s| s.rate).collect();
-    let Some(known) = display::expansions(d, steps, &rates, &named) else { return };
+    let Some(known) = expansion::expansions(d, steps, &rates, &named) else { return };
     let unknown: BTreeSet<Symbol> =
         states.iter().flat_map(|s| [s.symbol, s.rate]).chain(algebraic.iter().map(|a| a.symbol)).collect();
     let reads = |d: &Definitions, e: Expr| {
@@ -298,7 +298,7 @@ fn without_cancelling_terms(
         near.iter().copied().chain(far).filter(|s| unknown.contains(s)).collect::<BTreeSet<_>>().len()
     };
     for i in cancelling {
-        let written = display::put_in(&mut d.x, residuals[i], &known);
+        let written = expansion::put_in(&mut d.x, residuals[i], &known);
         if reads(d, written) < reads(d, residuals[i]) {
             residuals[i] = written;
         }

@@ -3,14 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::blocks::{LinearRow, Ordered};
-use super::definitions::Definitions;
 use super::display::{
     Dependent, DisplayEquation, Page, ShownDefinition, aliases, assign_rows, equation, from_sides, gathered,
-    named_sources, put_in, put_in_shown,
+    put_in_shown,
 };
-use super::{EquationStep, Equations};
 use crate::algebra::{Expr, Exprs, Node, ONE, Shared, Symbol};
+use crate::equations::{Definitions, EquationStep, Equations, LinearRow, Ordered, named_sources, put_in};
 use crate::ids::Map;
 
 /// Terms that may be formed in the search for short forms of all equations and definitions together.
