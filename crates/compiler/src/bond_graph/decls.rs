@@ -6,7 +6,7 @@ use super::builder::{Builder, OpenSignal, Value};
 use super::dimension::Quantity;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
 use super::value::Reading;
-use super::{Input, Meaning, Named, Parameter, ParameterKind, IntegratedSignal};
+use super::{Input, IntegratedSignal, Meaning, Named, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts};
 use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};

@@ -8,7 +8,9 @@ use super::definitions::{Definition, Definitions};
 use super::rows::Rows;
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
-use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, IntegratedSignal, Storage, StorageLaw};
+use crate::bond_graph::{
+    ElementId, IntegratedSignal, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw,
+};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 
 /// A state of the minimal form before it is ordered.

@@ -2,8 +2,8 @@
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, Symbol};
 use halfarrow_compiler::bond_graph::{
-    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, Kind, Meaning, Parameter, ParameterId, ParameterKind,
-    Port, PortRef, ResistorLaw, IntegratedSignal, SignalId, Storage, StorageLaw, Variable,
+    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, IntegratedSignal, Kind, Meaning, Parameter,
+    ParameterId, ParameterKind, Port, PortRef, ResistorLaw, SignalId, Storage, StorageLaw, Variable,
 };
 use halfarrow_compiler::causal_graph::{CausalGraph, Ports, Stroke};
 use halfarrow_compiler::ids::{Id, Map, Table};

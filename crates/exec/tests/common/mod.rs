@@ -4,7 +4,7 @@
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
 use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::bond_graph::{
-    BondGraph, Element, ElementId, HeldSignal, HeldKind, Input, Kind, Parameter, ParameterKind,
+    BondGraph, Element, ElementId, HeldKind, HeldSignal, Input, Kind, Parameter, ParameterKind,
 };
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::{
