@@ -15,4 +15,5 @@ pub mod ids;
 pub mod program;
 pub mod span;
 pub mod sparse;
+pub mod textbook;
 pub mod unit;

@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, SparseRow, Symbol, eliminate};
 use halfarrow_compiler::bond_graph::{BondId, ElementId, Kind};
-use halfarrow_compiler::equations::{EquationStep, Equations, Form, derive_equations, show};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, derive_equations};
 use halfarrow_compiler::ids::Id;
+use halfarrow_compiler::textbook::show;
 use serde_json::Value;
 use support::formula::formula;
 use support::paper::{causal_graph, example, strokes};

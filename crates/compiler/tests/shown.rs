@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
 use halfarrow_compiler::bond_graph::{Meaning, NoFiles};
 use halfarrow_compiler::compile::{Text, to_equations};
-use halfarrow_compiler::equations::{
-    EquationStep, Equations, Form, Shown, Style, print, print_dependent, print_meanings, show,
-};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form};
+use halfarrow_compiler::textbook::{Shown, Style, print, print_dependent, print_meanings, show};
 
 fn models() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::equations::{Shown, Style, print, print_meanings, print_symbol};
+use halfarrow_compiler::textbook::{Shown, Style, print, print_meanings, print_symbol};
 
 /// A document with the equations, what their names stand for, and the start values of the states.
 ///

@@ -1,8 +1,9 @@
 //! The equations, as plain data.
 
-use halfarrow_compiler::equations::{
-    Algebraic, AlgebraicRole, Equations, Form, Shown, StateKind, Style, print, print_certificate, print_definitions,
-    print_expr, print_form, print_meanings, print_symbol, show,
+use halfarrow_compiler::equations::{Algebraic, AlgebraicRole, Equations, Form, StateKind};
+use halfarrow_compiler::textbook::{
+    Shown, Style, print, print_certificate, print_definitions, print_expr, print_form, print_meanings, print_symbol,
+    show,
 };
 use serde::Serialize;
 

@@ -3,8 +3,9 @@
 
 use std::ops::ControlFlow;
 
-use halfarrow_compiler::equations::{Form, show};
+use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
+use halfarrow_compiler::textbook::show;
 #[cfg(feature = "fmu")]
 use halfarrow_emit::fmu;
 use halfarrow_emit::fmu::Version;

@@ -8,10 +8,9 @@ use halfarrow_compiler::causal_graph::{
     CausalGraph, Combination, PortState, Role, Stroke, by_hand, kept_junctions, state_rank,
 };
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
-use halfarrow_compiler::equations::{
-    EquationStep, Equations, Form, StateKind, Style, derive_equations, print_expr, show,
-};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, StateKind, derive_equations};
 use halfarrow_compiler::ids::{Id, Map};
+use halfarrow_compiler::textbook::{Style, print_expr, show};
 use serde::Serialize;
 
 use crate::error::Error;

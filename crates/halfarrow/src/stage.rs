@@ -4,8 +4,9 @@ use halfarrow_compiler::ast;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::compile::Found;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
-use halfarrow_compiler::equations::{Form, show};
+use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::schedule;
+use halfarrow_compiler::textbook::show;
 
 use crate::Override;
 use crate::error::Error;

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Stages of the compiler in pipeline order: each uses only those before it.
-const STAGES: [&str; 7] = ["algebra", "ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program"];
+const STAGES: [&str; 8] =
+    ["algebra", "ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program", "textbook"];
 
 /// What the stages stand on; these use no stage but `algebra`.
 const SHARED: [&str; 4] = ["diagnostic", "ids", "span", "unit"];

@@ -5,7 +5,7 @@ use super::csv;
 use super::dimension::Quantity;
 use super::files::{FileError, read_beside};
 use super::value::{Reading, known_of};
-use super::{Held, HeldKind, Meaning, Signal, SignalId};
+use super::{HeldKind, HeldSignal, IntegratedSignal, Meaning, SignalId};
 use crate::algebra::{Expr, Facts, Interpolation, Outside, Symbol, Table1d, TableError};
 use crate::ast::{self, Arg, Call, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -87,7 +87,7 @@ impl<'a> Builder<'a, '_> {
         let symbol = self.fresh(&title, Facts::default());
         let source = self.exprs.int(0);
         let name = self.exprs.name(symbol).to_string();
-        let id = self.held.push(Held { name, symbol, source, time, kind, span });
+        let id = self.held.push(HeldSignal { name, symbol, source, time, kind, span });
         self.mean(symbol, Meaning::Held(id), Quantity::Any);
         self.open(cx, &call.args[0].value, BlockInput::Held(id));
         Some(self.symbol_value(symbol))
@@ -103,7 +103,7 @@ impl<'a> Builder<'a, '_> {
         let symbol = self.fresh(&format!("{}.{name}", cx.owner), Facts::default());
         let name = self.exprs.name(symbol).to_string();
         let rate = self.exprs.int(0);
-        let id = self.signals.push(Signal { name, symbol, rate, initial: None, unit: None, span });
+        let id = self.signals.push(IntegratedSignal { name, symbol, rate, initial: None, unit: None, span });
         self.mean(symbol, Meaning::Signal(id), quantity);
         (id, symbol)
     }

@@ -11,7 +11,8 @@ use super::flatten::{Flat, Part};
 use super::scope::DeclId;
 use super::wire::Wiring;
 use super::{
-    BondId, ElementId, Held, HeldId, Input, InputId, Meaning, Named, Parameter, ParameterId, PortRef, Signal, SignalId,
+    BondId, ElementId, HeldId, HeldSignal, Input, InputId, IntegratedSignal, Meaning, Named, Parameter, ParameterId,
+    PortRef, SignalId,
 };
 use crate::algebra::{Expr, Exprs, Facts, Symbol};
 use crate::ast;
@@ -124,8 +125,8 @@ pub(super) struct Builder<'a, 'f> {
     /// Values of the parameters, as numbers.
     pub numbers: Vec<f64>,
     pub inputs: Table<InputId, Input>,
-    pub signals: Table<SignalId, Signal>,
-    pub held: Table<HeldId, Held>,
+    pub signals: Table<SignalId, IntegratedSignal>,
+    pub held: Table<HeldId, HeldSignal>,
     pub lets: Vec<Named>,
     pub outputs: Vec<Named>,
     /// Dimensions of the named expressions.

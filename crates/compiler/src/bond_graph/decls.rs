@@ -6,7 +6,7 @@ use super::builder::{Builder, OpenSignal, Value};
 use super::dimension::Quantity;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
 use super::value::Reading;
-use super::{Input, Meaning, Named, Parameter, ParameterKind, Signal};
+use super::{Input, IntegratedSignal, Meaning, Named, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts};
 use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -70,7 +70,7 @@ impl<'a> Builder<'a, '_> {
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         match d.kind {
             DeclKind::State(state) => {
-                let id = self.signals.push(Signal {
+                let id = self.signals.push(IntegratedSignal {
                     name: d.name.clone(),
                     symbol,
                     rate: zero,

@@ -97,9 +97,9 @@ pub struct BondGraph {
     /// Inputs.
     pub inputs: Table<InputId, Input>,
     /// Integrated signals.
-    pub signals: Table<SignalId, Signal>,
+    pub signals: Table<SignalId, IntegratedSignal>,
     /// Delayed and sampled signals.
-    pub held: Table<HeldId, Held>,
+    pub held: Table<HeldId, HeldSignal>,
     /// Named expressions (`let` values), in order, fully expanded.
     pub lets: Vec<Named>,
     /// Outputs, in order, fully expanded.
@@ -366,7 +366,7 @@ pub struct Input {
 
 /// An integrated signal.
 #[derive(Debug, Clone)]
-pub struct Signal {
+pub struct IntegratedSignal {
     /// Its name.
     pub name: String,
     /// Its symbol.
@@ -383,7 +383,7 @@ pub struct Signal {
 
 /// A signal read from earlier times.
 #[derive(Debug, Clone)]
-pub struct Held {
+pub struct HeldSignal {
     /// Its name, made from where it stands.
     pub name: String,
     /// Its symbol.

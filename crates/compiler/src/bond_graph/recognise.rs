@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::builder::Builder;
-use super::{BondGraph, ElementId, Kind, Meaning, Named, PortRef, Signal, SignalId, Storage, StorageLaw};
+use super::{BondGraph, ElementId, IntegratedSignal, Kind, Meaning, Named, PortRef, SignalId, Storage, StorageLaw};
 use crate::algebra::{Expr, Node, Symbol};
 use crate::ids::{Id, Table};
 
@@ -16,7 +16,7 @@ impl Builder<'_, '_> {
         rates: &BTreeMap<Symbol, Expr>,
     ) -> BTreeMap<Symbol, Expr> {
         let mut replaced = BTreeMap::new();
-        let mut kept: Table<SignalId, Signal> = Table::new();
+        let mut kept: Table<SignalId, IntegratedSignal> = Table::new();
         for (_, signal) in std::mem::take(&mut graph.signals).iter() {
             let rate = self.exprs.substitute(signal.rate, rates);
             match self.repeated(graph, rate, signal.initial) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{BondGraph, Held, Kind, Meaning, PortRef, Signal, Storage};
+use super::{BondGraph, HeldSignal, IntegratedSignal, Kind, Meaning, PortRef, Storage};
 use crate::algebra::{Expr, Symbol};
 use crate::ids::Id;
 
@@ -136,10 +136,10 @@ fn symbols(graph: &BondGraph) -> Result<(), String> {
     for p in graph.parameters.values() {
         check(p.value, &|| format!("parameter `{}`", p.name))?;
     }
-    for Held { time, name, .. } in graph.held.values() {
+    for HeldSignal { time, name, .. } in graph.held.values() {
         check(*time, &|| format!("`{name}`"))?;
     }
-    for Signal { symbol, name, .. } in graph.signals.values() {
+    for IntegratedSignal { symbol, name, .. } in graph.signals.values() {
         if !known(*symbol) {
             return Err(format!("signal `{name}` has no symbol"));
         }

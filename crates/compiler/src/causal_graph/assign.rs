@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::by_size::solve_part_by_size;
-use super::ports::{Solved, Virtual, Wishes, is_imposed, solve_part};
+use super::ports::{CausalityPreferences, Solved, Virtual, is_imposed, solve_part};
 use super::signals::{NodeId, signal_graph};
 use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
@@ -20,15 +20,21 @@ use crate::ids::{Id, Map, Table};
 /// Source: `method.md`, section 2 and 5.1.
 pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     let mut x = graph.exprs.clone();
-    let wanted = Wanted::of(&mut x, graph);
+    let wanted = StoragePreferences::of(&mut x, graph);
     let mut strokes = Strokes::new(graph);
     let mut ports = Ports::default();
     let mut faults = Vec::new();
     let mut undrawn = BTreeSet::new();
     let mut point = start_point(&x, graph);
     for members in parts(graph) {
-        let mut part =
-            Part { x: &mut x, graph, wanted: &wanted, members: &members, laws: BTreeMap::new(), kept: Vec::new() };
+        let mut part = ConnectedPart {
+            x: &mut x,
+            graph,
+            wanted: &wanted,
+            members: &members,
+            laws: BTreeMap::new(),
+            kept: Vec::new(),
+        };
         match part.assign_well_conditioned(&mut strokes, &mut point) {
             Ok(solved) => {
                 undrawn.extend(solved.undetermined.iter().copied());
@@ -51,10 +57,10 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
 }
 
 /// One connected part under assignment, with the causality chosen for some of its algebraic laws.
-struct Part<'a> {
+struct ConnectedPart<'a> {
     x: &'a mut Exprs,
     graph: &'a BondGraph,
-    wanted: &'a Wanted,
+    wanted: &'a StoragePreferences,
     members: &'a [ElementId],
     laws: BTreeMap<PortRef, PortCausality>,
     /// Junctions whose variable turned out independent without a storage.
@@ -66,7 +72,7 @@ const TRIED_TOGETHER: usize = 8;
 /// Parts with more elements than this keep the causality that propagation gives.
 const TURNED_AT_MOST: usize = 600;
 
-impl Part<'_> {
+impl ConnectedPart<'_> {
     /// Assigns the part; where the causality so found costs digits at the start, inputs are chosen by size instead.
     fn assign_well_conditioned(
         &mut self,
@@ -84,9 +90,9 @@ impl Part<'_> {
         self.laws.clear();
         let with_solved = self.x.assumed();
         self.x.suppose(before.clone());
-        let (_, wishes) = self.solve(&Strokes::new(graph), false);
+        let (_, preferences) = self.solve(&Strokes::new(graph), false);
         self.x.suppose(before);
-        let by_size = solve_part_by_size(self.x, graph, members, &wishes, point);
+        let by_size = solve_part_by_size(self.x, graph, members, &preferences, point);
         let Some(by_size) = by_size.filter(|found| digits::cost(self.x, graph, found, point) < cost) else {
             self.x.suppose(with_solved);
             return Ok(solved);
@@ -212,7 +218,7 @@ impl Part<'_> {
         size
     }
 
-    /// Assigns the part with the laws as they are wished.
+    /// Assigns the part with the laws as they are preferred.
     fn assign(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let (graph, members) = (self.graph, self.members);
         strokes.release(members);
@@ -251,7 +257,7 @@ impl Part<'_> {
 
     /// The causality asked of an algebraic law: the one chosen, else the one in which it is written.
     fn wish(&self, port: PortRef) -> PortCausality {
-        self.laws.get(&port).copied().unwrap_or_else(|| wished(self.graph, port))
+        self.laws.get(&port).copied().unwrap_or_else(|| preferred(self.graph, port))
     }
 }
 
@@ -280,7 +286,7 @@ type Choice = BTreeMap<PortRef, bool>;
 
 /// Number of curved laws that a choice meets against the direction in which they are written.
 fn turned(graph: &BondGraph, linear: &BTreeMap<PortRef, bool>, choice: &Choice) -> usize {
-    let against = |(p, here): &(&PortRef, &bool)| !linear[p] && causality_of(**here) != wished(graph, **p);
+    let against = |(p, here): &(&PortRef, &bool)| !linear[p] && causality_of(**here) != preferred(graph, **p);
     choice.iter().filter(against).count()
 }
 
@@ -290,7 +296,7 @@ fn causality_of(here: bool) -> PortCausality {
 
 /// The order in which storages are asked to be independent, ahead of the order of the model.
 #[derive(Default)]
-struct Wanted {
+struct StoragePreferences {
     independent: Vec<PortRef>,
     virtual_speeds: Vec<Virtual>,
     why: BTreeMap<Symbol, Kept>,
@@ -298,10 +304,10 @@ struct Wanted {
     asked: Vec<Vec<Symbol>>,
 }
 
-impl Wanted {
+impl StoragePreferences {
     /// `prefer`, then common variables of junctions whose integrals occur in moduli. Source: `method.md`, 5.2.
-    fn of(x: &mut Exprs, graph: &BondGraph) -> Wanted {
-        let mut wanted = Wanted::default();
+    fn of(x: &mut Exprs, graph: &BondGraph) -> StoragePreferences {
+        let mut wanted = StoragePreferences::default();
         for preference in &graph.preferences {
             let asked = wanted.add(x, graph, preference.symbol, Kept::Preferred);
             wanted.asked.push(asked);
@@ -413,7 +419,7 @@ fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
     found
 }
 
-impl Part<'_> {
+impl ConnectedPart<'_> {
     /// Sequential causality assignment. `false` if it meets a contradiction; then the strokes are partial.
     fn propagate(&mut self, strokes: &mut Strokes) -> bool {
         let graph = self.graph;
@@ -454,42 +460,42 @@ impl Part<'_> {
 
     /// Exact elimination, with virtual speeds where they are combinations of storages and sources; and what it was asked
     /// for.
-    fn solve(&mut self, strokes: &Strokes, forced: bool) -> (Solved, Wishes) {
+    fn solve(&mut self, strokes: &Strokes, forced: bool) -> (Solved, CausalityPreferences) {
         let (graph, members) = (self.graph, self.members);
         let inside = |e: ElementId| members.binary_search(&e).is_ok();
         let independent = self.wanted.independent.iter().copied().filter(|p| inside(p.element)).collect();
-        let mut wishes = Wishes { independent, ..Wishes::default() };
+        let mut preferences = CausalityPreferences { independent, ..CausalityPreferences::default() };
         for port in outer_ports(graph, members) {
             match &graph.elements[port.element].kind {
                 kind @ (Kind::Inertance(_) | Kind::Compliance(_)) => {
                     let integral = sits_here(PortCausality::Integral, matches!(kind, Kind::Inertance(_)));
                     if forced && strokes.at(port) == Some(!integral) {
-                        wishes.derivative.push(port);
+                        preferences.derivative.push(port);
                     }
                 }
                 _ => {
                     let drawn = strokes.at(port).map(causality_of);
-                    wishes.algebraic.insert(port, drawn.unwrap_or_else(|| self.wish(port)));
+                    preferences.algebraic.insert(port, drawn.unwrap_or_else(|| self.wish(port)));
                 }
             }
         }
         let before = self.x.assumed();
-        let mut first = solve_part(self.x, graph, members, &wishes);
+        let mut first = solve_part(self.x, graph, members, &preferences);
         let reading = self.sources_of_rates(&first);
         if !reading.is_empty() {
-            wishes.sources_as_laws = reading;
+            preferences.sources_as_laws = reading;
             self.x.suppose(before.clone());
-            first = solve_part(self.x, graph, members, &wishes);
+            first = solve_part(self.x, graph, members, &preferences);
         }
         let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
         if !speeds.is_empty() {
-            wishes.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
-            if !wishes.virtual_speeds.is_empty() {
+            preferences.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
+            if !preferences.virtual_speeds.is_empty() {
                 self.x.suppose(before);
-                return (solve_part(self.x, graph, members, &wishes), wishes);
+                return (solve_part(self.x, graph, members, &preferences), preferences);
             }
         }
-        (first, wishes)
+        (first, preferences)
     }
 
     /// Sources whose value reads the rate of a storage that they (or others) fix: `Se(1 - 2*c.f)` on the compliance `c`.
@@ -530,8 +536,9 @@ fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
 /// Strokes of a part by sequential assignment alone; `None` if that contradicts itself.
 pub(super) fn sequential(graph: &BondGraph, members: &[ElementId]) -> Option<Table<BondId, Stroke>> {
     let mut x = graph.exprs.clone();
-    let wanted = Wanted::default();
-    let mut part = Part { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
+    let wanted = StoragePreferences::default();
+    let mut part =
+        ConnectedPart { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
     let mut strokes = Strokes::new(graph);
     contradiction::force_strokes(graph, &mut strokes, members).ok()?;
     part.propagate(&mut strokes).then(|| strokes.table())
@@ -550,7 +557,7 @@ pub(super) fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
 }
 
 /// The causality that an algebraic law asks for: the one in which it is written.
-pub(super) fn wished(graph: &BondGraph, port: PortRef) -> PortCausality {
+pub(super) fn preferred(graph: &BondGraph, port: PortRef) -> PortCausality {
     match &graph.elements[port.element].kind {
         Kind::Resistor(laws) => match laws[port.port as usize] {
             ResistorLaw::Conductive(_) => PortCausality::Conductive,

@@ -134,7 +134,7 @@ fn component_break_set(successors: &[Vec<u32>], rank: impl Fn(usize) -> u8) -> B
 
 /// A small set that meets every cycle, without superfluous vertices, and a lower bound on the size of such sets.
 fn smallest(successors: &[Vec<u32>]) -> (BTreeSet<usize>, usize) {
-    let mut work = Work::new(successors);
+    let mut work = ReducedDigraph::new(successors);
     let mut set = BTreeSet::new();
     let mut bound = 0;
     work.reduce(&mut set);
@@ -150,7 +150,7 @@ fn smallest(successors: &[Vec<u32>]) -> (BTreeSet<usize>, usize) {
     (set, bound)
 }
 
-fn kernel_break_set(work: &Work, kernel: &[usize]) -> (Vec<usize>, usize) {
+fn kernel_break_set(work: &ReducedDigraph, kernel: &[usize]) -> (Vec<usize>, usize) {
     if kernel.len() <= BITS
         && let Some(exact) = Search::new(work, kernel).run()
     {
@@ -160,7 +160,7 @@ fn kernel_break_set(work: &Work, kernel: &[usize]) -> (Vec<usize>, usize) {
 }
 
 /// Takes the busiest vertex, reduces, and goes on until what is left can be solved exactly.
-fn greedy(mut work: Work) -> Vec<usize> {
+fn greedy(mut work: ReducedDigraph) -> Vec<usize> {
     let mut set = BTreeSet::new();
     loop {
         work.reduce(&mut set);
@@ -178,7 +178,7 @@ fn greedy(mut work: Work) -> Vec<usize> {
 }
 
 /// Number of cycles found greedily that share no vertex: no smaller set can meet them all.
-fn disjoint_cycles(work: &Work, kernel: &[usize]) -> usize {
+fn disjoint_cycles(work: &ReducedDigraph, kernel: &[usize]) -> usize {
     let successors: Vec<Vec<u32>> = kernel.iter().map(|&v| local_successors(work, kernel, v)).collect();
     let mut used = vec![false; kernel.len()];
     let mut order: Vec<usize> = (0..kernel.len()).collect();
@@ -196,7 +196,7 @@ fn disjoint_cycles(work: &Work, kernel: &[usize]) -> usize {
     number
 }
 
-fn local_successors(work: &Work, kernel: &[usize], v: usize) -> Vec<u32> {
+fn local_successors(work: &ReducedDigraph, kernel: &[usize], v: usize) -> Vec<u32> {
     let heads = work.after[v].iter();
     heads.filter_map(|w| kernel.binary_search(w).ok()).map(|w| w as u32).collect()
 }
@@ -420,16 +420,17 @@ fn pop_component(stack: &mut Vec<usize>, on_stack: &mut [bool], root: usize) -> 
 }
 
 /// A digraph under reduction.
-struct Work {
+struct ReducedDigraph {
     after: Vec<BTreeSet<usize>>,
     before: Vec<BTreeSet<usize>>,
     alive: Vec<bool>,
 }
 
-impl Work {
-    fn new(successors: &[Vec<u32>]) -> Work {
+impl ReducedDigraph {
+    fn new(successors: &[Vec<u32>]) -> ReducedDigraph {
         let n = successors.len();
-        let mut work = Work { after: vec![BTreeSet::new(); n], before: vec![BTreeSet::new(); n], alive: vec![true; n] };
+        let mut work =
+            ReducedDigraph { after: vec![BTreeSet::new(); n], before: vec![BTreeSet::new(); n], alive: vec![true; n] };
         for (v, heads) in successors.iter().enumerate() {
             heads.iter().for_each(|&w| work.connect(v, w as usize));
         }
@@ -437,13 +438,13 @@ impl Work {
     }
 
     /// A copy that holds only some vertices, with the same numbering.
-    fn part(&self, vertices: &[usize]) -> Work {
+    fn part(&self, vertices: &[usize]) -> ReducedDigraph {
         let keep: BTreeSet<usize> = vertices.iter().copied().collect();
         let within = |edges: &[BTreeSet<usize>], v: usize| {
             if keep.contains(&v) { edges[v].intersection(&keep).copied().collect() } else { BTreeSet::new() }
         };
         let n = self.alive.len();
-        Work {
+        ReducedDigraph {
             after: (0..n).map(|v| within(&self.after, v)).collect(),
             before: (0..n).map(|v| within(&self.before, v)).collect(),
             alive: (0..n).map(|v| keep.contains(&v)).collect(),
@@ -569,7 +570,7 @@ struct Masks {
 }
 
 impl Search {
-    fn new(work: &Work, kernel: &[usize]) -> Search {
+    fn new(work: &ReducedDigraph, kernel: &[usize]) -> Search {
         let mask = |edges: &BTreeSet<usize>| {
             kernel.iter().enumerate().filter(|(_, v)| edges.contains(v)).fold(0, |mask, (i, _)| mask | 1 << i)
         };

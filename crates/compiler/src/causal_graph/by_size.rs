@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::Role;
 use super::digits::slope;
-use super::ports::{Net, Offer, Solved, Wishes};
+use super::ports::{CausalityPreferences, Net, Offer, Solved};
 use crate::algebra::{Eliminator, Exprs, NumericPoint};
 use crate::bond_graph::{BondGraph, ElementId, PortCausality};
 
@@ -21,16 +21,22 @@ pub(super) fn solve_part_by_size(
     x: &mut Exprs,
     graph: &BondGraph,
     members: &[ElementId],
-    wishes: &Wishes,
+    preferences: &CausalityPreferences,
     point: &NumericPoint,
 ) -> Option<Solved> {
-    let net = Net::new(x, graph, members, wishes);
-    let outputs = x.tried(|x| chosen(x, graph, &net, wishes, point));
-    express(x, &net, outputs, wishes, point)
+    let net = Net::new(x, graph, members, preferences);
+    let outputs = x.tried(|x| chosen(x, graph, &net, preferences, point));
+    express(x, &net, outputs, preferences, point)
 }
 
 /// The roles of the ports, inputs and outputs chosen by size.
-fn chosen(x: &mut Exprs, graph: &BondGraph, net: &Net, wishes: &Wishes, point: &NumericPoint) -> BTreeMap<usize, Role> {
+fn chosen(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    net: &Net,
+    preferences: &CausalityPreferences,
+    point: &NumericPoint,
+) -> BTreeMap<usize, Role> {
     let mut choice = Choice::new(x, graph, net, point);
     choice.work.eliminate(x, &net.inner);
     let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
@@ -38,11 +44,11 @@ fn chosen(x: &mut Exprs, graph: &BondGraph, net: &Net, wishes: &Wishes, point: &
         let determined = choice.work.eliminate(x, &[net.ports[p].conjugate()]) == 1;
         outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
     }
-    let independent = choice.independent(x, wishes);
-    for (p, causality) in choice.laws(x, wishes) {
+    let independent = choice.independent(x, preferences);
+    for (p, causality) in choice.laws(x, preferences) {
         outputs.insert(p, Role::Algebraic(causality));
     }
-    for p in net.storage_order(wishes) {
+    for p in net.storage_order(preferences) {
         outputs.insert(p, if independent.contains(&p) { Role::Independent } else { Role::Dependent });
     }
     outputs
@@ -54,7 +60,7 @@ fn express(
     x: &mut Exprs,
     net: &Net,
     outputs: BTreeMap<usize, Role>,
-    wishes: &Wishes,
+    preferences: &CausalityPreferences,
     point: &NumericPoint,
 ) -> Option<Solved> {
     let wanted = outputs.iter().filter(|(_, role)| **role != Role::Redundant);
@@ -66,7 +72,7 @@ fn express(
             classes.iter().for_each(|class| _ = work.eliminate(x, class));
             let done = work.finish();
             let all = columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c));
-            all.then(|| net.solved(x, done, &outputs, wishes))
+            all.then(|| net.solved(x, done, &outputs, preferences))
         });
         if expressed.is_some() {
             return expressed;
@@ -109,11 +115,11 @@ impl<'a> Choice<'a> {
     }
 
     /// The storages that become independent: their rates follow from the structure.
-    fn independent(&mut self, x: &mut Exprs, wishes: &Wishes) -> Vec<usize> {
-        let mut open = self.net.storage_order(wishes);
+    fn independent(&mut self, x: &mut Exprs, preferences: &CausalityPreferences) -> Vec<usize> {
+        let mut open = self.net.storage_order(preferences);
         let asked = |p: &usize| match self.net.ports[*p].port {
             None => true,
-            Some(port) => wishes.independent.contains(&port),
+            Some(port) => preferences.independent.contains(&port),
         };
         let weights: BTreeMap<usize, f64> = open
             .iter()
@@ -145,8 +151,8 @@ impl<'a> Choice<'a> {
         found
     }
 
-    /// The causality of each law: the one wished for unless its pivot is small.
-    fn laws(&mut self, x: &mut Exprs, wishes: &Wishes) -> Vec<(usize, PortCausality)> {
+    /// The causality of each law: the one preferred for unless its pivot is small.
+    fn laws(&mut self, x: &mut Exprs, preferences: &CausalityPreferences) -> Vec<(usize, PortCausality)> {
         let mut open = self.net.ports_where(|o| o == Offer::Law);
         let columns = open.iter().flat_map(|&p| [self.net.ports[p].effort, self.net.ports[p].flow].map(|c| (p, c)));
         let weights: BTreeMap<usize, f64> = columns.map(|(p, c)| (c, self.weight(p, c))).collect();
@@ -157,7 +163,7 @@ impl<'a> Choice<'a> {
                 at -= 1;
                 let port = &self.net.ports[open[at]];
                 let wish =
-                    port.port.and_then(|p| wishes.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
+                    port.port.and_then(|p| preferences.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
                 let other = match wish {
                     PortCausality::Resistive => PortCausality::Conductive,
                     _ => PortCausality::Resistive,

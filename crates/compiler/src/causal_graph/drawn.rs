@@ -3,8 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use super::assign::{sequential, wished};
-use super::ports::{Virtual, Wishes, imposes_effort, solve_part};
+use super::assign::{preferred, sequential};
+use super::ports::{CausalityPreferences, Virtual, imposes_effort, solve_part};
 use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
 use super::strokes::{Strokes, parts};
@@ -94,7 +94,7 @@ pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     x.forget_unwatched(&Assumptions::default());
     let mut ports = Ports::default();
     for members in parts(graph) {
-        let solved = solve_part(&mut x, graph, &members, &wishes(causal, &members));
+        let solved = solve_part(&mut x, graph, &members, &preferences(causal, &members));
         ports.ports.extend(solved.ports);
         ports.definitions.extend(solved.definitions);
         ports.watched.extend(solved.watched);
@@ -105,34 +105,34 @@ pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     CausalGraph { graph: graph.with_exprs(x), strokes: causal.strokes.clone(), ports }
 }
 
-fn wishes(causal: &CausalGraph, members: &[ElementId]) -> Wishes {
+fn preferences(causal: &CausalGraph, members: &[ElementId]) -> CausalityPreferences {
     let graph = &causal.graph;
-    let mut wishes = Wishes::default();
+    let mut preferences = CausalityPreferences::default();
     for state in causal.ports.ports.iter().filter(|p| members.binary_search(&p.port.element).is_ok()) {
         let kind = &graph.elements[state.port.element].kind;
         match (kind, state.role) {
             (Kind::ZeroCompliance { .. } | Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. }, role) => {
                 let gives_effort = !matches!(kind, Kind::ResidualFlow { .. });
                 let causality = if gives_effort { PortCausality::Resistive } else { PortCausality::Conductive };
-                wishes.algebraic.insert(state.port, causality);
+                preferences.algebraic.insert(state.port, causality);
                 if role == Role::Redundant {
-                    wishes.dropped.insert(state.port, gives_effort);
+                    preferences.dropped.insert(state.port, gives_effort);
                 } else {
-                    wishes.sources_as_laws.insert(state.port);
+                    preferences.sources_as_laws.insert(state.port);
                 }
             }
             // A source that is a law to the exact causality stays one.
             (_, Role::Algebraic(causality)) => {
-                wishes.algebraic.insert(state.port, causality);
+                preferences.algebraic.insert(state.port, causality);
                 if imposes_effort(graph, state.port).is_some() {
-                    wishes.sources_as_laws.insert(state.port);
+                    preferences.sources_as_laws.insert(state.port);
                 }
             }
-            (_, Role::Independent) => wishes.independent.push(state.port),
+            (_, Role::Independent) => preferences.independent.push(state.port),
             _ => {}
         }
     }
-    wishes
+    preferences
 }
 
 /// Strokes with resistors first: each in the causality that leaves the fewest break variables, then the fewest storages
@@ -205,7 +205,7 @@ impl Relaxed<'_> {
             return None;
         }
         let written: Vec<bool> =
-            self.laws.iter().map(|&p| wished(self.graph, p) == PortCausality::Conductive).collect();
+            self.laws.iter().map(|&p| preferred(self.graph, p) == PortCausality::Conductive).collect();
         let all = |here| vec![here; self.laws.len()];
         let mut best: Option<(Cost, Vec<bool>, Table<BondId, Stroke>)> = None;
         let consider = |choice: Vec<bool>, best: &mut Option<(Cost, Vec<bool>, Table<BondId, Stroke>)>| {

@@ -9,10 +9,10 @@ use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
 /// What the elimination is asked for, beyond the graph itself.
 #[derive(Debug, Clone, Default)]
-pub struct Wishes {
+pub struct CausalityPreferences {
     /// Storages that shall become dependent rather than others (drawn in derivative causality).
     pub derivative: Vec<PortRef>,
-    /// Causality wished for algebraic ports.
+    /// Preferred causality of algebraic ports.
     pub algebraic: BTreeMap<PortRef, PortCausality>,
     /// Sources that are laws between effort and flow, since what they read depends on what they set.
     pub sources_as_laws: BTreeSet<PortRef>,
@@ -108,14 +108,19 @@ pub(super) struct Net {
 }
 
 /// Solves the junction structure of one connected part.
-pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Solved {
-    let net = Net::new(x, graph, members, wishes);
+pub fn solve_part(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    preferences: &CausalityPreferences,
+) -> Solved {
+    let net = Net::new(x, graph, members, preferences);
     let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len());
     work.eliminate(x, &net.inner);
 
     // Outputs are chosen from the least wanted input to the most wanted one: reactions, rates, laws, co-energies.
     let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
-    let storages = net.storage_order(wishes);
+    let storages = net.storage_order(preferences);
     let laws = net.ports_where(|o| o == Offer::Law);
     let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
     for &p in &imposed {
@@ -127,7 +132,7 @@ pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishe
     }
     for &p in laws.iter().rev() {
         let port = &net.ports[p];
-        let causality = law_causality(x, &mut work, port, wishes);
+        let causality = law_causality(x, &mut work, port, preferences);
         work.eliminate(x, &[port.column(causality == PortCausality::Conductive)]);
         outputs.insert(p, Role::Algebraic(causality));
     }
@@ -135,7 +140,7 @@ pub fn solve_part(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishe
         let dependent = work.eliminate(x, &[net.ports[p].given()]) == 1;
         outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
     }
-    net.solved(x, work.finish(), &outputs, wishes)
+    net.solved(x, work.finish(), &outputs, preferences)
 }
 
 impl NetPort {
@@ -165,7 +170,7 @@ impl NetPort {
 }
 
 impl Net {
-    pub fn new(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], wishes: &Wishes) -> Net {
+    pub fn new(x: &mut Exprs, graph: &BondGraph, members: &[ElementId], preferences: &CausalityPreferences) -> Net {
         let mut net = Net {
             symbols: Vec::new(),
             column: BTreeMap::new(),
@@ -177,12 +182,12 @@ impl Net {
         let minus = x.int(-1);
         for &element in members {
             if !graph.elements[element].kind.is_inner() {
-                net.add_ports(x, graph, element, one, minus, wishes);
+                net.add_ports(x, graph, element, one, minus, preferences);
             }
         }
         let outer = net.symbols.len();
         for &element in members {
-            let speed = wishes.virtual_speeds.iter().find(|v| v.junction == element);
+            let speed = preferences.virtual_speeds.iter().find(|v| v.junction == element);
             net.add_rows(x, graph, element, one, minus, speed);
         }
         let virtuals: Vec<usize> = net.ports.iter().flat_map(|p| [p.effort, p.flow]).filter(|&c| c >= outer).collect();
@@ -206,7 +211,7 @@ impl Net {
         element: ElementId,
         one: Expr,
         minus: Expr,
-        wishes: &Wishes,
+        preferences: &CausalityPreferences,
     ) {
         for (index, port) in graph.elements[element].ports.iter().enumerate() {
             let bond = &graph.bonds[port.bond];
@@ -220,14 +225,14 @@ impl Net {
                 }
             }
             let port = PortRef { element, port: index as u32 };
-            let law = wishes.sources_as_laws.contains(&port);
-            let offer = match wishes.dropped.get(&port) {
+            let law = preferences.sources_as_laws.contains(&port);
+            let offer = match preferences.dropped.get(&port) {
                 Some(true) => Offer::Imposed(Which::Effort),
                 Some(false) => Offer::Imposed(Which::Flow),
                 None if law => Offer::Law,
                 None => offer(graph, port),
             };
-            let offer = if wishes.derivative_first { offer.in_derivative_causality() } else { offer };
+            let offer = if preferences.derivative_first { offer.in_derivative_causality() } else { offer };
             let (effort, flow) = (self.of(effort), self.of(flow));
             self.ports.push(NetPort { port: Some(port), effort, flow, offer });
         }
@@ -303,13 +308,13 @@ impl Net {
     }
 
     /// Storages from the most wanted independent one to the least.
-    pub fn storage_order(&self, wishes: &Wishes) -> Vec<usize> {
+    pub fn storage_order(&self, preferences: &CausalityPreferences) -> Vec<usize> {
         let mut order = self.ports_where(|o| matches!(o, Offer::Storage(_) | Offer::Virtual(_)));
         order.sort_by_key(|&p| match self.ports[p].port {
             None => (1, 0, p),
-            Some(port) => match wishes.independent.iter().position(|&i| i == port) {
+            Some(port) => match preferences.independent.iter().position(|&i| i == port) {
                 Some(rank) => (0, rank, p),
-                None => (2 + usize::from(wishes.derivative.contains(&port)), 0, p),
+                None => (2 + usize::from(preferences.derivative.contains(&port)), 0, p),
             },
         });
         order
@@ -322,11 +327,17 @@ impl Net {
     }
 
     /// What an elimination has found.
-    pub fn solved(&self, x: &mut Exprs, done: Elimination, outputs: &BTreeMap<usize, Role>, wishes: &Wishes) -> Solved {
+    pub fn solved(
+        &self,
+        x: &mut Exprs,
+        done: Elimination,
+        outputs: &BTreeMap<usize, Role>,
+        preferences: &CausalityPreferences,
+    ) -> Solved {
         let demands = circuits(x, done.rest.clone());
         let demands = demands.into_iter().map(|(_, row)| self.combination(&row.0)).collect();
         let mut solved = Solved { demands, ..Solved::default() };
-        self.report(done, outputs, wishes, &mut solved, x);
+        self.report(done, outputs, preferences, &mut solved, x);
         solved
     }
 
@@ -334,7 +345,7 @@ impl Net {
         &self,
         done: Elimination,
         outputs: &BTreeMap<usize, Role>,
-        wishes: &Wishes,
+        preferences: &CausalityPreferences,
         solved: &mut Solved,
         x: &mut Exprs,
     ) {
@@ -351,7 +362,7 @@ impl Net {
                 }),
                 None if role == Role::Independent => solved
                     .virtual_speeds
-                    .extend(wishes.virtual_speeds.iter().filter(|v| v.speed == self.symbols[input])),
+                    .extend(preferences.virtual_speeds.iter().filter(|v| v.speed == self.symbols[input])),
                 // Nothing stands there: what does not lead takes up nothing.
                 None => solved.definitions.push((self.symbols[input], Combination::default())),
             }
@@ -394,9 +405,14 @@ fn offer(graph: &BondGraph, port: PortRef) -> Offer {
     }
 }
 
-/// The causality of an algebraic port: the one wished for if it is admissible and well conditioned.
-fn law_causality(x: &Exprs, work: &mut Eliminator, port: &NetPort, wishes: &Wishes) -> PortCausality {
-    let wish = port.port.and_then(|p| wishes.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
+/// The causality of an algebraic port: the one preferred for if it is admissible and well conditioned.
+fn law_causality(
+    x: &Exprs,
+    work: &mut Eliminator,
+    port: &NetPort,
+    preferences: &CausalityPreferences,
+) -> PortCausality {
+    let wish = port.port.and_then(|p| preferences.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
     let mut size = |column| work.divisor(x, column).map(|e| super::magnitude(x, e));
     match (size(port.effort), size(port.flow)) {
         (Some(_), None) => PortCausality::Conductive,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::drawn::by_hand;
-use super::ports::{Wishes, solve_part};
+use super::ports::{CausalityPreferences, solve_part};
 use super::signals::{NodeId, SignalGraph, signal_graph};
 use super::strokes::parts;
 use super::{CausalGraph, PortState, Role, Stroke};
@@ -110,8 +110,12 @@ fn order(causal: &CausalGraph) -> usize {
 fn rank_of(mut x: Exprs, graph: &BondGraph, order: usize, freed: &BTreeSet<PortRef>) -> StateRank {
     let mut integral = Vec::new();
     for members in parts(graph) {
-        let wishes = Wishes { derivative_first: true, sources_as_laws: freed.clone(), ..Wishes::default() };
-        let solved = solve_part(&mut x, graph, &members, &wishes);
+        let preferences = CausalityPreferences {
+            derivative_first: true,
+            sources_as_laws: freed.clone(),
+            ..CausalityPreferences::default()
+        };
+        let solved = solve_part(&mut x, graph, &members, &preferences);
         let stays = |p: &&PortState| p.role == Role::Dependent;
         integral.extend(solved.ports.iter().filter(stays).map(|p| p.port));
     }

@@ -23,7 +23,7 @@ pub fn verify(causal: &CausalGraph) -> Result<(), String> {
     let kept = kept_junctions(causal);
     let asked: BTreeSet<ElementId> = forced_elements(&causal.graph);
     for members in parts(&causal.graph) {
-        let part = Part {
+        let part = CheckedPart {
             causal,
             kept: &kept,
             open: is_open(causal, &members),
@@ -118,7 +118,7 @@ fn is_open(causal: &CausalGraph, members: &[ElementId]) -> bool {
 }
 
 /// A connected part.
-struct Part<'a> {
+struct CheckedPart<'a> {
     causal: &'a CausalGraph,
     kept: &'a BTreeSet<ElementId>,
     /// Whether something in it is not determined.
@@ -127,7 +127,7 @@ struct Part<'a> {
     forced: bool,
 }
 
-impl Part<'_> {
+impl CheckedPart<'_> {
     fn element(&self, element: ElementId) -> Result<(), String> {
         let graph = &self.causal.graph;
         let (name, kind) = (&graph.elements[element].name, &graph.elements[element].kind);

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::along::Closure;
+use super::along::AlgebraicConstraint;
 use super::definitions::Definitions;
 use super::{AlgebraicRole, BreakBound};
 use crate::algebra::Symbol;
@@ -19,7 +19,7 @@ pub fn open_loops(
     strokes: &Table<BondId, Stroke>,
     wanted: &BTreeSet<Symbol>,
     closed: &BTreeSet<Symbol>,
-) -> (Vec<Closure>, BreakBound) {
+) -> (Vec<AlgebraicConstraint>, BreakBound) {
     let signals = signal_graph(d.graph, strokes);
     let set = break_set(&signals.algebraic_successors(), &signals.break_ranks());
     let first: Vec<Symbol> = set.vertices.iter().map(|&v| NodeId::new(v).symbol(d.graph)).collect();
@@ -43,11 +43,11 @@ pub fn open_loops(
     }
     bound.number = cut.len();
     bound.at_least = planned.min(cut.len());
-    let closures = cut.into_iter().map(|symbol| close(d, symbol)).collect();
-    (closures, bound)
+    let constraints = cut.into_iter().map(|symbol| close(d, symbol)).collect();
+    (constraints, bound)
 }
 
-fn close(d: &mut Definitions, symbol: Symbol) -> Closure {
+fn close(d: &mut Definitions, symbol: Symbol) -> AlgebraicConstraint {
     let definition = d.of.remove(&symbol).expect("loops run through what is defined");
     d.free.insert(symbol);
     let residual = match definition {
@@ -57,7 +57,7 @@ fn close(d: &mut Definitions, symbol: Symbol) -> Closure {
         }
         super::definitions::Definition::Implicit(e) => e,
     };
-    Closure { unknown: Some((symbol, AlgebraicRole::Break)), residual }
+    AlgebraicConstraint { unknown: Some((symbol, AlgebraicRole::Break)), residual }
 }
 
 /// Who reads whom among the definitions on the way to what is wanted.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::along::{Closure, Treatment, assemble_all};
+use super::along::{AlgebraicConstraint, Treatment, assemble_all};
 use super::assumptions::assumptions;
 use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
@@ -14,7 +14,7 @@ use super::stiff::parameters;
 use super::verify::verify;
 use super::{
     Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Relations, State, StateKind, Unavailable,
-    conserved, display, domains, index, observed, relations,
+    conserved, domains, expansion, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -51,8 +51,8 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
     assembled.d.x.forget_unwatched(&before);
-    let draft = Draft { conserved, relations, ..Draft::of(assembled, Vec::new()) };
-    finish(causal, causal, form, draft)
+    let unordered = UnorderedEquations { conserved, relations, ..UnorderedEquations::of(assembled, Vec::new()) };
+    order_equations(causal, causal, form, unordered)
 }
 
 /// All storages along the strokes, dependent ones with multipliers.
@@ -81,58 +81,63 @@ fn along(
 ) -> Result<Equations, Diagnostics> {
     let drawn = as_drawn(causal, strokes);
     let graph = &drawn.graph;
-    let (mut assembled, mut closures) = assemble_all(&drawn, treat, speeds)
+    let (mut assembled, mut constraints) = assemble_all(&drawn, treat, speeds)
         .map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
-    closures.extend(assembled.open_laws(&drawn));
+    constraints.extend(assembled.open_laws(&drawn));
     let d = &mut assembled.d;
     let rates: BTreeSet<Symbol> = assembled.states.iter().map(|s| d.states[&s.symbol]).collect();
     let mut wanted = rates.clone();
-    closures.iter().for_each(|c| wanted.extend(d.x.symbols_of(c.residual)));
+    constraints.iter().for_each(|c| wanted.extend(d.x.symbols_of(c.residual)));
     let closed = rates.into_iter().chain(d.derived_rates()).collect();
     let (breaks, bound) = open_loops(d, strokes, &wanted, &closed);
-    closures.extend(breaks);
-    finish(&drawn, causal, form, Draft { breaks: bound, ..Draft::of(assembled, closures) })
+    constraints.extend(breaks);
+    order_equations(
+        &drawn,
+        causal,
+        form,
+        UnorderedEquations { breaks: bound, ..UnorderedEquations::of(assembled, constraints) },
+    )
 }
 
 /// All storages and constraints in the solved structure, each relation among them with a multiplier.
 fn lagrange(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
     let open = without_constraints(causal);
-    let (assembled, closures) = constrained(&open)?;
-    finish(&open, causal, Form::Lagrange, Draft::of(assembled, closures))
+    let (assembled, constraints) = constrained(&open)?;
+    order_equations(&open, causal, Form::Lagrange, UnorderedEquations::of(assembled, constraints))
 }
 
 /// The same with a stiff spring and a damper for each multiplier.
 fn stiff(causal: &CausalGraph) -> Result<Equations, Diagnostics> {
     let mut open = without_constraints(causal);
     let springs = parameters(&mut open);
-    let (mut assembled, closures) = constrained(&open)?;
-    let closures = assembled.relax(&open, &springs, closures);
-    finish(&open, causal, Form::Stiff, Draft::of(assembled, closures))
+    let (mut assembled, constraints) = constrained(&open)?;
+    let constraints = assembled.relax(&open, &springs, constraints);
+    order_equations(&open, causal, Form::Stiff, UnorderedEquations::of(assembled, constraints))
 }
 
-fn constrained(open: &CausalGraph) -> Result<(Assembled<'_>, Vec<Closure>), Diagnostics> {
+fn constrained(open: &CausalGraph) -> Result<(Assembled<'_>, Vec<AlgebraicConstraint>), Diagnostics> {
     let graph = &open.graph;
-    let (mut assembled, mut closures) = assemble_all(open, &|_| Treatment::Multiplier, Treatment::Multiplier)
+    let (mut assembled, mut constraints) = assemble_all(open, &|_| Treatment::Multiplier, Treatment::Multiplier)
         .map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
-    closures.extend(assembled.open_constraints(open));
-    Ok((assembled, closures))
+    constraints.extend(assembled.open_constraints(open));
+    Ok((assembled, constraints))
 }
 
 /// A form before its steps are in order.
-struct Draft<'a> {
+struct UnorderedEquations<'a> {
     assembled: Assembled<'a>,
-    closures: Vec<Closure>,
+    constraints: Vec<AlgebraicConstraint>,
     conserved: Vec<Conserved>,
     relations: Relations,
     breaks: BreakBound,
 }
 
-impl<'a> Draft<'a> {
+impl<'a> UnorderedEquations<'a> {
     /// Nothing conserved, no relations known, no break variables.
-    fn of(assembled: Assembled<'a>, closures: Vec<Closure>) -> Draft<'a> {
-        Draft {
+    fn of(assembled: Assembled<'a>, constraints: Vec<AlgebraicConstraint>) -> UnorderedEquations<'a> {
+        UnorderedEquations {
             assembled,
-            closures,
+            constraints,
             conserved: Vec::new(),
             relations: Relations::default(),
             breaks: BreakBound::default(),
@@ -141,9 +146,14 @@ impl<'a> Draft<'a> {
 }
 
 /// Puts everything into order. `truth` is the graph with its exact ports.
-fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -> Result<Equations, Diagnostics> {
+fn order_equations(
+    causal: &CausalGraph,
+    truth: &CausalGraph,
+    form: Form,
+    unordered: UnorderedEquations,
+) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
-    let Draft { mut assembled, closures, conserved, relations, breaks } = draft;
+    let UnorderedEquations { mut assembled, constraints, conserved, relations, breaks } = unordered;
     let momenta = assembled.momenta(truth);
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
@@ -159,8 +169,8 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
         return Err(unknown);
     }
     let mut roots = rates.clone();
-    for closure in &closures {
-        let read = d.x.symbols_of(closure.residual);
+    for constraint in &constraints {
+        let read = d.x.symbols_of(constraint.residual);
         if let Some((symbol, reason)) = read.iter().find_map(|s| d.missing.get_key_value(s)) {
             return Err(needs_rate(graph, &d.x, *symbol, reason));
         }
@@ -198,7 +208,7 @@ fn finish(causal: &CausalGraph, truth: &CausalGraph, form: Form, draft: Draft) -
             span: span_of(graph, s.symbol, s.kind),
         })
         .collect();
-    let (algebraic, mut residuals) = unknowns(&d, &closures);
+    let (algebraic, mut residuals) = unknowns(&d, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     let observed = observed::observed(&mut d, &states);
     // The other forms start as the minimal one does.
@@ -262,14 +272,14 @@ fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
 }
 
 /// The algebraic unknowns, and what vanishes: for free rates first, then for these.
-fn unknowns(d: &Definitions, closures: &[Closure]) -> (Vec<Algebraic>, Vec<Expr>) {
+fn unknowns(d: &Definitions, constraints: &[AlgebraicConstraint]) -> (Vec<Algebraic>, Vec<Expr>) {
     let mut algebraic = Vec::new();
-    let mut residuals: Vec<Expr> = closures.iter().filter(|c| c.unknown.is_none()).map(|c| c.residual).collect();
-    for closure in closures {
-        let Some((symbol, cause)) = closure.unknown else { continue };
+    let mut residuals: Vec<Expr> = constraints.iter().filter(|c| c.unknown.is_none()).map(|c| c.residual).collect();
+    for constraint in constraints {
+        let Some((symbol, cause)) = constraint.unknown else { continue };
         let tracked = of_the_bond(d, symbol);
         algebraic.push(Algebraic { symbol, tracked, name: name_of(d, symbol), cause, unit: unit_of(d.graph, symbol) });
-        residuals.push(closure.residual);
+        residuals.push(constraint.residual);
     }
     (algebraic, residuals)
 }
@@ -287,9 +297,9 @@ fn without_cancelling_terms(
     if cancelling.is_empty() {
         return;
     }
-    let named = display::named_sources(d);
+    let named = expansion::named_sources(d);
     let rates = states.iter().map(|s| s.rate).collect();
-    let Some(known) = display::expansions(d, steps, &rates, &named) else { return };
+    let Some(known) = expansion::expansions(d, steps, &rates, &named) else { return };
     let unknown: BTreeSet<Symbol> =
         states.iter().flat_map(|s| [s.symbol, s.rate]).chain(algebraic.iter().map(|a| a.symbol)).collect();
     let reads = |d: &Definitions, e: Expr| {
@@ -298,7 +308,7 @@ fn without_cancelling_terms(
         near.iter().copied().chain(far).filter(|s| unknown.contains(s)).collect::<BTreeSet<_>>().len()
     };
     for i in cancelling {
-        let written = display::put_in(&mut d.x, residuals[i], &known);
+        let written = expansion::put_in(&mut d.x, residuals[i], &known);
         if reads(d, written) < reads(d, residuals[i]) {
             residuals[i] = written;
         }

@@ -8,7 +8,9 @@ use super::definitions::{Definition, Definitions};
 use super::rows::Rows;
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
-use crate::bond_graph::{ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Signal, Storage, StorageLaw};
+use crate::bond_graph::{
+    ElementId, IntegratedSignal, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw,
+};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 
 /// A state of the minimal form before it is ordered.
@@ -34,7 +36,7 @@ pub struct Assembled<'a> {
     pub rows: Rows<'a>,
     /// What changes the stored quantities behind the states.
     pub balances: Vec<Balance>,
-    pub(super) later: Vec<Later>,
+    pub(super) deferred: Vec<DeferredRate>,
 }
 
 /// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`.
@@ -49,7 +51,7 @@ pub struct Balance {
 }
 
 /// A rate whose definition waits until all states are known.
-pub(super) enum Later {
+pub(super) enum DeferredRate {
     /// The rate of the state `z` makes the rate of `X(z)` equal to what the bond carries.
     Speed { z: Symbol, rate: Symbol, stored: Expr, bond: Symbol },
     /// The rate of a dependent storage follows by differentiating what defines its stored quantity.
@@ -60,15 +62,15 @@ pub(super) enum Later {
     Momentum { rate: Symbol, structure: Expr, followers: Vec<Follower>, z: Symbol },
 }
 
-impl Later {
+impl DeferredRate {
     /// Whether it is the rate of the speed `z`.
     pub(super) fn is_speed_of(&self, z: Symbol) -> bool {
-        matches!(self, Later::Speed { z: own, .. } if *own == z)
+        matches!(self, DeferredRate::Speed { z: own, .. } if *own == z)
     }
 }
 
 /// A storage port with all that its equations need.
-pub(super) struct Cell<'a> {
+pub(super) struct StoragePort<'a> {
     pub(super) state: &'a PortState,
     pub(super) storage: &'a Storage,
     pub(super) law: StorageLaw,
@@ -94,7 +96,7 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
         let value = row.expr(&mut d.x);
         d.set(symbol, value);
     }
-    let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), later: Vec::new() };
+    let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), deferred: Vec::new() };
     assembled.imposed_and_algebraic(causal);
     assembled.storages(causal, momenta);
     assembled.signals();
@@ -140,7 +142,7 @@ pub(super) fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) ->
 impl<'a> Assembled<'a> {
     /// Definitions without states yet.
     pub(super) fn empty(d: Definitions<'a>) -> Self {
-        Assembled { d, states: Vec::new(), rows: Rows::none(), balances: Vec::new(), later: Vec::new() }
+        Assembled { d, states: Vec::new(), rows: Rows::none(), balances: Vec::new(), deferred: Vec::new() }
     }
 
     /// Sources, constraints and algebraic laws give their variable.
@@ -232,15 +234,16 @@ impl<'a> Assembled<'a> {
 
     /// Storages, one group of mutually dependent ones after the other.
     fn storages(&mut self, causal: &'a CausalGraph, momenta: bool) {
-        let cells: Vec<Cell<'a>> = causal.ports.ports.iter().filter_map(|state| self.cell(causal, state)).collect();
-        for cell in &cells {
-            self.d.stored.insert(cell.stored, cell.rate);
+        let storage_ports: Vec<StoragePort<'a>> =
+            causal.ports.ports.iter().filter_map(|state| self.storage_port(causal, state)).collect();
+        for storage_port in &storage_ports {
+            self.d.stored.insert(storage_port.stored, storage_port.rate);
         }
         let speeds = &causal.ports.virtual_speeds;
-        for (members, group_speeds) in groups(&mut self.d.x, &cells, speeds, &mut self.rows) {
-            let group: Vec<&Cell> = members.iter().map(|&m| &cells[m]).collect();
+        for (members, group_speeds) in groups(&mut self.d.x, &storage_ports, speeds, &mut self.rows) {
+            let group: Vec<&StoragePort> = members.iter().map(|&m| &storage_ports[m]).collect();
             if group.iter().all(|c| c.state.role == Role::Independent) && group_speeds.is_empty() {
-                group.iter().for_each(|cell| self.independent(cell));
+                group.iter().for_each(|storage_port| self.independent(storage_port));
             } else if !momenta || self.in_velocity_form(&group) {
                 self.velocity_form(&group, &group_speeds);
             } else {
@@ -259,7 +262,11 @@ impl<'a> Assembled<'a> {
         self.states.sort_by_key(place);
     }
 
-    pub(super) fn cell<'c>(&mut self, causal: &'c CausalGraph, state: &'c PortState) -> Option<Cell<'c>> {
+    pub(super) fn storage_port<'c>(
+        &mut self,
+        causal: &'c CausalGraph,
+        state: &'c PortState,
+    ) -> Option<StoragePort<'c>> {
         if !matches!(state.role, Role::Independent | Role::Dependent) {
             return None;
         }
@@ -277,90 +284,91 @@ impl<'a> Assembled<'a> {
             known => known,
         };
         let inertance = matches!(element.kind, Kind::Inertance(_));
-        Some(Cell { state, storage, law, stored: storage.stored[port], z, rate, inertance })
+        Some(StoragePort { state, storage, law, stored: storage.stored[port], z, rate, inertance })
     }
 
     /// `X` as an expression of co-energy variables, if it can be written down.
-    pub(super) fn stored_of(&mut self, cell: &Cell) -> Option<Expr> {
-        match cell.law {
+    pub(super) fn stored_of(&mut self, storage_port: &StoragePort) -> Option<Expr> {
+        match storage_port.law {
             StorageLaw::Derivative(e) => Some(e),
             StorageLaw::Integral(e) => {
-                let z = self.d.x.sym(cell.z);
+                let z = self.d.x.sym(storage_port.z);
                 let residual = self.d.x.sub(z, e);
-                let others = cell.storage.stored.iter().any(|s| *s != cell.stored && self.d.x.depends_on(e, *s));
-                let inverse = if others { None } else { self.d.solve_for(residual, cell.stored) };
+                let others =
+                    storage_port.storage.stored.iter().any(|s| *s != storage_port.stored && self.d.x.depends_on(e, *s));
+                let inverse = if others { None } else { self.d.solve_for(residual, storage_port.stored) };
                 inverse.filter(|&e| !self.d.x.is_steep(e))
             }
-            StorageLaw::Implicit(e) => self.d.solve_for(e, cell.stored),
+            StorageLaw::Implicit(e) => self.d.solve_for(e, storage_port.stored),
             StorageLaw::Known { .. } => None,
         }
     }
 
     /// `m` of a linear inertance `X = m z` with constant `m`.
-    fn constant_inertance(&mut self, cell: &Cell) -> Option<Expr> {
-        if !cell.inertance {
+    fn constant_inertance(&mut self, storage_port: &StoragePort) -> Option<Expr> {
+        if !storage_port.inertance {
             return None;
         }
-        let stored = self.stored_of(cell)?;
-        let symbols: Vec<Symbol> = cell.storage_speeds(&self.d).into_iter().collect();
+        let stored = self.stored_of(storage_port)?;
+        let symbols: Vec<Symbol> = storage_port.storage_speeds(&self.d).into_iter().collect();
         let (coefficients, rest) = self.d.x.linear_in(stored, &symbols)?;
         let constant = coefficients.iter().all(|&c| self.d.is_constant(c)) && self.d.x.is_zero(rest);
         constant.then_some(stored)
     }
 
-    fn choose(&mut self, cell: &Cell, symbol: Symbol) {
-        let kind = StateKind::Storage(Some(cell.state.port.element));
+    fn choose(&mut self, storage_port: &StoragePort, symbol: Symbol) {
+        let kind = StateKind::Storage(Some(storage_port.state.port.element));
         self.states.push(Chosen { symbol, kind, meaning: None, tracked: symbol });
     }
 
     /// A storage on which no other depends: flow of a linear inertance, stored quantity of anything else.
-    pub(super) fn independent(&mut self, cell: &Cell) {
-        if let Some(stored) = self.constant_inertance(cell) {
-            return self.by_speed(cell, stored, &[]);
+    pub(super) fn independent(&mut self, storage_port: &StoragePort) {
+        if let Some(stored) = self.constant_inertance(storage_port) {
+            return self.by_speed(storage_port, stored, &[]);
         }
-        match cell.law {
+        match storage_port.law {
             StorageLaw::Integral(e) => {
-                self.by_stored(cell, &[]);
-                self.d.set(cell.z, e);
+                self.by_stored(storage_port, &[]);
+                self.d.set(storage_port.z, e);
             }
             StorageLaw::Derivative(e) => {
-                let stored = self.d.x.sym(cell.stored);
+                let stored = self.d.x.sym(storage_port.stored);
                 let residual = self.d.x.sub(stored, e);
-                let inverse = self.d.solve_for(residual, cell.z);
-                let alone = cell.storage.laws.len() == 1;
+                let inverse = self.d.solve_for(residual, storage_port.z);
+                let alone = storage_port.storage.laws.len() == 1;
                 match inverse.filter(|_| alone) {
                     Some(z) => {
-                        self.by_stored(cell, &[]);
-                        self.d.set(cell.z, z);
+                        self.by_stored(storage_port, &[]);
+                        self.d.set(storage_port.z, z);
                     }
-                    None => self.by_speed(cell, e, &[]),
+                    None => self.by_speed(storage_port, e, &[]),
                 }
             }
             StorageLaw::Implicit(e) => {
-                self.by_stored(cell, &[]);
-                self.d.set_root(cell.z, e);
+                self.by_stored(storage_port, &[]);
+                self.d.set_root(storage_port.z, e);
             }
             StorageLaw::Known { .. } => {}
         }
     }
 
     /// State `X`, whose rate the bond carries.
-    fn by_stored(&mut self, cell: &Cell, group: &[&Cell]) {
-        self.d.stored_state(cell.stored);
-        self.choose(cell, cell.stored);
-        let quantity = self.d.x.sym(cell.stored);
-        let followers = self.followers(cell.z, group);
-        self.balance(cell.stored, quantity, cell.rate, &followers);
+    fn by_stored(&mut self, storage_port: &StoragePort, group: &[&StoragePort]) {
+        self.d.stored_state(storage_port.stored);
+        self.choose(storage_port, storage_port.stored);
+        let quantity = self.d.x.sym(storage_port.stored);
+        let followers = self.followers(storage_port.z, group);
+        self.balance(storage_port.stored, quantity, storage_port.rate, &followers);
     }
 
     /// State `z`: its rate makes the rate of `X(z)` equal to what the bond carries.
-    fn by_speed(&mut self, cell: &Cell, stored: Expr, group: &[&Cell]) {
-        self.d.set(cell.stored, stored);
-        let rate = self.d.state(cell.z);
-        self.choose(cell, cell.z);
-        self.later.push(Later::Speed { z: cell.z, rate, stored, bond: cell.rate });
-        let followers = self.followers(cell.z, group);
-        self.balance(cell.z, stored, cell.rate, &followers);
+    fn by_speed(&mut self, storage_port: &StoragePort, stored: Expr, group: &[&StoragePort]) {
+        self.d.set(storage_port.stored, stored);
+        let rate = self.d.state(storage_port.z);
+        self.choose(storage_port, storage_port.z);
+        self.deferred.push(DeferredRate::Speed { z: storage_port.z, rate, stored, bond: storage_port.rate });
+        let followers = self.followers(storage_port.z, group);
+        self.balance(storage_port.z, stored, storage_port.rate, &followers);
     }
 
     /// Notes what changes a stored quantity together with the dependent ones that follow it, if they do so constantly.
@@ -380,7 +388,7 @@ impl<'a> Assembled<'a> {
     }
 
     /// The dependent storages of a group that read `z`.
-    fn followers(&mut self, z: Symbol, group: &[&Cell]) -> Vec<Follower> {
+    fn followers(&mut self, z: Symbol, group: &[&StoragePort]) -> Vec<Follower> {
         let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
         dependent
             .filter_map(|c| {
@@ -392,10 +400,10 @@ impl<'a> Assembled<'a> {
 
     /// Whether a group can be written with speeds (or stored quantities) of the independent storages as states: no
     /// varying source enters, and every law gives `X` from `z`.
-    fn in_velocity_form(&mut self, group: &[&Cell]) -> bool {
+    fn in_velocity_form(&mut self, group: &[&StoragePort]) -> bool {
         let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
-        let constant_sources = dependent.clone().all(|cell| !self.is_moved(cell.z));
-        constant_sources && group.iter().all(|cell| self.stored_of(cell).is_some())
+        let constant_sources = dependent.clone().all(|storage_port| !self.is_moved(storage_port.z));
+        constant_sources && group.iter().all(|storage_port| self.stored_of(storage_port).is_some())
     }
 
     /// Whether a source that is no constant stands in the row of a variable.
@@ -410,28 +418,29 @@ impl<'a> Assembled<'a> {
 
     /// States are speeds of linear inertances and stored quantities of other storages; rates of dependent ones follow by
     /// differentiating what they depend on.
-    fn velocity_form(&mut self, group: &[&Cell], speeds: &[Virtual]) {
-        for cell in group {
-            match (cell.state.role, self.stored_of(cell), cell.law) {
+    fn velocity_form(&mut self, group: &[&StoragePort], speeds: &[Virtual]) {
+        for storage_port in group {
+            match (storage_port.state.role, self.stored_of(storage_port), storage_port.law) {
                 (Role::Dependent, stored, _) => {
                     match stored {
-                        Some(stored) => self.d.set(cell.stored, stored),
-                        None => self.dependent_by_law(cell),
+                        Some(stored) => self.d.set(storage_port.stored, stored),
+                        None => self.dependent_by_law(storage_port),
                     }
-                    self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
+                    self.deferred
+                        .push(DeferredRate::Dependent { rate: storage_port.rate, stored: storage_port.stored });
                 }
-                (_, stored, StorageLaw::Integral(law)) => match self.constant_inertance(cell).and(stored) {
-                    Some(stored) => self.by_speed(cell, stored, group),
+                (_, stored, StorageLaw::Integral(law)) => match self.constant_inertance(storage_port).and(stored) {
+                    Some(stored) => self.by_speed(storage_port, stored, group),
                     None => {
-                        self.by_stored(cell, group);
-                        self.d.set(cell.z, law);
+                        self.by_stored(storage_port, group);
+                        self.d.set(storage_port.z, law);
                     }
                 },
-                (_, Some(stored), _) => self.by_speed(cell, stored, group),
+                (_, Some(stored), _) => self.by_speed(storage_port, stored, group),
                 (_, None, _) => {
-                    self.by_stored(cell, group);
-                    let residual = self.law_residual(cell);
-                    self.d.set_root(cell.z, residual);
+                    self.by_stored(storage_port, group);
+                    let residual = self.law_residual(storage_port);
+                    self.d.set_root(storage_port.z, residual);
                 }
             }
         }
@@ -452,28 +461,29 @@ impl<'a> Assembled<'a> {
     }
 
     /// States are `pi = X_i + S^T X_d`: no rate of a source is asked for, no law has to be inverted.
-    fn momentum_form(&mut self, group: &[&Cell], speeds: &[Virtual]) {
-        let dependent: Vec<&&Cell> = group.iter().filter(|c| c.state.role == Role::Dependent).collect();
-        for cell in &dependent {
-            match self.stored_of(cell) {
-                Some(stored) => self.d.set(cell.stored, stored),
-                None => self.dependent_by_law(cell),
+    fn momentum_form(&mut self, group: &[&StoragePort], speeds: &[Virtual]) {
+        let dependent: Vec<&&StoragePort> = group.iter().filter(|c| c.state.role == Role::Dependent).collect();
+        for storage_port in &dependent {
+            match self.stored_of(storage_port) {
+                Some(stored) => self.d.set(storage_port.stored, stored),
+                None => self.dependent_by_law(storage_port),
             }
             // While running nothing needs the rates of dependent storages; who looks at them gets them by differentiation.
-            self.later.push(Later::Dependent { rate: cell.rate, stored: cell.stored });
+            self.deferred.push(DeferredRate::Dependent { rate: storage_port.rate, stored: storage_port.stored });
         }
-        for cell in group.iter().filter(|c| c.state.role == Role::Independent) {
-            let followers = self.followers(cell.z, group);
-            let (port, graph) = (cell.state.port, self.d.graph);
+        for storage_port in group.iter().filter(|c| c.state.role == Role::Independent) {
+            let followers = self.followers(storage_port.z, group);
+            let (port, graph) = (storage_port.state.port, self.d.graph);
             let place = (port.element, graph.port_name(port));
-            let (sum, state) = self.momentum_state(Some(cell.stored), cell.z, cell.rate, place, followers);
+            let (sum, state) =
+                self.momentum_state(Some(storage_port.stored), storage_port.z, storage_port.rate, place, followers);
             let own = self.d.x.sub(state, sum);
-            self.d.set(cell.stored, own);
-            match cell.law {
-                StorageLaw::Integral(law) => self.d.set(cell.z, law),
+            self.d.set(storage_port.stored, own);
+            match storage_port.law {
+                StorageLaw::Integral(law) => self.d.set(storage_port.z, law),
                 _ => {
-                    let residual = self.law_residual(cell);
-                    self.d.set_root(cell.z, residual);
+                    let residual = self.law_residual(storage_port);
+                    self.d.set_root(storage_port.z, residual);
                 }
             }
         }
@@ -488,25 +498,25 @@ impl<'a> Assembled<'a> {
 
     /// `X` of a dependent storage from its law as written. Where the inverse has an infinite slope the law is solved for `X`
     /// by iteration, and its rate from the law's own slope.
-    fn dependent_by_law(&mut self, cell: &Cell) {
-        let residual = self.law_residual(cell);
-        match self.d.solve_for(residual, cell.stored) {
+    fn dependent_by_law(&mut self, storage_port: &StoragePort) {
+        let residual = self.law_residual(storage_port);
+        match self.d.solve_for(residual, storage_port.stored) {
             Some(inverse) if self.d.x.is_steep(inverse) => {
-                self.d.of.insert(cell.stored, Definition::Implicit(residual));
+                self.d.of.insert(storage_port.stored, Definition::Implicit(residual));
             }
-            _ => self.d.set_root(cell.stored, residual),
+            _ => self.d.set_root(storage_port.stored, residual),
         }
     }
 
     /// `0 = …` in `X` and `z`.
-    fn law_residual(&mut self, cell: &Cell) -> Expr {
-        match cell.law {
+    fn law_residual(&mut self, storage_port: &StoragePort) -> Expr {
+        match storage_port.law {
             StorageLaw::Integral(e) => {
-                let z = self.d.x.sym(cell.z);
+                let z = self.d.x.sym(storage_port.z);
                 self.d.x.sub(z, e)
             }
             StorageLaw::Derivative(e) => {
-                let stored = self.d.x.sym(cell.stored);
+                let stored = self.d.x.sym(storage_port.stored);
                 self.d.x.sub(stored, e)
             }
             StorageLaw::Implicit(e) => e,
@@ -546,7 +556,7 @@ impl<'a> Assembled<'a> {
             self.balances.pop();
         }
         let structure = structure.expr(&mut d.x);
-        self.later.push(Later::Momentum { rate: pi_rate, structure, followers, z });
+        self.deferred.push(DeferredRate::Momentum { rate: pi_rate, structure, followers, z });
         let kind = StateKind::Storage(Some(element));
         self.states.push(Chosen { symbol: pi, kind, meaning: Some(meaning), tracked: z });
         (sum, state)
@@ -570,7 +580,7 @@ impl<'a> Assembled<'a> {
 
 impl Assembled<'_> {
     /// A signal that repeats a stored quantity, read from it: with the same start value or a constant distance to it.
-    fn repeated(&mut self, signal: &Signal) -> Option<Expr> {
+    fn repeated(&mut self, signal: &IntegratedSignal) -> Option<Expr> {
         let &Node::Symbol(rate) = self.d.x.node(signal.rate) else { return None };
         let (&stored, _) = self.d.stored.iter().find(|(_, r)| **r == rate)?;
         let own = self.d.x.sym(stored);
@@ -586,20 +596,20 @@ impl Assembled<'_> {
 
     /// Defines the rates that were put off.
     pub(super) fn rates(&mut self) -> Result<(), (Symbol, Unavailable)> {
-        for later in std::mem::take(&mut self.later) {
+        for rate in std::mem::take(&mut self.deferred) {
             let d = &mut self.d;
-            match later {
-                Later::Speed { z, rate, stored, bond } => {
+            match rate {
+                DeferredRate::Speed { z, rate, stored, bond } => {
                     let change = d.rate(stored).map_err(|reason| (z, reason))?;
                     let bond = d.x.sym(bond);
                     let residual = d.x.sub(change, bond);
                     d.of.insert(rate, Definition::Implicit(residual));
                 }
-                Later::Free { stored, bond } => {
+                DeferredRate::Free { stored, bond } => {
                     let change = d.rate(stored).map_err(|reason| (bond, reason))?;
                     d.set(bond, change);
                 }
-                Later::Dependent { rate, stored } => {
+                DeferredRate::Dependent { rate, stored } => {
                     let definition = d.of[&stored];
                     match (d.rate(definition.expr()), definition) {
                         (Ok(change), Definition::Explicit(_)) => d.set(rate, change),
@@ -609,7 +619,7 @@ impl Assembled<'_> {
                         }
                     }
                 }
-                Later::Momentum { rate, structure, followers, z } => {
+                DeferredRate::Momentum { rate, structure, followers, z } => {
                     let mut sum = vec![structure];
                     for f in followers {
                         let slope = d.rate(f.factor).map_err(|reason| (z, reason))?;
@@ -633,7 +643,7 @@ pub(super) struct Follower {
     rate: Symbol,
 }
 
-impl Cell<'_> {
+impl StoragePort<'_> {
     /// The co-energy symbols of all ports of the storage.
     fn storage_speeds(&self, d: &Definitions) -> BTreeSet<Symbol> {
         let ports = 0..self.storage.laws.len() as u32;
@@ -648,20 +658,20 @@ impl Cell<'_> {
 /// Storages that depend on each other, or are ports of one field, with the virtual speeds among them.
 pub(super) fn groups(
     x: &mut Exprs,
-    cells: &[Cell],
+    storage_ports: &[StoragePort],
     speeds: &[Virtual],
     rows: &mut Rows,
 ) -> Vec<(Vec<usize>, Vec<Virtual>)> {
-    let mut index: BTreeMap<Symbol, usize> = cells.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
-    index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, cells.len() + k)));
-    let mut set = UnionFind::<usize>::new(cells.len() + speeds.len());
+    let mut index: BTreeMap<Symbol, usize> = storage_ports.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
+    index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, storage_ports.len() + k)));
+    let mut set = UnionFind::<usize>::new(storage_ports.len() + speeds.len());
     let mut last: BTreeMap<ElementId, usize> = BTreeMap::new();
-    for (i, cell) in cells.iter().enumerate() {
-        if let Some(previous) = last.insert(cell.state.port.element, i) {
+    for (i, storage_port) in storage_ports.iter().enumerate() {
+        if let Some(previous) = last.insert(storage_port.state.port.element, i) {
             set.union(previous, i);
         }
-        if cell.state.role == Role::Dependent {
-            for term in rows.of(x, cell.z).iter().flat_map(|row| &row.0) {
+        if storage_port.state.role == Role::Dependent {
+            for term in rows.of(x, storage_port.z).iter().flat_map(|row| &row.0) {
                 if let Some(&other) = index.get(&term.0) {
                     set.union(i, other);
                 }
@@ -669,11 +679,11 @@ pub(super) fn groups(
         }
     }
     let mut groups: BTreeMap<usize, (Vec<usize>, Vec<Virtual>)> = BTreeMap::new();
-    for i in 0..cells.len() {
+    for i in 0..storage_ports.len() {
         groups.entry(set.find(i)).or_default().0.push(i);
     }
     for (k, v) in speeds.iter().enumerate() {
-        groups.entry(set.find(cells.len() + k)).or_default().1.push(*v);
+        groups.entry(set.find(storage_ports.len() + k)).or_default().1.push(*v);
     }
     groups.into_values().collect()
 }

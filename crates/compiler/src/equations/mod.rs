@@ -7,8 +7,8 @@ mod breaks;
 mod conserved;
 mod definitions;
 mod derive;
-mod display;
 mod domains;
+mod expansion;
 mod form;
 mod forms;
 mod freedom;
@@ -16,14 +16,11 @@ mod independent_rows;
 mod index;
 mod minimal;
 mod momenta;
-mod named;
 mod observed;
-mod places;
 mod relations;
 mod rows;
 mod stiff;
 mod supports;
-mod text;
 mod verify;
 
 use std::collections::BTreeSet;
@@ -37,16 +34,14 @@ use crate::sparse::SparseMatrix;
 use crate::unit::Unit;
 
 pub use blocks::LinearRow;
+pub(crate) use blocks::{Ordered, substituted};
 pub use definitions::Definition;
+pub(crate) use definitions::Definitions;
 pub use derive::derive_equations;
-pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
+pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
 pub use momenta::Momentum;
 pub use relations::{Moved, Relations};
-pub use text::{
-    Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
-    print_sides, print_symbol,
-};
 pub use verify::verify;
 
 /// Equations in evaluation order.

@@ -2,7 +2,7 @@
 //! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
 use super::definitions::Definitions;
-use super::minimal::{Assembled, Cell, groups, imposed, rows_of};
+use super::minimal::{Assembled, StoragePort, groups, imposed, rows_of};
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::Meaning;
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role};
@@ -23,11 +23,12 @@ impl Assembled<'_> {
     /// of these definitions is a continuation.
     pub(super) fn momenta(&mut self, truth: &CausalGraph) -> Vec<Momentum> {
         let mut rows = rows_of(&mut self.d, truth);
-        let cells: Vec<Cell> = truth.ports.ports.iter().filter_map(|state| self.cell(truth, state)).collect();
+        let storage_ports: Vec<StoragePort> =
+            truth.ports.ports.iter().filter_map(|state| self.storage_port(truth, state)).collect();
         let mut all = Vec::new();
-        for (members, speeds) in groups(&mut self.d.x, &cells, &truth.ports.virtual_speeds, &mut rows) {
-            let dependent: Vec<&Cell> =
-                members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Dependent).collect();
+        for (members, speeds) in groups(&mut self.d.x, &storage_ports, &truth.ports.virtual_speeds, &mut rows) {
+            let dependent: Vec<&StoragePort> =
+                members.iter().map(|&m| &storage_ports[m]).filter(|c| c.state.role == Role::Dependent).collect();
             if dependent.is_empty() {
                 continue;
             }
@@ -35,13 +36,13 @@ impl Assembled<'_> {
                 dependent.iter().map(|c| rows.of(&mut self.d.x, c.z).cloned().unwrap_or_default()).collect();
             let mut inputs = of_dependent.iter().flat_map(|row| &row.0).filter_map(|t| rows.giver(t.0));
             let moved = inputs.any(|giver| is_moving(&mut self.d, truth, giver));
-            let independent = members.iter().map(|&m| &cells[m]).filter(|c| c.state.role == Role::Independent);
+            let independent = members.iter().map(|&m| &storage_ports[m]).filter(|c| c.state.role == Role::Independent);
             let own = independent.map(|c| (c.z, Some(c.stored)));
             for (speed, stored) in own.chain(speeds.iter().map(|v| (v.speed, None))) {
                 let mut sum: Vec<Expr> = stored.map(|s| self.d.x.sym(s)).into_iter().collect();
-                for (cell, row) in dependent.iter().zip(&of_dependent) {
+                for (storage_port, row) in dependent.iter().zip(&of_dependent) {
                     if let Some(factor) = row.coefficient(speed) {
-                        let stored = self.d.x.sym(cell.stored);
+                        let stored = self.d.x.sym(storage_port.stored);
                         sum.push(self.d.x.mul(&[factor, stored]));
                     }
                 }

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::along::Closure;
+use super::along::AlgebraicConstraint;
 use super::breaks::place_of;
 use super::definitions::{Definition, Definitions};
 use super::minimal::{Assembled, Chosen};
@@ -136,16 +136,21 @@ fn mobilities(graph: &BondGraph) -> BTreeMap<Symbol, f64> {
 
 impl Assembled<'_> {
     /// Gives every multiplier a spring and a damper in the place of its relation. Closures that are none are left.
-    pub fn relax(&mut self, causal: &CausalGraph, springs: &Springs, closures: Vec<Closure>) -> Vec<Closure> {
+    pub fn relax(
+        &mut self,
+        causal: &CausalGraph,
+        springs: &Springs,
+        constraints: Vec<AlgebraicConstraint>,
+    ) -> Vec<AlgebraicConstraint> {
         let mobility = mobilities(&causal.graph);
         let mut left = Vec::new();
-        for closure in closures {
-            match closure.unknown {
+        for constraint in constraints {
+            match constraint.unknown {
                 Some((multiplier, AlgebraicRole::Multiplier(element))) => {
                     let along = takes_up_along(causal, multiplier);
-                    self.spring(springs, &mobility, element, multiplier, closure.residual, along);
+                    self.spring(springs, &mobility, element, multiplier, constraint.residual, along);
                 }
-                _ => left.push(closure),
+                _ => left.push(constraint),
             }
         }
         self.sort_states();

@@ -32,7 +32,7 @@ impl Program {
             let set = match op {
                 Op::State(i) | Op::Rate(i) => Some(Rc::from([i])),
                 Op::Conserved(i) => Some(Rc::from([states + i])),
-                Op::Side(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
+                Op::Sign(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
                 Op::Solution(block, _) => {
                     let all = || self.gathered(&sets, self.blocks[block].reads().collect());
                     Some(blocks[block.index()].get_or_insert_with(all).clone())

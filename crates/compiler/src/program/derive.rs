@@ -30,7 +30,7 @@ impl Values {
             };
             let slope = match root == value {
                 true => Some(one),
-                false => self.slope(value, &|o| by_root.get(&o).filter(|_| roots.contains_key(&o)).copied()),
+                false => self.derivative(value, &|o| by_root.get(&o).filter(|_| roots.contains_key(&o)).copied()),
             };
             if let Some(slope) = slope {
                 roots.insert(value, root);
@@ -54,7 +54,7 @@ impl Values {
                 }
                 read.iter_mut().for_each(|(o, slope)| *slope = self.times(by_root[o], *slope));
                 let of = |o: Value| read.iter().find(|(v, _)| *v == o).map(|(_, slope)| *slope);
-                if let Some(slope) = self.slope(value, &of) {
+                if let Some(slope) = self.derivative(value, &of) {
                     slopes.insert(value, slope);
                 }
             }
@@ -68,8 +68,8 @@ impl Values {
     }
 
     /// Derivative of a value from those of its operands; `None` if it is zero.
-    pub(super) fn slope(&mut self, value: Value, d: &dyn Fn(Value) -> Option<Value>) -> Option<Value> {
-        self.op(value).slope(self, value, |_, operand| (operand, d(operand)))
+    pub(super) fn derivative(&mut self, value: Value, d: &dyn Fn(Value) -> Option<Value>) -> Option<Value> {
+        self.op(value).derivative(self, value, |_, operand| (operand, d(operand)))
     }
 }
 

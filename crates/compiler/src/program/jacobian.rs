@@ -51,16 +51,16 @@ impl Program {
     /// constants ([`Op::is_given`]). All other givens rest; a parameter given by others does not follow them. Conditions
     /// rest too, as they do in [`Values`] that read them.
     pub fn differentiate(&self, wanted: &[Value], givens: &[Op]) -> Differentiated {
-        let mut work = Work {
+        let mut work = Differentiation {
             values: self.values.clone(),
             blocks: self.blocks.clone(),
-            slopes: FxHashMap::default(),
+            gradients: FxHashMap::default(),
             of_blocks: FxHashMap::default(),
         };
         let one = work.values.number(1.0);
         for (column, &op) in givens.iter().enumerate() {
             if let Some(value) = self.values.find(op) {
-                work.slopes.insert(value, Rc::from([(column as u32, one)]));
+                work.gradients.insert(value, Rc::from([(column as u32, one)]));
             }
         }
         let live = self.live(wanted, true);
@@ -71,8 +71,8 @@ impl Program {
         }
         let mut entries = Vec::new();
         for (row, value) in wanted.iter().enumerate() {
-            let slopes = work.slopes.get(value).into_iter().flat_map(|s| s.iter());
-            entries.extend(slopes.map(|&(column, value)| Entry { row: row as u32, column, value }));
+            let gradients = work.gradients.get(value).into_iter().flat_map(|s| s.iter());
+            entries.extend(gradients.map(|&(column, value)| Entry { row: row as u32, column, value }));
         }
         let program = Program { values: work.values, blocks: work.blocks, ..self.clone() };
         debug_assert_eq!(verify(&program), Ok(()), "{}", self.name);
@@ -81,54 +81,54 @@ impl Program {
 }
 
 /// Derivatives by column, columns ascending.
-type Slopes = Rc<[(u32, Value)]>;
+type SparseGradient = Rc<[(u32, Value)]>;
 
-struct Work {
+struct Differentiation {
     values: Values,
     blocks: Table<BlockId, Block>,
     /// Of values that move.
-    slopes: FxHashMap<Value, Slopes>,
+    gradients: FxHashMap<Value, SparseGradient>,
     /// Of the unknowns of blocks.
-    of_blocks: FxHashMap<BlockId, Vec<Slopes>>,
+    of_blocks: FxHashMap<BlockId, Vec<SparseGradient>>,
 }
 
-impl Work {
+impl Differentiation {
     fn differentiate(&mut self, value: Value, op: Op) {
-        let slopes = match op {
+        let gradients = match op {
             Op::Solution(block, unknown) => {
                 if !self.of_blocks.contains_key(&block) {
-                    let slopes = self.of_block(block);
-                    self.of_blocks.insert(block, slopes);
+                    let gradients = self.of_block(block);
+                    self.of_blocks.insert(block, gradients);
                 }
                 Rc::clone(&self.of_blocks[&block][unknown as usize])
             }
             _ => self.of_operation(value, &FxHashMap::default()),
         };
-        if !slopes.is_empty() {
-            self.slopes.insert(value, slopes);
+        if !gradients.is_empty() {
+            self.gradients.insert(value, gradients);
         }
     }
 
-    /// Slopes of an operation from those of its operands; `inner` goes before the others.
-    fn of_operation(&mut self, value: Value, inner: &FxHashMap<Value, Slopes>) -> Slopes {
-        let mut operands: Vec<(Value, Slopes)> = Vec::with_capacity(3);
+    /// SparseGradient of an operation from those of its operands; `inner` goes before the others.
+    fn of_operation(&mut self, value: Value, inner: &FxHashMap<Value, SparseGradient>) -> SparseGradient {
+        let mut operands: Vec<(Value, SparseGradient)> = Vec::with_capacity(3);
         self.values.op(value).for_each_operand(|v| {
-            if let Some(slopes) = inner.get(&v).or_else(|| self.slopes.get(&v)) {
-                operands.push((v, Rc::clone(slopes)));
+            if let Some(gradients) = inner.get(&v).or_else(|| self.gradients.get(&v)) {
+                operands.push((v, Rc::clone(gradients)));
             }
         });
         let columns = columns_of(operands.iter().map(|(_, s)| s));
-        let mut slopes = Vec::with_capacity(columns.len());
+        let mut gradients = Vec::with_capacity(columns.len());
         for column in columns {
             let of = |v: Value| operands.iter().find(|(o, _)| *o == v).and_then(|(_, s)| at(s, column));
-            if let Some(slope) = self.values.slope(value, &of) {
-                slopes.push((column, slope));
+            if let Some(slope) = self.values.derivative(value, &of) {
+                gradients.push((column, slope));
             }
         }
-        slopes.into()
+        gradients.into()
     }
 
-    fn of_block(&mut self, block: BlockId) -> Vec<Slopes> {
+    fn of_block(&mut self, block: BlockId) -> Vec<SparseGradient> {
         let (matrix, right, shared) = match self.blocks[block].clone() {
             Block::Linear { matrix, right, .. } => {
                 let unknowns: Vec<Value> = (0..right.len()).map(|i| self.solution(block, i)).collect();
@@ -150,13 +150,13 @@ impl Work {
     }
 
     /// `A u = b` gives `A u' = b' - A' u`: the right-hand side for each column, one slope list a row.
-    fn right_of_linear(&mut self, matrix: &Matrix, right: &[Value], unknowns: &[Value]) -> Vec<Slopes> {
+    fn right_of_linear(&mut self, matrix: &Matrix, right: &[Value], unknowns: &[Value]) -> Vec<SparseGradient> {
         let mut rows = Vec::with_capacity(right.len());
         for (row, b) in matrix.values.rows().zip(right) {
-            let mut sum: Vec<(u32, Value)> = self.slopes.get(b).map(|s| s.to_vec()).unwrap_or_default();
+            let mut sum: Vec<(u32, Value)> = self.gradients.get(b).map(|s| s.to_vec()).unwrap_or_default();
             for (k, entry) in row {
-                let Some(slopes) = self.slopes.get(entry).cloned() else { continue };
-                for &(column, slope) in slopes.iter() {
+                let Some(gradients) = self.gradients.get(entry).cloned() else { continue };
+                for &(column, slope) in gradients.iter() {
                     let term = self.values.times(slope, unknowns[k]);
                     self.subtract(&mut sum, column, term);
                 }
@@ -167,7 +167,12 @@ impl Work {
     }
 
     /// `F(u, x) = 0` gives `(∂F/∂u) u' = -(∂F/∂x) x'`, at the solution: the matrix, and the right-hand side.
-    fn right_of_newton(&mut self, block: BlockId, residuals: &[Value], jacobian: &Matrix) -> (Matrix, Vec<Slopes>) {
+    fn right_of_newton(
+        &mut self,
+        block: BlockId,
+        residuals: &[Value],
+        jacobian: &Matrix,
+    ) -> (Matrix, Vec<SparseGradient>) {
         let n = residuals.len();
         let mut there: FxHashMap<Value, Value> = FxHashMap::default();
         for unknown in 0..n {
@@ -177,7 +182,7 @@ impl Work {
             }
         }
         let matrix = jacobian.map(|&v| self.at_solution(v, &mut there));
-        let mut inner: FxHashMap<Value, Slopes> = FxHashMap::default();
+        let mut inner: FxHashMap<Value, SparseGradient> = FxHashMap::default();
         there.values().for_each(|&v| {
             inner.insert(v, Rc::from([]));
         });
@@ -186,13 +191,14 @@ impl Work {
             for v in self.inside(residual) {
                 let moved = self.at_solution(v, &mut there);
                 if !inner.contains_key(&moved) || !matches!(self.values.op(v), Op::Guess(..)) {
-                    let slopes = self.of_operation(moved, &inner);
-                    inner.insert(moved, slopes);
+                    let gradients = self.of_operation(moved, &inner);
+                    inner.insert(moved, gradients);
                 }
             }
             let moved = self.at_solution(residual, &mut there);
-            let slopes = inner.get(&moved).or_else(|| self.slopes.get(&moved)).cloned();
-            let minus = slopes.iter().flat_map(|s| s.iter()).map(|&(column, v)| (column, self.values.neg(v))).collect();
+            let gradients = inner.get(&moved).or_else(|| self.gradients.get(&moved)).cloned();
+            let minus =
+                gradients.iter().flat_map(|s| s.iter()).map(|&(column, v)| (column, self.values.neg(v))).collect();
             rows.push(minus);
         }
         (matrix, rows)
@@ -234,32 +240,38 @@ impl Work {
         }
     }
 
-    /// Solves for the slopes of all unknowns, column by column, with one factorisation.
-    fn solved(&mut self, block: BlockId, matrix: &Arc<Matrix>, right: &[Slopes], shared: Option<Value>) -> Vec<Slopes> {
+    /// Solves for the gradients of all unknowns, column by column, with one factorisation.
+    fn solved(
+        &mut self,
+        block: BlockId,
+        matrix: &Arc<Matrix>,
+        right: &[SparseGradient],
+        shared: Option<Value>,
+    ) -> Vec<SparseGradient> {
         let elements = self.blocks[block].elements().to_string();
         let zero = self.values.number(0.0);
-        let mut slopes: Vec<Vec<(u32, Value)>> = vec![Vec::new(); right.len()];
+        let mut gradients: Vec<Vec<(u32, Value)>> = vec![Vec::new(); right.len()];
         let mut shared = shared;
         for column in columns_of(right.iter()) {
             let right = right.iter().map(|s| at(s, column).unwrap_or(zero)).collect();
             let (matrix, elements) = (Arc::clone(matrix), elements.clone());
             let solving = self.blocks.push(Block::Linear { matrix, right, shared, elements });
-            for (unknown, slopes) in slopes.iter_mut().enumerate() {
-                slopes.push((column, self.solution(solving, unknown)));
+            for (unknown, gradients) in gradients.iter_mut().enumerate() {
+                gradients.push((column, self.solution(solving, unknown)));
             }
             shared = shared.or_else(|| Some(self.solution(solving, 0)));
         }
-        slopes.into_iter().map(Rc::from).collect()
+        gradients.into_iter().map(Rc::from).collect()
     }
 }
 
-fn at(slopes: &Slopes, column: u32) -> Option<Value> {
-    let place = slopes.binary_search_by_key(&column, |(c, _)| *c).ok()?;
-    Some(slopes[place].1)
+fn at(gradients: &SparseGradient, column: u32) -> Option<Value> {
+    let place = gradients.binary_search_by_key(&column, |(c, _)| *c).ok()?;
+    Some(gradients[place].1)
 }
 
-fn columns_of<'a>(slopes: impl Iterator<Item = &'a Slopes>) -> Vec<u32> {
-    let mut columns: Vec<u32> = slopes.flat_map(|s| s.iter().map(|(column, _)| *column)).collect();
+fn columns_of<'a>(gradients: impl Iterator<Item = &'a SparseGradient>) -> Vec<u32> {
+    let mut columns: Vec<u32> = gradients.flat_map(|s| s.iter().map(|(column, _)| *column)).collect();
     columns.sort_unstable();
     columns.dedup();
     columns

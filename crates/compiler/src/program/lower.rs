@@ -422,7 +422,7 @@ impl<'a> Lowering<'a> {
     fn side(&mut self, a: Value) -> Value {
         if self.holds(a) {
             let condition = self.condition(a, ConditionKind::Sign);
-            return self.op(Op::Side(condition, a));
+            return self.op(Op::Sign(condition, a));
         }
         if let Some(inner) = &mut self.inner {
             inner.piecewise = true;

@@ -85,7 +85,7 @@ pub struct Program {
     /// Inputs.
     pub inputs: Vec<Input>,
     /// Signals held from earlier times.
-    pub held: Vec<Held>,
+    pub held: Vec<HeldSignal>,
     /// States; in implicit form all unknowns, states before algebraic ones.
     pub states: Vec<State>,
     /// What the equations are if they are no explicit rates.
@@ -150,7 +150,7 @@ pub struct Input {
 
 /// A delayed or sampled signal.
 #[derive(Debug, Clone)]
-pub struct Held {
+pub struct HeldSignal {
     /// Its name.
     pub name: String,
     /// The signal that is delayed or sampled.

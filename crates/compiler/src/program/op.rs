@@ -13,7 +13,7 @@ use crate::algebra::Function;
 ///
 /// - `given` stand before anything is computed, or are found by a solve block;
 /// - `plain` follow from what they read. `cost` is what they are counted as, `value` the meaning in `f64`, `text` how programs
-///   are printed, `c` the expression in C, `slope` the rule of the derivative: of `value`, for the calculus `k`, a
+///   are printed, `c` the expression in C, `derivative` its rule: of `value`, for the calculus `k`, a
 ///   number that may be none where nothing moves;
 /// - `held` read a condition or a table as well, so whoever runs them has a way of its own.
 ///
@@ -49,103 +49,103 @@ macro_rules! for_each_op {
                 /// `-a`.
                 Neg() [a da A] {
                     cost: Addition, value: -a, text: "-{a}", c: "-{a}",
-                    slope: $crate::program::calculus::opposite(k, da),
+                    derivative: $crate::program::calculus::opposite(k, da),
                 }
                 /// `a + b`.
                 Add() [a da A, b db A] {
                     cost: Addition, value: a + b, text: "{a} + {b}", c: "{a} + {b}",
-                    slope: $crate::program::calculus::sum(k, da, db),
+                    derivative: $crate::program::calculus::sum(k, da, db),
                 }
                 /// `a - b`.
                 Sub() [a da A, b db A] {
                     cost: Addition, value: a - b, text: "{a} - {b}", c: "{a} - {b}",
-                    slope: $crate::program::calculus::difference(k, da, db),
+                    derivative: $crate::program::calculus::difference(k, da, db),
                 }
                 /// `a * b`.
                 Mul() [a da A, b db A] {
                     cost: Multiplication, value: a * b, text: "{a} * {b}", c: "{a} * {b}",
-                    slope: $crate::program::calculus::of_product(k, (a, da), (b, db)),
+                    derivative: $crate::program::calculus::of_product(k, (a, da), (b, db)),
                 }
                 /// `a / b`.
                 Div() [a da A, b db A] {
                     cost: Division, value: a / b, text: "{a} / {b}", c: "{a} / {b}",
-                    slope: $crate::program::calculus::of_quotient(k, value, da, (b, db)),
+                    derivative: $crate::program::calculus::of_quotient(k, value, da, (b, db)),
                 }
                 /// `a^n`, by repeated multiplication.
                 Powi(n: u32) [a da A] {
                     cost: Power, value: $crate::algebra::math::powi(a, n), text: "{a}^{n}", c: "ha_powi({a}, {n})",
-                    slope: $crate::program::calculus::of_whole_power(k, n, (a, da)),
+                    derivative: $crate::program::calculus::of_whole_power(k, n, (a, da)),
                 }
                 /// `a^b`.
                 Pow() [a da A, b db A] {
                     cost: Call, value: $crate::algebra::math::pow(a, b), text: "{a} ^ {b}", c: "ha_pow({a}, {b})",
-                    slope: $crate::program::calculus::of_power(k, value, (a, da), (b, db)),
+                    derivative: $crate::program::calculus::of_power(k, value, (a, da), (b, db)),
                 }
                 /// A function of one argument; `abs`, `sign` and `floor` only where no condition is held.
                 Call(f: Function) [a da A] {
                     cost: Call, value: $crate::algebra::math::call(f, a), text: "{f}({a})", c: "{f}({a})",
-                    slope: $crate::program::calculus::of_call(k, f, value, (a, da)),
+                    derivative: $crate::program::calculus::of_call(k, f, value, (a, da)),
                 }
                 /// The angle of the point at `b` along and `a` across.
                 Atan2() [a da A, b db A] {
                     cost: Call, value: $crate::algebra::math::atan2(a, b), text: "atan2({a}, {b})",
                     c: "ha_atan2({a}, {b})",
-                    slope: $crate::program::calculus::of_angle(k, (a, da), (b, db)),
+                    derivative: $crate::program::calculus::of_angle(k, (a, da), (b, db)),
                 }
                 /// 1 if `a > 0`, else 0; never held.
                 Positive() [a da A] {
                     cost: Addition, value: f64::from(a > 0.0), text: "{a} > 0", c: "{a} > 0.0 ? 1.0 : 0.0",
-                    slope: $crate::program::calculus::none(k, [da]),
+                    derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// 1 if neither is 0.
                 And() [a da A, b db A] {
                     cost: Addition, value: f64::from(a != 0.0 && b != 0.0), text: "{a} and {b}",
                     c: "{a} != 0.0 && {b} != 0.0 ? 1.0 : 0.0",
-                    slope: $crate::program::calculus::none(k, [da, db]),
+                    derivative: $crate::program::calculus::none(k, [da, db]),
                 }
                 /// 1 if one of them is not 0.
                 Or() [a da A, b db A] {
                     cost: Addition, value: f64::from(a != 0.0 || b != 0.0), text: "{a} or {b}",
                     c: "{a} != 0.0 || {b} != 0.0 ? 1.0 : 0.0",
-                    slope: $crate::program::calculus::none(k, [da, db]),
+                    derivative: $crate::program::calculus::none(k, [da, db]),
                 }
                 /// 1 if it is 0.
                 Not() [a da A] {
                     cost: Addition, value: f64::from(a == 0.0), text: "not {a}", c: "{a} == 0.0 ? 1.0 : 0.0",
-                    slope: $crate::program::calculus::none(k, [da]),
+                    derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// The second if the first is not 0, else the third.
                 Select() [c dc A, a da A, b db A] {
                     cost: Addition, value: if c != 0.0 { a } else { b }, text: "if {c} then {a} else {b}",
                     c: "{c} != 0.0 ? {a} : {b}",
-                    slope: $crate::program::calculus::of_choice(k, (c, dc), da, db),
+                    derivative: $crate::program::calculus::of_choice(k, (c, dc), da, db),
                 }
             }
             held {
                 /// 1 if the held condition says `a > 0`, else 0.
-                Side(condition: ConditionId) [a da A] {
+                Sign(condition: ConditionId) [a da A] {
                     cost: Addition, text: "c{condition}: {a} > 0",
-                    slope: $crate::program::calculus::none(k, [da]),
+                    derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// The held integer part of `a`.
                 Floor(condition: ConditionId) [a da A] {
                     cost: Call, text: "c{condition}: floor({a})",
-                    slope: $crate::program::calculus::none(k, [da]),
+                    derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// A table (index into `Program::tables`), on the held piece if there is a condition.
                 Table(table: u32, piece: Option<ConditionId>) [a da A] {
                     cost: Table, text: "table {table} at {a}",
-                    slope: $crate::program::calculus::of_table(k, (table, piece), 1, (a, da)),
+                    derivative: $crate::program::calculus::of_table(k, (table, piece), 1, (a, da)),
                 }
                 /// The slope of a table.
                 TableSlope(table: u32, piece: Option<ConditionId>) [a da A] {
                     cost: Table, text: "slope of table {table} at {a}",
-                    slope: $crate::program::calculus::of_table(k, (table, piece), 2, (a, da)),
+                    derivative: $crate::program::calculus::of_table(k, (table, piece), 2, (a, da)),
                 }
                 /// The derivative of the slope of a table.
                 TableCurvature(table: u32, piece: Option<ConditionId>) [a da A] {
                     cost: Table, text: "curvature of table {table} at {a}",
-                    slope: $crate::program::calculus::of_table(k, (table, piece), 3, (a, da)),
+                    derivative: $crate::program::calculus::of_table(k, (table, piece), 3, (a, da)),
                 }
             }
         }
@@ -191,10 +191,10 @@ macro_rules! define {
     (($k:ident $value:ident)
      given { $($(#[$given_doc:meta])* $given:ident$(($($given_part:ident: $given_kind:ty),*))?;)* }
      plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-        cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+        cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
      })* }
      held { $($(#[$held_doc:meta])* $held:ident($($held_part:ident: $held_kind:ty),*) [$x:ident $dx:ident $X:ident] {
-        cost: $held_cost:ident, text: $held_text:literal, slope: $held_slope:expr,
+        cost: $held_cost:ident, text: $held_text:literal, derivative: $held_derivative:expr,
      })* }) => {
         /// An operation on operands `A`: how a [`Value`] comes about, a step of a routine, an instruction on registers.
         /// First what is fixed in it, then what it reads.
@@ -242,7 +242,7 @@ macro_rules! define {
             /// rate.
             #[allow(unused_variables, reason = "each rule reads what it needs")]
             #[inline]
-            pub fn slope<K: Calculus>(
+            pub fn derivative<K: Calculus>(
                 self,
                 k: &mut K,
                 value: K::Number,
@@ -253,12 +253,12 @@ macro_rules! define {
                     $(Op::$plain($($part,)* $($a),*) => {
                         $(let ($a, $da) = of(k, $a);)*
                         let ($k, $value) = (k, value);
-                        $slope
+                        $derivative
                     })*
                     $(Op::$held($($held_part,)* $x) => {
                         let ($x, $dx) = of(k, $x);
                         let $k = k;
-                        $held_slope
+                        $held_derivative
                     })*
                 }
             }
@@ -320,13 +320,13 @@ impl<A: Copy> Op<A> {
 
     /// Whether it moves with what it reads, rather than jump.
     pub fn moves(self) -> bool {
-        self.slope(&mut Whether, (), |_, _| ((), Some(()))).is_some()
+        self.derivative(&mut Whether, (), |_, _| ((), Some(()))).is_some()
     }
 
     /// The condition that it reads.
     pub fn condition(self) -> Option<ConditionId> {
         match self {
-            Op::Side(c, _) | Op::Floor(c, _) => Some(c),
+            Op::Sign(c, _) | Op::Floor(c, _) => Some(c),
             Op::Table(_, c, _) | Op::TableSlope(_, c, _) | Op::TableCurvature(_, c, _) => c,
             _ => None,
         }

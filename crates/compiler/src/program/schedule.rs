@@ -6,9 +6,9 @@ use super::op::Op;
 use super::sharing::share;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Held, Holds, Implicit, Input,
-    LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess, State,
-    Value, first_of, verify,
+    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, HeldSignal, Holds, Implicit,
+    Input, LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess,
+    State, Value, first_of, verify,
 };
 use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
 use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
@@ -296,7 +296,7 @@ impl Schedule<'_> {
                 })
                 .collect(),
             held: held
-                .map(|h| Held {
+                .map(|h| HeldSignal {
                     name: h.name.clone(),
                     source: lower.value(h.source),
                     time: lower.value(h.time),
@@ -576,7 +576,7 @@ fn degrees(program: &Program) -> Vec<Degree> {
         let degree = match op {
             _ if program.values.reads(value) == Reads::PARAMETERS => Degree::Constant,
             Op::Time => Degree::Line,
-            Op::Side(..) | Op::Floor(..) => Degree::Constant,
+            Op::Sign(..) | Op::Floor(..) => Degree::Constant,
             Op::Neg(a) => of(a),
             Op::Add(a, b) | Op::Sub(a, b) => of(a).max(of(b)),
             Op::Mul(a, b) if of(a) == Degree::Constant => of(b),

@@ -2,8 +2,8 @@
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Facts, Symbol};
 use halfarrow_compiler::bond_graph::{
-    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, Kind, Meaning, Parameter, ParameterId, ParameterKind,
-    Port, PortRef, ResistorLaw, Signal, SignalId, Storage, StorageLaw, Variable,
+    Bond, BondGraph, BondId, Element, ElementId, Input, InputId, IntegratedSignal, Kind, Meaning, Parameter,
+    ParameterId, ParameterKind, Port, PortRef, ResistorLaw, SignalId, Storage, StorageLaw, Variable,
 };
 use halfarrow_compiler::causal_graph::{CausalGraph, Ports, Stroke};
 use halfarrow_compiler::ids::{Id, Map, Table};
@@ -151,7 +151,7 @@ impl Builder<'_> {
         let rate = self.graph.exprs.sym(flow);
         let symbol = self.symbol("phi", Facts::default(), Meaning::Signal(SignalId::new(0)));
         let (name, span) = ("phi".to_owned(), Span::default());
-        self.graph.signals.push(Signal { name, symbol, rate, initial: None, unit: None, span });
+        self.graph.signals.push(IntegratedSignal { name, symbol, rate, initial: None, unit: None, span });
     }
 
     fn elements(&mut self) {

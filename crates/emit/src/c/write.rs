@@ -360,7 +360,7 @@ impl<'a> Writer<'a> {
     fn precision(&self, f: &Body, step: &Step) -> (bool, bool) {
         let single = self.real == Real::Float;
         match step {
-            Step::Op { op: Op::Side(..) | Op::Floor(..), .. } => (single, single),
+            Step::Op { op: Op::Sign(..) | Op::Floor(..), .. } => (single, single),
             Step::Op { op: Op::Table(..) | Op::TableSlope(..) | Op::TableCurvature(..), .. } => (single, false),
             Step::Guard { .. } => (single && self.all_timely(step, &f.wide), false),
             _ => {
@@ -409,40 +409,40 @@ impl<'a> Writer<'a> {
             Op::TableCurvature(table, piece, _) => {
                 self.table(f, (out, 2), (&a[0], d[0].as_deref()), (table, piece, place));
             }
-            Op::Side(condition, _) | Op::Floor(condition, _) => {
+            Op::Sign(condition, _) | Op::Floor(condition, _) => {
                 let taken = self.condition(f, condition, &a[0], d[0].as_deref());
                 self.put(f, out, &self.cast(taken, true, f.wide[out as usize]), None);
             }
             Op::Call(function @ (Function::Sin | Function::Cos), angle) if f.turns.contains_key(&angle) => {
                 let value = self.turn(f, (out, function), (&a[0], angle), place);
-                let rate = self.slope(f, out, op, reads);
+                let rate = self.derivative(f, out, op, reads);
                 self.put(f, out, &value, rate.as_deref());
             }
             Op::Powi(n, _) => {
                 let value = power(&mut f.text, (&format!("v{out}"), f.wide[out as usize]), &a[0], n);
                 self.put(f, out, &value, None);
-                if let Some(rate) = self.slope(f, out, op, reads) {
+                if let Some(rate) = self.derivative(f, out, op, reads) {
                     self.put_rate(f, out, &rate);
                 }
             }
             _ => {
                 let mut operands = a.iter();
                 let value = expression(op.map_operands(|_| operands.next().expect("as many as operands")));
-                let rate = self.slope(f, out, op, reads);
+                let rate = self.derivative(f, out, op, reads);
                 self.put(f, out, &value, rate.as_deref());
             }
         }
     }
 
     /// The derivative of an operation by the rules of the table, if it moves.
-    fn slope(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<String> {
+    fn derivative(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<String> {
         if !f.moves[out as usize] {
             return None;
         }
         let mut k = Expressions::new(&mut f.text, format!("d{out}"), f.wide[out as usize]);
         let value = k.whole(&format!("v{out}"));
         let mut operands = reads.values.iter().zip(&reads.rates);
-        let slope = op.slope(&mut k, value, |k, _| {
+        let slope = op.derivative(&mut k, value, |k, _| {
             let (value, rate) = operands.next().expect("as many as operands");
             (k.whole(value), rate.as_ref().map(|rate| k.whole(rate)))
         });

@@ -302,7 +302,7 @@ impl Frame {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
              plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
              })* }
              held $held:tt) => {
                 match operation.op {
@@ -311,10 +311,10 @@ impl Frame {
                         $(let $a = self.r[$a as usize];)*
                         let $value = $meaning;
                         let $k = &mut Plain;
-                        let rate = if ALONG { $slope.unwrap_or(0.0) } else { 0.0 };
+                        let rate = if ALONG { $derivative.unwrap_or(0.0) } else { 0.0 };
                         self.put::<ALONG>(out, $value, rate);
                     })*
-                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                    Op::Sign(condition, a) | Op::Floor(condition, a) => {
                         let value = self.condition::<ALONG>(condition, a);
                         self.put::<ALONG>(out, value, 0.0);
                     }

@@ -143,7 +143,7 @@ impl<const N: usize> WideFrame<N> {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
              plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
              })* }
              held $held:tt) => {
                 match operation.op {
@@ -152,7 +152,7 @@ impl<const N: usize> WideFrame<N> {
                         self.r[out as usize] = Vector(math::pow_lanes(&self.r[a as usize].0, &self.r[b as usize].0));
                     }
                     Op::Call(f, a) => self.r[out as usize] = Vector(math::call_lanes(f, &self.r[a as usize].0)),
-                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                    Op::Sign(condition, a) | Op::Floor(condition, a) => {
                         let a = self.r[a as usize];
                         for (lane, frame) in frames.iter_mut().enumerate() {
                             self.r[out as usize][lane] = frame.frame().condition_at(condition, a[lane]);

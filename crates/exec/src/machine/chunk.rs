@@ -185,7 +185,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         value
     }
 
-    fn slope(&mut self, register: Register) -> Value {
+    fn derivative(&mut self, register: Register) -> Value {
         if !self.along || register < self.context.time {
             return self.w.number(0.0);
         }
@@ -255,20 +255,20 @@ impl<'a, 'b> Chunk<'a, 'b> {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
              plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, slope: $slope:expr,
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
              })* }
              held $held:tt) => {
                 match op {
                     $(Op::$plain($($part,)* $($a),*) => {
-                        $(let $da = if self.along { Some(self.slope($a)) } else { None };)*
+                        $(let $da = if self.along { Some(self.derivative($a)) } else { None };)*
                         $(let $a = self.value($a);)*
                         let $value = self.lowered(Op::$plain($($part,)* $($a),*));
                         self.put(out, $value, |$k| {
-                            let slope = $slope;
+                            let slope = $derivative;
                             slope.unwrap_or_else(|| $k.zero())
                         });
                     })*
-                    Op::Side(condition, a) | Op::Floor(condition, a) => {
+                    Op::Sign(condition, a) | Op::Floor(condition, a) => {
                         let va = self.value(a);
                         let value = self.condition(condition, va);
                         self.put(out, value, |this| this.zero());
@@ -430,7 +430,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
 
     fn look_up(&mut self, out: Register, a: Register, (table, order): (u32, u64), piece: Option<ConditionId>) {
         let va = self.value(a);
-        let da = if self.along { Some(self.slope(a)) } else { None };
+        let da = if self.along { Some(self.derivative(a)) } else { None };
         let piece = match piece {
             Some(condition) => self.condition(condition, va),
             None => self.w.number(-1.0),

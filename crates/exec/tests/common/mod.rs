@@ -4,7 +4,7 @@
 use halfarrow_compiler::algebra::{Comparison, Expr, Exprs, Facts, Function, Symbol};
 use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::bond_graph::{
-    BondGraph, Element, ElementId, Held, HeldKind, Input, Kind, Parameter, ParameterKind,
+    BondGraph, Element, ElementId, HeldKind, HeldSignal, Input, Kind, Parameter, ParameterKind,
 };
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::{
@@ -22,7 +22,7 @@ pub struct Sketch {
     time: Symbol,
     parameters: Vec<Parameter>,
     inputs: Vec<Input>,
-    held: Vec<Held>,
+    held: Vec<HeldSignal>,
     elements: Table<ElementId, Element>,
     states: Vec<State>,
     conserved: Vec<Conserved>,
@@ -86,7 +86,7 @@ impl Sketch {
     pub fn held(&mut self, name: &str, kind: HeldKind, source: Expr, time: f64) -> Expr {
         let (symbol, e) = self.symbol(name);
         let time = self.number(time);
-        self.held.push(Held { name: name.into(), symbol, source, time, kind, span: Span::default() });
+        self.held.push(HeldSignal { name: name.into(), symbol, source, time, kind, span: Span::default() });
         e
     }
     pub fn element(&mut self, name: &str) -> ElementId {

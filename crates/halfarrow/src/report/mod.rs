@@ -7,9 +7,9 @@ mod page;
 use halfarrow_compiler::algebra::{PlainNames, mathml};
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::find_paths;
-use halfarrow_compiler::equations::{
-    AlgebraicRole, Form, StateKind, Style, print_certificate, print_dependent, print_meanings, print_sides,
-    print_symbol, show,
+use halfarrow_compiler::equations::{AlgebraicRole, Form, StateKind};
+use halfarrow_compiler::textbook::{
+    Style, print_certificate, print_dependent, print_meanings, print_sides, print_symbol, show,
 };
 use halfarrow_draw::DrawOptions;
 

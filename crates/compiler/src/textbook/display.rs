@@ -2,18 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::blocks::{LinearRow, Ordered};
-use super::definitions::{Definition, Definitions};
 use super::named::named_page;
-use super::{EquationStep, Equations, State};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
-use crate::bond_graph::{BondGraph, Kind, Meaning, Named};
+use crate::bond_graph::{BondGraph, Named};
+use crate::equations::{
+    CLOSED, Definitions, EquationStep, Equations, LinearRow, Ordered, State, expansions, named_sources, put_in,
+    substituted,
+};
 use crate::unit::Unit;
 
 /// Up to this many steps everything is put in, if that is short; above, names stay.
 const SMALL: usize = 2_000;
-/// Linear blocks up to this size are written out.
-const CLOSED: usize = 3;
 /// Terms that may be formed in the search for the form with everything put in.
 const TEXTBOOK: u64 = 400_000;
 /// A side of an equation that is longer in print than this does not fit a page of a textbook: names stay.
@@ -70,7 +69,7 @@ pub struct Dependent {
     pub value: Expr,
 }
 
-/// The equations for people, with everything put in that can be. Apart from [`derive_equations`](super::derive_equations)
+/// The equations for people, with everything put in that can be. Apart from [`derive_equations`](crate::equations::derive_equations)
 /// since to run a model takes none of it.
 pub fn show(mut equations: Equations) -> Shown {
     let mut d = Definitions::new(std::mem::take(&mut equations.graph.exprs), &equations.graph);
@@ -219,28 +218,6 @@ fn shifted_states(d: &mut Definitions, states: &[State]) -> Vec<Shifted> {
     found
 }
 
-/// Sources whose value varies by a law of time or inputs: equations are easier to read with their names.
-pub fn named_sources(d: &Definitions) -> BTreeMap<Symbol, Expr> {
-    let mut named = BTreeMap::new();
-    for element in d.graph.elements.values() {
-        let (symbol, value) = match element.kind {
-            Kind::EffortSource { value } => (d.graph.bonds[element.ports[0].bond].effort, value),
-            Kind::FlowSource { value } => (d.graph.bonds[element.ports[0].bond].flow, value),
-            _ => continue,
-        };
-        let outside = |s: &Symbol| {
-            matches!(d.meaning(*s), Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)))
-        };
-        let symbols = d.x.symbols_of(value);
-        let given = d.of.get(&symbol) == Some(&Definition::Explicit(value));
-        let plain = matches!(d.x.node(value), Node::Symbol(_));
-        if given && !plain && !d.is_constant(value) && symbols.iter().all(outside) {
-            named.insert(symbol, value);
-        }
-    }
-    named
-}
-
 /// Outputs and `let`s that are nothing but a state, in its unit.
 pub fn aliases(d: &mut Definitions, states: &[State], known: &BTreeMap<Symbol, Expr>) -> BTreeMap<Symbol, String> {
     let mut aliases = BTreeMap::new();
@@ -298,7 +275,7 @@ fn equations(
     for step in &ordered.steps {
         match step {
             EquationStep::Newton { residuals, body, .. } => {
-                let inner = super::blocks::substituted(&mut d.x, body, residuals);
+                let inner = substituted(&mut d.x, body, residuals);
                 let zero = d.x.int(0);
                 for residual in inner {
                     let left = put_in_shown(&mut d.x, residual, known);
@@ -414,14 +391,6 @@ fn balanced(x: &mut Exprs, residual: Expr, unknown: &[Symbol]) -> DisplayEquatio
     if left == zero { equation(zero, rest) } else { equation(left, right) }
 }
 
-/// An expression with what is known put in, in its shortest form.
-pub fn put_in(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
-    let e = x.substitute(e, known);
-    let e = x.without_settled_terms(e);
-    let e = x.simplify(e);
-    x.without_settled_terms(e)
-}
-
 pub fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> Expr {
     let e = put_in(x, e, known);
     textbook(x, e)
@@ -430,75 +399,4 @@ pub fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> E
 pub fn textbook(x: &mut Exprs, e: Expr) -> Expr {
     let e = x.textbook(e);
     x.without_settled_terms(e)
-}
-
-/// Every variable in terms of states, time, inputs, named sources and what stays implicit.
-///
-/// `None` if the search for short forms is over before all are found: [`Exprs::bound_search`].
-pub fn expansions(
-    d: &mut Definitions,
-    steps: &[EquationStep],
-    rates: &BTreeSet<Symbol>,
-    named: &BTreeMap<Symbol, Expr>,
-) -> Option<BTreeMap<Symbol, Expr>> {
-    let mut known: BTreeMap<Symbol, Expr> = BTreeMap::new();
-    for step in steps {
-        if d.x.search_is_over() {
-            return None;
-        }
-        match step {
-            EquationStep::Assign { symbol, value } if !named.contains_key(symbol) => {
-                let value = put_in(&mut d.x, *value, &known);
-                known.insert(*symbol, value);
-            }
-            EquationStep::Linear { unknowns, matrix, right, .. }
-                if unknowns.len() <= CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
-            {
-                let matrix = matrix.map(|&e| put_in(&mut d.x, e, &known)).dense(crate::algebra::ZERO);
-                let matrix: Vec<Vec<Expr>> = matrix.chunks(unknowns.len()).map(<[Expr]>::to_vec).collect();
-                let right: Vec<Expr> = right.iter().map(|&e| put_in(&mut d.x, e, &known)).collect();
-                let values = cramer(&mut d.x, &matrix, &right);
-                known.extend(unknowns.iter().copied().zip(values));
-            }
-            _ => {}
-        }
-    }
-    Some(known)
-}
-
-/// The solution of a small linear system by determinants.
-fn cramer(x: &mut Exprs, matrix: &[Vec<Expr>], right: &[Expr]) -> Vec<Expr> {
-    let all = determinant(x, matrix);
-    let all = x.simplify(all);
-    (0..right.len())
-        .map(|k| {
-            let replaced: Vec<Vec<Expr>> = matrix
-                .iter()
-                .zip(right)
-                .map(|(row, &r)| row.iter().enumerate().map(|(c, &e)| if c == k { r } else { e }).collect())
-                .collect();
-            let one = determinant(x, &replaced);
-            let one = x.simplify(one);
-            let quotient = x.div(one, all);
-            x.simplify(quotient)
-        })
-        .collect()
-}
-
-/// A determinant by expansion along the first row.
-fn determinant(x: &mut Exprs, matrix: &[Vec<Expr>]) -> Expr {
-    if let [row] = matrix {
-        return row[0];
-    }
-    let mut terms = Vec::new();
-    for (c, &e) in matrix[0].iter().enumerate() {
-        let minor: Vec<Vec<Expr>> = matrix[1..]
-            .iter()
-            .map(|r| r.iter().enumerate().filter(|(k, _)| *k != c).map(|(_, &e)| e).collect())
-            .collect();
-        let minor = determinant(x, &minor);
-        let term = x.mul(&[e, minor]);
-        terms.push(if c % 2 == 0 { term } else { x.neg(term) });
-    }
-    x.add(&terms)
 }

@@ -3,14 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::blocks::{LinearRow, Ordered};
-use super::definitions::Definitions;
 use super::display::{
     Dependent, DisplayEquation, Page, ShownDefinition, aliases, assign_rows, equation, from_sides, gathered,
-    named_sources, put_in, put_in_shown,
+    put_in_shown,
 };
-use super::{EquationStep, Equations};
 use crate::algebra::{Expr, Exprs, Node, ONE, Shared, Symbol};
+use crate::equations::{Definitions, EquationStep, Equations, LinearRow, Ordered, named_sources, put_in};
 use crate::ids::Map;
 
 /// Terms that may be formed in the search for short forms of all equations and definitions together.
@@ -23,24 +21,24 @@ const SHORT: u64 = 12;
 /// The page with names.
 pub fn named_page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
     let named = named_sources(d);
-    let drafts = Drafts::of(d, equations, ordered, &named);
+    let open_rows = OpenRows::of(d, equations, ordered, &named);
     let mut names = FreshNames::of(d);
-    let Kept { known, mut definitions } = kept(d, equations, &drafts, &mut names);
+    let Kept { known, mut definitions } = kept(d, equations, &open_rows, &mut names);
     let aliases = aliases(d, &equations.states, &known);
-    let mut exprs: Vec<Expr> = drafts.exprs();
+    let mut exprs: Vec<Expr> = open_rows.exprs();
     exprs.extend(definitions.iter().map(|d| d.1));
     let exprs = d.x.substitute_all(&exprs, &known);
     let share = WORK / (exprs.len() as u64 + 1);
     let Shared { roots, definitions: parts } =
         d.x.share(&exprs, &mut |x| names.next(x), &mut |x, e| shortened(x, e, share));
-    let (roots, values) = roots.split_at(drafts.exprs().len());
+    let (roots, values) = roots.split_at(open_rows.exprs().len());
     definitions.iter_mut().zip(values).for_each(|(definition, &value)| definition.1 = value);
     let mut all = in_order(d, parts, definitions);
     for definition in &mut all {
         definition.1 = shortened(&mut d.x, definition.1, share);
     }
-    let mut display = drafts.shown(&mut d.x, roots, share);
-    let mut dependent = drafts.dependent(&mut d.x, roots, share);
+    let mut display = open_rows.shown(&mut d.x, roots, share);
+    let mut dependent = open_rows.dependent(&mut d.x, roots, share);
     put_in_what_stands_once(d, &mut display, &mut dependent, &mut all);
     page(d, display, dependent, all, named, aliases)
 }
@@ -93,66 +91,66 @@ fn shortened(x: &mut Exprs, e: Expr, work: u64) -> Expr {
 }
 
 /// Equations before anything is put in, and what defines the variables that they read.
-struct Drafts {
-    rows: Vec<Draft>,
+struct OpenRows {
+    rows: Vec<OpenRow>,
     dependent: Vec<(Symbol, Expr)>,
     /// The variables that are needed, in the order of evaluation.
     values: Vec<(Symbol, Expr)>,
 }
 
 /// `Σ coefficient · symbol = right`; without symbols `0 = right`.
-struct Draft {
+struct OpenRow {
     symbols: Vec<Symbol>,
     /// The coefficients, then the right side.
     sides: Vec<Expr>,
 }
 
-impl Draft {
-    fn of_row(row: &LinearRow) -> Draft {
+impl OpenRow {
+    fn of_row(row: &LinearRow) -> OpenRow {
         let (symbols, mut sides): (Vec<Symbol>, Vec<Expr>) = row.left.iter().copied().unzip();
         sides.push(row.right);
-        Draft { symbols, sides }
+        OpenRow { symbols, sides }
     }
 
-    fn of_residual(d: &mut Definitions, residual: Expr, unknown: &[Symbol]) -> Draft {
+    fn of_residual(d: &mut Definitions, residual: Expr, unknown: &[Symbol]) -> OpenRow {
         let Some((coefficients, rest)) = d.x.linear_in(residual, unknown) else {
-            return Draft { symbols: Vec::new(), sides: vec![residual] };
+            return OpenRow { symbols: Vec::new(), sides: vec![residual] };
         };
         let terms = unknown.iter().copied().zip(coefficients);
         let (symbols, mut sides): (Vec<Symbol>, Vec<Expr>) = terms.filter(|t| !d.x.is_zero(t.1)).unzip();
         sides.push(if symbols.is_empty() { rest } else { d.x.neg(rest) });
-        Draft { symbols, sides }
+        OpenRow { symbols, sides }
     }
 }
 
-impl Drafts {
-    fn of(d: &mut Definitions, equations: &Equations, ordered: &Ordered, named: &BTreeMap<Symbol, Expr>) -> Drafts {
+impl OpenRows {
+    fn of(d: &mut Definitions, equations: &Equations, ordered: &Ordered, named: &BTreeMap<Symbol, Expr>) -> OpenRows {
         let states = &equations.states;
         let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
         let rows = ordered.rows.iter().filter(|r| r.left.iter().any(|t| rates.contains(&t.0)));
         let by_row = assign_rows(rows, &rates);
-        let mut drafts = Vec::new();
+        let mut open_rows = Vec::new();
         for state in states {
             match by_row.get(&state.rate) {
-                Some(row) => drafts.push(Draft::of_row(row)),
+                Some(row) => open_rows.push(OpenRow::of_row(row)),
                 None if d.free.contains(&state.rate) => {}
                 None => {
                     let own = d.x.sym(state.rate);
                     let value = d.of.get(&state.rate).map_or(own, |f| f.expr());
-                    drafts.push(Draft { symbols: vec![state.rate], sides: vec![ONE, value] });
+                    open_rows.push(OpenRow { symbols: vec![state.rate], sides: vec![ONE, value] });
                 }
             }
         }
         let mut unknown: Vec<Symbol> = states.iter().map(|s| s.rate).collect();
         unknown.extend(equations.algebraic.iter().map(|a| a.symbol));
         for &residual in &equations.residuals {
-            drafts.push(Draft::of_residual(d, residual, &unknown));
+            open_rows.push(OpenRow::of_residual(d, residual, &unknown));
         }
         let row = |&variable| Some((variable, d.of.get(&variable)?.expr()));
         let dependent = equations.dependent.iter().filter_map(row).collect();
-        let mut drafts = Drafts { rows: drafts, dependent, values: Vec::new() };
-        drafts.add_what_is_read(d, ordered, &rates, named);
-        drafts
+        let mut open_rows = OpenRows { rows: open_rows, dependent, values: Vec::new() };
+        open_rows.add_what_is_read(d, ordered, &rates, named);
+        open_rows
     }
 
     /// Adds the equations that stay implicit, as far as they are read, and the definitions of what is read.
@@ -208,11 +206,11 @@ impl Drafts {
             EquationStep::Linear { unknowns, matrix, right, .. } => {
                 for (row, &right) in matrix.rows().zip(right) {
                     let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
-                    self.rows.push(Draft::of_row(&LinearRow { left, right }));
+                    self.rows.push(OpenRow::of_row(&LinearRow { left, right }));
                 }
             }
             EquationStep::Newton { residuals, .. } => {
-                self.rows.extend(residuals.iter().map(|&r| Draft { symbols: Vec::new(), sides: vec![r] }));
+                self.rows.extend(residuals.iter().map(|&r| OpenRow { symbols: Vec::new(), sides: vec![r] }));
             }
             _ => {}
         }
@@ -280,15 +278,15 @@ struct Kept {
 
 /// What is read once, or is short, gives way to its value; the rest keeps its name where one can record it by that; parts
 /// of linear loops get a name of their own, else it is left to [`Exprs::share`].
-fn kept(d: &mut Definitions, equations: &Equations, drafts: &Drafts, names: &mut FreshNames) -> Kept {
+fn kept(d: &mut Definitions, equations: &Equations, open_rows: &OpenRows, names: &mut FreshNames) -> Kept {
     let recorded = recorded(d, equations);
-    let mut all = drafts.exprs();
-    all.extend(drafts.values.iter().map(|v| v.1));
+    let mut all = open_rows.exprs();
+    all.extend(open_rows.values.iter().map(|v| v.1));
     let uses = d.x.symbol_uses(&all);
-    let share = WORK / (drafts.values.len() as u64 + 1);
+    let share = WORK / (open_rows.values.len() as u64 + 1);
     let mut known = BTreeMap::new();
     let mut definitions = Vec::new();
-    for &(symbol, value) in &drafts.values {
+    for &(symbol, value) in &open_rows.values {
         let mut value = d.x.substitute(value, &known);
         if d.x.printed_length(value) <= SEARCHED {
             d.x.bound_search(share);

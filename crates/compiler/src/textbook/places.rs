@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::{Shown, StateKind};
+use super::Shown;
 use crate::algebra::{Expr, Place, Sort, Symbol};
 use crate::bond_graph::{BondGraph, Kind, Meaning, ResistorLaw, StorageLaw};
+use crate::equations::StateKind;
 
 /// The places of all symbols.
 ///

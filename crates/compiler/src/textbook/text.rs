@@ -4,13 +4,14 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{AlgebraicRole, Dependent, DisplayEquation, EquationStep, Shown, ShownDefinition, places};
+use super::{Dependent, DisplayEquation, Shown, ShownDefinition, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, mathml, mathml_name, mathml_owner,
     unicode, unicode_name,
 };
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
 use crate::causal_paths::Refusal;
+use crate::equations::{AlgebraicRole, EquationStep};
 
 /// Rows of larger systems of equations are written entry by entry.
 const FULL: usize = 32;

@@ -1,0 +1,13 @@
+//! Equations as a textbook prints them: put into each other where that is short, with names where it is not; as text, LaTeX and
+//! MathML. Apart from deriving them, since to run a model takes none of it.
+
+mod display;
+mod named;
+mod places;
+mod text;
+
+pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
+pub use text::{
+    Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
+    print_sides, print_symbol,
+};
