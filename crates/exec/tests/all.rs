@@ -14,6 +14,8 @@ mod jacobian;
 mod machine;
 #[path = "memory.rs"]
 mod memory;
+#[path = "nets.rs"]
+mod nets;
 #[path = "random.rs"]
 mod random;
 #[path = "start.rs"]

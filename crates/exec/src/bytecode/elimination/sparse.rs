@@ -82,9 +82,8 @@ impl SparseLu {
         }
         for (l, &k) in lower[before.clone()].iter_mut().zip(symbolic.lower.columns_of(place)) {
             let k = k as usize;
-            let size = row[k].abs();
-            // Not so for a NaN either.
-            if !(THRESHOLD * size <= weight[k] * scale) {
+            let (least, own) = (THRESHOLD * row[k].abs(), weight[k] * scale);
+            if least > own || least.is_nan() || own.is_nan() {
                 return None;
             }
             let factor = row[k] * inverse[k];
