@@ -17,6 +17,7 @@ mod functions;
 mod linear;
 mod lowest_terms;
 pub mod math;
+mod needed;
 mod node;
 mod order;
 mod polynomial;
