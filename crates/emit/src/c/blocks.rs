@@ -20,11 +20,17 @@ const WRITTEN_OUT: usize = 6;
 pub(super) fn elimination_room(block: &Block, real: Real) -> usize {
     let n = block.size();
     let lines = if real == Real::Double { 3 * n } else { 4 * n };
-    let full = if n <= FULL_AT_MOST { 2 * n * n } else { 0 };
+    let full = full_room(block);
     match &block.matrix().factors {
-        None => 2 * n * n + lines,
+        None => full + lines,
         Some(f) => f.matrix.len() + f.lower.len() + f.upper.len() + 3 * n + lines + full,
     }
+}
+
+/// Numbers of two full matrices; none for large sparse blocks.
+pub(super) fn full_room(block: &Block) -> usize {
+    let n = block.size();
+    if block.matrix().factors.is_none() || n <= FULL_AT_MOST { 2 * n * n } else { 0 }
 }
 
 /// Where linear blocks with a constant matrix keep their factors.

@@ -49,7 +49,7 @@ impl Patterns {
             let order = matrix.factors.as_ref().map(|f| order(&mut text, i, f));
             let order = match (self.any_sparse(), order) {
                 (false, _) => String::new(),
-                (true, None) => ", 0".to_string(),
+                (true, None) => ", NULL".to_string(),
                 (true, Some(name)) => format!(", &{name}"),
             };
             list += &format!("    {{{}, ha_starts_{i}, ha_columns_{i}{order}}},\n", pattern.size());

@@ -18,6 +18,8 @@ const BORROWED: f64 = 1e6;
 const STEPS: usize = 30;
 /// By how much the residuals have to shrink in a step.
 const SHRINKS: f64 = 0.75;
+/// Sparse blocks of more unknowns are not searched for unknowns that float: that takes the cube of their number.
+const LARGEST_SPARSE: usize = 200;
 /// Share in an undetermined direction from which on an unknown is said to float.
 const SHARE: f64 = 0.1;
 
@@ -37,10 +39,12 @@ pub(crate) struct Floating {
 }
 
 impl Floating {
-    pub fn new(size: usize) -> Floating {
+    /// Room for so many unknowns of a matrix that is factored as a sparse one or not: large sparse ones have no full matrix,
+    /// and no unknown of theirs floats.
+    pub fn new(size: usize, sparse: bool) -> Floating {
         Floating {
             terms: vec![0.0; size],
-            equations: RankRevealing::new(size),
+            equations: RankRevealing::new(size, sparse && size > LARGEST_SPARSE),
             size: vec![0.0; size],
             now: vec![false; size],
             ever: vec![false; size],
@@ -88,6 +92,9 @@ impl Frame {
     pub(super) fn floats(&mut self, solve: &Solve) -> bool {
         let newton = &mut self.solvers[solve.block.0 as usize].newton;
         newton.x.copy_from_slice(&newton.start);
+        if !newton.floating.equations.has_matrix() {
+            return false;
+        }
         let mut before = f64::INFINITY;
         for _ in 0..STEPS {
             if self.is_exhausted(solve) || !self.evaluate_root(solve) {
@@ -172,7 +179,8 @@ impl Frame {
             floating.terms[i] = if rounding > 0.0 { rounding } else { f64::MIN_POSITIVE };
             floating.equations.right[i] = (newton.offset[i] - r[right as usize]) / floating.terms[i];
         }
-        for ((i, j), entry) in solve.pattern.places().zip(entries(solve, r)) {
+        let (entries, whole) = (solve.pattern.places().zip(entries(solve, r)), floating.equations.has_matrix());
+        for ((i, j), entry) in entries.filter(|_| whole) {
             floating.equations.matrix[i * n + j] = entry * floating.size[j] / floating.terms[i];
         }
     }

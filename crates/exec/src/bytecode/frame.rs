@@ -82,8 +82,10 @@ impl Frame {
             let constant = matches!(block, Block::Linear { matrix, .. }
                 if matrix.values.entries().iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS));
             let newton = match block {
-                Block::Newton { jacobian, .. } => Newton::new(n, jacobian.values.pattern().len()),
-                Block::Linear { .. } => Newton::new(0, 0),
+                Block::Newton { jacobian, .. } => {
+                    Newton::new(n, jacobian.values.pattern().len(), jacobian.factors.is_some())
+                }
+                Block::Linear { .. } => Newton::new(0, 0, false),
             };
             // Factors that another block has made need no place here.
             let shared = matches!(block, Block::Linear { shared: Some(_), .. });

@@ -13,7 +13,7 @@ use halfarrow_compiler::program::{
     Routine, Value,
 };
 
-use super::blocks::elimination_room;
+use super::blocks::{elimination_room, full_room};
 use super::cost::{Cost, OperationCount};
 use super::flags::Flags;
 use super::patterns::Patterns;
@@ -321,8 +321,7 @@ impl<'a> Plan<'a> {
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (&program.blocks[*b], reads)).collect();
         let entries = |b: &Block| b.matrix().values.pattern().len();
         let memory = |&(b, reads): &(&Block, usize)| 2 * (b.size() + reads + entries(b));
-        let work =
-            |&(b, reads): &(&Block, usize)| 17 * b.size() + reads + 2 * entries(b) + 2 * b.size() * b.size() + lu(b);
+        let work = |&(b, reads): &(&Block, usize)| 17 * b.size() + reads + 2 * entries(b) + full_room(b) + lu(b);
         let all = linear.iter().copied().chain(newton.iter().map(|b| b.0));
         self.sizes = Sizes {
             derived: writer.givens.derived(),

@@ -24,7 +24,7 @@ typedef struct {
     const int *starts;
     const int *columns;
 //if sparse
-    /* None for a full one. */
+    /* NULL for a full one. */
     const ha_order *order;
 //end
 } ha_pattern;
@@ -67,7 +67,7 @@ static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
     l.n = n;
     l.pattern = pattern;
 //if sparse
-    if (pattern->order) {
+    if (pattern->order != NULL) {
         l.entries = place;
         l.lower = l.entries + ha_entries(pattern);
         l.upper = l.lower + pattern->order->lower_starts[n];
@@ -83,7 +83,7 @@ static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
         place += n;
 //end
         l.matrix = place;
-        l.factors = place + n * n;
+        l.factors = n > SPARSE_FULL_AT_MOST ? place : place + n * n;
         l.order = order;
         return l;
     }
@@ -442,7 +442,7 @@ static int ha_lu_factor(ha_lu *l, const double *entries)
     int i;
     int e;
 //if sparse
-    if (p->order) {
+    if (p->order != NULL) {
         for (e = 0; e < ha_entries(p); ++e) {
             l->entries[p->order->positions[e]] = entries[e];
         }
@@ -465,7 +465,7 @@ static void ha_lu_solve(ha_lu *l, double *b)
     int row;
     int j;
 //if sparse
-    if (l->pattern->order && !l->order[n]) {
+    if (l->pattern->order != NULL && !l->order[n]) {
         ha_sparse_solve(l, b);
         return;
     }
@@ -503,7 +503,7 @@ static int ha_lu_is_positive(const ha_lu *l)
     int j;
     int k;
 //if sparse
-    if (l->pattern->order && !l->order[n]) {
+    if (l->pattern->order != NULL && !l->order[n]) {
         changes = l->pattern->order->odd;
         for (k = 0; k < n; ++k) {
             changes += l->inverse[k] > 0.0 ? 0 : 1;

@@ -9,6 +9,8 @@ pub(crate) use batch::{BatchFactors, UpperPattern};
 pub(crate) use full::Lu;
 pub(crate) use rank::RankRevealing;
 
+pub(crate) use sparse::FULL_AT_MOST;
+
 use halfarrow_compiler::program::Block;
 use sparse::SparseLu;
 

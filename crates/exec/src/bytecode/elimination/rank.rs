@@ -15,9 +15,15 @@ pub(crate) struct RankRevealing {
 }
 
 impl RankRevealing {
-    pub fn new(size: usize) -> RankRevealing {
-        let square = vec![0.0; size * size];
+    /// For so many unknowns; without a matrix where `only_right`.
+    pub fn new(size: usize, only_right: bool) -> RankRevealing {
+        let square = vec![0.0; if only_right { 0 } else { size * size }];
         RankRevealing { matrix: square.clone(), right: vec![0.0; size], order: vec![0; size], free: square }
+    }
+
+    /// Whether there is a matrix.
+    pub fn has_matrix(&self) -> bool {
+        self.matrix.len() == self.order.len() * self.order.len()
     }
 
     /// Unknowns in their own places, an empty matrix.
@@ -122,7 +128,7 @@ mod tests {
     #[test]
     fn the_shortest_of_many_solutions_is_found() {
         // 3 x + 4 y = 10 twice, and nothing of z.
-        let mut equations = RankRevealing::new(3);
+        let mut equations = RankRevealing::new(3, false);
         equations.clear();
         for row in 0..2 {
             equations.matrix[row * 3..][..2].copy_from_slice(&[30.0, 40.0]);
@@ -142,7 +148,7 @@ mod tests {
 
     #[test]
     fn of_full_rank_it_is_a_solution() {
-        let mut equations = RankRevealing::new(2);
+        let mut equations = RankRevealing::new(2, false);
         equations.clear();
         equations.matrix.copy_from_slice(&[0.0, 8.0, 4.0, 2.0]);
         equations.right.copy_from_slice(&[8.0, 8.0]);

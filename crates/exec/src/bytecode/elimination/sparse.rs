@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Software 37, 2010).
 const THRESHOLD: f64 = 1e-3;
 /// Matrices of more rows are not factored as full ones.
-const FULL_AT_MOST: usize = 1_000;
+pub(crate) const FULL_AT_MOST: usize = 1_000;
 
 /// A sparse square matrix and, beside it, its triangular factors.
 #[derive(Debug, Clone)]

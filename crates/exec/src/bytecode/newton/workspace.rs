@@ -73,8 +73,8 @@ pub(crate) struct Followed {
 }
 
 impl Newton {
-    /// Room for so many unknowns and entries of the Jacobian.
-    pub fn new(size: usize, entries: usize) -> Newton {
+    /// Room for so many unknowns and entries of the Jacobian, which is factored as a sparse matrix or not.
+    pub fn new(size: usize, entries: usize, sparse: bool) -> Newton {
         let (line, matrix) = (vec![0.0; size], vec![0.0; entries]);
         Newton {
             previous: line.clone(),
@@ -102,7 +102,7 @@ impl Newton {
             magnitude: line,
             start_jacobian: matrix,
             contracts: false,
-            floating: Floating::new(size),
+            floating: Floating::new(size, sparse),
         }
     }
 

@@ -18,12 +18,14 @@ static void ha_measure(ha_model *m, ha_newton *w)
         w->units[j] = size > 0.0 ? size : (largest > 0.0 ? largest : 1.0);
         w->order[j] = (double)j;
     }
-    ha_fill(w->loose, 0.0, n * n);
+    if (w->loose != NULL) {
+        ha_fill(w->loose, 0.0, n * n);
+    }
     for (i = 0; i < n; ++i) {
         const double rounding = 8.0 * DBL_EPSILON * w->terms[i];
         w->terms[i] = rounding > 0.0 ? rounding : DBL_MIN;
         w->rest[i] = (w->offset[i] - w->right[i]) / w->terms[i];
-        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+        for (e = w->starts[i]; w->loose != NULL && e < w->starts[i + 1]; ++e) {
             w->loose[i * n + w->columns[e]] = w->matrix[e] * w->units[w->columns[e]] / w->terms[i];
         }
     }
@@ -181,6 +183,9 @@ static int ha_floats(ha_model *m, ha_newton *w)
     int step;
     int i;
     ha_copy(w->x, w->start, n);
+    if (w->loose == NULL) {
+        return 0;
+    }
     for (step = 0; step < 30; ++step) {
         double rest;
         int rank;

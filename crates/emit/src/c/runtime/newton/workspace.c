@@ -122,8 +122,18 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.order = ha_take(&place, n);
     w.rest = ha_take(&place, n);
     w.floor = ha_take(&place, n);
+    w.loose = NULL;
+    w.unseen = NULL;
+//if sparse
+    /* Large sparse blocks are not searched for unknowns that float. */
+    if (block->pattern->order == NULL || n <= SPARSE_FULL_AT_MOST) {
+        w.loose = ha_take(&place, n * n);
+        w.unseen = ha_take(&place, n * n);
+    }
+//else
     w.loose = ha_take(&place, n * n);
     w.unseen = ha_take(&place, n * n);
+//end
     w.lu = ha_lu_at(place, m->order, block->pattern);
     return w;
 }
