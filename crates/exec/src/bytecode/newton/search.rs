@@ -172,8 +172,17 @@ impl Frame {
                 return true;
             }
         }
+        // Each unknown at another value: between equal ones, laws such as that of an orifice have infinite slopes.
+        let n = solve.right.len();
+        for start in OTHER_STARTS.into_iter().filter(|_| n > 1) {
+            let apart = |i: usize| start * ((i + 1) as f64 / n as f64);
+            self.newton_of(solve).start.iter_mut().enumerate().for_each(|(i, own)| *own = apart(i));
+            if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
+                return true;
+            }
+        }
         self.newton_of(solve).floating.now.fill(false);
-        solve.right.len() == 1 && self.scan(solve)
+        n == 1 && self.scan(solve)
     }
 }
 

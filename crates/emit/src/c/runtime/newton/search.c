@@ -100,6 +100,17 @@ static int ha_search(ha_model *m, ha_newton *w)
             return 1;
         }
     }
+    /* Each unknown at another value: between equal ones, laws such as that of an orifice have infinite slopes. */
+    for (i = 1; i < 7 && w->n > 1; ++i) {
+        int j;
+        for (j = 0; j < w->n; ++j) {
+            const double part = (double)(j + 1) / (double)w->n;
+            w->start[j] = starts[i] * part;
+        }
+        if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+            return 1;
+        }
+    }
 //if newton_single
     return w->n == 1 && ha_scan(m, w);
 //else
