@@ -64,3 +64,15 @@ fn find(leader: &mut [u32], mut u: u32) -> u32 {
     }
     u
 }
+
+#[cfg(test)]
+mod tests {
+    use super::place_guesses;
+
+    #[test]
+    fn a_guess_places_the_only_unknown_that_is_left() {
+        assert_eq!(place_guesses(&[&[0, 1], &[1], &[]]), [(1, 1), (0, 0)]);
+        assert_eq!(place_guesses(&[&[0, 1], &[0, 1], &[0]]), [(2, 0), (0, 1)]);
+        assert_eq!(place_guesses(&[&[2, 3], &[2, 3]]), [(0, 2), (1, 3)]);
+    }
+}
