@@ -9,9 +9,11 @@ use super::flatten::{self, Flat, Word};
 use super::load::{Loaded, load};
 use super::overrides::{self, Override};
 use super::wire::{Wiring, wire};
-use super::{Bond, BondGraph, Element, Kind, Meaning, Port, Variable};
+use super::{
+    Bond, BondGraph, Element, ForcedCausality, ForcedStroke, Guess, Kind, Meaning, Port, Preference, Variable, verify,
+};
 use crate::algebra::{Expr, Symbol};
-use crate::ast::Ast;
+use crate::ast::{Ast, Header};
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
 use crate::ids::{Id, Map, Table};
 use crate::unit::{Dimension, Unit};
@@ -43,26 +45,23 @@ pub struct Elaborated {
 /// assert_eq!(result.graph.unwrap().bonds.len(), 1);
 /// ```
 pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: &[Override]) -> Elaborated {
-    let Loaded { files: mut trees, mut faults } = load(main, &mut sources, files);
+    let Loaded { files: trees, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
-    let header = trees.first_mut().and_then(|t| t.header.take());
+    let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
     let mut flat = flatten::flatten(&trees);
     faults.append(&mut flat.faults);
     overrides::apply(&given, &mut flat, &mut faults);
     let mut wiring = wire(&flat);
     faults.append(&mut wiring.faults);
     let (graph, more) =
-        build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &BTreeSet::new());
+        build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &title, &BTreeSet::new());
     faults.extend(more);
     faults.extend(graph.iter().flat_map(super::guesses::idle));
     in_order(&mut faults);
-    let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error)).map(|mut graph| {
-        if let Some(header) = header {
-            graph.name = header.name.text;
-            graph.doc = header.doc.map_or(String::new(), |d| d.text);
-        }
-        graph
-    });
+    let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error));
+    if let Some(graph) = &graph {
+        debug_assert_eq!(verify(graph), Ok(()), "{}", graph.name);
+    }
     drop(flat);
     Elaborated { graph, diagnostics: Diagnostics(faults), sources }
 }
@@ -81,6 +80,7 @@ fn build(
     sources: &Sources,
     files: &dyn Files,
     faulty: bool,
+    title: &Title,
     parted: &BTreeSet<usize>,
 ) -> (Option<BondGraph>, Vec<Diagnostic>) {
     let mut b = Builder::new(flat, wiring, sources, files);
@@ -93,15 +93,18 @@ fn build(
     let guesses = b.guesses();
     b.settle_units();
     b.finish_blocks();
-    let preferences = b.preferences();
-    let forced_causality = b.forced_causality();
-    let forced_strokes = b.forced_strokes();
+    let asked = Asked {
+        guesses,
+        preferences: b.preferences(),
+        forced_causality: b.forced_causality(),
+        forced_strokes: b.forced_strokes(),
+    };
     let sides = b.constraint_sides();
     let rates = b.rates_of_signals();
     let relations = b.relations(&sides, &rates);
     let found = b.parted(&relations);
     if b.faults.is_empty() && found != *parted {
-        return build(flat, wiring, sources, files, faulty, &found);
+        return build(flat, wiring, sources, files, faulty, title, &found);
     }
     b.forgive_unwritten_units();
     let complete = !faulty && !b.incomplete && b.faults.is_empty() && kinds.iter().all(Option::is_some);
@@ -109,11 +112,7 @@ fn build(
         return (None, b.faults);
     }
     let kinds: Vec<Kind> = kinds.into_iter().flatten().collect();
-    let mut graph = b.assemble(kinds);
-    graph.preferences = preferences;
-    graph.forced_causality = forced_causality;
-    graph.forced_strokes = forced_strokes;
-    graph.guesses = guesses;
+    let mut graph = b.assemble(title, kinds, asked);
     b.build_constraints(&mut graph, &relations);
     let repeated = b.recognise_storages(&mut graph, &rates);
     let mut graph = b.finish(graph);
@@ -123,15 +122,37 @@ fn build(
     (Some(graph), b.faults)
 }
 
+/// What a model is called.
+#[derive(Default)]
+struct Title {
+    name: String,
+    doc: String,
+}
+
+impl Title {
+    fn of(header: &Header) -> Title {
+        let doc = header.doc.as_ref().map_or(String::new(), |d| d.text.clone());
+        Title { name: header.name.text.clone(), doc }
+    }
+}
+
+/// What a model asks of its causality and of its start.
+struct Asked {
+    guesses: Vec<Guess>,
+    preferences: Vec<Preference>,
+    forced_causality: Vec<ForcedCausality>,
+    forced_strokes: Vec<ForcedStroke>,
+}
+
 impl Builder<'_, '_> {
     /// The graph without constraints and without the table of its variables.
-    fn assemble(&mut self, kinds: Vec<Kind>) -> BondGraph {
+    fn assemble(&mut self, title: &Title, kinds: Vec<Kind>, asked: Asked) -> BondGraph {
         let elements: Table<_, Element> =
             kinds.into_iter().enumerate().map(|(part, kind)| self.element(part, kind)).collect();
         let bonds: Table<_, Bond> = self.wiring.wires.iter().enumerate().map(|(wire, w)| self.bond(wire, w)).collect();
         BondGraph {
-            name: String::new(),
-            doc: String::new(),
+            name: title.name.clone(),
+            doc: title.doc.clone(),
             exprs: crate::algebra::Exprs::default(),
             variables: Map::new(),
             elements,
@@ -143,10 +164,10 @@ impl Builder<'_, '_> {
             held: std::mem::take(&mut self.held),
             lets: std::mem::take(&mut self.lets),
             outputs: self.outputs_in_order(),
-            preferences: Vec::new(),
-            forced_causality: Vec::new(),
-            forced_strokes: Vec::new(),
-            guesses: Vec::new(),
+            preferences: asked.preferences,
+            forced_causality: asked.forced_causality,
+            forced_strokes: asked.forced_strokes,
+            guesses: asked.guesses,
             constraints: Vec::new(),
             time: self.time,
         }

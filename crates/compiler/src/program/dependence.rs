@@ -1,31 +1,45 @@
 //! Which states a value reads.
 
+use super::Value;
+use super::dataflow::Dataflow;
 use super::op::Op;
 use super::values::Reads;
-use super::{Program, Value};
 use crate::ids::Id;
 use std::rc::Rc;
 
 type Set = Rc<[u32]>;
 
-impl Program {
-    /// Finds what rates and start conditions read; what only moves a condition does not count.
-    pub(super) fn find_dependence(&mut self) {
-        let sets = self.state_sets();
-        let states = self.states.len() as u32;
-        let of = |v: Value| sets[v.index()].as_ref().expect("what is read from outside has its set");
-        let below = |v: Value| of(v).iter().copied().filter(|&s| s < states).collect();
-        self.dependence = self.states.iter().map(|s| below(s.rate)).collect();
-        self.start.iter_mut().for_each(|c| c.reads = of(c.residual).to_vec());
-        self.guesses.iter_mut().for_each(|g| g.reads = of(g.residual).to_vec());
+/// The states, and after them the conserved constants, that values read; what only moves a condition does not count.
+pub(super) struct Dependence {
+    /// By value; none for those that were not wanted and that one other value reads.
+    sets: Vec<Option<Set>>,
+    states: u32,
+}
+
+impl Dependence {
+    /// What the wanted values read, of this many states.
+    pub fn new(flow: Dataflow<'_>, states: u32, wanted: &[Value]) -> Dependence {
+        Dependence { sets: flow.state_sets(states, wanted), states }
     }
 
+    /// What a wanted value reads, ascending: states by their index, and after them conserved constants.
+    pub fn unknowns_of(&self, value: Value) -> &[u32] {
+        self.sets[value.index()].as_ref().expect("what is wanted has its set")
+    }
+
+    /// The states that a wanted value reads, ascending.
+    pub fn states_of(&self, value: Value) -> Vec<u32> {
+        let unknowns = self.unknowns_of(value).iter().copied();
+        unknowns.take_while(|&u| u < self.states).collect()
+    }
+}
+
+impl Dataflow<'_> {
     /// The states, and after them the conserved constants, that each value reads; of values that one other value reads
     /// the set is not kept, so that a long sum has one set.
-    fn state_sets(&self) -> Vec<Option<Set>> {
+    fn state_sets(self, states: u32, wanted: &[Value]) -> Vec<Option<Set>> {
         let none: Set = Rc::from([]);
-        let states = self.states.len() as u32;
-        let readers = self.readers();
+        let readers = self.readers(wanted);
         let mut sets: Vec<Option<Set>> = Vec::with_capacity(self.values.len());
         let mut blocks: Vec<Option<Set>> = vec![None; self.blocks.len()];
         for (value, op) in self.values.iter() {
@@ -46,19 +60,17 @@ impl Program {
         sets
     }
 
-    /// How many times a value is read by others, by blocks, and from outside, which counts twice.
-    fn readers(&self) -> Vec<u32> {
+    /// How many times a value is read by others, by blocks, and by those who want it, which counts twice.
+    fn readers(self, wanted: &[Value]) -> Vec<u32> {
         let mut readers = vec![0; self.values.len()];
-        let wanted = self.states.iter().map(|s| s.rate).chain(self.start.iter().map(|c| c.residual));
-        let wanted = wanted.chain(self.guesses.iter().map(|g| g.residual));
-        wanted.for_each(|v| readers[v.index()] += 2);
+        wanted.iter().for_each(|v| readers[v.index()] += 2);
         self.blocks.values().flat_map(|b| b.reads()).for_each(|v| readers[v.index()] += 1);
         self.values.iter().for_each(|(_, op)| op.for_each_operand(|v| readers[v.index()] += 1));
         readers
     }
 
     /// The union of what values read.
-    fn gathered(&self, sets: &[Option<Set>], mut open: Vec<Value>) -> Set {
+    fn gathered(self, sets: &[Option<Set>], mut open: Vec<Value>) -> Set {
         let mut parts: Vec<&Set> = Vec::new();
         while let Some(value) = open.pop() {
             match &sets[value.index()] {

@@ -63,7 +63,7 @@ impl Program {
                 work.gradients.insert(value, Rc::from([(column as u32, one)]));
             }
         }
-        let live = self.live(wanted, true);
+        let live = self.dataflow().live(wanted, true);
         for (value, op) in self.values.iter() {
             if live[value.index()] && !self.values.reads(value).includes(Reads::GUESS) && !op.is_given() {
                 work.differentiate(value, op);

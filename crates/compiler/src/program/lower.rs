@@ -3,7 +3,7 @@
 use super::op::Op;
 use super::sharing::{Sharing, Unit, UnitId};
 use super::values::{Reads, Values};
-use super::{BlockId, Condition, ConditionId, ConditionKind, EventTrigger, Value};
+use super::{BlockId, ConditionId, ConditionKind, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
 use crate::ids::Table;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -12,7 +12,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 pub(super) struct Lowering<'a> {
     exprs: &'a Exprs,
     pub values: Values,
-    pub conditions: Table<ConditionId, Condition>,
+    /// What conditions read, and how they decide.
+    pub conditions: Table<ConditionId, (Value, ConditionKind)>,
     condition_of: FxHashMap<(Value, ConditionKind), ConditionId>,
     symbols: Vec<Option<Value>>,
     known: Vec<Option<Value>>,
@@ -450,7 +451,7 @@ impl<'a> Lowering<'a> {
         if let Some(&known) = self.condition_of.get(&(operand, kind)) {
             return known;
         }
-        let id = self.conditions.push(Condition { operand, kind, trigger: EventTrigger::RecordedOnly });
+        let id = self.conditions.push((operand, kind));
         self.condition_of.insert((operand, kind), id);
         id
     }

@@ -17,10 +17,13 @@ mod op;
 
 mod angles;
 pub mod calculus;
+mod checks;
+mod dataflow;
 mod dependence;
 mod derive;
 pub mod elimination;
 mod jacobian;
+mod kept;
 mod lower;
 mod operations;
 mod print;
@@ -28,6 +31,7 @@ mod routine;
 mod schedule;
 mod sharing;
 mod start;
+mod triggers;
 mod values;
 mod verify;
 
@@ -358,6 +362,16 @@ pub enum ConditionKind {
     Floor,
     /// The piece of this table (index into [`Program::tables`]) that the operand is in: number of points not above it.
     Piece(u32),
+}
+
+impl ConditionKind {
+    /// Number of switching functions that it needs.
+    pub fn switches(self) -> usize {
+        match self {
+            ConditionKind::Sign => 1,
+            ConditionKind::Floor | ConditionKind::Piece(_) => 2,
+        }
+    }
 }
 
 /// What moves a condition.

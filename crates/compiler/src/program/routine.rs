@@ -203,26 +203,9 @@ impl Program {
         chosen.map(|(index, _)| index as u32).collect()
     }
 
-    /// Marks what the wanted values read, themselves included; with what parameters alone determine if `deep`.
-    pub(super) fn live(&self, wanted: &[Value], deep: bool) -> Vec<bool> {
-        let mut live = vec![false; self.values.len()];
-        wanted.iter().for_each(|v| live[v.index()] = true);
-        for (value, op) in self.values.iter().rev() {
-            if !live[value.index()] || (!deep && self.values.reads(value) == Reads::PARAMETERS) {
-                continue;
-            }
-            match op {
-                Op::Solution(block, _) => self.blocks[block].reads().for_each(|v| live[v.index()] = true),
-                Op::Parameter(i) => live[self.parameters[i as usize].default.index()] = true,
-                _ => op.for_each_operand(|v| live[v.index()] = true),
-            }
-        }
-        live
-    }
-
     fn live_anywhere(&self, more: &[Value]) -> Vec<bool> {
         let wanted: Vec<Value> = self.wanted_anywhere().into_iter().chain(more.iter().copied()).collect();
-        self.live(&wanted, true)
+        self.dataflow().live(&wanted, true)
     }
 
     /// All values that are read from outside.
@@ -283,7 +266,7 @@ impl<'a> Builder<'a> {
         let mut roots = wanted.to_vec();
         let guarded = |w: &u32| &self.program.pivot_guards[*w as usize];
         roots.extend(pivot_guards.iter().map(guarded).flat_map(|w| [w.pivot, w.scale]));
-        let live = self.program.live(&roots, self.preamble);
+        let live = self.program.dataflow().live(&roots, self.preamble);
         self.order(&live, pivot_guards).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
         debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);

@@ -1,18 +1,22 @@
 //! Equations to a program.
 
 use super::angles::sums_of_angles;
+use super::checks::{assumption, described, divisors, domain, names};
+use super::dataflow::Dataflow;
+use super::dependence::Dependence;
+use super::kept::kept;
 use super::lower::Lowering;
 use super::op::Op;
 use super::sharing::share;
+use super::start::place_guesses;
 use super::values::Reads;
 use super::{
-    Assumption, Block, BlockId, Condition, ConditionId, ConditionKind, EventTrigger, HeldSignal, Holds, Implicit,
-    Input, LawDomain, Matrix, Moved, Observed, Parameter, PivotGuard, Program, Relations, StartCondition, StartGuess,
-    State, Value, first_of, verify,
+    Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Program,
+    Relations, StartCondition, StartGuess, State, Value, triggers, verify,
 };
-use crate::algebra::{Expr, Exprs, Function, Interpolation, MINUS_ONE, Node, PlainNames, Symbol, ascii};
-use crate::bond_graph::{BondGraph, ElementId, Kind, Meaning, ParameterId};
-use crate::equations::{EquationStep, Equations, Momentum};
+use crate::algebra::{Expr, Function, Node, Symbol};
+use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
+use crate::equations::{self, EquationStep, Equations};
 use crate::ids::{Id, Table};
 use crate::sparse::SparseMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -33,7 +37,7 @@ pub fn schedule(equations: &Equations) -> Program {
         lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
         blocks: Table::new(),
         pivot_guards: Vec::new(),
-        kinks: Vec::new(),
+        nonsmooth: Vec::new(),
     };
     let parameters = schedule.parameters();
     schedule.givens(equations);
@@ -79,16 +83,13 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     }
 }
 
-/// A divisor whose text is longer is described in messages by what it reads.
-const SHORT: usize = 60;
-
 struct Schedule<'a> {
     graph: &'a BondGraph,
     lower: Lowering<'a>,
     blocks: Table<BlockId, Block>,
     pivot_guards: Vec<PivotGuard>,
     /// Conditions inside Newton blocks, as seen from outside.
-    kinks: Vec<ConditionId>,
+    nonsmooth: Vec<ConditionId>,
 }
 
 impl Schedule<'_> {
@@ -202,7 +203,7 @@ impl Schedule<'_> {
             residuals.iter().for_each(|&e| {
                 self.lower.value(e);
             });
-            self.kinks.extend(self.lower.conditions.ids().skip(known));
+            self.nonsmooth.extend(self.lower.conditions.ids().skip(known));
         }
     }
 
@@ -240,24 +241,67 @@ impl Schedule<'_> {
             Node::Call(Function::Sin | Function::Cos, _) => self.lower.constant(1.0),
             _ => self.lower.constant(0.0),
         };
-        let divisor = self.described(factor);
+        let fixed = |s: &Symbol| matches!(self.graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
+        let divisor = described(&self.graph.exprs, factor, &|s| !fixed(s));
         self.pivot_guards.push(PivotGuard { pivot, scale, elements: elements.to_string(), divisor });
     }
 
-    /// An expression as text if it is short, else what varies in it.
-    fn described(&self, e: Expr) -> String {
-        let exprs = &self.graph.exprs;
-        let text = ascii(exprs, e, &PlainNames(exprs));
-        if text.len() <= SHORT {
-            return text;
-        }
-        let fixed = |s: &Symbol| matches!(self.graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
-        let varies: Vec<Symbol> = exprs.symbols_of(e).into_iter().filter(|s| !fixed(s)).collect();
-        format!("an expression in {}", first_of(&self.names_of(&varies).join(", ")))
-    }
-
+    /// Lowers what is read from outside, finds out what follows from how all of it is read, and puts the program together.
     fn finish(mut self, equations: &Equations, parameters: Vec<Parameter>) -> Program {
         let graph = self.graph;
+        let states = self.states(equations);
+        let implicit = implicit(&self.lower, equations);
+        let variables = graph.variables.keys().filter_map(|&s| Some((s, self.lower.defined(s)?))).collect();
+        let momenta = equations.momenta.iter().map(|m| (m.speed, self.lower.value(m.sum))).collect();
+        let inputs = self.inputs();
+        let held = self.held();
+        let observed = self.observed(equations);
+        let conditions = self.start_conditions(equations);
+        let guesses = self.start_guesses(equations);
+        let lower = &mut self.lower;
+        let domains = equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect();
+        let assumed = equations.assumptions.iter();
+        let assumptions = assumed.filter_map(|a| assumption(lower, graph, &self.pivot_guards, a)).collect();
+        let relations = relations(lower, graph, &equations.relations);
+        let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
+
+        let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
+        let flow = Dataflow { values: &values, blocks: &blocks, parameters: &parameters };
+        let rates: Vec<Value> = states.iter().map(|s| s.rate).collect();
+        let residuals = conditions.iter().chain(&guesses).map(|vanishing| vanishing.residual);
+        let wanted: Vec<Value> = rates.iter().copied().chain(residuals).collect();
+        let dependence = Dependence::new(flow, states.len() as u32, &wanted);
+        let integrated = rates.iter().copied().chain(held.iter().map(|h| h.source)).collect();
+        let program = Program {
+            name: graph.name.clone(),
+            kept: kept(flow, equations, &momenta),
+            start: start(equations, &conditions, &dependence),
+            guesses: placed(equations, &guesses, &dependence),
+            conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),
+            dependence: rates.iter().map(|&rate| dependence.states_of(rate)).collect(),
+            tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
+            conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
+            states,
+            implicit,
+            variables,
+            momenta,
+            inputs,
+            held,
+            observed,
+            domains,
+            assumptions,
+            relations,
+            tables,
+            parameters,
+            blocks,
+            pivot_guards,
+            values,
+        };
+        debug_assert_eq!(verify(&program), Ok(()), "{}", program.name);
+        program
+    }
+
+    fn states(&mut self, equations: &Equations) -> Vec<State> {
         let lower = &mut self.lower;
         let mut residuals = equations.residuals.iter();
         let mut residual =
@@ -273,128 +317,90 @@ impl Schedule<'_> {
         for a in &equations.algebraic {
             states.push(State { name: a.name.clone(), rate: residual(lower), unit: a.unit.clone() });
         }
-        let implicit = implicit(lower, equations);
-        let graph_variables = graph.variables.keys().copied();
-        let variables = graph_variables.filter_map(|s| Some((s, lower.defined(s)?))).collect();
-        let inputs = graph.inputs.values();
-        let held = graph.held.values();
-        let mut program = Program {
-            name: graph.name.clone(),
-            states,
-            implicit,
-            variables,
-            tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
-            momenta: equations.momenta.iter().map(|m| (m.speed, lower.value(m.sum))).collect(),
-            kept: Vec::new(),
-            conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
-            inputs: inputs
-                .map(|i| Input {
-                    name: i.name.clone(),
-                    default: lower.value(i.default),
-                    unit: i.unit.clone(),
-                    deduced: graph.variables.get(&i.symbol).and_then(|v| v.unit.clone()),
-                })
-                .collect(),
-            held: held
-                .map(|h| HeldSignal {
-                    name: h.name.clone(),
-                    source: lower.value(h.source),
-                    time: lower.value(h.time),
-                    kind: h.kind,
-                })
-                .collect(),
-            observed: equations
-                .observed
-                .iter()
-                .map(|o| Observed {
-                    name: o.name.clone(),
-                    value: o.value.clone().map(|e| lower.value(e)),
-                    unit: o.unit.clone(),
-                    kind: o.kind,
-                    default: o.default,
-                })
-                .collect(),
-            start: equations
-                .conditions
-                .iter()
-                .map(|c| StartCondition {
-                    name: c.name.clone(),
-                    residual: lower.value(c.residual),
-                    asked: lower.value(c.value),
-                    firm: c.firm,
-                    weak: c.weak,
-                    reads: Vec::new(),
-                    span: c.span,
-                })
-                .collect(),
-            guesses: equations
-                .guesses
-                .iter()
-                .map(|g| StartGuess {
-                    name: g.name.clone(),
-                    asked: lower.value(g.value),
-                    residual: lower.value(g.residual),
-                    unknown: 0,
-                    reads: Vec::new(),
-                    span: g.span,
-                })
-                .collect(),
-            domains: equations.domains.iter().filter_map(|d| domain(lower, graph, d)).collect(),
-            assumptions: equations
-                .assumptions
-                .iter()
-                .filter_map(|a| assumption(lower, graph, &self.pivot_guards, a))
-                .collect(),
-            relations: relations(lower, graph, &equations.relations),
-            tables: (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect(),
-            parameters,
-            blocks: self.blocks,
-            pivot_guards: self.pivot_guards,
-            conditions: self.lower.conditions,
-            values: self.lower.values,
-            dependence: Vec::new(),
+        states
+    }
+
+    fn inputs(&mut self) -> Vec<Input> {
+        let graph = self.graph;
+        let input = |i: &bond_graph::Input| Input {
+            name: i.name.clone(),
+            default: self.lower.value(i.default),
+            unit: i.unit.clone(),
+            deduced: graph.variables.get(&i.symbol).and_then(|v| v.unit.clone()),
         };
-        program.find_dependence();
-        program.place_guesses();
-        find_causes(&mut program, &self.kinks);
-        program.kept = kept(&program, equations);
-        debug_assert_eq!(verify(&program), Ok(()), "{}", program.name);
-        program
+        graph.inputs.values().map(input).collect()
+    }
+
+    fn held(&mut self) -> Vec<HeldSignal> {
+        let held = |h: &bond_graph::HeldSignal| HeldSignal {
+            name: h.name.clone(),
+            source: self.lower.value(h.source),
+            time: self.lower.value(h.time),
+            kind: h.kind,
+        };
+        self.graph.held.values().map(held).collect()
+    }
+
+    fn observed(&mut self, equations: &Equations) -> Vec<Observed> {
+        let observed = |o: &equations::Observed| Observed {
+            name: o.name.clone(),
+            value: o.value.clone().map(|e| self.lower.value(e)),
+            unit: o.unit.clone(),
+            kind: o.kind,
+            default: o.default,
+        };
+        equations.observed.iter().map(observed).collect()
+    }
+
+    fn start_conditions(&mut self, equations: &Equations) -> Vec<Vanishing> {
+        let of = |c: &equations::InitialCondition| Vanishing {
+            residual: self.lower.value(c.residual),
+            asked: self.lower.value(c.value),
+        };
+        equations.conditions.iter().map(of).collect()
+    }
+
+    fn start_guesses(&mut self, equations: &Equations) -> Vec<Vanishing> {
+        let of = |g: &equations::Guess| Vanishing {
+            asked: self.lower.value(g.value),
+            residual: self.lower.value(g.residual),
+        };
+        equations.guesses.iter().map(of).collect()
     }
 }
 
-/// Speeds that are states although a source that can jump moves storages that follow them.
-fn kept(program: &Program, equations: &Equations) -> Vec<(u32, Value)> {
-    if program.implicit.is_some() {
-        return Vec::new();
-    }
-    // The state is the variable itself, or what its storage holds.
-    let held = |m: &Momentum| stored_with(&equations.graph, m.speed);
-    let of_state = |m: &Momentum| {
-        let held = held(m);
-        equations.tracked.iter().position(|s| *s == m.speed || Some(*s) == held)
+/// What vanishes at the start, and the value asked for there.
+struct Vanishing {
+    residual: Value,
+    asked: Value,
+}
+
+/// Start conditions with what they read.
+fn start(equations: &Equations, values: &[Vanishing], dependence: &Dependence) -> Vec<StartCondition> {
+    let condition = |(c, v): (&equations::InitialCondition, &Vanishing)| StartCondition {
+        name: c.name.clone(),
+        residual: v.residual,
+        asked: v.asked,
+        firm: c.firm,
+        weak: c.weak,
+        reads: dependence.unknowns_of(v.residual).to_vec(),
+        span: c.span,
     };
-    // A sum that is itself the state keeps its value anyway.
-    let is_sum = |i: usize| equations.meanings.iter().any(|(s, _)| *s == equations.states[i].symbol);
-    let moved = equations.momenta.iter().filter(|m| m.moved);
-    let kept: Vec<(u32, Value)> =
-        moved.filter_map(|m| Some((of_state(m).filter(|&i| !is_sum(i))? as u32, program.momenta[&m.speed]))).collect();
-    let sums: Vec<Value> = kept.iter().map(|k| k.1).collect();
-    let live = program.live(&sums, false);
-    let jumps = |op: Op| op.condition().is_some() || matches!(op, Op::Held(_));
-    let jumps = program.values.iter().any(|(v, op)| live[v.index()] && jumps(op));
-    if jumps { kept } else { Vec::new() }
+    equations.conditions.iter().zip(values).map(condition).collect()
 }
 
-/// What the storage holds whose co-energy variable this is.
-fn stored_with(graph: &BondGraph, variable: Symbol) -> Option<Symbol> {
-    graph.outer_ports().into_iter().find_map(|port| {
-        let (z, _) = graph.storage_symbols(port)?;
-        match &graph.elements[port.element].kind {
-            Kind::Inertance(s) | Kind::Compliance(s) if z == variable => Some(s.stored[port.port as usize]),
-            _ => None,
-        }
-    })
+/// Guesses in the order in which they are placed.
+fn placed(equations: &Equations, values: &[Vanishing], dependence: &Dependence) -> Vec<StartGuess> {
+    let reads: Vec<&[u32]> = values.iter().map(|v| dependence.unknowns_of(v.residual)).collect();
+    let guess = |(i, unknown): (usize, u32)| StartGuess {
+        name: equations.guesses[i].name.clone(),
+        asked: values[i].asked,
+        residual: values[i].residual,
+        unknown,
+        reads: reads[i].to_vec(),
+        span: equations.guesses[i].span,
+    };
+    place_guesses(&reads).into_iter().map(guess).collect()
 }
 
 /// What the equations are, where they are no explicit rates.
@@ -416,80 +422,6 @@ fn implicit(lower: &Lowering, equations: &Equations) -> Option<Implicit> {
     })
 }
 
-fn names(graph: &BondGraph, elements: &[ElementId]) -> String {
-    let names: Vec<&str> = elements.iter().map(|&e| graph.elements[e].name.as_str()).collect();
-    names.join(", ")
-}
-
-/// A domain, if all that it reads is evaluated.
-fn domain(lower: &mut Lowering, graph: &BondGraph, domain: &crate::equations::LawDomain) -> Option<LawDomain> {
-    let name = |s: Symbol| graph.exprs.name(s).to_string();
-    let defined = graph.exprs.symbols_of(domain.argument).iter().all(|&s| lower.defined(s).is_some());
-    defined.then(|| LawDomain {
-        given: name(domain.symbol),
-        elements: names(graph, &domain.elements),
-        argument: lower.value(domain.argument),
-        kind: domain.kind,
-        asked: domain.asked.and_then(|s| Some((name(s), lower.defined(s)?))),
-        limit: domain.limit.map(|limit| lower.value(limit)),
-    })
-}
-
-/// An assumption with the value that tells whether it holds; none if it is a divisor that is guarded as it is.
-fn assumption(
-    lower: &mut Lowering,
-    graph: &BondGraph,
-    pivot_guards: &[PivotGuard],
-    of: &crate::algebra::Assumption,
-) -> Option<Assumption> {
-    let exprs = &graph.exprs;
-    let says = match of.holds {
-        Holds::Zero => "is zero",
-        Holds::NotZero => "is not zero",
-        Holds::Positive => "is above zero",
-        Holds::NotNegative => "is not below zero",
-    };
-    let text = ascii(exprs, of.expr, &PlainNames(exprs));
-    let what = if text.len() <= SHORT {
-        text
-    } else {
-        let read: Vec<&str> = exprs.symbols_of(of.expr).into_iter().map(|s| exprs.name(s)).collect();
-        format!("an expression in {}", first_of(&read.join(", ")))
-    };
-    let value = lower.value(of.expr);
-    if of.holds == Holds::NotZero && pivot_guards.iter().any(|w| w.pivot == value) {
-        return None;
-    }
-    let sum = matches!(of.holds, Holds::Zero | Holds::NotZero) && !matches!(exprs.node(of.expr), Node::Symbol(_));
-    let scale = if sum { magnitude(lower, exprs, of.expr) } else { value };
-    Some(Assumption { value, scale, holds: of.holds, text: format!("{what} {says}") })
-}
-
-/// What a sum of products comes to if nothing in it cancels.
-fn magnitude(lower: &mut Lowering, exprs: &Exprs, e: Expr) -> Value {
-    match exprs.node(e) {
-        Node::Add(terms) => {
-            let mut sum = lower.constant(0.0);
-            for &term in terms {
-                let size = magnitude(lower, exprs, term);
-                sum = lower.add(sum, size);
-            }
-            sum
-        }
-        Node::Mul(factors) => {
-            let sized = factors.iter().filter(|&&factor| factor != MINUS_ONE);
-            let sizes = sized.map(|&factor| magnitude(lower, exprs, factor)).collect::<Vec<_>>();
-            let product = sizes.into_iter().reduce(|product, size| lower.op(Op::Mul(product, size)));
-            product.expect("a product has factors")
-        }
-        Node::Number(n) => lower.constant(n.to_f64().abs()),
-        _ => {
-            let value = lower.value(e);
-            lower.op(Op::Call(Function::Abs, value))
-        }
-    }
-}
-
 /// The rows of which all is evaluated.
 fn relations(lower: &mut Lowering, graph: &BondGraph, of: &crate::equations::Relations) -> Relations {
     let known = |lower: &Lowering, e: Expr| graph.exprs.symbols_of(e).iter().all(|&s| lower.defined(s).is_some());
@@ -508,103 +440,4 @@ fn relations(lower: &mut Lowering, graph: &BondGraph, of: &crate::equations::Rel
         });
     }
     Relations { rows, drives: of.drives }
-}
-
-/// The factors of a divisor that vary or could vanish.
-fn divisors(exprs: &Exprs, pivot: Expr) -> Vec<Expr> {
-    match exprs.node(pivot) {
-        Node::Mul(factors) => factors.iter().flat_map(|&f| divisors(exprs, f)).collect(),
-        Node::Pow(base, exponent) if exprs.is_number(*exponent).is_some_and(|n| n.signum() > 0) => {
-            divisors(exprs, *base)
-        }
-        Node::Pow(_, exponent) if exprs.is_number(*exponent).is_some() => Vec::new(),
-        Node::Number(n) if !n.is_zero() => Vec::new(),
-        _ => vec![pivot],
-    }
-}
-
-/// How a value depends on time while conditions are held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Degree {
-    Constant,
-    Line,
-    Curve,
-}
-
-fn find_causes(program: &mut Program, kinks: &[ConditionId]) {
-    let degrees = degrees(program);
-    let mut triggers: Vec<EventTrigger> = Vec::new();
-    for condition in program.conditions.values() {
-        let reads = program.values.reads(condition.operand);
-        triggers.push(match degrees[condition.operand.index()] {
-            _ if reads.includes(Reads::STATE) => EventTrigger::RecordedOnly,
-            Degree::Curve => EventTrigger::CurvedTime,
-            _ => EventTrigger::LinearTime,
-        });
-    }
-    let shown = |trigger: &mut EventTrigger| {
-        if *trigger == EventTrigger::RecordedOnly {
-            *trigger = EventTrigger::State;
-            return true;
-        }
-        false
-    };
-    kinks.iter().for_each(|c| {
-        shown(&mut triggers[c.index()]);
-    });
-    let mut roots: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-    roots.extend(program.held.iter().map(|h| h.source));
-    loop {
-        let events = program.conditions.iter().filter(|(id, _)| triggers[id.index()] == EventTrigger::State);
-        roots.extend(events.map(|(_, c)| c.operand));
-        let live = program.live(&roots, false);
-        let used = program.values.iter().filter(|(v, _)| live[v.index()]).filter_map(|(_, op)| op.condition());
-        // Not short-circuited: all of them are marked.
-        if used.filter(|c| shown(&mut triggers[c.index()])).count() == 0 {
-            break;
-        }
-    }
-    program.conditions.iter_mut().for_each(|(id, condition): (ConditionId, &mut Condition)| {
-        condition.trigger = triggers[id.index()];
-    });
-}
-
-fn degrees(program: &Program) -> Vec<Degree> {
-    let mut degrees: Vec<Degree> = Vec::with_capacity(program.values.len());
-    for (value, op) in program.values.iter() {
-        let of = |v: Value| degrees[v.index()];
-        let degree = match op {
-            _ if program.values.reads(value) == Reads::PARAMETERS => Degree::Constant,
-            Op::Time => Degree::Line,
-            Op::Sign(..) | Op::Floor(..) => Degree::Constant,
-            Op::Neg(a) => of(a),
-            Op::Add(a, b) | Op::Sub(a, b) => of(a).max(of(b)),
-            Op::Mul(a, b) if of(a) == Degree::Constant => of(b),
-            Op::Mul(a, b) | Op::Div(a, b) if of(b) == Degree::Constant => of(a),
-            Op::Select(c, a, b) if of(c) == Degree::Constant => of(a).max(of(b)),
-            Op::Table(t, Some(_), a) if program.tables[t as usize].interpolation() != Interpolation::Cubic => of(a),
-            Op::TableSlope(t, Some(_), _) if program.tables[t as usize].interpolation() != Interpolation::Cubic => {
-                Degree::Constant
-            }
-            Op::Guess(..) | Op::Solution(..) => Degree::Curve,
-            Op::Input(_) | Op::Held(_) | Op::Conserved(_) | Op::State(_) => Degree::Curve,
-            _ => {
-                let mut most = Degree::Constant;
-                op.for_each_operand(|v| most = most.max(of(v)));
-                if most == Degree::Constant { most } else { Degree::Curve }
-            }
-        };
-        degrees.push(degree);
-    }
-    degrees
-}
-
-impl ConditionKind {
-    /// Number of switching functions that it needs.
-    pub fn switches(self) -> usize {
-        match self {
-            ConditionKind::Sign => 1,
-            ConditionKind::Floor | ConditionKind::Piece(_) => 2,
-        }
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Program, StartGuess};
+use super::Program;
 
 /// Start conditions that share unknowns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -34,24 +34,25 @@ impl Program {
         }
         groups.into_values().collect()
     }
+}
 
-    /// Gives each guess the unknown that it places: the only one that it reads which is not placed yet; where there is no
-    /// such guess, the first one of the first guess. Brings the guesses into this order and leaves out those for which no
-    /// unknown is left.
-    pub(super) fn place_guesses(&mut self) {
-        let mut left = std::mem::take(&mut self.guesses);
-        let mut placed: BTreeSet<u32> = BTreeSet::new();
-        loop {
-            let open = |g: &StartGuess| g.reads.iter().filter(|u| !placed.contains(u)).count();
-            left.retain(|g| open(g) > 0);
-            if left.is_empty() {
-                return;
-            }
-            let mut guess = left.remove(left.iter().position(|g| open(g) == 1).unwrap_or(0));
-            guess.unknown = *guess.reads.iter().find(|u| !placed.contains(u)).expect("one is open");
-            placed.insert(guess.unknown);
-            self.guesses.push(guess);
+/// Where guesses go that read these unknowns, in the order in which they are placed: the number of the guess and its
+/// unknown. A guess places the only unknown that it reads which is not placed yet; where there is no such guess, the
+/// first guess places the first such. Guesses for which no unknown is left are left out.
+pub(super) fn place_guesses(reads: &[&[u32]]) -> Vec<(usize, u32)> {
+    let mut left: Vec<usize> = (0..reads.len()).collect();
+    let mut placed: BTreeSet<u32> = BTreeSet::new();
+    let mut places = Vec::new();
+    loop {
+        let open = |guess: usize| reads[guess].iter().copied().filter(|u| !placed.contains(u));
+        left.retain(|&g| open(g).next().is_some());
+        if left.is_empty() {
+            return places;
         }
+        let guess = left.remove(left.iter().position(|&g| open(g).count() == 1).unwrap_or(0));
+        let unknown = open(guess).next().expect("one is open");
+        placed.insert(unknown);
+        places.push((guess, unknown));
     }
 }
 
@@ -62,4 +63,16 @@ fn find(leader: &mut [u32], mut u: u32) -> u32 {
         u = leader[u as usize];
     }
     u
+}
+
+#[cfg(test)]
+mod tests {
+    use super::place_guesses;
+
+    #[test]
+    fn a_guess_places_the_only_unknown_that_is_left() {
+        assert_eq!(place_guesses(&[&[0, 1], &[1], &[]]), [(1, 1), (0, 0)]);
+        assert_eq!(place_guesses(&[&[0, 1], &[0, 1], &[0]]), [(2, 0), (0, 1)]);
+        assert_eq!(place_guesses(&[&[2, 3], &[2, 3]]), [(0, 2), (1, 3)]);
+    }
 }

@@ -2,9 +2,10 @@
 
 use super::op::Op;
 use super::values::Reads;
-use super::{Arg, Block, BlockId, Code, ConditionKind, Method, Program, Solve, Step, Value};
+use super::{Arg, Block, BlockId, Code, ConditionKind, EventTrigger, Method, Program, Solve, Step, Value};
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
 
 /// Checks the invariants of a [`Program`]: every value reads values before it and knows on what it depends; what reads a
 /// guess belongs to one Newton block, which alone reads it; blocks are square and share the factors of equal matrices; all
@@ -126,6 +127,9 @@ fn conditions(p: &Program) -> Result<(), String> {
         all(known, || format!("{id:?} is about no value"))?;
         let guess = p.values.reads(condition.operand).includes(Reads::GUESS);
         all(!guess, || format!("{id:?} holds a guess"))?;
+        let timed = matches!(condition.trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime);
+        let of_state = p.values.reads(condition.operand).includes(Reads::STATE);
+        all(timed != of_state, || format!("{id:?} is moved by something else"))?;
         if let ConditionKind::Piece(table) = condition.kind {
             all((table as usize) < p.tables.len(), || format!("{id:?} is about no table"))?;
         }
@@ -147,6 +151,8 @@ fn tables_of_states(p: &Program) -> Result<(), String> {
     all(reads.into_iter().all(|r| ascending(r, unknowns)), || "starts read unknowns that there are not".into())?;
     let placed = p.guesses.iter().all(|g| g.reads.contains(&g.unknown));
     all(placed, || "a guess places what it does not read".into())?;
+    let places: BTreeSet<u32> = p.guesses.iter().map(|g| g.unknown).collect();
+    all(places.len() == p.guesses.len(), || "two guesses place one unknown".into())?;
     all(p.kept.iter().all(|k| (k.0 as usize) < n), || "a state that jumps is none".into())?;
     p.implicit.as_ref().map_or(Ok(()), |of| {
         let lengths = [of.explicit.len(), of.differential.len(), of.indices.len()];
@@ -160,6 +166,11 @@ fn outside(p: &Program) -> Result<(), String> {
     for value in p.wanted_anywhere() {
         let fine = known(value) && !p.values.reads(value).includes(Reads::GUESS);
         all(fine, || format!("{value:?} is wanted and no value of its own"))?;
+    }
+    let carried = p.implicit.iter().flat_map(|of| of.carried.iter().map(|c| c.2));
+    let told = p.relations.values().chain(p.variables.values().copied()).chain(p.kept.iter().map(|k| k.1));
+    for value in told.chain(carried) {
+        all(known(value), || format!("{value:?} is told and no value"))?;
     }
     let parameters = p.parameters.iter().map(|p| p.default).chain(p.inputs.iter().map(|i| i.default));
     let parameters = parameters.chain(p.held.iter().map(|h| h.time));
@@ -233,7 +244,7 @@ mod tests {
     use crate::causal_graph::assign_causality;
     use crate::diagnostic::Sources;
     use crate::equations::{Form, derive_equations};
-    use crate::program::{Bits, Local, Matrix, schedule};
+    use crate::program::{Bits, Condition, Local, Matrix, schedule};
     use crate::sparse::SparseMatrix;
     use std::sync::Arc;
 
@@ -270,6 +281,13 @@ mod tests {
         assert!(said(|p| p.dependence.clear()).contains("rates read"));
         assert!(said(|p| p.dependence[0] = vec![7]).contains("states that there are not"));
         assert!(said(|p| p.tracked.clear()).contains("tell"));
+        assert!(said(|p| p.kept.push((0, Value(9999)))).contains("is told"));
+        let clocked = |p: &mut Program| {
+            let condition =
+                Condition { operand: p.states[0].rate, kind: ConditionKind::Sign, trigger: EventTrigger::LinearTime };
+            p.conditions.push(condition);
+        };
+        assert!(said(clocked).contains("moved by something else"));
         let shorten = |p: &mut Program| {
             let id = newton(p);
             if let Block::Newton { jacobian, .. } = &mut p.blocks[id] {
