@@ -34,8 +34,8 @@ fn net(seed: u64, nonlinear: bool) -> String {
         String::from("model Net\n0:in -> R:feed(2)\nSe:source(sin(3*t)) -> 1:s\ns -> R:r(1)\ns -> in -> n0\n");
     let serial: Vec<bool> = (0..n).map(|i| i > 0 && r.below(3) == 0).collect();
     let mut states = Vec::new();
-    for i in 0..n {
-        let _ = writeln!(text, "{}:n{i}", u8::from(serial[i]));
+    for (i, &serial) in serial.iter().enumerate() {
+        let _ = writeln!(text, "{}:n{i}", u8::from(serial));
         let value = r.between(0.5, 3.0);
         match r.below(8) {
             0 => (_ = writeln!(text, "n{i} -> C:C{i}({value})"), states.push(format!("C{i}.q"))).1,

@@ -538,3 +538,18 @@ constraint cx: x.f - 0.3*cos(psi)*roll.f = 0
 prefer roll.f";
     assert!(fault_at_start(text).contains("I003"));
 }
+
+/// Laws of infinite slope where pressures are equal, as they are when nothing is known of them. Pressures by SciPy's `fsolve`.
+#[test]
+fn pipes_find_their_pressures() {
+    let start = start_of(&model(&fault("pipes")), Form::Minimal, Start::Given);
+    let wanted = [
+        ("a.e", 9.256558695382685),
+        ("b.e", 4.991449199300263),
+        ("c.e", 4.992505057797692),
+        ("d.e", 1.8586032615432873),
+    ];
+    for (name, wanted) in wanted {
+        assert!((start[name] - wanted).abs() < 1e-13, "{name}: {:e} but {wanted:e}", start[name]);
+    }
+}
