@@ -234,3 +234,21 @@ fn rows_of_an_input_are_corners_and_no_jumps() {
     assert_eq!((over.report.jumps, over.report.corners), (1, 1999));
     std::fs::remove_file(&path).expect("it is there");
 }
+
+/// Where equations become singular between two steps the trajectory ends, whatever a step that leads across has found.
+#[test]
+fn no_run_goes_on_behind_a_pole() {
+    let fixed = [FixedMethod::Rk4, FixedMethod::Rosenbrock].map(Method::Fixed);
+    let methods = [Method::Auto, Method::Bdf, Method::Radau].into_iter().chain(fixed);
+    for (name, pole) in [("determinant", 2.0 / 3.0), ("determinant_net", 1.121925)] {
+        for method in methods.clone() {
+            let step = matches!(method, Method::Fixed(_)).then_some(0.01);
+            let asked = Run { to: 6.0, method, step, rtol: 1e-8, ..Run::default() };
+            let Err(Error::Run(stopped)) = fault(name).simulate(&asked, &mut |_| true) else {
+                panic!("{name} {method:?} goes on");
+            };
+            let time = stopped.report.reached;
+            assert!((time - pole).abs() < 0.011, "{name} {method:?} at {time}: {}", stopped.failure);
+        }
+    }
+}

@@ -5,6 +5,7 @@ use super::conditions::{Conditions, table_on};
 use super::elimination::Factors;
 use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use super::newton::Newton;
+use super::orientation::Orientation;
 use super::piece_of;
 use super::registers::Layout;
 use super::wide::HasFrame;
@@ -67,7 +68,8 @@ pub(crate) struct Frame {
 pub(crate) struct Solver {
     pub factors: Factors,
     /// Right-hand side and solution.
-    x: Vec<f64>,
+    pub(super) x: Vec<f64>,
+    pub(super) orientation: Orientation,
     rate: Vec<f64>,
     /// Whether the matrix reads parameters alone, and has been factored since they were set.
     pub constant: bool,
@@ -92,6 +94,7 @@ impl Frame {
             Solver {
                 factors: if shared { Factors::none() } else { Factors::new(block) },
                 x: vec![0.0; n],
+                orientation: Orientation::new(if shared || constant { 0 } else { n }),
                 rate: vec![0.0; n],
                 constant,
                 factored: false,
@@ -215,6 +218,7 @@ impl Frame {
         let solver = &mut solvers[solve.shared.unwrap_or(solve.block).0 as usize];
         if solve.shared.is_none() && !(solver.constant && solver.factored) {
             solver.factored = solver.factors.factor(entries(solve, r)).is_ok();
+            solver.orientation.fresh = solver.factored && !solver.constant;
         }
         solver.x.iter_mut().zip(&solve.right).for_each(|(x, &b)| *x = r[b as usize]);
         if !solver.factored {

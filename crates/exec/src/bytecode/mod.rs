@@ -7,6 +7,7 @@ mod floating;
 mod frame;
 mod instruction;
 mod newton;
+mod orientation;
 mod packed;
 mod registers;
 mod wide;

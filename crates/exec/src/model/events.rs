@@ -2,7 +2,7 @@
 
 use super::system::What;
 use super::{DelayOrSample, Model};
-use crate::bytecode::Hold;
+use crate::bytecode::{Hold, SolveError};
 use halfarrow_sim::{Affected, Events, Failure};
 
 impl Model {
@@ -115,7 +115,15 @@ impl Events for Model {
         !held && self.run.clock_event != Some(t) && !self.inputs().iter().any(|signal| signal.jumps_at(t))
     }
 
+    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
+        match self.frame.passed_pole() {
+            Some(block) => Err(self.failure(t, SolveError::Singular { block })),
+            None => Ok(()),
+        }
+    }
+
     fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        self.frame.forget_orientations();
         if t < self.run.crossed {
             self.restart();
         }

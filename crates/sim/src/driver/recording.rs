@@ -22,6 +22,7 @@ impl Run<'_> {
         }
         self.seen = Some(self.time);
         events.observe(self.time, point, &mut self.values)?;
+        events.passed_pole(self.time)?;
         self.sink.watch(self.time, &self.values)
     }
 

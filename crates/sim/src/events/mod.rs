@@ -84,6 +84,16 @@ pub trait Events {
         format!("recorded value {}", value + 1)
     }
 
+    /// Whether equations have become singular between the point observed last and the one before: the trajectory ends there,
+    /// whatever a step that led across has found. Asked in runs that are watched step by step.
+    ///
+    /// # Errors
+    /// They have.
+    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
+        let _ = t;
+        Ok(())
+    }
+
     /// Values recorded at `(t, point)`, [`observed`](Events::observed) of them.
     ///
     /// # Errors

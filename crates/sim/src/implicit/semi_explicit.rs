@@ -96,6 +96,10 @@ impl System for SemiExplicit<'_> {
 }
 
 impl Events for SemiExplicit<'_> {
+    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
+        self.system.passed_pole(t)
+    }
+
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
         self.system.next_time_event(t)
     }

@@ -86,6 +86,10 @@ impl ImplicitSystem for ImplicitModel {
 }
 
 impl Events for ImplicitModel {
+    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
+        self.form.passed_pole(t)
+    }
+
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
         self.form.next_time_event(t)
     }
