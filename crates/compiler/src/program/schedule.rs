@@ -161,6 +161,10 @@ impl Schedule<'_> {
             }
             EquationStep::Guard { pivot, elements } => {
                 let read: Vec<Symbol> = self.graph.exprs.symbols_of(*pivot).into_iter().collect();
+                // Where nothing is evaluated that a divisor reads, nothing is divided by it.
+                if read.iter().any(|&s| self.lower.defined(s).is_none()) {
+                    return;
+                }
                 let elements = self.concerned(elements, &read);
                 divisors(&self.graph.exprs, *pivot).into_iter().for_each(|factor| self.guard(factor, &elements));
             }
