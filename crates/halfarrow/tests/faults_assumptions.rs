@@ -8,7 +8,7 @@ use halfarrow::{Error, FixedMethod, Form, Method, Model, Override, Record, Reduc
 use halfarrow_compiler::bond_graph::NoFiles;
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_exec as exec;
-use halfarrow_sim::Failure;
+use halfarrow_sim::{Failure, System};
 
 fn fault(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/faults/{name}.bond"));
@@ -163,6 +163,14 @@ fn compound_times_stay_above_zero() {
     let model = Model::from_text("model.bond", text, &[]).unwrap();
     let (report, rows) = sweep(&model, &["b=list(0.1,0.4)"], "m.f", Method::Fixed(FixedMethod::Rk4));
     assert_eq!((report.failed, rows[0][2].is_finite(), rows[1][2].is_finite()), (1, true, false), "{rows:?}");
+}
+
+/// Divisors that read a momentum of which no equation is left: there is no step before which they could be looked at.
+#[test]
+fn a_divisor_that_nothing_evaluates_is_not_guarded() {
+    let text = "model Product\n0:j0\n0:j1\nTF:t1(1 - i.p)\nTF:t2(i.p - 2)\nI:i(1)\n\
+                t1 -> j0\nj1 -> t2\nt2 -> j0\nj0 -> t1\nj1 -> i\n";
+    assert_eq!(System::states(&program(text)), 0);
 }
 
 #[test]

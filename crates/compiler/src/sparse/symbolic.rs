@@ -5,7 +5,8 @@
 //! value is known; whoever computes the factors has to see to it that pivots are good.
 
 use super::{Matching, Pattern};
-use std::collections::BTreeSet;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 
 /// Matrices of up to this many rows are better treated as full ones,
 const SMALL: usize = 32;
@@ -39,25 +40,35 @@ impl SymbolicFactors {
         if pattern.size() <= SMALL {
             return None;
         }
-        let factors = SymbolicFactors::new(pattern)?;
-        (GAIN * factors.operations() < full_operations(pattern.size())).then_some(factors)
+        let full = full_operations(pattern.size());
+        SymbolicFactors::within(pattern, full / GAIN).filter(|factors| GAIN * factors.operations() < full)
     }
 
     /// The factors of a matrix with this pattern; `None` if it is singular whatever its entries are.
     pub fn new(pattern: &Pattern) -> Option<SymbolicFactors> {
+        SymbolicFactors::within(pattern, u64::MAX)
+    }
+
+    /// The same; `None` too if rows take off more than so many operations from others, which is found out on the way.
+    fn within(pattern: &Pattern, most: u64) -> Option<SymbolicFactors> {
         let row_of = matched(pattern)?;
         let order = minimum_degree(pattern, &row_of);
         let mut place_of = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &column)| place_of[column] = place);
         let (mut lower, mut upper, mut matrix) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
         let (mut positions, mut known) = (vec![0; pattern.len()], 0..);
+        let (mut fill, mut operations) = (Fill::new(order.len()), 0);
         for (place, &column) in order.iter().enumerate() {
             let row = row_of[column];
             let mut own: Vec<(usize, usize)> =
                 pattern.row(row).map(|e| (place_of[pattern.columns()[e] as usize], e)).collect();
             own.sort_unstable();
             own.iter().zip(known.by_ref()).for_each(|(e, number)| positions[e.1] = number);
-            let (before, after) = filled(own.iter().map(|e| e.0).collect(), place, &upper);
+            let (before, after) = fill.row(own.iter().map(|e| e.0), place, &upper);
+            operations += before.iter().map(|&k| 1 + 2 * upper[k].len() as u64).sum::<u64>();
+            if operations > most {
+                return None;
+            }
             lower.push(before);
             upper.push(after);
             matrix.push(own.into_iter().map(|e| e.0).collect::<Vec<_>>());
@@ -112,16 +123,46 @@ fn minimum_degree(pattern: &Pattern, row_of: &[usize]) -> Vec<usize> {
     order.into_iter().map(|column| column as usize).collect()
 }
 
-/// What elimination makes of the columns of a row: those before its own place, and those behind it.
-fn filled(columns: BTreeSet<usize>, place: usize, upper: &[Vec<usize>]) -> (Vec<usize>, Vec<usize>) {
-    let mut open = columns;
-    let mut before = Vec::new();
-    while let Some(&k) = open.first().filter(|&&k| k < place) {
-        open.remove(&k);
-        open.extend(&upper[k]);
-        before.push(k);
+/// What elimination makes of the columns of rows.
+struct Fill {
+    /// For each column the last row that has it.
+    seen: Vec<usize>,
+    /// Columns before the place of the row that are still to be eliminated.
+    open: BinaryHeap<Reverse<usize>>,
+}
+
+impl Fill {
+    fn new(size: usize) -> Fill {
+        Fill { seen: vec![usize::MAX; size], open: BinaryHeap::new() }
     }
-    (before, open.into_iter().filter(|&column| column > place).collect())
+
+    /// The columns of a row before its own place, and those behind it, ascending.
+    fn row(
+        &mut self,
+        columns: impl Iterator<Item = usize>,
+        place: usize,
+        upper: &[Vec<usize>],
+    ) -> (Vec<usize>, Vec<usize>) {
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        columns.for_each(|column| self.meet(column, place, &mut after));
+        while let Some(Reverse(k)) = self.open.pop() {
+            upper[k].iter().for_each(|&column| self.meet(column, place, &mut after));
+            before.push(k);
+        }
+        after.sort_unstable();
+        (before, after)
+    }
+
+    fn meet(&mut self, column: usize, place: usize, after: &mut Vec<usize>) {
+        if std::mem::replace(&mut self.seen[column], place) == place {
+            return;
+        }
+        match column.cmp(&place) {
+            Ordering::Less => self.open.push(Reverse(column)),
+            Ordering::Equal => {}
+            Ordering::Greater => after.push(column),
+        }
+    }
 }
 
 /// Whether a permutation is made of an odd number of exchanges.
