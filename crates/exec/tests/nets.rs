@@ -131,3 +131,40 @@ fn sparse_blocks_give_what_full_ones_give() {
     }
     assert!(sparse.iter().all(|&found| found >= 6), "{sparse:?} sparse blocks");
 }
+
+/// A gear train with ratios of 16 digits: every wheel costs the same, and what they make together is what one of them with
+/// the inertia of all does.
+#[test]
+fn gear_trains_cost_the_same_for_every_wheel() {
+    let mut lengths = Vec::new();
+    for wheels in [50, 100, 400] {
+        let mut r = Random(wheels + 3);
+        let (mut text, mut inertia, mut friction, mut ratio) = (String::from("model Gears\n"), 0.0, 0.0, 1.0);
+        for k in 0..wheels {
+            let (g, m, b) =
+                (r.between(0.8, 1.25) + 1e-16 * 271.0, r.between(0.1, 1.0) / 3.0, r.between(0.01, 0.5) / 7.0);
+            match k {
+                0 => _ = writeln!(text, "Se:drive(3) -> 1:w0"),
+                _ => _ = writeln!(text, "w{} -> TF:g{k}({g:?}) -> 1:w{k}", k - 1),
+            }
+            // f_out = modulus * f_in
+            ratio *= if k == 0 { 1.0 } else { g };
+            let _ = writeln!(text, "w{k} -> I:J{k}({m:?})\nw{k} -> R:b{k}({b:?})");
+            inertia += m * ratio * ratio;
+            friction += b * ratio * ratio;
+        }
+        let text = Text { name: "gears.bond", text: &text, files: &NoFiles, overrides: &[] };
+        let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+        let rates: Vec<_> = program.states.iter().map(|state| state.rate).collect();
+        let length = program.routine(&rates).code.steps.len() as f64;
+        let mut model = Model::new(program).expect("a model");
+        assert_eq!(model.states(), 1);
+        let (mut x, mut rate) = (vec![0.0], vec![0.0]);
+        model.handle_event(0.0, &mut x).expect("a start");
+        model.rates(0.0, &[0.7], &mut rate).expect("rates");
+        let wanted = (3.0 - friction * 0.7) / inertia;
+        assert!((rate[0] - wanted).abs() <= 1e-13 * wanted.abs(), "{wheels} wheels: {} and {wanted}", rate[0]);
+        lengths.push(length / wheels as f64);
+    }
+    assert!(lengths[2] <= 1.05 * lengths[1] && lengths[1] <= 1.1 * lengths[0], "{lengths:?}");
+}

@@ -3,6 +3,9 @@
 use super::exprs::{Exprs, MINUS_ONE, ONE};
 use super::node::{Expr, Node};
 
+/// Bits of a rational beyond which it is long: literals of 17 digits have about 110, products of two less than this.
+const LONG_NUMBER: u64 = 256;
+
 /// Operations of one evaluation, shared parts counted once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cost {
@@ -24,6 +27,12 @@ impl Cost {
 }
 
 impl Exprs {
+    /// Whether a number in the expression is a long one: exact products of numbers that are put into each other grow
+    /// without bound, though they are printed and computed with the digits of one.
+    pub fn has_long_number(&self, e: Expr) -> bool {
+        self.below(&[e], &|_| true).into_iter().any(|part| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER))
+    }
+
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1
     /// is part of the addition around it.
     pub fn cost(&self, roots: &[Expr]) -> Cost {

@@ -6,6 +6,7 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// An exact rational number.
@@ -20,10 +21,21 @@ use std::ops::{Add, Mul, Neg, Sub};
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Rational(Repr);
 
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq, Eq)]
 enum Repr {
     Small(i64, i64),
     Big(Box<BigRational>),
+}
+
+/// Of parts in lowest terms; that of `BigRational` divides them all the way down, so that fractions not in lowest terms
+/// have the same.
+impl Hash for Repr {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        match self {
+            Repr::Small(n, d) => (n, d).hash(state),
+            Repr::Big(big) => (big.numer(), big.denom()).hash(state),
+        }
+    }
 }
 
 impl Rational {
@@ -99,6 +111,16 @@ impl Rational {
         match &self.0 {
             Repr::Small(n, 1) => Some(*n),
             _ => None,
+        }
+    }
+
+    /// The bits of numerator and denominator together.
+    pub fn bits(&self) -> u64 {
+        match &self.0 {
+            Repr::Small(n, d) => {
+                u64::from(u64::BITS * 2 - n.unsigned_abs().leading_zeros() - d.unsigned_abs().leading_zeros())
+            }
+            Repr::Big(big) => big.numer().bits() + big.denom().bits(),
         }
     }
 

@@ -143,7 +143,7 @@ impl Ports {
     pub fn resolve_into(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) {
         let mut open = vec![symbol];
         while let Some((next, definition)) = self.next_to_resolve(&mut open, |s| known.contains_key(s)) {
-            let flat = definition.substitute(x, known, &self.undetermined);
+            let flat = definition.substitute(x, |s| known.get(&s), &self.undetermined);
             known.insert(next, flat);
         }
     }
@@ -203,19 +203,25 @@ impl Combination {
     }
 
     /// The combination with known ones put in for their symbols.
-    fn substitute(&self, x: &mut Exprs, known: &Map<Symbol, Combination>, undetermined: &[Symbol]) -> Combination {
-        if self.0.iter().all(|t| !known.contains_key(&t.0)) {
+    pub(crate) fn substitute<'k>(
+        &self,
+        x: &mut Exprs,
+        known: impl Fn(Symbol) -> Option<&'k Combination>,
+        undetermined: &[Symbol],
+    ) -> Combination {
+        if self.0.iter().all(|t| known(t.0).is_none()) {
             return self.clone();
         }
         if let [(only, coefficient)] = self.0[..]
             && x.is_number(coefficient).is_some_and(|n| n.is_one())
+            && let Some(row) = known(only)
         {
-            return known[&only].clone();
+            return row.clone();
         }
         let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
         for &(s, c) in &self.0 {
             let own = [(s, c)];
-            let inner = known.get(&s);
+            let inner = known(s);
             for &(t, e) in inner.map_or(&own[..], |k| &k.0) {
                 let product = if inner.is_some() { x.mul(&[c, e]) } else { e };
                 let value = sum.get(&t).map_or(product, |&old| x.add(&[old, product]));

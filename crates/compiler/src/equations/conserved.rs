@@ -3,21 +3,45 @@
 use std::collections::BTreeMap;
 
 use super::Conserved;
-use super::minimal::{Assembled, Balance};
+use super::minimal::Assembled;
+use super::rows::without_own;
 use crate::algebra::{Expr, SparseRow, Symbol};
-use crate::causal_graph::{CausalGraph, circuits};
+use crate::causal_graph::{Combination, Role, circuits};
+
+/// What changes a stored quantity: `quantity' = row`.
+struct Balance {
+    /// The state that stands for it.
+    state: Symbol,
+    quantity: Expr,
+    /// Its rate, over inputs of the junction structure other than rates of dependent storages.
+    row: Combination,
+}
 
 /// Finds them, and makes each a constant in place of one state.
-pub fn eliminate(assembled: &mut Assembled, causal: &CausalGraph) -> Vec<Conserved> {
-    let _ = causal;
-    let balances = std::mem::take(&mut assembled.balances);
+pub fn eliminate(assembled: &mut Assembled) -> Vec<Conserved> {
+    let balances = entangled(assembled);
     let rows = constant_rows(assembled, &balances);
-    let core = peel(&rows);
+    let columns: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|e| e.0).collect()).collect();
+    let left = without_own(&columns);
+    let core: Vec<usize> = (0..rows.len()).filter(|&r| left[r]).collect();
     let mut found = Vec::new();
     for vector in null_vectors(assembled, &rows, &core) {
         found.extend(replace(assembled, &balances, &vector, found.len() + 1));
     }
     found
+}
+
+/// The balances that may share all that changes them.
+fn entangled(assembled: &mut Assembled) -> Vec<Balance> {
+    let balances = std::mem::take(&mut assembled.balances);
+    let rates: Vec<[Symbol; 1]> = balances.iter().map(|balance| [balance.rate]).collect();
+    let entangled = assembled.rows.entangled(&rates, |input| input.role != Role::Dependent);
+    let open = balances.into_iter().zip(entangled).filter(|b| b.1);
+    let open = open.filter_map(|(balance, _)| {
+        let (quantity, row) = assembled.written_out(&balance)?;
+        Some(Balance { state: balance.state, quantity, row })
+    });
+    open.collect()
 }
 
 /// Rows over columns that are an input times its non-constant factor, with constant coefficients.
@@ -38,29 +62,6 @@ fn constant_rows(assembled: &mut Assembled, balances: &[Balance]) -> Vec<Vec<(us
         rows.push(row);
     }
     rows
-}
-
-/// The rows that are left when rows with a column of their own are taken away again and again.
-fn peel(rows: &[Vec<(usize, Expr)>]) -> Vec<usize> {
-    let columns = rows.iter().flatten().map(|e| e.0 + 1).max().unwrap_or(0);
-    let mut holders: Vec<Vec<usize>> = vec![Vec::new(); columns];
-    for (r, row) in rows.iter().enumerate() {
-        row.iter().for_each(|e| holders[e.0].push(r));
-    }
-    let mut count: Vec<usize> = holders.iter().map(Vec::len).collect();
-    let mut gone = vec![false; rows.len()];
-    let mut single: Vec<usize> = (0..columns).filter(|&c| count[c] == 1).collect();
-    while let Some(column) = single.pop() {
-        let Some(&row) = holders[column].iter().find(|&&r| !gone[r]) else { continue };
-        gone[row] = true;
-        for &(c, _) in &rows[row] {
-            count[c] -= 1;
-            if count[c] == 1 {
-                single.push(c);
-            }
-        }
-    }
-    (0..rows.len()).filter(|&r| !gone[r]).collect()
 }
 
 /// Combinations of rows that vanish: pairs (index of a balance, factor).

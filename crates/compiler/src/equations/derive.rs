@@ -47,7 +47,7 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let momenta = form == Form::Minimal;
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
-    let conserved = if momenta { conserved::eliminate(&mut assembled, causal) } else { Vec::new() };
+    let conserved = if momenta { conserved::eliminate(&mut assembled) } else { Vec::new() };
     let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
     assembled.d.x.forget_unwatched(&before);

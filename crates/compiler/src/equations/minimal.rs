@@ -1,6 +1,7 @@
 //! The minimal form: one explicit ODE per degree of freedom. Source: `method.md`, section 5.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use petgraph::unionfind::UnionFind;
 
@@ -39,15 +40,35 @@ pub struct Assembled<'a> {
     pub(super) deferred: Vec<DeferredRate>,
 }
 
-/// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`.
+/// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`. Written out by
+/// [`Assembled::written_out`], where that is asked for.
 #[derive(Debug, Clone)]
 pub struct Balance {
     /// The state that stands for it.
     pub state: Symbol,
-    /// The quantity.
-    pub quantity: Expr,
-    /// Its rate, over inputs of the junction structure other than rates of dependent storages.
-    pub row: Combination,
+    /// The quantity, those of dependent storages that follow left out unless it is a momentum.
+    own: Expr,
+    /// What changes it: the rate of the storage, or the reaction of a speed without one.
+    pub rate: Symbol,
+    /// The co-energy variable that dependent storages follow, and those that may.
+    z: Symbol,
+    dependent: Rc<[DependentStorage]>,
+    /// Whether `own` is a momentum.
+    is_momentum: bool,
+}
+
+/// A dependent storage of a group.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DependentStorage {
+    z: Symbol,
+    stored: Symbol,
+    rate: Symbol,
+}
+
+/// The dependent storages of a group.
+fn dependent_of(group: &[&StoragePort]) -> Rc<[DependentStorage]> {
+    let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
+    dependent.map(|c| DependentStorage { z: c.z, stored: c.stored, rate: c.rate }).collect()
 }
 
 /// A rate whose definition waits until all states are known.
@@ -323,29 +344,30 @@ impl<'a> Assembled<'a> {
 
     /// A storage on which no other depends: flow of a linear inertance, stored quantity of anything else.
     pub(super) fn independent(&mut self, storage_port: &StoragePort) {
+        let alone = dependent_of(&[]);
         if let Some(stored) = self.constant_inertance(storage_port) {
-            return self.by_speed(storage_port, stored, &[]);
+            return self.by_speed(storage_port, stored, &alone);
         }
         match storage_port.law {
             StorageLaw::Integral(e) => {
-                self.by_stored(storage_port, &[]);
+                self.by_stored(storage_port, &alone);
                 self.d.set(storage_port.z, e);
             }
             StorageLaw::Derivative(e) => {
                 let stored = self.d.x.sym(storage_port.stored);
                 let residual = self.d.x.sub(stored, e);
                 let inverse = self.d.solve_for(residual, storage_port.z);
-                let alone = storage_port.storage.laws.len() == 1;
-                match inverse.filter(|_| alone) {
+                let single = storage_port.storage.laws.len() == 1;
+                match inverse.filter(|_| single) {
                     Some(z) => {
-                        self.by_stored(storage_port, &[]);
+                        self.by_stored(storage_port, &alone);
                         self.d.set(storage_port.z, z);
                     }
-                    None => self.by_speed(storage_port, e, &[]),
+                    None => self.by_speed(storage_port, e, &alone),
                 }
             }
             StorageLaw::Implicit(e) => {
-                self.by_stored(storage_port, &[]);
+                self.by_stored(storage_port, &alone);
                 self.d.set_root(storage_port.z, e);
             }
             StorageLaw::Known { .. } => {}
@@ -353,49 +375,46 @@ impl<'a> Assembled<'a> {
     }
 
     /// State `X`, whose rate the bond carries.
-    fn by_stored(&mut self, storage_port: &StoragePort, group: &[&StoragePort]) {
+    fn by_stored(&mut self, storage_port: &StoragePort, dependent: &Rc<[DependentStorage]>) {
         self.d.stored_state(storage_port.stored);
         self.choose(storage_port, storage_port.stored);
-        let quantity = self.d.x.sym(storage_port.stored);
-        let followers = self.followers(storage_port.z, group);
-        self.balance(storage_port.stored, quantity, storage_port.rate, &followers);
+        let own = self.d.x.sym(storage_port.stored);
+        self.balances.push(storage_port.balance(storage_port.stored, own, dependent));
     }
 
     /// State `z`: its rate makes the rate of `X(z)` equal to what the bond carries.
-    fn by_speed(&mut self, storage_port: &StoragePort, stored: Expr, group: &[&StoragePort]) {
+    fn by_speed(&mut self, storage_port: &StoragePort, stored: Expr, dependent: &Rc<[DependentStorage]>) {
         self.d.set(storage_port.stored, stored);
         let rate = self.d.state(storage_port.z);
         self.choose(storage_port, storage_port.z);
         self.deferred.push(DeferredRate::Speed { z: storage_port.z, rate, stored, bond: storage_port.rate });
-        let followers = self.followers(storage_port.z, group);
-        self.balance(storage_port.z, stored, storage_port.rate, &followers);
+        self.balances.push(storage_port.balance(storage_port.z, stored, dependent));
     }
 
-    /// Notes what changes a stored quantity together with the dependent ones that follow it, if they do so constantly.
-    fn balance(&mut self, state: Symbol, quantity: Expr, rate: Symbol, followers: &[Follower]) {
+    /// A balance over its quantity and what changes it, inputs of the junction structure other than rates of dependent
+    /// storages; `None` if dependent storages do not follow constantly.
+    pub fn written_out(&mut self, balance: &Balance) -> Option<(Expr, Combination)> {
+        let followers = self.followers(balance.z, &balance.dependent);
         if followers.iter().any(|f| !self.d.is_constant(f.factor)) {
-            return;
+            return None;
         }
-        let Some(mut row) = self.rows.of(&mut self.d.x, rate).cloned() else { return };
-        let mut terms = vec![quantity];
-        for f in followers {
-            row.0.retain(|t| t.0 != f.rate);
+        let mut row = self.rows.of(&mut self.d.x, balance.rate)?.clone();
+        row.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
+        let mut terms = vec![balance.own];
+        for f in followers.iter().filter(|_| !balance.is_momentum) {
             let stored = self.d.x.sym(f.stored);
             terms.push(self.d.x.mul(&[f.factor, stored]));
         }
-        let quantity = self.d.x.add(&terms);
-        self.balances.push(Balance { state, quantity, row });
+        Some((self.d.x.add(&terms), row))
     }
 
     /// The dependent storages of a group that read `z`.
-    fn followers(&mut self, z: Symbol, group: &[&StoragePort]) -> Vec<Follower> {
-        let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
-        dependent
-            .filter_map(|c| {
-                let factor = self.rows.of(&mut self.d.x, c.z)?.coefficient(z)?;
-                Some(Follower { factor, stored: c.stored, rate: c.rate })
-            })
-            .collect()
+    fn followers(&mut self, z: Symbol, dependent: &[DependentStorage]) -> Vec<Follower> {
+        let follower = |c: &DependentStorage| {
+            let factor = self.rows.of(&mut self.d.x, c.z)?.coefficient(z)?;
+            Some(Follower { factor, stored: c.stored, rate: c.rate })
+        };
+        dependent.iter().filter_map(follower).collect()
     }
 
     /// Whether a group can be written with speeds (or stored quantities) of the independent storages as states: no
@@ -408,17 +427,17 @@ impl<'a> Assembled<'a> {
 
     /// Whether a source that is no constant stands in the row of a variable.
     fn is_moved(&mut self, z: Symbol) -> bool {
-        let row = self.rows.of(&mut self.d.x, z).cloned().unwrap_or_default();
-        row.0.iter().any(|t| {
-            let giver = self.rows.giver(t.0);
+        self.rows.inputs_of(&mut self.d.x, z).into_iter().any(|input| {
+            let giver = self.rows.giver(input);
             giver.is_some_and(|p| matches!(p.role, Role::Source | Role::Redundant))
-                && !self.d.is_constant(self.d.of[&t.0].expr())
+                && !self.d.is_constant(self.d.of[&input].expr())
         })
     }
 
     /// States are speeds of linear inertances and stored quantities of other storages; rates of dependent ones follow by
     /// differentiating what they depend on.
     fn velocity_form(&mut self, group: &[&StoragePort], speeds: &[Virtual]) {
+        let dependent = dependent_of(group);
         for storage_port in group {
             match (storage_port.state.role, self.stored_of(storage_port), storage_port.law) {
                 (Role::Dependent, stored, _) => {
@@ -430,15 +449,15 @@ impl<'a> Assembled<'a> {
                         .push(DeferredRate::Dependent { rate: storage_port.rate, stored: storage_port.stored });
                 }
                 (_, stored, StorageLaw::Integral(law)) => match self.constant_inertance(storage_port).and(stored) {
-                    Some(stored) => self.by_speed(storage_port, stored, group),
+                    Some(stored) => self.by_speed(storage_port, stored, &dependent),
                     None => {
-                        self.by_stored(storage_port, group);
+                        self.by_stored(storage_port, &dependent);
                         self.d.set(storage_port.z, law);
                     }
                 },
-                (_, Some(stored), _) => self.by_speed(storage_port, stored, group),
+                (_, Some(stored), _) => self.by_speed(storage_port, stored, &dependent),
                 (_, None, _) => {
-                    self.by_stored(storage_port, group);
+                    self.by_stored(storage_port, &dependent);
                     let residual = self.law_residual(storage_port);
                     self.d.set_root(storage_port.z, residual);
                 }
@@ -462,8 +481,8 @@ impl<'a> Assembled<'a> {
 
     /// States are `pi = X_i + S^T X_d`: no rate of a source is asked for, no law has to be inverted.
     fn momentum_form(&mut self, group: &[&StoragePort], speeds: &[Virtual]) {
-        let dependent: Vec<&&StoragePort> = group.iter().filter(|c| c.state.role == Role::Dependent).collect();
-        for storage_port in &dependent {
+        let dependent = dependent_of(group);
+        for storage_port in group.iter().filter(|c| c.state.role == Role::Dependent) {
             match self.stored_of(storage_port) {
                 Some(stored) => self.d.set(storage_port.stored, stored),
                 None => self.dependent_by_law(storage_port),
@@ -472,11 +491,10 @@ impl<'a> Assembled<'a> {
             self.deferred.push(DeferredRate::Dependent { rate: storage_port.rate, stored: storage_port.stored });
         }
         for storage_port in group.iter().filter(|c| c.state.role == Role::Independent) {
-            let followers = self.followers(storage_port.z, group);
             let (port, graph) = (storage_port.state.port, self.d.graph);
             let place = (port.element, graph.port_name(port));
-            let (sum, state) =
-                self.momentum_state(Some(storage_port.stored), storage_port.z, storage_port.rate, place, followers);
+            let stored = Some(storage_port.stored);
+            let (sum, state) = self.momentum_state(stored, storage_port.z, storage_port.rate, place, &dependent);
             let own = self.d.x.sub(state, sum);
             self.d.set(storage_port.stored, own);
             match storage_port.law {
@@ -488,9 +506,8 @@ impl<'a> Assembled<'a> {
             }
         }
         for v in speeds {
-            let followers = self.followers(v.speed, group);
             let place = (v.junction, self.d.graph.elements[v.junction].name.clone());
-            let (sum, state) = self.momentum_state(None, v.speed, v.reaction, place, followers);
+            let (sum, state) = self.momentum_state(None, v.speed, v.reaction, place, &dependent);
             let residual = self.d.x.sub(state, sum);
             self.d.set_root(v.speed, residual);
         }
@@ -531,14 +548,13 @@ impl<'a> Assembled<'a> {
         z: Symbol,
         rate: Symbol,
         (element, place): (ElementId, String),
-        followers: Vec<Follower>,
+        dependent: &Rc<[DependentStorage]>,
     ) -> (Expr, Expr) {
+        let followers = self.followers(z, dependent);
         let pi = self.d.x.made_of(SymbolKind::Momentum(z), &format!("{place}.pi"));
         let state = self.d.x.sym(pi);
-        self.balance(pi, state, rate, &[]);
-        if let Some(balance) = self.balances.last_mut() {
-            balance.row.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
-        }
+        let dependent = Rc::clone(dependent);
+        self.balances.push(Balance { state: pi, own: state, rate, z, dependent, is_momentum: true });
         let d = &mut self.d;
         let pi_rate = d.state(pi);
         let mut sum = Vec::new();
@@ -552,9 +568,6 @@ impl<'a> Assembled<'a> {
         // pi' = what the bond of the independent storage carries without the rates of dependent ones, and S'^T X_d.
         let mut structure = self.rows.of(&mut d.x, rate).cloned().unwrap_or_default();
         structure.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
-        if followers.iter().any(|f| !d.is_constant(f.factor)) {
-            self.balances.pop();
-        }
         let structure = structure.expr(&mut d.x);
         self.deferred.push(DeferredRate::Momentum { rate: pi_rate, structure, followers, z });
         let kind = StateKind::Storage(Some(element));
@@ -644,6 +657,12 @@ pub(super) struct Follower {
 }
 
 impl StoragePort<'_> {
+    /// What changes the quantity `own` behind `state`, and the dependent ones that follow it.
+    fn balance(&self, state: Symbol, own: Expr, dependent: &Rc<[DependentStorage]>) -> Balance {
+        let dependent = Rc::clone(dependent);
+        Balance { state, own, rate: self.rate, z: self.z, dependent, is_momentum: false }
+    }
+
     /// The co-energy symbols of all ports of the storage.
     fn storage_speeds(&self, d: &Definitions) -> BTreeSet<Symbol> {
         let ports = 0..self.storage.laws.len() as u32;
@@ -671,8 +690,8 @@ pub(super) fn groups(
             set.union(previous, i);
         }
         if storage_port.state.role == Role::Dependent {
-            for term in rows.of(x, storage_port.z).iter().flat_map(|row| &row.0) {
-                if let Some(&other) = index.get(&term.0) {
+            for input in rows.inputs_of(x, storage_port.z) {
+                if let Some(&other) = index.get(&input) {
                     set.union(i, other);
                 }
             }

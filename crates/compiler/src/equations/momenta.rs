@@ -1,6 +1,8 @@
 //! What stays as it is where a source jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
 //! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
+use std::collections::BTreeSet;
+
 use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, groups, imposed, rows_of};
 use crate::algebra::{Expr, Symbol};
@@ -19,7 +21,7 @@ pub struct Momentum {
 }
 
 impl Assembled<'_> {
-    /// The sums of all storages that depend on each other. `truth` is the graph with its exact ports, of whose pool that
+    /// The sums of storages that depend on each other, where a source may move them or a sum is a state. `truth` is the graph with its exact ports, of whose pool that
     /// of these definitions is a continuation.
     pub(super) fn momenta(&mut self, truth: &CausalGraph) -> Vec<Momentum> {
         let mut rows = rows_of(&mut self.d, truth);
@@ -32,10 +34,16 @@ impl Assembled<'_> {
             if dependent.is_empty() {
                 continue;
             }
+            let mut inputs = BTreeSet::new();
+            dependent.iter().for_each(|c| inputs.extend(rows.inputs_of(&mut self.d.x, c.z)));
+            let mut givers = inputs.iter().filter_map(|&input| rows.giver(input));
+            let moved = givers.any(|giver| is_moving(&mut self.d, truth, giver));
+            // Else the states tell the storages, whatever form they are in.
+            if !moved && members.iter().all(|&m| self.stored_of(&storage_ports[m]).is_some()) {
+                continue;
+            }
             let of_dependent: Vec<Combination> =
                 dependent.iter().map(|c| rows.of(&mut self.d.x, c.z).cloned().unwrap_or_default()).collect();
-            let mut inputs = of_dependent.iter().flat_map(|row| &row.0).filter_map(|t| rows.giver(t.0));
-            let moved = inputs.any(|giver| is_moving(&mut self.d, truth, giver));
             let independent = members.iter().map(|&m| &storage_ports[m]).filter(|c| c.state.role == Role::Independent);
             let own = independent.map(|c| (c.z, Some(c.stored)));
             for (speed, stored) in own.chain(speeds.iter().map(|v| (v.speed, None))) {

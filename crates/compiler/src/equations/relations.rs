@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::definitions::Definitions;
 use super::minimal::{Assembled, Chosen};
+use super::rows::without_own;
 use crate::algebra::{Expr, Exprs, ONE, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role};
@@ -51,8 +52,13 @@ struct Row {
 pub(super) fn relations(assembled: &mut Assembled, causal: &CausalGraph) -> Relations {
     let ports = Ports::of(&assembled.d, causal);
     let states = assembled.states.clone();
-    let mut rows: Vec<Row> = states.iter().filter_map(|state| row(assembled, &ports, state)).collect();
-    without_free_rows(&mut rows);
+    let entangled = entangled(assembled, &ports, &states);
+    let entangled = states.iter().zip(entangled).filter(|state| state.1);
+    let mut rows: Vec<Row> = entangled.filter_map(|(state, _)| row(assembled, &ports, state)).collect();
+    // Rows with a drive of their own go wherever the others go.
+    let drives: Vec<Vec<Drive>> = rows.iter().map(|row| row.by.keys().copied().collect()).collect();
+    let mut left = without_own(&drives).into_iter();
+    rows.retain(|_| left.next() == Some(true));
     let drives: BTreeSet<Drive> = rows.iter().flat_map(|r| r.by.keys().copied()).collect();
     let number: BTreeMap<Drive, usize> = drives.into_iter().zip(0..).collect();
     let numbered =
@@ -107,6 +113,18 @@ impl<'a> Ports<'a> {
         ports.free.extend(causal.ports.virtual_speeds.iter().map(|v| v.speed));
         ports
     }
+
+    /// The port of the independent storage behind a state.
+    fn port_of(&self, state: &Chosen) -> Option<&'a PortState> {
+        self.independent.get(&state.symbol).or_else(|| self.independent.get(&state.tracked)).copied()
+    }
+
+    /// What the junction structure makes of it: the rate of the storage, or the reaction of a speed without one.
+    fn rate_of(&self, state: &Chosen) -> Option<Symbol> {
+        let speeds = &self.causal.ports.virtual_speeds;
+        let alone = || speeds.iter().find(|v| v.speed == state.tracked).map(|v| v.reaction);
+        self.port_of(state).map(|p| p.output).or_else(alone)
+    }
 }
 
 fn stored(causal: &CausalGraph, port: &PortState) -> Option<Symbol> {
@@ -128,6 +146,20 @@ fn varies(d: &Definitions, e: Expr) -> bool {
     d.x.depends_on_any(e, &|s| !still(s))
 }
 
+/// Which states may share all their drives with others.
+fn entangled(assembled: &Assembled, ports: &Ports, states: &[Chosen]) -> Vec<bool> {
+    let moved_by = |state: &Chosen| match assembled.d.meaning(state.symbol) {
+        Some(Meaning::Signal(signal)) => {
+            let rate = ports.causal.graph.signals[signal].rate;
+            assembled.d.x.symbols_of(rate).into_iter().collect()
+        }
+        _ => ports.rate_of(state).into_iter().collect(),
+    };
+    let moved_by: Vec<Vec<Symbol>> = states.iter().map(moved_by).collect();
+    let is_drive = |p: &PortState| ports.free.contains(&p.input) && !ports.sources.contains_key(&p.input);
+    assembled.rows.entangled(&moved_by, is_drive)
+}
+
 /// The row of a state; `None` if nothing is known of it, so that it moves as it likes.
 fn row(assembled: &mut Assembled, ports: &Ports, state: &Chosen) -> Option<Row> {
     let causal = ports.causal;
@@ -138,9 +170,8 @@ fn row(assembled: &mut Assembled, ports: &Ports, state: &Chosen) -> Option<Row> 
         sum.add_rate(state.symbol, rate)?;
         return sum.finish();
     }
-    let port = ports.independent.get(&state.symbol).or_else(|| ports.independent.get(&state.tracked)).copied();
-    let virtual_speed = causal.ports.virtual_speeds.iter().find(|v| v.speed == state.tracked);
-    let rate = port.map(|p| p.output).or(virtual_speed.map(|v| v.reaction))?;
+    let port = ports.port_of(state);
+    let rate = ports.rate_of(state)?;
     let combination = assembled.rows.of(&mut assembled.d.x, rate)?.clone();
     let mut sum = Sum { assembled, ports, row: Row { quantity: Vec::new(), by: BTreeMap::new() } };
     sum.row.quantity.extend(port.and_then(|p| stored(causal, p)).map(|stored| (ONE, stored)));
@@ -260,27 +291,4 @@ fn add_to<K: Ord>(x: &mut Exprs, sum: &mut BTreeMap<K, Expr>, key: K, term: Expr
     } else {
         sum.insert(key, value);
     }
-}
-
-/// Takes rows with a drive of their own away, again and again: they go wherever the others go.
-fn without_free_rows(rows: &mut Vec<Row>) {
-    let mut holders: BTreeMap<Drive, BTreeSet<usize>> = BTreeMap::new();
-    for (r, row) in rows.iter().enumerate() {
-        row.by.keys().for_each(|&drive| _ = holders.entry(drive).or_default().insert(r));
-    }
-    let mut gone = vec![false; rows.len()];
-    let mut single: Vec<Drive> = holders.iter().filter(|(_, h)| h.len() == 1).map(|(&drive, _)| drive).collect();
-    while let Some(drive) = single.pop() {
-        let Some(&row) = holders[&drive].iter().next() else { continue };
-        gone[row] = true;
-        for other in rows[row].by.keys() {
-            let left = holders.get_mut(other).expect("every drive has its rows");
-            left.remove(&row);
-            if left.len() == 1 {
-                single.push(*other);
-            }
-        }
-    }
-    let mut gone = gone.into_iter();
-    rows.retain(|_| gone.next() == Some(false));
 }

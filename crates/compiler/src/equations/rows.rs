@@ -25,6 +25,10 @@ pub struct Rows<'a> {
     zero: BTreeSet<Symbol>,
     /// Rows over inputs.
     known: Map<Symbol, Combination>,
+    /// The same with coefficients in a prime field.
+    residues: Map<Symbol, Row>,
+    /// Rows that are written with short coefficients, over inputs and variables that are not; none for those.
+    short: Map<Symbol, Option<Combination>>,
 }
 
 impl<'a> Rows<'a> {
@@ -36,12 +40,22 @@ impl<'a> Rows<'a> {
         let shared = ports.ports.iter().map(|p| p.output).filter(|s| !ports.definitions.contains_key(s));
         let mut known: Map<Symbol, Combination> = shared.map(|s| (s, Combination(vec![(s, ONE)]))).collect();
         known.extend(zero.iter().map(|&s| (s, Combination::default())));
-        Rows { ports: Some(ports), givers, zero, known }
+        let one = causal.graph.exprs.residue(ONE);
+        let residues = known.iter().map(|(&s, row)| (s, row.0.iter().map(|t| (t.0, one)).collect())).collect();
+        let short = known.iter().map(|(&s, row)| (s, Some(row.clone()))).collect();
+        Rows { ports: Some(ports), givers, zero, known, residues, short }
     }
 
     /// No rows: where variables are defined along strokes they may run in circles.
     pub fn none() -> Rows<'a> {
-        Rows { ports: None, givers: Map::new(), zero: BTreeSet::new(), known: Map::new() }
+        Rows {
+            ports: None,
+            givers: Map::new(),
+            zero: BTreeSet::new(),
+            known: Map::new(),
+            residues: Map::new(),
+            short: Map::new(),
+        }
     }
 
     /// The port that gives a variable.
@@ -57,6 +71,63 @@ impl<'a> Rows<'a> {
         self.known.get(&symbol)
     }
 
+    /// A variable over what elements give, and over variables whose own rows have long coefficients.
+    fn shortly(&mut self, x: &mut Exprs, symbol: Symbol) -> Option<Combination> {
+        let ports = self.ports?;
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| self.short.contains_key(s)) {
+            let row = definition.substitute(x, |s| self.short.get(&s)?.as_ref(), &ports.undetermined);
+            self.short.insert(next, Some(row).filter(|row| is_short(x, row)));
+        }
+        self.short.get(&symbol)?.clone()
+    }
+
+    /// What elements give of which a variable of the junction structure is made; nothing of other variables.
+    pub fn inputs_of(&mut self, x: &mut Exprs, symbol: Symbol) -> Vec<Symbol> {
+        let Some(ports) = self.ports else { return Vec::new() };
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| self.residues.contains_key(s)) {
+            let mut row = put_in(x, definition, &self.residues);
+            row.retain(|t| !t.1.is_some_and(Residue::vanishes));
+            self.residues.insert(next, row);
+        }
+        let row = self.residues.get(&symbol).map_or(&[][..], |row| row);
+        let open = |t: &(Symbol, Option<Residue>)| t.1.is_none() || ports.undetermined.contains(&t.0);
+        if row.iter().any(open) {
+            return self.of(x, symbol).map_or(Vec::new(), |row| row.0.iter().map(|t| t.0).collect());
+        }
+        row.iter().map(|t| t.0).collect()
+    }
+
+    /// Which of these sums of variables may be put together so that no input is left, whatever their factors.
+    ///
+    /// One with a variable that no other row has takes no part: such rows, those that define variables among them, are
+    /// taken away again and again. `counts` says which inputs have to vanish; no row is written out.
+    pub fn entangled<S: AsRef<[Symbol]>>(&self, sums: &[S], counts: impl Fn(&PortState) -> bool) -> Vec<bool> {
+        let Some(ports) = self.ports else { return vec![true; sums.len()] };
+        let has_to_vanish = |s: &Symbol| {
+            ports.definitions.contains_key(s)
+                || !self.zero.contains(s) && self.givers.get(s).is_some_and(|giver| counts(giver))
+        };
+        let mut rows: Vec<Vec<Symbol>> = sums.iter().map(|sum| sum.as_ref().to_vec()).collect();
+        let mut reached: BTreeSet<Symbol> = BTreeSet::new();
+        let mut open: Vec<Symbol> = rows.iter().flatten().copied().collect();
+        while let Some(symbol) = open.pop() {
+            let Some(definition) = ports.definitions.get(&symbol).filter(|_| reached.insert(symbol)) else { continue };
+            let reads = definition.0.iter().map(|t| t.0);
+            open.extend(reads.clone());
+            rows.push(std::iter::once(symbol).chain(reads).collect());
+        }
+        for row in &mut rows {
+            row.retain(has_to_vanish);
+            row.sort_unstable();
+            row.dedup();
+        }
+        let mut left = without_own(&rows);
+        left.truncate(sums.len());
+        left
+    }
+
     /// What defines each variable: triangular, and over what elements give where terms cancel. Variables that are nothing
     /// but others give way to these.
     pub fn definitions(&mut self, x: &mut Exprs) -> Vec<(Symbol, Combination)> {
@@ -67,7 +138,7 @@ impl<'a> Rows<'a> {
             let own = Combination(row.0.iter().filter(|t| !self.zero.contains(&t.0)).copied().collect());
             let row = match (needed.contains(&symbol), as_short.contains(&symbol)) {
                 (true, _) => self.of(x, symbol).expect("it is defined").clone(),
-                (_, true) => self.of(x, symbol).filter(|row| is_short(x, row)).cloned().unwrap_or(own),
+                (_, true) => self.shortly(x, symbol).filter(|row| row.0.len() <= own.0.len()).unwrap_or(own),
                 _ => own,
             };
             all.insert(symbol, row);
@@ -101,6 +172,29 @@ fn for_junctions(all: &mut Map<Symbol, Combination>, outputs: &BTreeSet<Symbol>)
     }
 }
 
+/// Rows that are left when rows with a variable of their own are taken away again and again.
+pub fn without_own<C: Ord>(rows: &[Vec<C>]) -> Vec<bool> {
+    let mut holders: BTreeMap<&C, Vec<usize>> = BTreeMap::new();
+    for (r, row) in rows.iter().enumerate() {
+        row.iter().for_each(|column| holders.entry(column).or_default().push(r));
+    }
+    let mut count: BTreeMap<&C, usize> = holders.iter().map(|(&column, holders)| (column, holders.len())).collect();
+    let mut left = vec![true; rows.len()];
+    let mut own: Vec<&C> = count.iter().filter(|c| *c.1 == 1).map(|c| *c.0).collect();
+    while let Some(column) = own.pop() {
+        let Some(&row) = holders[column].iter().find(|&&r| left[r]) else { continue };
+        left[row] = false;
+        for other in &rows[row] {
+            let count = count.get_mut(other).expect("counted");
+            *count -= 1;
+            if *count == 1 {
+                own.push(other);
+            }
+        }
+    }
+    left
+}
+
 /// A row with its coefficients in a prime field; `None` where one has no value there.
 type Row = Vec<(Symbol, Option<Residue>)>;
 
@@ -117,7 +211,7 @@ struct WrittenOut {
 
 /// Whether all coefficients are written shortly.
 fn is_short(x: &mut Exprs, row: &Combination) -> bool {
-    row.0.iter().all(|t| x.written_length(t.1) <= SHORT)
+    row.0.iter().all(|t| x.written_length(t.1) <= SHORT && !x.has_long_number(t.1))
 }
 
 /// What of the definitions is written out, as far as a bound of work goes.

@@ -14,7 +14,8 @@ use crate::algebra::Symbol;
 pub fn verify(equations: &Equations) -> Result<(), String> {
     names(equations)?;
     symbols(equations)?;
-    let open = equations.states.iter().filter(|s| !equations.steps.iter().any(|step| step.defines(s.rate))).count();
+    let defined: BTreeSet<Symbol> = equations.steps.iter().flat_map(EquationStep::defined).collect();
+    let open = equations.states.iter().filter(|s| !defined.contains(&s.rate)).count();
     let (unknown, vanish) = (open + equations.algebraic.len(), equations.residuals.len());
     if unknown != vanish {
         return Err(format!("{vanish} expressions vanish for {unknown} unknowns"));
