@@ -1,6 +1,6 @@
 //! What is shown is what is computed, and is set without fault.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
@@ -191,4 +191,50 @@ fn fractions_stand_over_one_denominator() {
     let parallel =
         "model P\nparam R1 = 2, R2 = 3, m = 1\nSf:s(1) -> 0:n -> R:R1(R1)\nn -> R:R2(R2)\nn -> 1:b -> I:I(m)\n";
     assert_eq!(text(parallel), ["m f_I' = R1 R2 (1 - f_I)/(R1 + R2)"]);
+}
+
+/// The unknowns of a page: what it names that is neither given, nor a state, nor defined on it.
+fn open_symbols(shown: &Shown) -> BTreeSet<Symbol> {
+    let equations = &shown.equations;
+    let x = &equations.graph.exprs;
+    let given = |s: &Symbol| {
+        let meaning = equations.graph.variables.get(s).map(|variable| variable.meaning);
+        matches!(meaning, Some(Meaning::Time | Meaning::Parameter(_) | Meaning::Input(_) | Meaning::Held(_)))
+    };
+    let mut told: BTreeSet<Symbol> = equations.states.iter().map(|s| s.symbol).collect();
+    told.extend(equations.conserved.iter().map(|c| c.symbol));
+    told.extend(shown.definitions.iter().map(|d| d.symbol));
+    let sides = shown.display.iter().flat_map(|equation| [equation.closed.0, equation.closed.1]);
+    let values = shown.definitions.iter().filter(|d| !d.of_dependent).map(|d| d.closed);
+    let read = sides.chain(values).flat_map(|e| x.symbols_of(e));
+    read.filter(|s| !told.contains(s) && !given(s)).collect()
+}
+
+/// Pendulums on each other, so many that their rates stand in one block with the reactions between them.
+fn pendulums(links: usize) -> String {
+    let mut text = String::from("model Pendulum\nparam m = 1, l = 1, g = 9.81\n");
+    for i in 1..=links {
+        text += &format!("1:w{i}\nstate a{i}' = w{i}.f from {i}/10\n1:x{i} -> I:mx{i}(m)\n1:y{i} -> I:my{i}(m)\n");
+        text += &format!("Se:G{i}(-m*g) -> y{i}\n");
+        for (way, factor) in [("x", "cos"), ("y", "sin")] {
+            let hung = if i == 1 { format!("{way}1") } else { format!("j{way}{i}") };
+            if i > 1 {
+                text += &format!("0:{hung} -> {way}{i}\n{way}{} -> {hung}\n", i - 1);
+            }
+            text += &format!("w{i} -> TF:c{way}{i}(l*{factor}(a{i})) -> {hung}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn a_page_has_as_many_equations_as_unknowns() {
+    let mut pages: Vec<(String, Shown)> =
+        models().iter().map(|folder| (folder.display().to_string(), shown(folder))).collect();
+    pages.push(("40 pendulums".into(), shown_of(&pendulums(40))));
+    for (name, shown) in pages {
+        let open = open_symbols(&shown);
+        let named = || open.iter().map(|&s| shown.equations.graph.exprs.label(s)).collect::<Vec<_>>();
+        assert_eq!(shown.display.len(), open.len(), "{name}: unknown are {:?}", named());
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::named::named_page;
+use super::named::{named_page, wide_blocks};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{BondGraph, Named};
 use crate::equations::{
@@ -110,7 +110,7 @@ fn page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Page {
 
 /// The shorter page: in the states alone, or with names that the modeller gave to a state and a constant.
 fn textbook_page(d: &mut Definitions, equations: &Equations, ordered: &Ordered) -> Option<Page> {
-    if ordered.steps.len() > SMALL {
+    if ordered.steps.len() > SMALL || !wide_blocks(equations, &ordered.steps).is_empty() {
         return None;
     }
     let plain = page_with(d, equations, ordered, &BTreeMap::new())?;

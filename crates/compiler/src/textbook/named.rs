@@ -90,6 +90,20 @@ fn shortened(x: &mut Exprs, e: Expr, work: u64) -> Expr {
     put_in_shown(x, e, &BTreeMap::new())
 }
 
+/// Linear blocks in which other variables stand beside rates of states: all their rows are needed to tell the rates.
+pub fn wide_blocks<'s>(equations: &Equations, steps: &'s [EquationStep]) -> Vec<&'s EquationStep> {
+    let rates: BTreeSet<Symbol> = equations.states.iter().map(|s| s.rate).collect();
+    let told: BTreeSet<Symbol> = equations.algebraic.iter().map(|a| a.symbol).collect();
+    let is_wide = |step: &&EquationStep| match step {
+        EquationStep::Linear { unknowns, .. } => {
+            unknowns.iter().any(|u| rates.contains(u))
+                && unknowns.iter().any(|u| !rates.contains(u) && !told.contains(u))
+        }
+        _ => false,
+    };
+    steps.iter().filter(is_wide).collect()
+}
+
 /// Equations before anything is put in, and what defines the variables that they read.
 struct OpenRows {
     rows: Vec<OpenRow>,
@@ -127,10 +141,14 @@ impl OpenRows {
     fn of(d: &mut Definitions, equations: &Equations, ordered: &Ordered, named: &BTreeMap<Symbol, Expr>) -> OpenRows {
         let states = &equations.states;
         let rates: BTreeSet<Symbol> = states.iter().map(|s| s.rate).collect();
-        let rows = ordered.rows.iter().filter(|r| r.left.iter().any(|t| rates.contains(&t.0)));
-        let by_row = assign_rows(rows, &rates);
+        let wide = wide_blocks(equations, &ordered.steps);
+        let in_wide: BTreeSet<Symbol> = wide.iter().flat_map(|step| step.unknowns()).copied().collect();
+        let of_rates = |r: &&LinearRow| {
+            r.left.iter().any(|t| rates.contains(&t.0)) && !r.left.iter().any(|t| in_wide.contains(&t.0))
+        };
+        let by_row = assign_rows(ordered.rows.iter().filter(of_rates), &rates);
         let mut open_rows = Vec::new();
-        for state in states {
+        for state in states.iter().filter(|state| !in_wide.contains(&state.rate)) {
             match by_row.get(&state.rate) {
                 Some(row) => open_rows.push(OpenRow::of_row(row)),
                 None if d.free.contains(&state.rate) => {}
@@ -149,6 +167,7 @@ impl OpenRows {
         let row = |&variable| Some((variable, d.of.get(&variable)?.expr()));
         let dependent = equations.dependent.iter().filter_map(row).collect();
         let mut open_rows = OpenRows { rows: open_rows, dependent, values: Vec::new() };
+        wide.into_iter().for_each(|step| open_rows.add_block(step));
         open_rows.add_what_is_read(d, ordered, &rates, named);
         open_rows
     }
