@@ -31,6 +31,7 @@ prints! {
     decimal_number ascii: "9.81*M" => "9.81*M";
     third ascii: "x/3" => "x/3";
     two_thirds ascii: "2*x/3" => "2*x/3";
+    many_digits ascii: "0.8432708698133384*0.8690672397953783*x" => "0.7328590872285258*x";
     lone_third ascii: "1/3" => "1/3";
     small_number ascii: "1.4e-13" => "1.4e-13";
     large_number ascii: "6.02e23*x" => "6.02e23*x";

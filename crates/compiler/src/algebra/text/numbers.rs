@@ -4,12 +4,13 @@ use super::super::rational::Rational;
 use num_bigint::BigInt;
 
 /// The digits and the power of ten of a number of 0 or more: `digits * 10^exponent`, no zeros at the end. `None` if it is
-/// no decimal of at most 17 digits and not the exact value of a float either.
+/// a fraction of integers that are no longer than a float, and no decimal of at most 17 digits. Of longer ones the digits
+/// of the nearest float, with which is computed.
 pub(super) fn decimal(value: &Rational) -> Option<(String, i32)> {
     exact_decimal(value).or_else(|| {
         let float = value.to_f64();
-        let exact = Rational::from_f64(float).as_ref() == Some(value);
-        exact.then(|| Rational::from_decimal(&format!("{float:e}")))?.and_then(|v| exact_decimal(&v))
+        let as_float = value.small().is_none() || Rational::from_f64(float).as_ref() == Some(value);
+        as_float.then(|| Rational::from_decimal(&format!("{float:e}")))?.and_then(|v| exact_decimal(&v))
     })
 }
 
