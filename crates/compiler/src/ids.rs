@@ -82,6 +82,10 @@ impl<K: Id, V> Table<K, V> {
     pub fn values(&self) -> std::slice::Iter<'_, V> {
         self.entries.iter()
     }
+    /// The entries in order, taken out.
+    pub fn into_values(self) -> std::vec::IntoIter<V> {
+        self.entries.into_iter()
+    }
     /// The entry, if the id is in range.
     pub fn get(&self, id: K) -> Option<&V> {
         self.entries.get(id.index())

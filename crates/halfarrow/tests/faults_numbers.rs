@@ -299,3 +299,13 @@ fn a_truly_singular_position_says_what_vanishes() {
     assert!(told.contains("`prefer`") && told.contains("vanishes there"), "{told}");
     assert!(told.len() < 600, "{told}");
 }
+
+/// Two masses of 1 kg that move alike, one of them pushed by `t²`: each gets half of it, through the multiplier.
+#[test]
+fn the_rate_of_a_multiplier_is_that_of_an_effort() {
+    let text = "model Coupled\nSe:push(t^2) -> 1:a -> I:m(1)\nSe:none(0) -> 1:b -> I:n(1)\nconstraint c: m.f = n.f\n\
+                output rate = c.e'\noutput twice = 2*c.e\n";
+    let found = last(text, 1.0, &["rate", "twice"]);
+    near(found[0].abs(), 1.0, 1e-12);
+    near(found[0], found[1], 1e-12);
+}

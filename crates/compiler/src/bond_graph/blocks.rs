@@ -1,11 +1,11 @@
 //! Signal blocks unfolded: `pid` and `tf` to integrated signals, `delay` and `sample` to held ones, `table` to a table.
 
-use super::builder::{BlockInput, Builder, OpenBlock, Value};
+use super::builder::{BlockInput, Builder, HeldDraft, OpenBlock, SignalDraft, Value};
 use super::csv;
 use super::dimension::Quantity;
 use super::files::{FileError, read_beside};
 use super::value::{Reading, known_of};
-use super::{HeldKind, HeldSignal, IntegratedSignal, Meaning, SignalId};
+use super::{HeldKind, Meaning, SignalId};
 use crate::algebra::{Expr, Facts, Interpolation, Outside, Symbol, Table1d, TableError};
 use crate::ast::{self, Arg, Call, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -85,9 +85,8 @@ impl<'a> Builder<'a, '_> {
         let time = self.positive(cx, &call.args[1].value, what)?;
         let title = format!("{}.{name}", cx.owner);
         let symbol = self.fresh(&title, Facts::default());
-        let source = self.exprs.int(0);
         let name = self.exprs.name(symbol).to_string();
-        let id = self.held.push(HeldSignal { name, symbol, source, time, kind, span });
+        let id = self.held.push(HeldDraft { name, symbol, source: None, time, kind, span });
         self.mean(symbol, Meaning::Held(id), Quantity::Any);
         self.open(cx, &call.args[0].value, BlockInput::Held(id));
         Some(self.symbol_value(symbol))
@@ -102,8 +101,7 @@ impl<'a> Builder<'a, '_> {
     fn block_signal(&mut self, cx: &Reading<'_>, name: &str, quantity: Quantity, span: Span) -> (SignalId, Symbol) {
         let symbol = self.fresh(&format!("{}.{name}", cx.owner), Facts::default());
         let name = self.exprs.name(symbol).to_string();
-        let rate = self.exprs.int(0);
-        let id = self.signals.push(IntegratedSignal { name, symbol, rate, initial: None, unit: None, span });
+        let id = self.signals.push(SignalDraft { name, symbol, rate: None, initial: None, unit: None, span });
         self.mean(symbol, Meaning::Signal(id), quantity);
         (id, symbol)
     }
@@ -123,7 +121,7 @@ impl<'a> Builder<'a, '_> {
         let second = Quantity::of(Dim::SECOND);
         if !self.is_left_out(ki.expr) {
             let (id, symbol) = self.block_signal(cx, "integral", u.quantity.times(&second), span);
-            self.signals[id].rate = u.expr;
+            self.signals[id].rate = Some(u.expr);
             let integral = self.exprs.sym(symbol);
             terms.push(self.exprs.mul(&[ki.expr, integral]));
             quantity = self.same(&quantity, &ki.quantity.times(&u.quantity).times(&second), span);
@@ -186,7 +184,7 @@ impl<'a> Builder<'a, '_> {
         let behind = self.exprs.sym(symbol);
         let rest = self.exprs.sub(u.expr, behind);
         let rate = self.exprs.div(rest, time);
-        self.signals[id].rate = rate;
+        self.signals[id].rate = Some(rate);
         Some(rate)
     }
 
@@ -237,7 +235,7 @@ impl<'a> Builder<'a, '_> {
         let minus = self.exprs.neg(sum);
         let highest = self.exprs.div(minus, den[n]);
         for i in 0..n {
-            self.signals[signals[i].0].rate = if i + 1 < n { states[i + 1] } else { highest };
+            self.signals[signals[i].0].rate = Some(if i + 1 < n { states[i + 1] } else { highest });
         }
         let mut value: Vec<Expr> = (0..n.min(num.len())).map(|i| self.exprs.mul(&[num[i], states[i]])).collect();
         match (input, signals.last()) {
@@ -245,7 +243,7 @@ impl<'a> Builder<'a, '_> {
                 let part = self.exprs.div(u.expr, den[n]);
                 let top = self.exprs.add(&[highest, part]);
                 if let Some((id, _)) = last {
-                    self.signals[*id].rate = top;
+                    self.signals[*id].rate = Some(top);
                 }
                 value.push(self.exprs.mul(&[num[n], top]));
             }
@@ -287,10 +285,11 @@ impl<'a> Builder<'a, '_> {
             let cx = Reading { own: block.own, law: block.law, ..Reading::of(block.scope, &owner) };
             let Some(value) = self.number(&cx, block.input) else { continue };
             match block.goes {
-                BlockInput::Held(id) => self.held[id].source = value.expr,
+                BlockInput::Held(id) => self.held[id].source = Some(value.expr),
                 BlockInput::Rate(id, divisor) => {
                     let part = self.exprs.div(value.expr, divisor);
-                    self.signals[id].rate = self.exprs.add(&[self.signals[id].rate, part]);
+                    let terms: Vec<Expr> = self.signals[id].rate.into_iter().chain([part]).collect();
+                    self.signals[id].rate = Some(self.exprs.add(&terms));
                 }
             }
         }

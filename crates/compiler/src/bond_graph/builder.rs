@@ -10,16 +10,13 @@ use super::files::Files;
 use super::flatten::{Flat, Part};
 use super::scope::DeclId;
 use super::wire::Wiring;
-use super::{
-    BondId, ElementId, HeldId, HeldSignal, Input, InputId, IntegratedSignal, Meaning, Named, Parameter, ParameterId,
-    PortRef, SignalId,
-};
+use super::{BondId, ElementId, HeldId, HeldKind, InputId, Meaning, Parameter, ParameterId, PortRef, SignalId};
 use crate::algebra::{Expr, Exprs, Facts, Symbol};
 use crate::ast;
 use crate::diagnostic::{Diagnostic, Sources, codes};
 use crate::ids::{Id, Table};
 use crate::span::Span;
-use crate::unit::{Dimension as Dim, Domain};
+use crate::unit::{Dimension as Dim, Domain, Unit};
 
 /// A value that has been read: its expression in SI and its dimension.
 #[derive(Debug, Clone)]
@@ -37,6 +34,56 @@ impl Value {
     pub fn number(expr: Expr, quantity: Quantity) -> Value {
         Value { expr, quantity, truth: false }
     }
+}
+
+/// What a symbol stands for while the graph is being built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// What it stands for in the graph.
+    Known(Meaning),
+    /// Effort or flow of the bond of a constraint, which has no number before the constraint is built in.
+    Reaction,
+}
+
+/// An input; its default is read after its symbol is known.
+pub(super) struct InputDraft {
+    pub name: String,
+    pub symbol: Symbol,
+    pub default: Option<Expr>,
+    pub unit: Option<Unit>,
+    pub doc: String,
+    pub span: Span,
+}
+
+/// An integrated signal; its rate is read after its symbol is known.
+pub(super) struct SignalDraft {
+    pub name: String,
+    pub symbol: Symbol,
+    pub rate: Option<Expr>,
+    pub initial: Option<Expr>,
+    pub unit: Option<Unit>,
+    pub span: Span,
+}
+
+/// A delayed or sampled signal; its source is read after its symbol is known.
+pub(super) struct HeldDraft {
+    pub name: String,
+    pub symbol: Symbol,
+    pub source: Option<Expr>,
+    pub time: Expr,
+    pub kind: HeldKind,
+    pub span: Span,
+}
+
+/// A named expression; its unit, where none is written, is that of its quantity when all laws have spoken.
+pub(super) struct NamedDraft {
+    pub name: String,
+    pub value: Expr,
+    pub unit: Option<Unit>,
+    pub unit_is_written: bool,
+    pub quantity: Quantity,
+    pub doc: String,
+    pub span: Span,
 }
 
 /// A signal whose rate is lowered when all names are known.
@@ -102,8 +149,8 @@ pub(super) struct Builder<'a, 'f> {
     pub faults: Vec<Diagnostic>,
     /// Whether something in the tree is missing, which the parser has said.
     pub incomplete: bool,
-    /// Meaning and dimension of every symbol, by its number.
-    pub meanings: Vec<Option<(Meaning, Quantity)>>,
+    /// Role and dimension of every symbol, by its number.
+    pub roles: Vec<Option<(Role, Quantity)>>,
     /// Variables of every bond.
     pub pairs: Vec<Pair>,
     /// The bond that stands for each junction, by part.
@@ -124,13 +171,11 @@ pub(super) struct Builder<'a, 'f> {
     pub parameters: Table<ParameterId, Parameter>,
     /// Values of the parameters, as numbers.
     pub numbers: Vec<f64>,
-    pub inputs: Table<InputId, Input>,
-    pub signals: Table<SignalId, IntegratedSignal>,
-    pub held: Table<HeldId, HeldSignal>,
-    pub lets: Vec<Named>,
-    pub outputs: Vec<Named>,
-    /// Dimensions of the named expressions.
-    pub named_quantities: BTreeMap<String, Quantity>,
+    pub inputs: Table<InputId, InputDraft>,
+    pub signals: Table<SignalId, SignalDraft>,
+    pub held: Table<HeldId, HeldDraft>,
+    pub lets: Vec<NamedDraft>,
+    pub outputs: Vec<NamedDraft>,
     pub open_signals: Vec<OpenSignal<'a>>,
     pub open_blocks: Vec<OpenBlock<'a>>,
     /// Rates of signals that expressions ask for, and the signal of each.
@@ -158,7 +203,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             later: None,
             faults: Vec::new(),
             incomplete: wiring.broken,
-            meanings: Vec::new(),
+            roles: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
             moduli: BTreeMap::new(),
             common: representatives(flat, wiring),
@@ -174,7 +219,6 @@ impl<'a, 'f> Builder<'a, 'f> {
             held: Table::new(),
             lets: Vec::new(),
             outputs: Vec::new(),
-            named_quantities: BTreeMap::new(),
             open_signals: Vec::new(),
             open_blocks: Vec::new(),
             rate_symbols: FxHashMap::default(),
@@ -193,21 +237,34 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// Says what a symbol means.
     pub fn mean(&mut self, symbol: Symbol, meaning: Meaning, quantity: Quantity) {
-        let at = symbol.0 as usize;
-        if self.meanings.len() <= at {
-            self.meanings.resize(at + 1, None);
-        }
-        self.meanings[at] = Some((meaning, quantity));
+        self.play(symbol, Role::Known(meaning), quantity);
     }
 
-    /// What a symbol means.
+    /// Says what the role of a symbol is.
+    pub fn play(&mut self, symbol: Symbol, role: Role, quantity: Quantity) {
+        let at = symbol.0 as usize;
+        if self.roles.len() <= at {
+            self.roles.resize(at + 1, None);
+        }
+        self.roles[at] = Some((role, quantity));
+    }
+
+    /// What a symbol means in the graph; `None` where that is not known yet.
     pub fn meaning(&self, symbol: Symbol) -> Option<Meaning> {
-        self.meanings.get(symbol.0 as usize).and_then(|m| m.as_ref()).map(|m| m.0)
+        match self.role(symbol)? {
+            Role::Known(meaning) => Some(meaning),
+            Role::Reaction => None,
+        }
+    }
+
+    /// The role of a symbol.
+    pub fn role(&self, symbol: Symbol) -> Option<Role> {
+        self.roles.get(symbol.0 as usize).and_then(|m| m.as_ref()).map(|m| m.0)
     }
 
     /// The dimension of a symbol.
     pub fn quantity(&self, symbol: Symbol) -> Quantity {
-        self.meanings.get(symbol.0 as usize).and_then(|m| m.as_ref()).map_or(Quantity::Any, |m| m.1.clone())
+        self.roles.get(symbol.0 as usize).and_then(|m| m.as_ref()).map_or(Quantity::Any, |m| m.1.clone())
     }
 
     /// A new symbol of that name, or of one like it if that is taken.

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::builder::{Builder, Pair};
 use super::constraint::Relation;
 use super::flatten::{Flat, Word};
+use super::structure::Structure;
 use super::wire::Wiring;
-use super::{BondGraph, BondId, ElementId, Meaning};
+use super::{Bond, BondGraph, BondId, ElementId, Kind, Meaning};
 use crate::algebra::{Facts, Symbol};
 use crate::ids::Id;
 
@@ -126,6 +127,31 @@ impl Builder<'_, '_> {
     }
 }
 
+impl Structure {
+    /// The same as [`BondGraph::junction_of`], of what becomes a graph.
+    pub fn junction_of(&self, bond: BondId, flow: bool) -> Option<ElementId> {
+        let Bond { from, to, .. } = &self.bonds[bond];
+        junction_of(
+            [from.element, to.element],
+            |e| &self.elements[e].kind,
+            |e| self.common.get(&e) == Some(&bond),
+            flow,
+        )
+    }
+}
+
+/// Of the ends of a bond the junction whose common flow (or effort) it has, first of all the one for which it stands.
+fn junction_of<'g>(
+    ends: [ElementId; 2],
+    kind: impl Fn(ElementId) -> &'g Kind,
+    stands_for: impl Fn(ElementId) -> bool,
+    flow: bool,
+) -> Option<ElementId> {
+    let fits = |e: &ElementId| matches!((kind(*e), flow), (Kind::One, true) | (Kind::Zero, false));
+    let ends = ends.into_iter().filter(fits);
+    ends.clone().find(|e| stands_for(*e)).or_else(|| ends.clone().next())
+}
+
 impl BondGraph {
     /// The element at the other end of a bond of this one.
     pub fn far_end(&self, bond: BondId, element: ElementId) -> ElementId {
@@ -135,9 +161,12 @@ impl BondGraph {
 
     /// The junction whose common flow (or effort) a bond has: of two that touch, the one for which it stands.
     pub fn junction_of(&self, bond: BondId, flow: bool) -> Option<ElementId> {
-        use super::Kind::{One, Zero};
-        let fits = |e: &ElementId| matches!((&self.elements[*e].kind, flow), (One, true) | (Zero, false));
-        let ends = [self.bonds[bond].from.element, self.bonds[bond].to.element].into_iter().filter(fits);
-        ends.clone().find(|e| self.common.get(e) == Some(&bond)).or_else(|| ends.clone().next())
+        let Bond { from, to, .. } = &self.bonds[bond];
+        junction_of(
+            [from.element, to.element],
+            |e| &self.elements[e].kind,
+            |e| self.common.get(&e) == Some(&bond),
+            flow,
+        )
     }
 }

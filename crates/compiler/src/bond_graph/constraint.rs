@@ -6,9 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use super::builder::{Builder, Pair};
+use super::builder::{Builder, Pair, Role};
+use super::structure::Structure;
 use super::value::Reading;
-use super::{Bond, BondGraph, BondId, Constraint, Element, ElementId, Kind, Meaning, Port, PortRef};
+use super::{BondId, Constraint, ElementId, Kind, Meaning};
 use crate::algebra::{Expr, Facts, MINUS_ONE, ONE, Symbol};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -98,20 +99,26 @@ impl Builder<'_, '_> {
         let mut terms = Vec::new();
         for symbol in self.exprs.symbols_of(expr) {
             let slope = self.exprs.derivative(expr, symbol);
-            let rate = match self.meaning(symbol)? {
-                Meaning::Signal(id) => {
-                    let rate = self.signals[id].rate;
+            let rate = match self.role(symbol)? {
+                Role::Known(Meaning::Signal(id)) => {
+                    let rate = self.signals[id].rate?;
                     self.exprs.substitute(rate, rates)
                 }
-                Meaning::Stored(port) if self.part(port.element.index()).word == super::flatten::Word::I => {
+                Role::Known(Meaning::Stored(port))
+                    if self.part(port.element.index()).word == super::flatten::Word::I =>
+                {
                     self.not_a_displacement(symbol, "a momentum", span);
                     return None;
                 }
-                Meaning::Effort(_) => {
+                Role::Known(Meaning::Effort(_)) => {
                     self.not_a_displacement(symbol, "an effort", span);
                     return None;
                 }
-                Meaning::Parameter(_) => continue,
+                Role::Reaction => {
+                    self.not_a_displacement(symbol, "what belongs to a constraint", span);
+                    return None;
+                }
+                Role::Known(Meaning::Parameter(_)) => continue,
                 _ => {
                     let own = self.exprs.sym(symbol);
                     self.rate_of(own, span)?
@@ -131,9 +138,9 @@ impl Builder<'_, '_> {
 
     /// Coefficients may read what is known at an instant: no efforts, flows or rates.
     fn refuse_unknown(&mut self, expr: Expr, span: Span) -> Option<()> {
-        let bad = self.exprs.symbols_of(expr).into_iter().find(|s| match self.meaning(*s) {
-            Some(Meaning::Effort(_) | Meaning::Flow(_)) => true,
-            Some(Meaning::Rate(of)) => !matches!(self.meaning(of), Some(Meaning::Input(_))),
+        let bad = self.exprs.symbols_of(expr).into_iter().find(|s| match self.role(*s) {
+            Some(Role::Known(Meaning::Effort(_) | Meaning::Flow(_)) | Role::Reaction) => true,
+            Some(Role::Known(Meaning::Rate(of))) => !matches!(self.meaning(of), Some(Meaning::Input(_))),
             _ => false,
         });
         match bad {
@@ -145,53 +152,45 @@ impl Builder<'_, '_> {
         }
     }
 
-    /// Builds the constraints into the graph, behind all bonds that are drawn.
-    pub fn build_constraints(&mut self, graph: &mut BondGraph, relations: &[Relation]) {
-        for relation in relations {
-            self.build(graph, relation);
-        }
+    /// Builds the constraints into the structure, behind all bonds that are drawn.
+    pub fn build_constraints(&mut self, structure: &mut Structure, relations: &[Relation]) -> Vec<Constraint> {
+        relations.iter().map(|relation| self.build(structure, relation)).collect()
     }
 
-    fn build(&mut self, graph: &mut BondGraph, r: &Relation) {
+    fn build(&mut self, structure: &mut Structure, r: &Relation) -> Constraint {
         let (scope, c, _) = &self.flat.constraints[r.at];
         let name = format!("{}{}", self.flat.names.scopes[*scope].prefix, c.name.text);
         let minus_rest = self.exprs.neg(r.rest);
-        let doc_label = self.sources.slice(c.left.span.to(c.right.span)).to_string();
-        let node = new_element(graph, format!("{name}.0"), Kind::Zero, r.span, String::new());
-        let zc = new_element(graph, name.clone(), Kind::ZeroCompliance { flow: minus_rest }, r.span, doc_label);
-        for (n, (junction, a)) in self.by_junction(graph, r, &name).into_iter().enumerate() {
+        let label = self.sources.slice(c.left.span.to(c.right.span)).to_string();
+        let node = structure.add(format!("{name}.0"), Kind::Zero, r.span, String::new());
+        let zc = structure.add(name.clone(), Kind::ZeroCompliance { flow: minus_rest }, r.span, label);
+        for (n, (junction, a)) in self.by_junction(structure, r, &name).into_iter().enumerate() {
             let modulus = self.exprs.neg(a);
             match modulus {
-                ONE => self.new_bond(graph, (junction, ""), (node, ""), r.span),
-                MINUS_ONE => self.new_bond(graph, (node, ""), (junction, ""), r.span),
+                ONE => self.new_bond(structure, (junction, ""), (node, ""), r.span),
+                MINUS_ONE => self.new_bond(structure, (node, ""), (junction, ""), r.span),
                 _ => {
                     let tf = format!("{name}.tf{}", n + 1);
-                    let tf = new_element(graph, tf, Kind::Transformer { modulus }, r.span, String::new());
-                    self.new_bond(graph, (junction, ""), (tf, "in"), r.span);
-                    self.new_bond(graph, (tf, "out"), (node, ""), r.span)
+                    let tf = structure.add(tf, Kind::Transformer { modulus }, r.span, String::new());
+                    self.new_bond(structure, (junction, ""), (tf, "in"), r.span);
+                    self.new_bond(structure, (tf, "out"), (node, ""), r.span);
                 }
-            };
+            }
         }
-        let bond = self.new_bond(graph, (zc, ""), (node, ""), r.span);
-        let pair = self.reactions[r.at].clone();
-        self.take_symbols(graph, bond, &pair);
-        let multiplier = self.exprs.sym(pair.effort);
-        graph.constraints.push(Constraint {
-            name,
-            expr: r.expr,
-            holonomic: r.holonomic,
-            element: zc,
-            multiplier,
-            span: r.span,
-        });
+        let Pair { effort, flow, effort_in, flow_in } = self.reactions[r.at].clone();
+        let bond = structure.join((zc, ""), (node, ""), (effort, flow), r.span);
+        self.mean(effort, Meaning::Effort(bond), effort_in);
+        self.mean(flow, Meaning::Flow(bond), flow_in);
+        let multiplier = self.exprs.sym(effort);
+        Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span }
     }
 
     /// The 1-junctions whose flows a relation reads, with their coefficients.
-    fn by_junction(&mut self, graph: &mut BondGraph, r: &Relation, name: &str) -> Vec<(ElementId, Expr)> {
+    fn by_junction(&mut self, structure: &mut Structure, r: &Relation, name: &str) -> Vec<(ElementId, Expr)> {
         let mut found: Vec<(ElementId, Expr)> = Vec::new();
         for (flow, a) in &r.terms {
             let Some(Meaning::Flow(bond)) = self.meaning(*flow) else { continue };
-            let junction = self.one_junction(graph, bond, name, r.span);
+            let junction = self.one_junction(structure, bond, name, r.span);
             match found.iter_mut().find(|(j, _)| *j == junction) {
                 Some((_, sum)) => *sum = self.exprs.add(&[*sum, *a]),
                 None => found.push((junction, *a)),
@@ -202,107 +201,44 @@ impl Builder<'_, '_> {
     }
 
     /// The 1-junction to which the flow of a bond belongs; a new one in the bond if it belongs to none.
-    fn one_junction(&mut self, graph: &mut BondGraph, bond: BondId, name: &str, span: Span) -> ElementId {
-        if let Some(junction) = graph.junction_of(bond, true) {
+    fn one_junction(&mut self, structure: &mut Structure, bond: BondId, name: &str, span: Span) -> ElementId {
+        if let Some(junction) = structure.junction_of(bond, true) {
             return junction;
         }
-        let (from, to) = (graph.bonds[bond].from, graph.bonds[bond].to);
-        let mut n = 1;
-        let free = |n: usize| format!("{name}.1{}", if n == 1 { String::new() } else { format!("_{n}") });
-        while graph.elements.values().any(|e| e.span == span && e.name == free(n)) {
-            n += 1;
-        }
-        let junction = new_element(graph, free(n), Kind::One, span, String::new());
-        let keeps_from = self.left_end(bond.index()).0 == to.element.index();
-        let at = PortRef { element: junction, port: 0 };
-        let new = BondId::new(graph.bonds.len());
-        let moved = if keeps_from { to } else { from };
-        graph.elements[junction].ports.push(Port { name: String::new(), bond, inward: keeps_from });
-        let far = PortRef { element: junction, port: 1 };
-        graph.elements[junction].ports.push(Port { name: String::new(), bond: new, inward: !keeps_from });
-        if keeps_from {
-            graph.bonds[bond].to = at
-        } else {
-            graph.bonds[bond].from = at
+        let keeps_from = self.left_end(bond.index()).0 == structure.bonds[bond].to.element.index();
+        let name = structure.unused(&format!("{name}.1"), span);
+        let new = BondId::new(structure.bonds.len());
+        let (effort, flow) = (structure.bonds[bond].effort, structure.bonds[bond].flow);
+        let pair = match self.beyond.get(&bond.index()).copied() {
+            Some((_, known)) => {
+                self.mean(known, Meaning::Effort(new), self.quantity(effort));
+                (known, self.internal_flow(new, flow))
+            }
+            None => self.internal_pair(new, (effort, flow)),
         };
-        graph.elements[moved.element].ports[moved.port as usize].bond = new;
-        let (new_from, new_to) = if keeps_from { (far, moved) } else { (moved, far) };
-        let like = (graph.bonds[bond].effort, graph.bonds[bond].flow);
-        let mut pair = self.internal_pair(new, like);
-        if let Some(&(_, known)) = self.beyond.get(&bond.index()) {
-            self.meanings[pair.effort.0 as usize] = None;
-            self.mean(known, Meaning::Effort(new), pair.effort_in.clone());
-            pair.effort = known;
-        }
-        graph.common.entry(moved.element).and_modify(|common| *common = if *common == bond { new } else { *common });
-        let pseudo = graph.bonds[bond].pseudo;
-        graph.bonds.push(Bond {
-            from: new_from,
-            to: new_to,
-            name: String::new(),
-            effort: pair.effort,
-            flow: pair.flow,
-            pseudo,
-            span,
-        });
-        junction
+        structure.split(bond, name, keeps_from, pair, span)
     }
 
     /// Symbols for a bond that nobody drew, with the dimensions of others.
-    fn internal_pair(&mut self, bond: BondId, like: (Symbol, Symbol)) -> Pair {
-        let (effort_in, flow_in) = (self.quantity(like.0), self.quantity(like.1));
-        let number = bond.index() + 1;
-        let effort = self.fresh(&format!("e{number}"), Facts::default());
-        let flow = self.fresh(&format!("f{number}"), Facts::default());
-        self.mean(effort, Meaning::Effort(bond), effort_in.clone());
-        self.mean(flow, Meaning::Flow(bond), flow_in.clone());
-        Pair { effort, flow, effort_in, flow_in }
+    fn internal_pair(&mut self, bond: BondId, like: (Symbol, Symbol)) -> (Symbol, Symbol) {
+        let effort_in = self.quantity(like.0);
+        let effort = self.fresh(&format!("e{}", bond.index() + 1), Facts::default());
+        self.mean(effort, Meaning::Effort(bond), effort_in);
+        (effort, self.internal_flow(bond, like.1))
     }
 
-    /// A new bond between two elements.
-    fn new_bond(
-        &mut self,
-        graph: &mut BondGraph,
-        from: (ElementId, &str),
-        to: (ElementId, &str),
-        span: Span,
-    ) -> BondId {
-        let bond = BondId::new(graph.bonds.len());
-        let mut end = |(element, name): (ElementId, &str), inward: bool| {
-            let ports = &mut graph.elements[element].ports;
-            ports.push(Port { name: name.to_string(), bond, inward });
-            PortRef { element, port: ports.len() as u32 - 1 }
-        };
-        let (from, to) = (end(from, false), end(to, true));
-        let like = [from, to].into_iter().find_map(|p| {
-            let first = graph.elements[p.element].ports.first()?.bond;
-            graph
-                .bonds
-                .get(first)
-                .filter(|_| matches!(graph.elements[p.element].kind, Kind::One))
-                .map(|b| (b.effort, b.flow))
-        });
-        let pair = match like {
-            Some(like) => self.internal_pair(bond, like),
-            None => self.internal_pair(bond, (self.time, self.time)),
-        };
-        let bond_data =
-            Bond { from, to, name: String::new(), effort: pair.effort, flow: pair.flow, pseudo: false, span };
-        graph.bonds.push(bond_data)
+    fn internal_flow(&mut self, bond: BondId, like: Symbol) -> Symbol {
+        let flow_in = self.quantity(like);
+        let flow = self.fresh(&format!("f{}", bond.index() + 1), Facts::default());
+        self.mean(flow, Meaning::Flow(bond), flow_in);
+        flow
     }
 
-    /// Gives a bond the symbols that expressions have used for it already.
-    fn take_symbols(&mut self, graph: &mut BondGraph, bond: BondId, pair: &Pair) {
-        for old in [graph.bonds[bond].effort, graph.bonds[bond].flow] {
-            self.meanings[old.0 as usize] = None;
-        }
-        graph.bonds[bond].effort = pair.effort;
-        graph.bonds[bond].flow = pair.flow;
-        self.mean(pair.effort, Meaning::Effort(bond), pair.effort_in.clone());
-        self.mean(pair.flow, Meaning::Flow(bond), pair.flow_in.clone());
+    /// A new bond between two elements, with the dimensions of a 1-junction at one of its ends.
+    fn new_bond(&mut self, structure: &mut Structure, from: (ElementId, &str), to: (ElementId, &str), span: Span) {
+        let bond = BondId::new(structure.bonds.len());
+        let like = [from.0, to.0].into_iter().find_map(|element| structure.variables_of_one(element));
+        let pair = self.internal_pair(bond, like.unwrap_or((self.time, self.time)));
+        structure.join(from, to, pair, span);
     }
-}
-
-fn new_element(graph: &mut BondGraph, name: String, kind: Kind, span: Span, label: String) -> ElementId {
-    graph.elements.push(Element { name, kind, ports: Vec::new(), span, label })
 }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::builder::{Builder, OpenSignal, Value};
+use super::builder::{Builder, InputDraft, NamedDraft, OpenSignal, Role, SignalDraft, Value};
 use super::dimension::Quantity;
-use super::scope::{DeclId, DeclKind, Node, ScopeId};
+use super::scope::{self, DeclId, DeclKind, ScopeId};
 use super::value::Reading;
-use super::{Input, IntegratedSignal, Meaning, Named, Parameter, ParameterKind};
-use crate::algebra::{Expr, Facts};
+use super::{InputId, Meaning, Parameter, ParameterKind};
+use crate::algebra::{Expr, Facts, Node};
 use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -53,7 +53,7 @@ impl<'a> Builder<'a, '_> {
                 let declared = d.unit.and_then(|u| self.unit(u)).map(|u| u.dim);
                 let dimension = declared.or_else(|| default.and_then(dimension_of_number));
                 let quantity = dimension.map_or(Quantity::Any, Quantity::of);
-                (Meaning::Input(super::InputId::new(self.inputs.len())), quantity)
+                (Meaning::Input(InputId::new(self.inputs.len())), quantity)
             }
             DeclKind::State(_) => {
                 let quantity = match d.unit.and_then(|u| self.unit(u)) {
@@ -66,23 +66,16 @@ impl<'a> Builder<'a, '_> {
         };
         let symbol = self.fresh(&d.name, Facts::default());
         self.mean(symbol, meaning, quantity.clone());
-        let zero = self.exprs.int(0);
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         match d.kind {
             DeclKind::State(state) => {
-                let id = self.signals.push(IntegratedSignal {
-                    name: d.name.clone(),
-                    symbol,
-                    rate: zero,
-                    initial: None,
-                    unit,
-                    span: d.span,
-                });
+                let name = d.name.clone();
+                let id = self.signals.push(SignalDraft { name, symbol, rate: None, initial: None, unit, span: d.span });
                 self.open_signals.push(OpenSignal { id, state, decl });
             }
             _ => {
                 let (name, doc) = (d.name.clone(), d.doc.to_string());
-                self.inputs.push(Input { name, symbol, default: zero, unit, doc, span: d.span });
+                self.inputs.push(InputDraft { name, symbol, default: None, unit, doc, span: d.span });
             }
         }
         self.values[decl] = Some(Value::number(self.exprs.sym(symbol), quantity));
@@ -206,7 +199,7 @@ impl<'a> Builder<'a, '_> {
             return (!formals.contains(&first)).then(|| self.flat.names.value(scope, first)).flatten();
         }
         match self.flat.names.node(scope, path) {
-            Ok((Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
+            Ok((scope::Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
                 self.flat.names.scopes[inner].values.get(path.parts[used].name.text.as_str()).copied()
             }
             _ => None,
@@ -278,7 +271,7 @@ impl<'a> Builder<'a, '_> {
     /// A parameter of an instance that is given another parameter is that parameter.
     fn alias(&mut self, decl: DeclId, value: &Value) -> Option<Value> {
         let d = &self.flat.names.decls[decl];
-        let is_symbol = matches!(self.exprs.node(value.expr), crate::algebra::Node::Symbol(_));
+        let is_symbol = matches!(self.exprs.node(value.expr), Node::Symbol(_));
         let inside = d.name.contains('.');
         (inside && is_symbol).then(|| self.with_unit(value.clone(), d.unit, d.span))
     }
@@ -292,6 +285,7 @@ impl<'a> Builder<'a, '_> {
             Some(Meaning::Time) => "time",
             Some(Meaning::Input(_)) => "an input",
             Some(Meaning::Signal(_) | Meaning::Held(_)) => "a signal",
+            _ if self.role(other) == Some(Role::Reaction) => "a variable of a constraint",
             _ => "a variable of an element",
         };
         let name = self.exprs.name(other).to_string();
@@ -321,17 +315,24 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn input_default(&mut self, decl: DeclId, value: Option<&'a ast::Expr>) {
-        let Some(e) = value else { return };
+        let Some(id) = self.values[decl].as_ref().and_then(|v| self.input_of(v.expr)) else { return };
+        let Some(e) = value else {
+            self.inputs[id].default = Some(self.exprs.int(0));
+            return;
+        };
         let d = &self.flat.names.decls[decl];
         let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
         if !self.only_parameters(value.expr, e.span, "the default of an input") {
             return;
         }
-        let value = self.with_unit(value, d.unit, e.span);
-        let symbol = self.values[decl].as_ref().map(|v| v.expr);
-        let found = self.inputs.iter_mut().find(|(_, i)| i.name == d.name);
-        if let (Some((_, input)), Some(_)) = (found, symbol) {
-            input.default = value.expr;
+        self.inputs[id].default = Some(self.with_unit(value, d.unit, e.span).expr);
+    }
+
+    fn input_of(&self, value: Expr) -> Option<InputId> {
+        let Node::Symbol(symbol) = *self.exprs.node(value) else { return None };
+        match self.meaning(symbol)? {
+            Meaning::Input(id) => Some(id),
+            _ => None,
         }
     }
 
@@ -342,9 +343,9 @@ impl<'a> Builder<'a, '_> {
         let value = self.with_unit(value, d.unit, e.span);
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
-        self.named_quantities.insert(name.clone(), value.quantity.clone());
         let unit_is_written = unit.is_some();
-        let named = Named { name, value: value.expr, unit, unit_is_written, doc, span: d.span };
+        let quantity = value.quantity.clone();
+        let named = NamedDraft { name, value: value.expr, unit, unit_is_written, quantity, doc, span: d.span };
         if output {
             self.outputs.push(named)
         } else {
@@ -383,7 +384,7 @@ impl<'a> Builder<'a, '_> {
             if let Some(rate) = self.number(&cx, &open.state.rate) {
                 let per_second = own.over(&Quantity::of(Dim::SECOND));
                 self.equal(&rate.quantity, &per_second, open.state.rate.span, "the rate and the signal over time");
-                self.signals[open.id].rate = rate.expr;
+                self.signals[open.id].rate = Some(rate.expr);
             }
             let Some(start) = &open.state.start else { continue };
             if let Some(value) = self.number(&cx, start)
@@ -403,10 +404,12 @@ impl<'a> Builder<'a, '_> {
         let mut known = BTreeMap::new();
         let mut left: Vec<_> = asked.into_iter().collect();
         while !left.is_empty() {
-            let before = left.len();
+            let before = known.len();
             let mut later = Vec::new();
             for (symbol, id) in left {
-                let rate = self.exprs.substitute(self.signals[id].rate, &known);
+                // One without a rate is at fault, which has been said.
+                let Some(rate) = self.signals[id].rate else { continue };
+                let rate = self.exprs.substitute(rate, &known);
                 let open = self.exprs.depends_on_any(rate, &|s| self.rate_symbols.contains_key(&s));
                 if open {
                     later.push((symbol, id));
@@ -414,7 +417,7 @@ impl<'a> Builder<'a, '_> {
                     known.insert(symbol, rate);
                 }
             }
-            if later.len() == before {
+            if known.len() == before && !later.is_empty() {
                 self.rates_in_a_circle(&later);
                 break;
             }

@@ -1,7 +1,7 @@
 //! What names in expressions stand for.
 
 use super::Meaning;
-use super::builder::{Builder, Value};
+use super::builder::{Builder, Role, Value};
 use super::dimension::Quantity;
 use super::flatten::Word;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
@@ -385,17 +385,17 @@ impl<'a> Builder<'a, '_> {
 
     /// The rate of a symbol; the inner `None` if it is constant.
     fn symbol_rate(&mut self, symbol: Symbol, span: Span) -> Option<Option<Expr>> {
-        let rate = match self.meaning(symbol)? {
-            Meaning::Parameter(_) => return Some(None),
-            Meaning::Time => return Some(Some(self.exprs.int(1))),
-            Meaning::Stored(port) => {
+        let rate = match self.role(symbol)? {
+            Role::Known(Meaning::Parameter(_)) => return Some(None),
+            Role::Known(Meaning::Time) => return Some(Some(self.exprs.int(1))),
+            Role::Known(Meaning::Stored(port)) => {
                 let wire = self.wire_at(port.element.0 as usize, port.port as usize)?;
                 match self.part(port.element.0 as usize).word {
                     Word::I => self.pairs[wire].effort,
                     _ => self.pairs[wire].flow,
                 }
             }
-            Meaning::Held(_) => {
+            Role::Known(Meaning::Held(_)) => {
                 self.fault(
                     Diagnostic::error(
                         codes::L004,

@@ -6,6 +6,7 @@
 //! held signals, and the effort, flow and stored quantity of bonds and ports. What the modeller wrote as `R1.f` is the
 //! flow of the bond at `R1`; `w.f` of a 1-junction is the flow of any of its bonds.
 
+mod assemble;
 mod blocks;
 mod builder;
 mod common;
@@ -15,6 +16,7 @@ mod decls;
 mod dimension;
 mod elaborate;
 mod elements;
+mod expressions;
 mod files;
 mod flatten;
 mod guesses;
@@ -26,6 +28,7 @@ mod overrides;
 mod print;
 mod recognise;
 mod scope;
+mod structure;
 mod symbols;
 mod two_ports;
 mod value;

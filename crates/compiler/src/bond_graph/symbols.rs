@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::Meaning;
-use super::builder::{Builder, Pair};
+use super::builder::{Builder, Pair, Role};
 use super::dimension::Quantity;
 use super::flatten::Word;
 use crate::algebra::Facts;
@@ -81,9 +81,8 @@ impl Builder<'_, '_> {
             let name = format!("{}{}", self.flat.names.scopes[*scope].prefix, c.name.text);
             let effort = self.fresh(&format!("{name}.e"), Facts::default());
             let flow = self.fresh(&format!("{name}.f"), Facts::default());
-            // The bond is not known yet; its place is filled in when the constraint is built.
-            self.mean(effort, Meaning::Time, Quantity::Any);
-            self.mean(flow, Meaning::Time, Quantity::Any);
+            self.play(effort, Role::Reaction, Quantity::Any);
+            self.play(flow, Role::Reaction, Quantity::Any);
             self.reactions.push(Pair { effort, flow, effort_in: Quantity::Any, flow_in: Quantity::Any });
         }
     }

@@ -127,10 +127,7 @@ fn symbols(graph: &BondGraph) -> Result<(), String> {
         Some(symbol) => Err(format!("{} reads `{}`, which means nothing", what(), graph.exprs.name(symbol))),
         None => Ok(()),
     };
-    let mut copy = graph.clone();
-    let mut all = Vec::new();
-    copy.for_each_expr(&mut |e| all.push(*e));
-    for e in all {
+    for e in graph.expressions() {
         check(e, &|| "an expression".to_string())?;
     }
     for p in graph.parameters.values() {

@@ -38,9 +38,7 @@ fn isolated_parts(graph: &BondGraph) -> Vec<Diagnostic> {
     }
     let mut reads = Reads { graph, sets };
     for (id, element) in graph.elements.iter() {
-        let mut exprs = Vec::new();
-        element.kind.clone().for_each_expr(&mut |e| exprs.push(*e));
-        exprs.into_iter().for_each(|e| reads.by(id.index(), e));
+        element.kind.expressions().into_iter().for_each(|e| reads.by(id.index(), e));
     }
     let elements = graph.elements.len();
     for (id, signal) in graph.signals.iter() {

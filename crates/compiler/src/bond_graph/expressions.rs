@@ -1,0 +1,59 @@
+//! The expressions of a graph, visited always in the same order.
+
+use super::{BondGraph, Kind, ResistorLaw, Storage, StorageLaw};
+use crate::algebra::Expr;
+
+impl BondGraph {
+    /// The expressions of laws, signals, named values, constraints and guesses.
+    pub(super) fn expressions(&self) -> Vec<Expr> {
+        let mut all: Vec<Expr> = self.elements.values().flat_map(|e| e.kind.expressions()).collect();
+        all.extend(self.signals.values().flat_map(|s| std::iter::once(s.rate).chain(s.initial)));
+        all.extend(self.held.values().map(|h| h.source));
+        all.extend(self.lets.iter().chain(&self.outputs).map(|n| n.value));
+        all.extend(self.constraints.iter().flat_map(|c| [c.expr, c.multiplier]));
+        all.extend(self.guesses.iter().flat_map(|g| [g.what, g.value]));
+        all
+    }
+}
+
+impl Kind {
+    /// The expressions of the element.
+    pub(super) fn expressions(&self) -> Vec<Expr> {
+        let mut all = Vec::new();
+        self.clone().for_each_expr(&mut |e| all.push(*e));
+        all
+    }
+
+    /// Visits every expression of the element.
+    pub(super) fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        match self {
+            Kind::Zero | Kind::One | Kind::EffortDetector | Kind::FlowDetector => {}
+            Kind::EffortSource { value: e } | Kind::FlowSource { value: e } | Kind::ZeroCompliance { flow: e } => {
+                visit(e)
+            }
+            Kind::Transformer { modulus: e } | Kind::Gyrator { modulus: e } => visit(e),
+            Kind::ResidualEffort { residual } | Kind::ResidualFlow { residual } => residual.iter_mut().for_each(visit),
+            Kind::Inertance(s) | Kind::Compliance(s) => s.for_each_expr(visit),
+            Kind::Resistor(laws) => laws.iter_mut().for_each(|law| match law {
+                ResistorLaw::Resistive(e) | ResistorLaw::Conductive(e) | ResistorLaw::Implicit(e) => {
+                    visit(e);
+                }
+            }),
+        }
+    }
+}
+
+impl Storage {
+    fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        for law in &mut self.laws {
+            match law {
+                StorageLaw::Integral(e) | StorageLaw::Derivative(e) | StorageLaw::Implicit(e) => visit(e),
+                StorageLaw::Known { displacement, law } => {
+                    visit(displacement);
+                    visit(law);
+                }
+            }
+        }
+        self.energy.iter_mut().for_each(visit);
+    }
+}
