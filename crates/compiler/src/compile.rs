@@ -1,7 +1,9 @@
 //! The chain of stages.
 
 use crate::ast::parse;
-use crate::bond_graph::{self, BondGraph, Files, Override, elaborate};
+use std::sync::Arc;
+
+use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate};
 use crate::causal_graph::{self, CausalGraph, assign_causality};
 use crate::diagnostic::{Diagnostics, Sources, render};
 use crate::equations::{Equations, Form, derive_equations};
@@ -36,6 +38,8 @@ pub struct Found {
     pub diagnostics: Diagnostics,
     /// The files of the model.
     pub sources: Sources,
+    /// The names that they declare, and where they are used.
+    pub names: Arc<Vec<Name>>,
 }
 
 /// From model text to what is evaluated.
@@ -64,7 +68,8 @@ pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
     let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
     diagnostics.0.extend(elaborated.diagnostics.0);
-    let mut found = Found { diagnostics, sources: elaborated.sources };
+    let names = Arc::new(elaborated.names);
+    let mut found = Found { diagnostics, sources: elaborated.sources, names };
     match elaborated.graph {
         Some(ir) if !found.diagnostics.has_errors() => {
             found.diagnostics.0.extend(bond_graph::warnings(&ir));

@@ -62,6 +62,7 @@ pub use draw::{NamedRuns, Picture};
 pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
 pub use error::{Error, Problem};
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
+pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;
 pub use halfarrow_compiler::equations::Form;
@@ -78,7 +79,7 @@ pub use linearize::{
 };
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};
-pub use names::{Name, NameKind, Place};
+pub use names::{Name, Place};
 pub use quantity::{duration, frequency};
 #[cfg(feature = "real_time")]
 pub use real_time::{Durations, Feed, RealTimeReport, RealTimeRun};

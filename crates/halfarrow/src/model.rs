@@ -141,7 +141,7 @@ pub fn format_text(name: &str, text: &str) -> Result<String, Error> {
     ast::format(text).map_err(|errors| {
         let mut sources = Sources::new();
         sources.add(name, text);
-        Error::Model(Found { diagnostics: Diagnostics(errors), sources })
+        Error::Model(Found { diagnostics: Diagnostics(errors), sources, ..Found::default() })
     })
 }
 

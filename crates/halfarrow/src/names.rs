@@ -1,35 +1,14 @@
-//! The names of a model: where each is declared, and who reads it.
+//! The names of a model: where each is declared, where the text uses it, and who reads it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::{Expr, Symbol};
-use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind, ResistorLaw, Storage, StorageLaw};
-use halfarrow_compiler::span::Span;
-use serde::Serialize;
+use halfarrow_compiler::bond_graph::{self, BondGraph, Element, Kind, NameKind, ResistorLaw, Storage, StorageLaw};
+use halfarrow_compiler::diagnostic::Sources;
+use halfarrow_compiler::span::{FileId, Span};
+use serde::{Serialize, Serializer};
 
 use crate::model::Model;
-
-/// What a name stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NameKind {
-    /// A parameter.
-    Parameter,
-    /// A constant.
-    Constant,
-    /// An input.
-    Input,
-    /// A signal that is integrated.
-    State,
-    /// A named expression.
-    Let,
-    /// An output.
-    Output,
-    /// An element or a junction.
-    Element,
-    /// A bond that has a name.
-    Bond,
-}
 
 /// A name of a model. Names within components stand with those of their instances before them: `motor.coil`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,12 +16,23 @@ pub struct Name {
     /// The name.
     pub name: String,
     /// What it stands for.
+    #[serde(serialize_with = "word")]
     pub kind: NameKind,
-    /// Where it is declared.
+    /// Where it is declared: the place of the name alone. What a component declares is declared there for each of its
+    /// instances; a file is declared by its beginning.
     pub declared: Place,
+    /// Where the text uses it, in the order of the files and of their text: the places of the name alone, without what
+    /// stands before and behind the dots. A place inside a component is one of each instance's name that it means there.
+    /// Components that nothing instantiates use nothing; the arguments of functions are no names of the model.
+    pub uses: Vec<Place>,
     /// Whose values or laws read it, by name: of a parameter or signal itself, of an element one of its variables. A `let` is
-    /// written out where it stands: what it reads is read there.
+    /// written out where it stands: what it reads is read there. A parameter of an instance that is given another one whole
+    /// is that one, which is read in its place.
     pub read_by: Vec<String>,
+}
+
+fn word<S: Serializer>(kind: &NameKind, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(kind.word())
 }
 
 /// A place in the text of a model.
@@ -60,8 +50,8 @@ pub struct Place {
     pub end: usize,
 }
 
-/// A name with what it gives others to read, and what it reads.
-struct NamedItem<'g> {
+/// What a name gives others to read, and what it reads.
+struct Reader<'g> {
     name: &'g str,
     kind: NameKind,
     span: Span,
@@ -70,61 +60,125 @@ struct NamedItem<'g> {
 }
 
 impl Model {
-    /// All names, those of one kind in the order of the text.
+    /// All names, those of one kind in the order of the text, with the places that use them. Behind those of a kind that the
+    /// text declares stand those that it implies: the states of `pid` and `tf`, and the elements that make up a constraint;
+    /// their places are those of what they were made for, and no text uses them.
+    ///
+    /// ```
+    /// use halfarrow::{Model, NameKind};
+    /// let text = "model Drop\nparam m = 2 kg\nSe:weight(9.81*m) -> I:mass(m)\noutput v = mass.f\n";
+    /// let names = Model::from_text("drop.bond", text, &[])?.names();
+    /// let m = names.iter().find(|n| n.name == "m").unwrap();
+    /// assert_eq!((m.kind, m.declared.line), (NameKind::Parameter, 2));
+    /// let uses: Vec<(usize, usize)> = m.uses.iter().map(|place| (place.line, place.column)).collect();
+    /// assert_eq!(uses, [(3, 16), (3, 29)]);
+    /// # Ok::<(), halfarrow::Error>(())
+    /// ```
     pub fn names(&self) -> Vec<Name> {
-        let entries = entries(&self.graph);
-        let named = |entry: &NamedItem| {
-            let reads = |other: &&NamedItem| {
-                other.name != entry.name && entry.symbols.iter().any(|symbol| other.reads.contains(symbol))
-            };
-            Name {
-                name: entry.name.to_string(),
-                kind: entry.kind,
-                declared: self.place(entry.span),
-                read_by: entries.iter().filter(reads).map(|other| other.name.to_string()).collect(),
-            }
-        };
-        entries.iter().map(named).collect()
-    }
-
-    fn place(&self, span: Span) -> Place {
-        let sources = &self.found.sources;
-        let (line, column) = sources.line_column(span);
-        let (start, end) = (span.start as usize, span.end as usize);
-        Place { file: sources.name(span.file).to_string(), line, column, start, end }
+        let readers = readers(&self.graph);
+        let by_name: BTreeMap<(bool, &str), usize> =
+            readers.iter().enumerate().map(|(at, r)| ((r.kind.is_value(), r.name), at)).collect();
+        let read_by = read_by(&readers);
+        let places = Places::of(&self.found.sources);
+        let mut told = vec![false; readers.len()];
+        let mut all = Vec::with_capacity(self.found.names.len());
+        for bond_graph::Name { name, kind, declared, uses } in self.found.names.iter() {
+            let reader = by_name.get(&(kind.is_value(), name.as_str())).copied();
+            reader.into_iter().for_each(|at| told[at] = true);
+            all.push(Name {
+                name: name.clone(),
+                kind: *kind,
+                declared: declared.map_or_else(|| beginning_of(name), |span| places.place(span)),
+                uses: uses.iter().map(|span| places.place(*span)).collect(),
+                read_by: reader.map_or_else(Vec::new, |at| read_by[at].clone()),
+            });
+        }
+        for (at, reader) in readers.iter().enumerate().filter(|(at, _)| !told[*at]) {
+            let (name, declared) = (reader.name.to_string(), places.place(reader.span));
+            all.push(Name { name, kind: reader.kind, declared, uses: Vec::new(), read_by: read_by[at].clone() });
+        }
+        all.sort_by_key(|name| name.kind);
+        all
     }
 }
 
-fn entries(graph: &BondGraph) -> Vec<NamedItem<'_>> {
+/// The place that stands for a whole file.
+fn beginning_of(file: &str) -> Place {
+    Place { file: file.to_string(), line: 1, column: 1, start: 0, end: 0 }
+}
+
+/// Places of spans, with the lines of all files known.
+struct Places<'s> {
+    sources: &'s Sources,
+    /// Where the lines of each file begin.
+    lines: Vec<Vec<usize>>,
+}
+
+impl<'s> Places<'s> {
+    fn of(sources: &'s Sources) -> Places<'s> {
+        let begin = |text: &str| std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Places { sources, lines: sources.texts().map(begin).collect() }
+    }
+
+    fn place(&self, span: Span) -> Place {
+        let FileId(file) = span.file;
+        let (start, end) = (span.start as usize, span.end as usize);
+        let lines = &self.lines[file as usize];
+        let line = lines.partition_point(|begin| *begin <= start);
+        let before = &self.sources.text(span.file)[lines[line - 1]..start];
+        let (file, column) = (self.sources.name(span.file).to_string(), 1 + before.chars().count());
+        Place { file, line, column, start, end }
+    }
+}
+
+/// For each of them those that read one of its symbols, itself left out.
+fn read_by(readers: &[Reader]) -> Vec<Vec<String>> {
+    let mut readers_of: BTreeMap<Symbol, Vec<usize>> = BTreeMap::new();
+    for (at, reader) in readers.iter().enumerate() {
+        reader.reads.iter().for_each(|symbol| readers_of.entry(*symbol).or_default().push(at));
+    }
+    let names = |own: usize| {
+        let all = readers[own].symbols.iter().filter_map(|symbol| readers_of.get(symbol)).flatten();
+        let others: BTreeSet<usize> = all.copied().filter(|at| *at != own).collect();
+        others.into_iter().map(|at| readers[at].name.to_string()).collect()
+    };
+    (0..readers.len()).map(names).collect()
+}
+
+fn readers(graph: &BondGraph) -> Vec<Reader<'_>> {
     let symbols = |exprs: &[Expr]| exprs.iter().flat_map(|e| graph.exprs.symbols_of(*e)).collect();
-    let entry = |name, kind, span, own: &[Symbol], exprs: &[Expr]| NamedItem {
+    let reader = |name, kind, span, own: &[Symbol], exprs: &[Expr]| Reader {
         name,
         kind,
         span,
         symbols: own.to_vec(),
         reads: symbols(exprs),
     };
-    let mut all: Vec<NamedItem> = Vec::new();
+    let mut all: Vec<Reader> = Vec::new();
     all.extend(graph.parameters.values().map(|p| {
         let kind = if p.constant { NameKind::Constant } else { NameKind::Parameter };
-        entry(&p.name, kind, p.span, &[p.symbol], &[p.value])
+        reader(&p.name, kind, p.span, &[p.symbol], &[p.value])
     }));
-    all.extend(graph.inputs.values().map(|i| entry(&i.name, NameKind::Input, i.span, &[i.symbol], &[i.default])));
+    all.extend(graph.inputs.values().map(|i| reader(&i.name, NameKind::Input, i.span, &[i.symbol], &[i.default])));
     all.extend(graph.signals.values().map(|s| {
         let reads: Vec<Expr> = std::iter::once(s.rate).chain(s.initial).collect();
-        entry(&s.name, NameKind::State, s.span, &[s.symbol], &reads)
+        reader(&s.name, NameKind::State, s.span, &[s.symbol], &reads)
     }));
-    all.extend(graph.lets.iter().map(|l| entry(&l.name, NameKind::Let, l.span, &[], &[l.value])));
-    all.extend(graph.outputs.iter().map(|o| entry(&o.name, NameKind::Output, o.span, &[], &[o.value])));
+    all.extend(graph.lets.iter().map(|l| reader(&l.name, NameKind::Let, l.span, &[], &[l.value])));
+    all.extend(graph.outputs.iter().map(|o| reader(&o.name, NameKind::Output, o.span, &[], &[o.value])));
     all.extend(
-        graph
-            .elements
-            .values()
-            .map(|e| entry(&e.name, NameKind::Element, e.span, &variables(graph, e), &laws(&e.kind))),
+        graph.elements.values().map(|e| reader(&e.name, kind_of(e), e.span, &variables(graph, e), &laws(&e.kind))),
     );
     let bonds = graph.bonds.values().filter(|b| !b.name.is_empty());
-    all.extend(bonds.map(|b| entry(&b.name, NameKind::Bond, b.span, &[b.effort, b.flow], &[])));
+    all.extend(bonds.map(|b| reader(&b.name, NameKind::Bond, b.span, &[b.effort, b.flow], &[])));
     all
+}
+
+fn kind_of(element: &Element) -> NameKind {
+    match element.kind {
+        Kind::Zero | Kind::One => NameKind::Junction,
+        _ => NameKind::Element,
+    }
 }
 
 /// The variables of an element: of its bonds and of what it stores. Those of a junction belong to its bonds' other ends.

@@ -59,7 +59,7 @@ impl Stage {
                 let parsed = ast::parse(sources.text(file), file);
                 let diagnostics = Diagnostics(parsed.diagnostics);
                 match diagnostics.has_errors() {
-                    true => Err(Error::Model(Found { diagnostics, sources })),
+                    true => Err(Error::Model(Found { diagnostics, sources, ..Found::default() })),
                     false => Ok(parsed.ast.to_string()),
                 }
             }

@@ -30,6 +30,8 @@ mod faults_strokes;
 mod forms;
 #[path = "linearize.rs"]
 mod linearize;
+#[path = "names.rs"]
+mod names;
 #[path = "report.rs"]
 mod report;
 #[path = "sweep.rs"]

@@ -11,6 +11,7 @@ use crate::ast::{self, Arg, Call, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 use crate::unit::Dimension as Dim;
+use std::rc::Rc;
 
 /// The time constant of the filter of a `pid` is by default `kd/(10*kp)`.
 const FILTER_RATIO: i64 = 10;
@@ -308,8 +309,9 @@ impl<'a> Builder<'a, '_> {
         };
         let interpolation = self.word(call, "interpolation", &["linear", "cubic", "step"])?;
         let outside = self.word(call, "outside", &["error", "clamp", "extrapolate"])?;
-        let columns = self.columns(path, file.value.span)?;
-        let column = self.column(call, &columns, span)?;
+        let table = self.columns(path, file.value.span)?;
+        let columns = &table.columns;
+        let column = self.column(call, columns, span)?;
         let interpolation = [Interpolation::Linear, Interpolation::Cubic, Interpolation::Step][interpolation];
         let outside = [Outside::Error, Outside::Clamp, Outside::Extrapolate][outside];
         match Table1d::new(columns.columns[0].clone(), columns.columns[column].clone(), interpolation, outside) {
@@ -352,16 +354,25 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The columns of a file, read once.
-    fn columns(&mut self, path: &str, span: Span) -> Option<csv::Columns> {
+    fn columns(&mut self, path: &str, span: Span) -> Option<Rc<csv::Table>> {
         let from = self.sources.name(span.file).to_string();
         let key = format!("{from}\n{path}");
-        if let Some(known) = self.csv.get(&key) {
-            return known.clone();
+        if let Some(known) = self.csv.get(&key).cloned() {
+            if let Some(known) = &known {
+                self.uses.tables.push((known.path.clone(), span));
+            }
+            return known;
         }
         let read = read_beside(self.files, &from, path).map_err(|why| (why.to_string(), why.remedy().to_string()));
-        let parse = |text: &str| csv::parse(text).map_err(|why| (why.to_string(), FileError::NotFound.remedy().into()));
-        let columns = match read.and_then(|(_, text)| parse(&text)) {
-            Ok(columns) if columns.columns.len() > 1 => Some(columns),
+        let parse = |(path, text): (String, String)| match csv::parse(&text) {
+            Ok(columns) => Ok((path, columns)),
+            Err(why) => Err((why.to_string(), FileError::NotFound.remedy().into())),
+        };
+        let columns = match read.and_then(parse) {
+            Ok((path, columns)) if columns.columns.len() > 1 => {
+                self.uses.tables.push((path.clone(), span));
+                Some(Rc::new(csv::Table { path, columns }))
+            }
             Ok(_) => {
                 let d = Diagnostic::error(
                     codes::N020,

@@ -1,6 +1,7 @@
 //! What is known while a graph is being built: symbols, dimensions, values of names.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use rustc_hash::FxHashMap;
 
@@ -8,6 +9,7 @@ use super::common::representatives;
 use super::dimension::{Clash, Dimensions, Quantity, Reason};
 use super::files::Files;
 use super::flatten::{Flat, Part};
+use super::names::Uses;
 use super::scope::DeclId;
 use super::wire::Wiring;
 use super::{BondId, ElementId, HeldId, HeldKind, InputId, Meaning, Parameter, ParameterId, PortRef, SignalId};
@@ -183,7 +185,9 @@ pub(super) struct Builder<'a, 'f> {
     /// Whether a bond carries no power.
     pub pseudo: Vec<bool>,
     /// Columns of the tables that were read.
-    pub csv: FxHashMap<String, Option<super::csv::Columns>>,
+    pub csv: FxHashMap<String, Option<Rc<super::csv::Table>>>,
+    /// Where names are read.
+    pub uses: Uses,
     pub time: Symbol,
 }
 
@@ -224,6 +228,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             rate_symbols: FxHashMap::default(),
             pseudo: Vec::new(),
             csv: FxHashMap::default(),
+            uses: Uses::default(),
             time,
         };
         b.mean(time, Meaning::Time, Quantity::Any);

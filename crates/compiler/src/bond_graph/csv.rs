@@ -9,6 +9,13 @@ pub(super) struct Columns {
     pub columns: Vec<Vec<f64>>,
 }
 
+/// A table, and the path under which it was found.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub path: String,
+    pub columns: Columns,
+}
+
 /// Why a text is no table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum CsvError {

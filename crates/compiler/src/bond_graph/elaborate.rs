@@ -8,6 +8,7 @@ use super::constraint::Relation;
 use super::files::Files;
 use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
+use super::names::{self, Name, Uses};
 use super::overrides::{self, Override};
 use super::wire::{Wiring, wire};
 use super::{BondGraph, ForcedCausality, ForcedStroke, Guess, Kind, Preference, verify};
@@ -20,6 +21,8 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
 pub struct Elaborated {
     /// The graph, if there is no error.
     pub graph: Option<BondGraph>,
+    /// The names that the text declares, and where it uses them; as far as they are known, also if there are errors.
+    pub names: Vec<Name>,
     /// All faults of this stage, and of the syntax of imported files, in the order of the text.
     pub diagnostics: Diagnostics,
     /// The texts of the model: the main file, what it imports, and the overrides.
@@ -42,7 +45,7 @@ pub struct Elaborated {
 /// assert_eq!(result.graph.unwrap().bonds.len(), 1);
 /// ```
 pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: &[Override]) -> Elaborated {
-    let Loaded { files: trees, mut faults } = load(main, &mut sources, files);
+    let Loaded { files: trees, imports, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
     let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
     let mut flat = flatten::flatten(&trees);
@@ -50,7 +53,7 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     overrides::apply(&given, &mut flat, &mut faults);
     let mut wiring = wire(&flat);
     faults.append(&mut wiring.faults);
-    let (graph, more) =
+    let Built { graph, faults: more, uses } =
         build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &title, &BTreeSet::new());
     faults.extend(more);
     faults.extend(graph.iter().flat_map(super::guesses::idle));
@@ -59,8 +62,8 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     if let Some(graph) = &graph {
         debug_assert_eq!(verify(graph), Ok(()), "{}", graph.name);
     }
-    drop(flat);
-    Elaborated { graph, diagnostics: Diagnostics(faults), sources }
+    let names = names::table(&trees[0], &flat, uses, &imports, &sources);
+    Elaborated { graph, names, diagnostics: Diagnostics(faults), sources }
 }
 
 /// Brings faults into the order of the text, each once.
@@ -79,7 +82,7 @@ fn build(
     faulty: bool,
     title: &Title,
     parted: &BTreeSet<usize>,
-) -> (Option<BondGraph>, Vec<Diagnostic>) {
+) -> Built {
     let mut b = Builder::new(flat, wiring, sources, files);
     b.make_symbols(parted);
     b.later = Some(Vec::new());
@@ -105,10 +108,10 @@ fn build(
     }
     b.forgive_unwritten_units();
     if faulty || b.incomplete || !b.faults.is_empty() {
-        return (None, b.faults);
+        return Built { graph: None, faults: b.faults, uses: b.uses };
     }
-    let faults = std::mem::take(&mut b.faults);
-    (finished(b, title, kinds, asked, &relations, &rates), faults)
+    let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
+    Built { graph: finished(b, title, kinds, asked, &relations, &rates), faults, uses }
 }
 
 /// The graph of what has been read without a fault; `None` if something is missing nevertheless.
@@ -128,6 +131,13 @@ fn finished(
     let (lets, outputs) = (b.whole_named(lets), b.whole_named(outputs));
     let laws = Laws { structure, signals, held, lets, outputs, constraints };
     b.assemble(title, asked, laws, [rates, &repeated])
+}
+
+/// What building has given.
+struct Built {
+    graph: Option<BondGraph>,
+    faults: Vec<Diagnostic>,
+    uses: Uses,
 }
 
 /// What a model is called.

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::names::{Used, Uses};
 use super::scope::{Decl, DeclKind, Names, Node, Scope, ScopeId};
 use crate::ast::{self, StatementKind};
 use crate::diagnostic::nearest;
@@ -163,6 +164,8 @@ pub(super) struct Flat<'a> {
     pub guesses: Vec<(ScopeId, &'a ast::Guess)>,
     pub constraints: Vec<(ScopeId, &'a ast::Constraint, Span)>,
     pub faults: Vec<Diagnostic>,
+    /// Where names are used that say what there is and how it is joined.
+    pub uses: Uses,
     chains: Vec<(ScopeId, &'a ast::Chain, bool)>,
     full: bool,
 }
@@ -220,13 +223,14 @@ impl<'a> Flat<'a> {
             self.faults.push(Diagnostic::error(codes::N003, title, c.name.span, "here").hint("use another name"));
         }
         match self.names.scopes[scope].components.get(name) {
-            Some(first) => self.faults.push(
+            Some(&first) => self.faults.push(
                 Diagnostic::error(codes::N002, format!("component `{name}` is declared twice"), c.name.span, "again")
-                    .also(first.name.span, "declared first")
+                    .also(self.names.components[first].1.name.span, "declared first")
                     .hint("give one of them another name"),
             ),
             None => {
-                self.names.scopes[scope].components.insert(name, c);
+                self.names.scopes[scope].components.insert(name, self.names.components.len());
+                self.names.components.push((scope, c));
             }
         }
     }
@@ -402,9 +406,11 @@ impl<'a> Flat<'a> {
 
     /// Makes a scope for an instance of a component and fills it.
     fn instance(&mut self, scope: ScopeId, element: &'a ast::Element, pseudo: bool) {
-        let Some((component, written)) = self.names.component(scope, &element.kind.text) else {
+        let Some(used) = self.names.component(scope, &element.kind.text) else {
             return self.unknown_kind(scope, element);
         };
+        self.uses.add(Used::Component(used), element.kind.span);
+        let (written, component) = self.names.components[used];
         if let Some(fault) = self.endless(scope, component, element) {
             self.faults.push(fault);
             self.place(scope, &element.name, Node::Broken);
@@ -529,6 +535,7 @@ impl<'a> Flat<'a> {
             };
             self.declare_reading(id, reads, &d.name, kind, d.unit.as_ref(), d.doc.as_ref());
         }
+        self.labels_use(id, element);
         for d in component.outs.iter().filter(|d| d.value.is_some()) {
             self.declare(id, &d.name, DeclKind::Let(d.value.as_ref()), d.unit.as_ref(), d.doc.as_ref());
         }
@@ -536,6 +543,15 @@ impl<'a> Flat<'a> {
             let joint = self.joints.len();
             self.joints.push(Joint { instance: id, name: &d.name });
             self.place(id, &d.name, Node::Joint(joint));
+        }
+    }
+
+    /// The label of an argument names what the instance declares.
+    fn labels_use(&mut self, id: ScopeId, element: &ast::Element) {
+        for label in element.args.iter().filter_map(|a| a.label.as_ref()) {
+            if let Some(&decl) = self.names.scopes[id].values.get(label.name.text.as_str()) {
+                self.uses.add(Used::Value(decl), label.name.span);
+            }
         }
     }
 
@@ -551,7 +567,9 @@ impl<'a> Flat<'a> {
     /// Says which outputs of a component have no value.
     fn check_outs(&mut self, id: ScopeId, component: &'a ast::Component) {
         for d in component.outs.iter().filter(|d| d.value.is_none()) {
-            if !self.names.scopes[id].values.contains_key(d.name.text.as_str()) {
+            if let Some(&decl) = self.names.scopes[id].values.get(d.name.text.as_str()) {
+                self.uses.add(Used::Value(decl), d.name.span);
+            } else {
                 let title =
                     format!("component `{}` gives no value to its output `{}`", component.name.text, d.name.text);
                 let fault = Diagnostic::error(codes::N009, title, d.name.span, "declared here")
@@ -629,7 +647,10 @@ impl<'a> Flat<'a> {
         match node {
             Node::Part(part) => self.named_port(part, port),
             Node::Instance(inner) => match self.names.scopes[inner].nodes.get(port.text.as_str()) {
-                Some(&(Node::Joint(joint), _)) => At::Outside(joint),
+                Some(&(Node::Joint(joint), _)) => {
+                    self.uses.add(Used::Node(Node::Joint(joint)), port.span);
+                    At::Outside(joint)
+                }
                 _ => At::Broken,
             },
             _ => At::Broken,
@@ -662,7 +683,7 @@ impl<'a> Flat<'a> {
 
     /// What a path stands for as the end of a bond.
     fn named_end(&mut self, scope: ScopeId, path: &'a ast::Path) -> At {
-        let (node, used) = match self.names.node(scope, path) {
+        let (node, used) = match self.names.walk(scope, path, &mut |node, span| self.uses.add(Used::Node(node), span)) {
             Ok(found) => found,
             Err(fault) => {
                 self.faults.push(*fault);

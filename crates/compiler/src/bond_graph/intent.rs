@@ -2,6 +2,7 @@
 
 use super::builder::Builder;
 use super::flatten::Word;
+use super::names::Used;
 use super::scope::{Node, ScopeId};
 use super::{ForcedCausality, ForcedStroke, PortCausality, PortRef, Preference};
 use crate::algebra::Symbol;
@@ -29,7 +30,7 @@ impl<'a> Builder<'a, '_> {
 
     /// A dotted name as a node and the names that follow it.
     fn node_of(&mut self, scope: ScopeId, path: &'a ast::Path) -> Option<(Node, Vec<&'a ast::Name>)> {
-        match self.flat.names.node(scope, path) {
+        match self.flat.names.walk(scope, path, &mut |node, span| self.uses.add(Used::Node(node), span)) {
             Ok((node, used)) => Some((node, path.parts[used..].iter().map(|p| &p.name).collect())),
             Err(fault) => {
                 self.fault(*fault);
@@ -243,7 +244,10 @@ impl<'a> Builder<'a, '_> {
 
     fn bond_named(&mut self, scope: ScopeId, name: &'a ast::Name) -> Option<usize> {
         match self.flat.names.scopes[scope].nodes.get(name.text.as_str()) {
-            Some((Node::Bond(drawn), _)) => self.wiring.of_drawn[*drawn],
+            Some(&(node @ Node::Bond(drawn), _)) => {
+                self.uses.add(Used::Node(node), name.span);
+                self.wiring.of_drawn[drawn]
+            }
             _ => {
                 let d = Diagnostic::error(
                     codes::B008,

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use super::files::{FileError, Files, read_beside};
 use crate::ast::{self, Ast, StatementKind};
 use crate::diagnostic::{Diagnostic, Sources, codes};
-use crate::span::Span;
+use crate::span::{FileId, Span};
 
 /// The greatest number of files of a model.
 const MAX_FILES: usize = 1000;
@@ -14,6 +14,8 @@ const MAX_FILES: usize = 1000;
 pub(super) struct Loaded {
     /// The trees.
     pub files: Vec<Ast>,
+    /// Where files are imported.
+    pub imports: Vec<(FileId, Span)>,
     /// Faults of imports and of the syntax of imported files.
     pub faults: Vec<Diagnostic>,
 }
@@ -27,12 +29,13 @@ pub(super) fn load(main: Ast, sources: &mut Sources, files: &dyn Files) -> Loade
         open: vec![true],
         imported_at: vec![None],
         trees: vec![main],
+        imports: Vec::new(),
         faults: Vec::new(),
     };
     let name = loader.sources.name(loader.trees[0].file).to_string();
     loader.known.insert(name, 0);
     loader.imports_of(0);
-    Loaded { files: loader.trees, faults: loader.faults }
+    Loaded { files: loader.trees, imports: loader.imports, faults: loader.faults }
 }
 
 struct Loader<'f> {
@@ -45,6 +48,7 @@ struct Loader<'f> {
     /// The import that brought the tree, and the tree that it stands in.
     imported_at: Vec<Option<(usize, Span)>>,
     trees: Vec<Ast>,
+    imports: Vec<(FileId, Span)>,
     faults: Vec<Diagnostic>,
 }
 
@@ -73,6 +77,7 @@ impl Loader<'_> {
         let name = self.sources.name(self.trees[from].file).to_string();
         let near = super::files::beside(&name, path);
         if let Some(&tree) = self.known.get(&near).or_else(|| self.known.get(path)) {
+            self.imports.push((self.trees[tree].file, span));
             self.check_circle(tree, from, span);
             return None;
         }
@@ -95,6 +100,7 @@ impl Loader<'_> {
                 self.open.push(true);
                 self.imported_at.push(Some((from, span)));
                 let tree = self.trees.len() - 1;
+                self.imports.push((file, span));
                 self.known.insert(found, tree);
                 Some(tree)
             }

@@ -4,6 +4,7 @@ use super::Meaning;
 use super::builder::{Builder, Role, Value};
 use super::dimension::Quantity;
 use super::flatten::Word;
+use super::names::Used;
 use super::scope::{DeclId, DeclKind, Node, ScopeId};
 use super::value::Reading;
 use crate::algebra::{Expr, Symbol, SymbolKind};
@@ -39,6 +40,7 @@ impl<'a> Builder<'a, '_> {
             _ => {}
         }
         if let Some(decl) = self.flat.names.value(cx.scope, text) {
+            self.uses.add(Used::Value(decl), name.span);
             return self.declared(decl, name.span);
         }
         if let Some(found) = self.own(cx, text, None, name.span) {
@@ -155,7 +157,8 @@ impl<'a> Builder<'a, '_> {
         {
             return found;
         }
-        let (node, used) = match self.flat.names.node(cx.scope, path) {
+        let visit = &mut |node, span| self.uses.add(Used::Node(node), span);
+        let (node, used) = match self.flat.names.walk(cx.scope, path, visit) {
             Ok(found) => found,
             Err(fault) => {
                 self.fault(*fault);
@@ -215,7 +218,10 @@ impl<'a> Builder<'a, '_> {
 
     fn inner_value(&mut self, inner: ScopeId, name: &ast::Name) -> Option<Value> {
         match self.flat.names.scopes[inner].values.get(name.text.as_str()) {
-            Some(&decl) => self.declared(decl, name.span),
+            Some(&decl) => {
+                self.uses.add(Used::Value(decl), name.span);
+                self.declared(decl, name.span)
+            }
             None => {
                 let names = &self.flat.names;
                 let owner = names.scopes[inner].prefix.trim_end_matches('.');

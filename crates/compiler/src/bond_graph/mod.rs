@@ -24,6 +24,7 @@ mod intent;
 mod load;
 mod lookup;
 mod measure;
+mod names;
 mod overrides;
 mod print;
 mod recognise;
@@ -38,6 +39,7 @@ mod wire;
 
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
+pub use names::{Name, NameKind};
 pub use overrides::Override;
 pub use verify::verify;
 pub use warnings::warnings;

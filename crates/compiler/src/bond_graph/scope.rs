@@ -44,6 +44,8 @@ pub(super) const FUNCTIONS: [(&str, usize, usize); 26] = [
 pub(super) type ScopeId = usize;
 /// Index of a [`Decl`].
 pub(super) type DeclId = usize;
+/// Index of a component as it is written in a scope.
+pub(super) type ComponentId = usize;
 
 /// The names of the model itself, or of one instance of a component.
 pub(super) struct Scope<'a> {
@@ -62,11 +64,11 @@ pub(super) struct Scope<'a> {
     /// Elements, instances, ports, named bonds and constraints.
     pub nodes: FxHashMap<&'a str, (Node, Span)>,
     /// Components written here.
-    pub components: FxHashMap<&'a str, &'a ast::Component>,
+    pub components: FxHashMap<&'a str, ComponentId>,
 }
 
 /// What a name of the second namespace stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Node {
     /// An element or junction: index into the parts.
     Part(usize),
@@ -140,6 +142,8 @@ pub(super) struct Names<'a> {
     pub scopes: Vec<Scope<'a>>,
     /// The declarations, in the order in which they stand.
     pub decls: Vec<Decl<'a>>,
+    /// The components, each with the scope that it is written in.
+    pub components: Vec<(ScopeId, &'a ast::Component)>,
 }
 
 impl<'a> Names<'a> {
@@ -155,12 +159,12 @@ impl<'a> Names<'a> {
         None
     }
 
-    /// The component of that name seen from a scope, and the scope in which it is written.
-    pub fn component(&self, from: ScopeId, name: &str) -> Option<(&'a ast::Component, ScopeId)> {
+    /// The component of that name seen from a scope.
+    pub fn component(&self, from: ScopeId, name: &str) -> Option<ComponentId> {
         let mut scope = Some(from);
         while let Some(s) = scope {
             if let Some(&component) = self.scopes[s].components.get(name) {
-                return Some((component, s));
+                return Some(component);
             }
             scope = self.scopes[s].parent;
         }
@@ -213,6 +217,16 @@ impl<'a> Names<'a> {
 
     /// What a dotted name stands for as far as it names nodes, and how many of its parts that took.
     pub fn node(&self, from: ScopeId, path: &ast::Path) -> Result<(Node, usize), Box<Diagnostic>> {
+        self.walk(from, path, &mut |_, _| {})
+    }
+
+    /// The same, visiting each node on the way, with the place of its name.
+    pub fn walk(
+        &self,
+        from: ScopeId,
+        path: &ast::Path,
+        visit: &mut dyn FnMut(Node, Span),
+    ) -> Result<(Node, usize), Box<Diagnostic>> {
         let mut scope = from;
         let mut at = 0;
         loop {
@@ -220,6 +234,7 @@ impl<'a> Names<'a> {
             let Some(&(node, _)) = self.scopes[scope].nodes.get(name.text.as_str()) else {
                 return Err(Box::new(self.unknown_node(scope, name, at > 0)));
             };
+            visit(node, name.span);
             at += 1;
             match node {
                 Node::Instance(inner) if at < path.parts.len() => {

@@ -2,6 +2,7 @@
 
 use super::builder::{Builder, Value};
 use super::dimension::Quantity;
+use super::names::Used;
 use super::scope::{DeclKind, FUNCTIONS, ScopeId};
 use crate::algebra::{Comparison, Expr, Function, Symbol};
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
@@ -199,6 +200,7 @@ impl<'a> Builder<'a, '_> {
         if let Some(decl) = declared
             && let DeclKind::Function(f) = self.flat.names.decls[decl].kind
         {
+            self.uses.add(Used::Value(decl), call.function.span);
             return self.call_declared(cx, decl, f, call, span);
         }
         let Some(&(_, least, most)) = FUNCTIONS.iter().find(|f| f.0 == name) else {

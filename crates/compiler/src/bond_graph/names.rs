@@ -1,0 +1,221 @@
+//! The names of a model: who declares them, who uses them.
+
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+use super::flatten::Flat;
+use super::scope::{ComponentId, DeclId, DeclKind, Node};
+use crate::ast::Ast;
+use crate::diagnostic::Sources;
+use crate::span::{FileId, Span};
+
+/// What a name stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NameKind {
+    /// The model.
+    Model,
+    /// A file that is imported.
+    File,
+    /// A file with a table.
+    Table,
+    /// A component: a type of instances.
+    Component,
+    /// A parameter.
+    Parameter,
+    /// A constant.
+    Constant,
+    /// An input.
+    Input,
+    /// A signal that is integrated.
+    State,
+    /// A named expression.
+    Let,
+    /// An output.
+    Output,
+    /// A function.
+    Function,
+    /// An element that is no junction.
+    Element,
+    /// A junction.
+    Junction,
+    /// An instance of a component.
+    Instance,
+    /// A port of an instance.
+    Port,
+    /// A bond that has a name.
+    Bond,
+    /// A constraint.
+    Constraint,
+}
+
+impl NameKind {
+    /// The kind in a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            NameKind::Model => "model",
+            NameKind::File => "file",
+            NameKind::Table => "table",
+            NameKind::Component => "component",
+            NameKind::Parameter => "parameter",
+            NameKind::Constant => "constant",
+            NameKind::Input => "input",
+            NameKind::State => "state",
+            NameKind::Let => "let",
+            NameKind::Output => "output",
+            NameKind::Function => "function",
+            NameKind::Element => "element",
+            NameKind::Junction => "junction",
+            NameKind::Instance => "instance",
+            NameKind::Port => "port",
+            NameKind::Bond => "bond",
+            NameKind::Constraint => "constraint",
+        }
+    }
+
+    /// Whether expressions name it bare; what has parts or variables is named with a dot behind it. One name may be declared
+    /// once as either.
+    pub fn is_value(self) -> bool {
+        use NameKind::{Constant, Function, Input, Let, Output, Parameter, State};
+        matches!(self, Parameter | Constant | Input | State | Let | Output | Function)
+    }
+}
+
+/// A name that the text of a model declares, and the places at which the text uses it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Name {
+    /// The name, within instances with theirs before it: `crane.motor.r`. Of files the path.
+    pub name: String,
+    /// What it stands for.
+    pub kind: NameKind,
+    /// Where the name is declared. What a component declares stands there for each of its instances. `None` for tables,
+    /// which are no model text; a file that is imported is declared by its beginning.
+    pub declared: Option<Span>,
+    /// Where it is used: its name alone, without what stands before or behind the dots. In the order of the files and of
+    /// their text, each place once. A place inside a component counts for each instance that names something else by it.
+    pub uses: Vec<Span>,
+}
+
+/// What a place in the text uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Used {
+    /// A value or function.
+    Value(DeclId),
+    /// An element, instance, port, bond or constraint.
+    Node(Node),
+    /// A component.
+    Component(ComponentId),
+}
+
+/// The places that use names.
+#[derive(Default)]
+pub(super) struct Uses {
+    places: Vec<(Used, Span)>,
+    /// Tables by the paths under which they were found.
+    pub tables: Vec<(String, Span)>,
+}
+
+impl Uses {
+    /// A name is used at this place.
+    pub fn add(&mut self, used: Used, at: Span) {
+        self.places.push((used, at));
+    }
+}
+
+/// The names of a model, those of one kind in the order of the text.
+pub(super) fn table(
+    main: &Ast,
+    flat: &Flat<'_>,
+    mut uses: Uses,
+    imports: &[(FileId, Span)],
+    sources: &Sources,
+) -> Vec<Name> {
+    uses.places.extend(&flat.uses.places);
+    uses.places.sort_unstable();
+    uses.places.dedup();
+    let mut places: FxHashMap<Used, Vec<Span>> = FxHashMap::default();
+    for (used, span) in uses.places {
+        places.entry(used).or_default().push(span);
+    }
+    let mut of = |used: Used| places.remove(&used).unwrap_or_default();
+    let mut all: Vec<Name> = main.header.iter().map(model).collect();
+    all.extend(files(imports, sources));
+    all.extend(tables(uses.tables));
+    all.extend(values(flat, &mut of));
+    all.extend(nodes(flat, &mut of));
+    all.extend(components(flat, &mut of));
+    all.sort_by(|a, b| (a.kind, a.declared, &a.name).cmp(&(b.kind, b.declared, &b.name)));
+    all
+}
+
+fn model(header: &crate::ast::Header) -> Name {
+    let declared = Some(header.name.span);
+    Name { name: header.name.text.clone(), kind: NameKind::Model, declared, uses: Vec::new() }
+}
+
+fn files(imports: &[(FileId, Span)], sources: &Sources) -> Vec<Name> {
+    let mut uses: BTreeMap<FileId, Vec<Span>> = BTreeMap::new();
+    imports.iter().for_each(|(file, span)| uses.entry(*file).or_default().push(*span));
+    let name = |(file, uses): (FileId, Vec<Span>)| {
+        let declared = Some(Span { file, start: 0, end: 0 });
+        Name { name: sources.name(file).to_string(), kind: NameKind::File, declared, uses: in_order(uses) }
+    };
+    uses.into_iter().map(name).collect()
+}
+
+fn tables(read: Vec<(String, Span)>) -> Vec<Name> {
+    let mut uses: BTreeMap<String, Vec<Span>> = BTreeMap::new();
+    read.into_iter().for_each(|(path, span)| uses.entry(path).or_default().push(span));
+    let name = |(name, uses)| Name { name, kind: NameKind::Table, declared: None, uses: in_order(uses) };
+    uses.into_iter().map(name).collect()
+}
+
+fn in_order(mut places: Vec<Span>) -> Vec<Span> {
+    places.sort_unstable();
+    places.dedup();
+    places
+}
+
+fn values(flat: &Flat<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
+    let name = |(id, d): (DeclId, &super::scope::Decl<'_>)| {
+        let kind = match d.kind {
+            DeclKind::Parameter { constant: false, .. } => NameKind::Parameter,
+            DeclKind::Parameter { constant: true, .. } => NameKind::Constant,
+            DeclKind::Input(_) => NameKind::Input,
+            DeclKind::Let(_) => NameKind::Let,
+            DeclKind::Output(_) => NameKind::Output,
+            DeclKind::State(_) => NameKind::State,
+            DeclKind::Function(_) => NameKind::Function,
+        };
+        Name { name: d.name.clone(), kind, declared: Some(d.span), uses: uses(Used::Value(id)) }
+    };
+    flat.names.decls.iter().enumerate().map(name).collect()
+}
+
+fn nodes(flat: &Flat<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
+    let mut all = Vec::new();
+    for scope in &flat.names.scopes {
+        for (own, &(node, declared)) in &scope.nodes {
+            let kind = match node {
+                Node::Part(part) if flat.parts[part].word.is_junction() => NameKind::Junction,
+                Node::Part(_) => NameKind::Element,
+                Node::Instance(_) => NameKind::Instance,
+                Node::Joint(_) => NameKind::Port,
+                Node::Bond(_) => NameKind::Bond,
+                Node::Constraint(_) => NameKind::Constraint,
+                Node::Broken => continue,
+            };
+            let name = [&scope.prefix, *own].concat();
+            all.push(Name { name, kind, declared: Some(declared), uses: uses(Used::Node(node)) });
+        }
+    }
+    all
+}
+
+fn components(flat: &Flat<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
+    let name = |(id, &(scope, c)): (ComponentId, &(usize, &crate::ast::Component))| {
+        let name = [&flat.names.scopes[scope].prefix, c.name.text.as_str()].concat();
+        let declared = Some(c.name.span);
+        Name { name, kind: NameKind::Component, declared, uses: uses(Used::Component(id)) }
+    };
+    flat.names.components.iter().enumerate().map(name).collect()
+}
