@@ -1,6 +1,6 @@
 //! What it costs to evaluate expressions once.
 
-use super::exprs::{Exprs, MINUS_ONE, ONE};
+use super::exprs::{Exprs, MINUS_ONE};
 use super::node::{Expr, Node};
 
 /// Bits of a rational beyond which it is long: literals of 17 digits have about 110, products of two less than this.
@@ -49,7 +49,7 @@ impl Exprs {
             Node::Add(terms) => cost.adds += terms.len() - 1,
             Node::Mul(factors) => {
                 let counted = factors.iter().filter(|&&f| f != MINUS_ONE);
-                let below = counted.clone().filter(|&&f| self.is_divisor(f)).count();
+                let below = counted.clone().filter(|&&f| self.divides(f)).count();
                 // a/(b c) is one product below and one division.
                 let above = counted.count() - below;
                 cost.muls += above.saturating_sub(1) + below.saturating_sub(1);
@@ -64,9 +64,5 @@ impl Exprs {
             },
             _ => cost.calls += 1,
         }
-    }
-
-    fn is_divisor(&self, e: Expr) -> bool {
-        matches!(self.node(e), Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.signum() < 0) && *n != ONE)
     }
 }

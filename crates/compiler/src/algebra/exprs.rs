@@ -5,7 +5,7 @@ use super::fingerprint::{Fingerprint, mix};
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
-use super::short_forms::ShortForms;
+use super::rewrite::ShortForms;
 use super::symbol_sets::{SetId, SymbolSets};
 use super::symbols::{SymbolEntry, SymbolKind, Texts};
 use super::table::{Table1d, TableId};

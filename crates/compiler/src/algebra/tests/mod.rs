@@ -6,7 +6,8 @@ mod laws;
 mod numbers;
 mod random;
 mod reader;
+mod rewrite;
 mod symbols;
 mod text;
-mod together;
+
 mod zero;

@@ -1,14 +1,11 @@
-//! Fractions as people write them: over one denominator where that is shorter, with common factors taken out.
+//! Fractions within fractions over one denominator, with common factors and squares of sums found in the numerators.
 
-use super::exprs::{Exprs, ONE};
-use super::node::{Expr, Node};
-use super::polynomial::{Generators, Polynomial, monomial_expr};
-use super::rational::Rational;
-use super::short_forms::Way;
-use rustc_hash::{FxHashMap, FxHashSet};
+use super::super::exprs::{Exprs, ONE};
+use super::super::node::{Expr, Node};
+use super::super::polynomial::{Generators, Polynomial, monomial_expr};
+use super::super::rational::Rational;
+use super::factor;
 
-/// Expressions that are written longer than this are left as they are; their parts are not.
-const LONGEST: u64 = 600;
 const DEEPEST: u32 = 64;
 const HIGHEST_POWER: i64 = 8;
 
@@ -20,39 +17,6 @@ struct Ratio {
 }
 
 impl Exprs {
-    /// The expression as a textbook prints it: the shortest of itself, of all its terms over one denominator, and of
-    /// the terms with equal denominators taken together, with common factors and squares of sums in the numerators. The
-    /// value and where it has one never change.
-    ///
-    /// ```
-    /// use halfarrow_compiler::algebra::{Exprs, Facts, PlainNames, ascii};
-    /// let mut x = Exprs::default();
-    /// let [a, b] = ["R1", "R2"].map(|name| x.symbol(name, Facts { positive: true, ..Facts::default() }));
-    /// let [a, b] = [a, b].map(|s| x.sym(s));
-    /// let (p, q) = (x.recip(a), x.recip(b));
-    /// let sum = x.add(&[p, q]);
-    /// let parallel = x.recip(sum);
-    /// let e = x.textbook(parallel);
-    /// assert_eq!(ascii(&x, e, &PlainNames(&x)), "R1*R2/(R1 + R2)");
-    /// ```
-    pub fn textbook(&mut self, e: Expr) -> Expr {
-        let order = self.below(&[e], &|_| true);
-        self.spend(order.len() as u64);
-        let mut whole: FxHashSet<Expr> = [e].into_iter().collect();
-        for &part in order.iter().filter(|&&p| !self.is_arithmetic(p)) {
-            self.node(part).for_each_child(|c| {
-                whole.insert(c);
-            });
-        }
-        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
-        for part in order {
-            let rebuilt = self.rebuild(part, &|c| new[&c]);
-            let short = if whole.contains(&part) { self.shortest_fraction(rebuilt) } else { rebuilt };
-            new.insert(part, short);
-        }
-        new[&e]
-    }
-
     /// What stands below the bar if all is brought over one denominator, as far as it is known to be nonzero.
     pub fn denominator(&mut self, e: Expr) -> Expr {
         let e = self.over_one_within_bound(e).unwrap_or(e);
@@ -72,26 +36,9 @@ impl Exprs {
         self.mul(&below)
     }
 
-    /// Without terms `0 f` in which `f` reads parameters only and has a value at the given ones.
-    pub fn without_settled_terms(&mut self, e: Expr) -> Expr {
-        let order = self.below(&[e], &|_| true);
-        let vanishes = |x: &Exprs, e: Expr| matches!(x.node(e), Node::Mul(_)) && x.coefficient(e).0.is_zero();
-        if !order.iter().any(|&part| vanishes(self, part)) {
-            return e;
-        }
-        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
-        for part in order {
-            let rest = self.coefficient(part).1;
-            let settled = vanishes(self, part) && self.given_value(rest).is_some_and(f64::is_finite);
-            let value = if settled { super::ZERO } else { self.rebuild(part, &|c| new[&c]) };
-            new.insert(part, value);
-        }
-        new[&e]
-    }
-
     /// What all of them that are not 0 have as a factor and is known to be nonzero, numbers left out.
     pub fn common_factor(&mut self, of: &[Expr]) -> Expr {
-        let of: Vec<Expr> = of.iter().copied().filter(|&e| e != super::ZERO).collect();
+        let of: Vec<Expr> = of.iter().copied().filter(|&e| e != super::super::ZERO).collect();
         let mut common: Option<Vec<(Expr, i64)>> = None;
         for e in of {
             let powers = self.nonzero_powers(e);
@@ -128,101 +75,8 @@ impl Exprs {
         powers
     }
 
-    fn is_arithmetic(&self, e: Expr) -> bool {
-        matches!(self.node(e), Node::Add(_) | Node::Mul(_) | Node::Pow(..))
-    }
-
-    fn shortest_fraction(&mut self, e: Expr) -> Expr {
-        if !self.is_arithmetic(e) || self.printed_length(e) > LONGEST {
-            return e;
-        }
-        self.short_form(e, Way::OverOne, |x| x.shortest_of_fractions(e))
-    }
-
-    /// The shortest form, and how many terms were formed on the way.
-    fn shortest_of_fractions(&mut self, e: Expr) -> (Expr, u64) {
-        let mut best = (self.printed_length(e), e);
-        let mut work = u64::from(self.entry(e).size);
-        let mut forms = vec![self.by_denominators(e, &mut work)];
-        for open in [true, false] {
-            forms.extend(self.over_one(e, open, &mut work));
-        }
-        for form in forms {
-            let length = self.printed_length(form);
-            if length < best.0 {
-                best = (length, form);
-            }
-        }
-        (best.1, work)
-    }
-
-    /// How long the expression is in print: a bar counts once, brackets and fractions within fractions count extra.
-    pub fn printed_length(&self, e: Expr) -> u64 {
-        let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
-        for part in self.below(&[e], &|_| true) {
-            let length = self.length_of(part, &lengths);
-            lengths.insert(part, length);
-        }
-        lengths[&e]
-    }
-
-    fn length_of(&self, e: Expr, known: &FxHashMap<Expr, u64>) -> u64 {
-        match self.node(e) {
-            Node::Number(value) if value.abs().is_one() => 1,
-            Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
-            Node::Add(terms) => terms.iter().fold(terms.len() as u64 - 1, |l, t| l.saturating_add(known[t])),
-            Node::Mul(factors) => self.length_of_product(factors, known),
-            Node::Pow(..) => self.length_of_product(&[e], known),
-            node => {
-                let mut length = 2u64;
-                node.for_each_child(|c| length = length.saturating_add(known[&c]));
-                length
-            }
-        }
-    }
-
-    fn length_of_product(&self, factors: &[Expr], known: &FxHashMap<Expr, u64>) -> u64 {
-        let mut length = 0u64;
-        let (mut above, mut below) = (0u64, 0u64);
-        for &factor in factors {
-            let (base, exponent) = match *self.node(factor) {
-                Node::Pow(base, n) => (base, Some(n)),
-                _ => (factor, None),
-            };
-            if self.is_number(base).is_some_and(|v| v.abs().is_one()) {
-                continue;
-            }
-            let number = exponent.and_then(|n| self.is_number(n));
-            let under = number.is_some_and(|n| n.signum() < 0);
-            *if under { &mut below } else { &mut above } += 1;
-            length = length.saturating_add(known[&base]);
-            let sum = matches!(self.node(base), Node::Add(_));
-            length += u64::from(sum && (factors.len() > 1 || exponent.is_some()));
-            if self.holds_quotient(base) {
-                length += if under { 4 } else { 1 };
-            }
-            match exponent {
-                Some(n) if number.is_none_or(|n| !n.is_integer()) => length = length.saturating_add(known[&n]),
-                _ => {}
-            }
-        }
-        let bar = if below > 0 { 2 + u64::from(above == 0) } else { 0 };
-        length + bar + above.saturating_sub(1) + below.saturating_sub(1)
-    }
-
-    /// Whether a term of the sum has a denominator.
-    fn holds_quotient(&self, sum: Expr) -> bool {
-        let divides =
-            |e: &Expr| matches!(self.node(*e), Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.signum() < 0));
-        let Node::Add(terms) = self.node(sum) else { return false };
-        terms.iter().any(|t| match self.node(*t) {
-            Node::Mul(factors) => factors.iter().any(divides),
-            _ => divides(t),
-        })
-    }
-
     /// The terms with equal denominators taken together.
-    fn by_denominators(&mut self, e: Expr, work: &mut u64) -> Expr {
+    pub(super) fn by_denominators(&mut self, e: Expr, work: &mut u64) -> Expr {
         let Node::Add(terms) = self.node(e) else { return e };
         let mut groups: Vec<(Vec<Expr>, Vec<Expr>)> = Vec::new();
         for term in terms.clone() {
@@ -248,12 +102,11 @@ impl Exprs {
     }
 
     fn divisors_of_term(&self, term: Expr) -> Vec<Expr> {
-        let divides =
-            |e: &&Expr| matches!(self.node(**e), Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.signum() < 0));
-        match self.node(term) {
-            Node::Mul(factors) => factors.iter().filter(divides).copied().collect(),
-            _ => Some(&term).into_iter().filter(divides).copied().collect(),
-        }
+        let factors = match self.node(term) {
+            Node::Mul(factors) => factors.as_slice(),
+            _ => &[term],
+        };
+        factors.iter().copied().filter(|f| self.divides(*f)).collect()
     }
 
     /// Everything over one denominator, unless the search for short forms is over.
@@ -268,7 +121,7 @@ impl Exprs {
     }
 
     /// Everything over one denominator. `open`: powers of sums are multiplied out.
-    fn over_one(&mut self, e: Expr, open: bool, work: &mut u64) -> Option<Expr> {
+    pub(super) fn over_one(&mut self, e: Expr, open: bool, work: &mut u64) -> Option<Expr> {
         let mut generators = Generators::within(self.search_left());
         let form = self.over_one_in(e, open, &mut generators);
         *work += generators.work;
@@ -420,7 +273,7 @@ impl Exprs {
         let content = polynomial.content();
         let inner = polynomial.divided_by_monomial(&content);
         let outer = monomial_expr(self, generators, &content, &Rational::from(1));
-        let work = super::factor::work_of_split(&inner);
+        let work = factor::work_of_split(&inner);
         let split = if generators.affords(work) { self.best_split(&inner, generators) } else { None };
         generators.work += work;
         let inner = match split {
@@ -444,7 +297,7 @@ impl Exprs {
         }
         let content = polynomial.content();
         let inner = polynomial.divided_by_monomial(&content);
-        let products = super::factor::collected(&inner, &self.varying(generators));
+        let products = factor::collected(&inner, &self.varying(generators));
         let mut terms = Vec::with_capacity(products.len());
         for (factor, variables) in &products {
             let (a, b) = (self.factored_deep(factor, generators), self.factored_deep(variables, generators));
@@ -461,14 +314,14 @@ impl Exprs {
         generators.list.iter().map(varies).collect()
     }
 
-    fn best_split(&self, polynomial: &Polynomial, generators: &Generators) -> Option<super::factor::Split> {
+    fn best_split(&self, polynomial: &Polynomial, generators: &Generators) -> Option<factor::Split> {
         let length = |e: Expr| self.printed_length(e) + u64::from(matches!(self.node(e), Node::Add(_)));
         let base = |e: Expr| match *self.node(e) {
             Node::Pow(base, n) if self.is_number(n).is_some_and(|n| n.is_integer()) => length(base),
             _ => length(e),
         };
         let lengths: Vec<u64> = generators.list.iter().map(|&e| base(e)).collect();
-        super::factor::best_split(polynomial, &lengths, &self.varying(generators))
+        factor::best_split(polynomial, &lengths, &self.varying(generators))
     }
 }
 

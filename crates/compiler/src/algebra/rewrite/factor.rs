@@ -1,7 +1,7 @@
 //! Polynomials as products of sums and a rest: weak division, by what makes the text shortest.
 
-use super::polynomial::{Monomial, Polynomial, quotient_of, times};
-use super::rational::Rational;
+use super::super::polynomial::{Monomial, Polynomial, quotient_of, times};
+use super::super::rational::Rational;
 use std::collections::BTreeMap;
 
 /// Sums of more terms are left as they are.

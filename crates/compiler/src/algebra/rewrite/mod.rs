@@ -1,0 +1,218 @@
+//! Expressions in their shortest form. There is one search, and two lengths by which a form is the shortest: as it is
+//! evaluated, in programs, and in print, for people. The value and where it has one never change.
+
+mod expanded;
+mod factor;
+mod flat;
+mod length;
+mod nested;
+mod trigonometric;
+
+use super::exprs::Exprs;
+use super::node::{Expr, Node};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Expressions that are longer than this are left as they are; their parts are not.
+const LONGEST: u64 = 600;
+
+/// By what forms are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Length {
+    /// Operands and operations, each time that they are written: what programs are made of.
+    Evaluated,
+    /// In print.
+    Printed,
+}
+
+/// What the search for short forms remembers.
+#[derive(Clone)]
+pub(super) struct ShortForms {
+    /// The shortest forms that are known.
+    known: FxHashMap<(Length, Expr), Expr>,
+    /// Terms that may still be formed.
+    left: u64,
+}
+
+impl Default for ShortForms {
+    fn default() -> Self {
+        ShortForms { known: FxHashMap::default(), left: u64::MAX }
+    }
+}
+
+impl ShortForms {
+    /// Something new is known of expressions: other forms may hold now.
+    pub fn forget(&mut self) {
+        self.known.clear();
+    }
+}
+
+impl Exprs {
+    /// The shortest form to evaluate: multiplied out, common factors taken out, over one denominator, with
+    /// `sin² + cos² = 1` and the sums of angles used. The value and where it has one never change: `q/q` stays unless
+    /// `q` is known to be nonzero.
+    pub fn simplify(&mut self, e: Expr) -> Expr {
+        self.simplify_all(&[e])[0]
+    }
+
+    /// The expressions, each in its shortest form to evaluate; what they share is looked at once.
+    pub fn simplify_all(&mut self, roots: &[Expr]) -> Vec<Expr> {
+        self.shortest_forms(roots, Length::Evaluated)
+    }
+
+    /// The expression as a textbook prints it: the shortest of itself, of all its terms over one denominator, and of
+    /// the terms with equal denominators taken together, with common factors and squares of sums in the numerators. The
+    /// value and where it has one never change.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{Exprs, Facts, PlainNames, ascii};
+    /// let mut x = Exprs::default();
+    /// let [a, b] = ["R1", "R2"].map(|name| x.symbol(name, Facts { positive: true, ..Facts::default() }));
+    /// let [a, b] = [a, b].map(|s| x.sym(s));
+    /// let (p, q) = (x.recip(a), x.recip(b));
+    /// let sum = x.add(&[p, q]);
+    /// let parallel = x.recip(sum);
+    /// let e = x.textbook(parallel);
+    /// assert_eq!(ascii(&x, e, &PlainNames(&x)), "R1*R2/(R1 + R2)");
+    /// ```
+    pub fn textbook(&mut self, e: Expr) -> Expr {
+        self.shortest_forms(&[e], Length::Printed)[0]
+    }
+
+    /// The search: from the leaves to the roots, so that the parts of what is looked at are short already.
+    fn shortest_forms(&mut self, roots: &[Expr], by: Length) -> Vec<Expr> {
+        let order = self.below(roots, &|_| true);
+        self.spend(order.len() as u64);
+        let sought = self.sought(roots, &order, by);
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in order {
+            let rebuilt = self.rebuild(part, &|c| new[&c]);
+            let short = if sought.contains(&part) { self.shortest_form(rebuilt, by) } else { rebuilt };
+            new.insert(part, short);
+        }
+        roots.iter().map(|r| new[r]).collect()
+    }
+
+    /// The parts whose short form is sought. What is evaluated is made of parts, which others may share. What is printed
+    /// is read as a whole: a sum, product or power with all the sums, products and powers in it.
+    fn sought(&self, roots: &[Expr], order: &[Expr], by: Length) -> FxHashSet<Expr> {
+        match by {
+            Length::Evaluated => order.iter().copied().collect(),
+            Length::Printed => {
+                let mut whole: FxHashSet<Expr> = roots.iter().copied().collect();
+                for &part in order.iter().filter(|&&p| !self.is_arithmetic(p)) {
+                    self.node(part).for_each_child(|c| {
+                        whole.insert(c);
+                    });
+                }
+                whole
+            }
+        }
+    }
+
+    fn is_arithmetic(&self, e: Expr) -> bool {
+        matches!(self.node(e), Node::Add(_) | Node::Mul(_) | Node::Pow(..))
+    }
+
+    /// The shortest form of one part; the known one where there is one, the part itself where the search is over.
+    fn shortest_form(&mut self, e: Expr, by: Length) -> Expr {
+        if !self.may_be_shorter(e, by) {
+            return e;
+        }
+        if let Some(&known) = self.short_forms.known.get(&(by, e)) {
+            return known;
+        }
+        if self.search_is_over() {
+            return e;
+        }
+        let mut work = u64::from(self.entry(e).size);
+        let forms = self.forms(e, by, &mut work);
+        let short = self.shortest_of(e, forms, by);
+        self.spend(work);
+        if !self.search_is_over() {
+            self.short_forms.known.insert((by, e), short);
+        }
+        short
+    }
+
+    fn may_be_shorter(&self, e: Expr, by: Length) -> bool {
+        let other_forms = match by {
+            Length::Evaluated => self.has_other_forms(e) && u64::from(self.entry(e).size) <= LONGEST,
+            Length::Printed => self.is_arithmetic(e),
+        };
+        other_forms && self.length(e, by) <= LONGEST
+    }
+
+    /// The forms among which the shortest is. Where all parts are short the fractions in a part are told by its terms; print
+    /// looks through fractions within fractions, and for what people expect to see together. `work` counts the terms that
+    /// were formed.
+    fn forms(&mut self, e: Expr, by: Length, work: &mut u64) -> Vec<Expr> {
+        let mut forms = Vec::new();
+        match by {
+            Length::Evaluated => {
+                self.expanded_forms(e, &mut forms, work);
+                forms.extend(self.over_one_denominator(e, work));
+                forms.extend(self.turned_fraction(e, work));
+            }
+            Length::Printed => {
+                forms.push(self.by_denominators(e, work));
+                for open in [true, false] {
+                    forms.extend(self.over_one(e, open, work));
+                }
+            }
+        }
+        forms
+    }
+
+    /// The shortest of an expression and its other forms, the first among equals.
+    fn shortest_of(&self, e: Expr, forms: Vec<Expr>, by: Length) -> Expr {
+        std::iter::once(e).chain(forms).min_by_key(|form| self.length(*form, by)).unwrap_or(e)
+    }
+
+    fn length(&self, e: Expr, by: Length) -> u64 {
+        match by {
+            Length::Evaluated => self.written_length(e),
+            Length::Printed => self.printed_length(e),
+        }
+    }
+
+    /// Without terms `0 f` in which `f` reads parameters only and has a value at the given ones.
+    pub fn without_settled_terms(&mut self, e: Expr) -> Expr {
+        let order = self.below(&[e], &|_| true);
+        let vanishes = |x: &Exprs, e: Expr| matches!(x.node(e), Node::Mul(_)) && x.coefficient(e).0.is_zero();
+        if !order.iter().any(|&part| vanishes(self, part)) {
+            return e;
+        }
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in order {
+            let rest = self.coefficient(part).1;
+            let settled = vanishes(self, part) && self.given_value(rest).is_some_and(f64::is_finite);
+            let value = if settled { super::ZERO } else { self.rebuild(part, &|c| new[&c]) };
+            new.insert(part, value);
+        }
+        new[&e]
+    }
+
+    /// Bounds the search for short forms from now on: after so many terms have been formed, what [`Exprs::simplify`]
+    /// and [`Exprs::textbook`] are given stays as it is. The same expressions always take the same number of terms, on
+    /// every machine; about two million take a second.
+    pub fn bound_search(&mut self, terms: u64) {
+        self.short_forms.left = terms;
+    }
+
+    /// Whether the bound of [`Exprs::bound_search`] has been met.
+    pub fn search_is_over(&self) -> bool {
+        self.short_forms.left == 0
+    }
+
+    /// Terms that may still be formed before [`Exprs::search_is_over`].
+    pub fn search_left(&self) -> u64 {
+        self.short_forms.left
+    }
+
+    /// So many terms have been formed.
+    pub(super) fn spend(&mut self, terms: u64) {
+        if self.short_forms.left != u64::MAX {
+            self.short_forms.left = self.short_forms.left.saturating_sub(terms);
+        }
+    }
+}
