@@ -4,7 +4,7 @@ pub mod codes;
 mod render;
 
 use crate::span::{FileId, Span};
-pub use codes::Code;
+pub use codes::DiagnosticCode;
 pub use render::{render, to_json};
 
 /// How bad it is.
@@ -39,7 +39,7 @@ pub struct Diagnostic {
     /// How bad it is.
     pub severity: Severity,
     /// Which fault; see [`codes`].
-    pub code: Code,
+    pub code: DiagnosticCode,
     /// What is wrong, in modelling words.
     pub title: String,
     /// The place.
@@ -54,7 +54,7 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// An error at a place.
-    pub fn error(code: Code, title: impl Into<String>, span: Span, text: impl Into<String>) -> Diagnostic {
+    pub fn error(code: DiagnosticCode, title: impl Into<String>, span: Span, text: impl Into<String>) -> Diagnostic {
         Diagnostic {
             severity: Severity::Error,
             code,
@@ -67,7 +67,7 @@ impl Diagnostic {
     }
 
     /// A warning at a place.
-    pub fn warning(code: Code, title: impl Into<String>, span: Span, text: impl Into<String>) -> Diagnostic {
+    pub fn warning(code: DiagnosticCode, title: impl Into<String>, span: Span, text: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, title, span, text) }
     }
 

@@ -31,7 +31,7 @@ use std::fmt;
 /// ```
 #[derive(Clone)]
 pub struct Exprs {
-    pub(super) entries: Vec<Entry>,
+    pub(super) entries: Vec<PoolEntry>,
     ids: HashTable<u32>,
     pub(super) symbols: Vec<SymbolEntry>,
     pub(super) by_label: HashTable<u32>,
@@ -48,7 +48,7 @@ pub struct Exprs {
 
 /// An expression with what is known of it from birth.
 #[derive(Clone)]
-pub(super) struct Entry {
+pub(super) struct PoolEntry {
     pub node: Node,
     /// From names and structure only: equal in every pool.
     pub hash: u64,
@@ -171,7 +171,7 @@ impl Exprs {
         self.tables.len()
     }
 
-    pub(super) fn entry(&self, e: Expr) -> &Entry {
+    pub(super) fn entry(&self, e: Expr) -> &PoolEntry {
         &self.entries[e.0 as usize]
     }
 
@@ -183,7 +183,7 @@ impl Exprs {
             return Expr(id);
         }
         let monomial = self.monomial_of(&node);
-        let entry = Entry {
+        let entry = PoolEntry {
             hash,
             depth: self.depth_of(&node),
             size: self.size_of(&node),

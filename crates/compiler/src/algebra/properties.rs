@@ -1,7 +1,7 @@
 //! What is known of an expression without a value for its symbols: sign, and whether it is defined everywhere.
 
 use super::assumptions::Decided;
-use super::exprs::{Entry, Exprs};
+use super::exprs::{Exprs, PoolEntry};
 use super::node::{Expr, Function, Node};
 use super::rational::Rational;
 use super::table::Outside;
@@ -146,7 +146,7 @@ impl Exprs {
 
     /// What is known of an expression if this is known of its parts.
     fn known_by(&self, e: Expr, of: &dyn Fn(Expr) -> Known) -> Known {
-        let Entry { node, properties, .. } = self.entry(e);
+        let PoolEntry { node, properties, .. } = self.entry(e);
         let mut signs = properties.known.signs.and(self.signs_of(node, &|c| of(c).signs));
         if self.assumptions.is_divisor(e) {
             signs = signs.and(Signs::NOT_ZERO);

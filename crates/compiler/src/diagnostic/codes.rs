@@ -5,7 +5,7 @@
 
 /// The code of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Code {
+pub struct DiagnosticCode {
     /// A letter for the stage and three digits.
     pub name: &'static str,
     /// What it means, in one line.
@@ -15,9 +15,9 @@ pub struct Code {
 /// Declares the codes, and `ALL` with all of them in this order.
 macro_rules! codes {
     ($($name:ident $meaning:literal;)*) => {
-        $(#[doc = $meaning] pub const $name: Code = Code { name: stringify!($name), meaning: $meaning };)*
+        $(#[doc = $meaning] pub const $name: DiagnosticCode = DiagnosticCode { name: stringify!($name), meaning: $meaning };)*
         /// All codes, in the order in which they are declared.
-        pub const ALL: &[Code] = &[$($name),*];
+        pub const ALL: &[DiagnosticCode] = &[$($name),*];
     };
 }
 

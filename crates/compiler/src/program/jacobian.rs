@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A derivative that is not zero whatever the values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Entry {
+pub struct JacobianEntry {
     /// What is differentiated: index into the wanted values.
     pub row: u32,
     /// By what: index into the givens.
@@ -27,7 +27,7 @@ pub struct Differentiated {
     /// meaning. What of them reads parameters alone is [`determined`](Program::determined) together with the values of the entries.
     pub program: Program,
     /// The derivatives that may be nonzero, by row, in a row by column.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<JacobianEntry>,
 }
 
 impl Program {
@@ -72,7 +72,7 @@ impl Program {
         let mut entries = Vec::new();
         for (row, value) in wanted.iter().enumerate() {
             let gradients = work.gradients.get(value).into_iter().flat_map(|s| s.iter());
-            entries.extend(gradients.map(|&(column, value)| Entry { row: row as u32, column, value }));
+            entries.extend(gradients.map(|&(column, value)| JacobianEntry { row: row as u32, column, value }));
         }
         let program = Program { values: work.values, blocks: work.blocks, ..self.clone() };
         debug_assert_eq!(verify(&program), Ok(()), "{}", self.name);

@@ -35,7 +35,7 @@ mod triggers;
 mod values;
 mod verify;
 
-pub use jacobian::{Differentiated, Entry};
+pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;

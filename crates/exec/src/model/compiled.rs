@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
 use crate::bytecode::{BlockBatches, Layout, Routine};
-use halfarrow_compiler::program::{ConditionId, Entry, EventTrigger, Program, Value};
+use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ pub(super) struct Mode {
 }
 
 impl Mode {
-    fn new(program: Program, entries: Option<Vec<Entry>>) -> Mode {
+    fn new(program: Program, entries: Option<Vec<JacobianEntry>>) -> Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();

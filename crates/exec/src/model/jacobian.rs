@@ -3,7 +3,7 @@
 use super::Model;
 use super::system::What;
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Entry, Program, Value};
+use halfarrow_compiler::program::{JacobianEntry, Program, Value};
 use halfarrow_sim::{Affected, Failure, Sparsity, System};
 
 /// The code of the derivatives, and where in the pattern each of them stands.
@@ -14,9 +14,9 @@ pub(super) struct JacobianCode {
 }
 
 impl JacobianCode {
-    pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[Entry]) -> JacobianCode {
+    pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[JacobianEntry]) -> JacobianCode {
         let values: Vec<Value> = entries.iter().map(|e| e.value).collect();
-        let place = |e: &Entry| {
+        let place = |e: &JacobianEntry| {
             let (row, column) = (e.row as usize, e.column as usize);
             let found = sparsity.column(column).binary_search(&row);
             sparsity.places(column).start + found.expect("what moves stands in the pattern")

@@ -11,7 +11,7 @@ mod units;
 
 use super::lexer::{Token, TokenKind, lex};
 use super::tree::*;
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, codes};
+use crate::diagnostic::{Diagnostic, DiagnosticCode, Diagnostics, codes};
 use crate::span::{FileId, Span};
 
 /// What the parser makes of a text: always a tree, and all that is wrong with the text.
@@ -427,7 +427,7 @@ impl Parser<'_> {
         }
         let text = self.text_of(self.token());
         let title = format!("`{}` has no meaning here", shortened(text));
-        let code: Code = codes::S003;
+        let code: DiagnosticCode = codes::S003;
         let mut fault = Diagnostic { code, title, ..fault };
         fault.primary.text.clear();
         match text.chars().next().and_then(remedy) {
