@@ -1,4 +1,4 @@
-//! The stage: strokes by propagation where that is the whole truth, exact elimination everywhere else.
+//! The stage: strokes by propagation (sequential causality assignment) where that is exact, elimination elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -56,7 +56,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     Ok(causal)
 }
 
-/// One connected part under assignment, with the causality chosen for some of its algebraic laws.
+/// A connected part during assignment, with the causality chosen for some of its algebraic laws.
 struct ConnectedPart<'a> {
     x: &'a mut Exprs,
     graph: &'a BondGraph,
@@ -67,13 +67,15 @@ struct ConnectedPart<'a> {
     kept: Vec<ElementId>,
 }
 
-/// Up to this many laws on causal loops all their causalities are tried; above, one law is turned at a time.
+/// Up to this many laws on causal loops all combinations of their causalities are tried; above, they are inverted one at a
+/// time.
 const TRIED_TOGETHER: usize = 8;
 /// Parts with more elements than this keep the causality that propagation gives.
 const TURNED_AT_MOST: usize = 600;
 
 impl ConnectedPart<'_> {
-    /// Assigns the part; where the causality so found costs digits at the start, inputs are chosen by size instead.
+    /// Assigns the part. Where the causality found amplifies rounding errors at the start, inputs are chosen by the size of
+    /// pivots instead.
     fn assign_well_conditioned(
         &mut self,
         strokes: &mut Strokes,
@@ -102,7 +104,7 @@ impl ConnectedPart<'_> {
         Ok(by_size)
     }
 
-    /// Assigns the part; laws on causal loops are turned so that the fewest break variables are left.
+    /// Assigns the part, with laws on causal loops inverted such that the fewest break variables are needed.
     fn assign_with_fewest_breaks(&mut self, strokes: &mut Strokes) -> Result<Solved, Vec<Diagnostic>> {
         let mark = strokes.mark();
         let assumed = self.x.assumed();
@@ -146,7 +148,7 @@ impl ConnectedPart<'_> {
         found.into_iter().filter_map(|p| Some((p, self.linear_if_invertible(p)?))).collect()
     }
 
-    /// Whether a law is linear; `None` if it cannot be met in both directions.
+    /// Whether a law is linear; `None` if it cannot be used in both causalities.
     fn linear_if_invertible(&mut self, port: PortRef) -> Option<bool> {
         let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return None };
         let bond = &self.graph.bonds[self.graph.bond_of(port)];
@@ -255,17 +257,17 @@ impl ConnectedPart<'_> {
         }
     }
 
-    /// The causality asked of an algebraic law: the one chosen, else the one in which it is written.
+    /// The causality of an algebraic law: the one chosen, else the one in which it is written.
     fn wish(&self, port: PortRef) -> PortCausality {
         self.laws.get(&port).copied().unwrap_or_else(|| preferred(self.graph, port))
     }
 }
 
-/// How unwelcome loops are: number of break variables, signals on loops that no law is on, curved laws met against the
-/// direction in which they are written, signals on any loop.
+/// The cost of causal loops, in lexicographic order: break variables, signals on loops without a law, nonlinear laws used in
+/// the inverse causality, signals on any loop.
 ///
-/// Loops without a law are those that can be singular; dividing by their determinant spoils the equations even where
-/// the model is regular. Source: `method.md`, section 3 and 5.1.
+/// Loops without a law are those whose determinant can vanish; dividing by it makes equations singular even where the model
+/// is regular. Source: `method.md`, section 3 and 5.1.
 type Loops = (usize, usize, usize, usize);
 
 fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>, turned: usize) -> Loops {
@@ -284,7 +286,7 @@ fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>, turned: usize) ->
 /// For each law whether its stroke sits at it.
 type Choice = BTreeMap<PortRef, bool>;
 
-/// Number of curved laws that a choice meets against the direction in which they are written.
+/// Number of nonlinear laws that a choice uses in the inverse causality.
 fn turned(graph: &BondGraph, linear: &BTreeMap<PortRef, bool>, choice: &Choice) -> usize {
     let against = |(p, here): &(&PortRef, &bool)| !linear[p] && causality_of(**here) != preferred(graph, **p);
     choice.iter().filter(against).count()
@@ -294,13 +296,13 @@ fn causality_of(here: bool) -> PortCausality {
     if here { PortCausality::Conductive } else { PortCausality::Resistive }
 }
 
-/// The order in which storages are asked to be independent, ahead of the order of the model.
+/// Variables with priority as independent ones over the order of the model.
 #[derive(Default)]
 struct StoragePreferences {
     independent: Vec<PortRef>,
     virtual_speeds: Vec<Virtual>,
     why: BTreeMap<Symbol, Kept>,
-    /// Of each `prefer` the variables that would meet it.
+    /// The variables that satisfy each `prefer`.
     asked: Vec<Vec<Symbol>>,
 }
 
@@ -318,7 +320,7 @@ impl StoragePreferences {
         wanted
     }
 
-    /// Notes that a variable shall stay independent; gives the symbols of which one then does.
+    /// Gives a variable priority as an independent one; the symbols of which one then stays independent.
     fn add(&mut self, x: &mut Exprs, graph: &BondGraph, symbol: Symbol, why: Kept) -> Vec<Symbol> {
         let (bond, flow) = match graph.variables.get(&symbol).map(|v| v.meaning) {
             Some(Meaning::Flow(bond)) => (bond, true),
@@ -359,7 +361,7 @@ impl StoragePreferences {
         z
     }
 
-    /// The `prefer`s that are not met, by their numbers.
+    /// The numbers of the `prefer`s that are not satisfied.
     fn unmet(&self, x: &Exprs, ports: &Ports) -> Vec<usize> {
         let own = |s: Symbol| x.untwinned(s);
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
@@ -374,7 +376,8 @@ impl StoragePreferences {
     }
 }
 
-/// The common variable of a junction as it is kept, and what acts on it: a twin of that variable, where the graph has it.
+/// The common variable of a junction that stays independent, and its conjugate; as its twin where the graph has the variable
+/// already.
 fn kept_variable(x: &mut Exprs, graph: &BondGraph, junction: ElementId, flow: bool) -> (Symbol, Symbol) {
     let element = &graph.elements[junction];
     let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
@@ -420,7 +423,7 @@ fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
 }
 
 impl ConnectedPart<'_> {
-    /// Sequential causality assignment. `false` if it meets a contradiction; then the strokes are partial.
+    /// Sequential causality assignment (SCAP). `false` if it ends in a contradiction; then the strokes are partial.
     fn propagate(&mut self, strokes: &mut Strokes) -> bool {
         let graph = self.graph;
         let ports = outer_ports(graph, self.members);
@@ -444,8 +447,8 @@ impl ConnectedPart<'_> {
                 || (strokes.complete(self.members).is_ok() && strokes.is_complete(self.members)))
     }
 
-    /// Whether a curved law, the way it is written, gives its junction the common variable. Such laws come first: what
-    /// the others read is then found at their own junction, not at the end of a chain.
+    /// Whether a nonlinear law in its written causality determines the common variable of its junction. Such laws come first,
+    /// so that other laws read a variable of their own junction, not one at the end of a causal chain.
     fn leads(&mut self, port: PortRef) -> bool {
         let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return false };
         let bond = &self.graph.bonds[self.graph.bond_of(port)];
@@ -458,8 +461,8 @@ impl ConnectedPart<'_> {
         self.x.linear_in(law, &[read]).is_none()
     }
 
-    /// Exact elimination, with virtual speeds where they are combinations of storages and sources; and what it was asked
-    /// for.
+    /// Exact elimination, with virtual speeds that are combinations of co-energy and imposed variables; and the preferences
+    /// that it used.
     fn solve(&mut self, strokes: &Strokes, forced: bool) -> (Solved, CausalityPreferences) {
         let (graph, members) = (self.graph, self.members);
         let inside = |e: ElementId| members.binary_search(&e).is_ok();
@@ -498,7 +501,7 @@ impl ConnectedPart<'_> {
         (first, preferences)
     }
 
-    /// Sources whose value reads the rate of a storage that they (or others) fix: `Se(1 - 2*c.f)` on the compliance `c`.
+    /// Sources whose value reads the rate of a storage that they (or others) determine: `Se(1 - 2*c.f)` on the compliance `c`.
     /// Such a source imposes nothing; it is an algebraic law between effort and flow.
     fn sources_of_rates(&mut self, solved: &Solved) -> BTreeSet<PortRef> {
         let rates: BTreeSet<Symbol> =
@@ -533,7 +536,7 @@ fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
         .collect()
 }
 
-/// Strokes of a part by sequential assignment alone; `None` if that contradicts itself.
+/// Strokes of a part by sequential assignment alone; `None` if that ends in a contradiction.
 pub(super) fn sequential(graph: &BondGraph, members: &[ElementId]) -> Option<Table<BondId, Stroke>> {
     let mut x = graph.exprs.clone();
     let wanted = StoragePreferences::default();
@@ -556,7 +559,7 @@ pub(super) fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
     }
 }
 
-/// The causality that an algebraic law asks for: the one in which it is written.
+/// The preferred causality of an algebraic law: the one in which it is written.
 pub(super) fn preferred(graph: &BondGraph, port: PortRef) -> PortCausality {
     match &graph.elements[port.element].kind {
         Kind::Resistor(laws) => match laws[port.port as usize] {
@@ -567,7 +570,7 @@ pub(super) fn preferred(graph: &BondGraph, port: PortRef) -> PortCausality {
     }
 }
 
-/// Whether nothing in the part asks for exact elimination: residual sinks, and moduli that vanish.
+/// Whether the part has nothing that requires exact elimination: residual sinks, or moduli that vanish.
 fn is_plain(x: &mut Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
     members.iter().all(|&m| match graph.elements[m].kind {
         Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. } => false,
@@ -589,8 +592,8 @@ fn reads_bonds(x: &Exprs, graph: &BondGraph, element: ElementId) -> bool {
     })
 }
 
-/// The definitions that the strokes give, if they are the whole truth: on trees, and on rings in which all storages are
-/// integral and no signal runs in a circle.
+/// The definitions that the strokes imply, where they are exact: on trees, and on parts with rings in which all storages are
+/// in integral causality and no causal loop exists.
 fn whole_truth(
     x: &mut Exprs,
     graph: &BondGraph,
@@ -608,7 +611,7 @@ fn whole_truth(
     (tree || is_triangular(&definitions)).then_some((definitions, divisors))
 }
 
-/// Whether no definition leads back to itself.
+/// Whether the definitions are acyclic.
 fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
     let index: BTreeMap<Symbol, usize> = definitions.iter().enumerate().map(|(i, d)| (d.0, i)).collect();
     let mut waits = vec![0usize; definitions.len()];
@@ -649,7 +652,7 @@ fn spanned(x: &mut Exprs, graph: &BondGraph, solved: &Solved, speed: &Virtual) -
         && row.0.iter().any(|t| solved.ports.iter().any(|p| p.input == t.0 && p.role == Role::Independent))
 }
 
-/// Strokes from the exact causality of the ports; what that leaves open is completed by matching.
+/// Strokes from the exact causality of the ports; bonds that it leaves open are completed by a matching.
 fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], solved: &Solved) {
     for &symbol in &solved.undetermined {
         if let Some(Meaning::Effort(bond) | Meaning::Flow(bond)) = graph.variables.get(&symbol).map(|v| v.meaning)
@@ -664,14 +667,14 @@ fn draw_truth(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId], s
     for state in &solved.ports {
         let inertance = matches!(graph.elements[state.port.element].kind, Kind::Inertance(_));
         let here = match (imposes(graph, state.port), state.role) {
-            // A source that reads what it makes is a law, and has the stroke of one.
+            // A source whose value depends on its own variable is a law, and has the stroke of one.
             (_, Role::Algebraic(causality)) => sits_here(causality, false),
             (Some(effort), _) => !effort,
             (None, Role::Independent) => sits_here(PortCausality::Integral, inertance),
             (None, Role::Dependent) => sits_here(PortCausality::Derivative, inertance),
             (None, Role::Source | Role::Redundant) => continue,
         };
-        // Where a flow circulates, what is true of the ports need not fit on the strokes.
+        // Where a flow circulates, strokes cannot always show the causality of the ports.
         let _ = strokes.set_at(state.port, here);
     }
     let _ = strokes.complete(members);

@@ -1,5 +1,5 @@
-//! Inputs and outputs chosen by the size of pivots at the start, where the usual order of priority costs digits, or
-//! divides by what vanishes there. Source: `method.md`, 5.1 and 5.2.
+//! Inputs and outputs chosen by the size of pivots at the start (threshold pivoting), where the usual order of priority
+//! amplifies rounding errors or divides by zero there. Source: `method.md`, 5.1 and 5.2.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use super::ports::{CausalityPreferences, Net, Offer, Solved};
 use crate::algebra::{Eliminator, Exprs, NumericPoint};
 use crate::bond_graph::{BondGraph, ElementId, PortCausality};
 
-/// A variable is taken as it comes, in the order of priority, if its pivot is at least this part of the greatest that
-/// the others of its class have in that row.
+/// Threshold: a variable is eliminated in the order of priority if its pivot is at least this fraction of the largest one of
+/// its class in the row.
 const GOOD: f64 = 0.1;
-/// The same for variables that are asked for: by the modeller, or since their integrals occur in moduli.
+/// The same for variables with priority: preferred by the modeller, or with integrals in moduli.
 const ASKED_FOR: f64 = 1e-6;
 
 /// Solves the junction structure of one connected part as [`solve_part`](super::ports::solve_part) does, with storages
@@ -85,8 +85,8 @@ fn express(
 struct Choice<'a> {
     net: &'a Net,
     work: Eliminator,
-    /// What effort and flow of a port have to be multiplied by to have the unit of the square root of power; of storages
-    /// and laws. Coefficients are divided by it.
+    /// Factors by which effort and flow of ports of storages and laws get the unit of the square root of power. Coefficients
+    /// are divided by them.
     weights: Vec<Option<(f64, f64)>>,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Choice<'a> {
         Choice { net, work, weights }
     }
 
-    /// What a column weighs: entries of it are multiplied by that.
+    /// The scale factor of a column.
     fn weight(&self, p: usize, column: usize) -> f64 {
         let (effort, flow) = self.weights[p].unwrap_or((1.0, 1.0));
         1.0 / if column == self.net.ports[p].effort { effort } else { flow }
@@ -141,7 +141,7 @@ impl<'a> Choice<'a> {
                     Some((_, row)) => {
                         self.work.eliminate_by(x, column, row);
                         found.push(open.remove(at));
-                        // What was too small before may be great enough now.
+                        // A pivot rejected before may pass the threshold now.
                         at = 0;
                     }
                     None => at += 1,
@@ -180,7 +180,7 @@ impl<'a> Choice<'a> {
                 }
             }
         }
-        // A law that the structure leaves alone.
+        // A law whose causality the structure leaves open.
         found.extend(open.into_iter().map(|p| (p, PortCausality::Resistive)));
         found
     }

@@ -1,4 +1,4 @@
-//! What cannot hold together, and what is legal but odd, in physical words.
+//! Contradictions between sources, constraints and forced strokes, and legal but suspicious structures, in physical words.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -38,7 +38,7 @@ pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[Elemen
         strokes.undo(mark);
         fine
     };
-    // Leave out one demand after the other as long as the rest still contradicts itself.
+    // A minimal infeasible subset: drop each demand without which the rest is still contradictory.
     let mut core = demands;
     let mut i = 0;
     while i < core.len() {
@@ -85,7 +85,7 @@ fn demands_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {
     demands
 }
 
-/// Errors for relations that the structure demands of imposed variables and that do not hold.
+/// Errors for relations among imposed variables that the structure implies and that do not hold.
 pub fn demands(x: &mut Exprs, graph: &BondGraph, solved: &Solved) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     for demand in &solved.demands {
@@ -165,7 +165,7 @@ fn shared_junction(graph: &BondGraph, a: PortRef, b: PortRef) -> Option<ElementI
     (other(a) == other(b)).then(|| other(a))
 }
 
-/// Legal, but odd: redundant constraints, storages fixed by sources alone, circulating variables, degenerate parameters.
+/// Legal but suspicious: redundant constraints, storages fixed by sources alone, circulating variables, degenerate parameters.
 pub fn warnings(causal: &CausalGraph) -> Vec<Diagnostic> {
     let mut all = Vec::new();
     let graph = &causal.graph;

@@ -1,6 +1,6 @@
-//! How many digits a causality costs: what is computed with inputs and outputs so chosen, beside what is put in.
+//! Loss of digits by a choice of causality: growth of rounding errors from the inputs to the outputs.
 //!
-//! In a junction structure nothing is lost as long as its entries are near 1 once every port is weighed by its own law:
+//! A junction structure loses no digits as long as its entries are near 1, with every port scaled by its own law:
 //! efforts by `√(e/f)` of a resistor, co-energies by `√(X/z)` of a storage. Source: `method.md`, 5.1 and 5.2.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,11 +12,11 @@ use super::{Combination, Role};
 use crate::algebra::{Expr, Exprs, Node, NumericPoint, Symbol};
 use crate::bond_graph::{BondGraph, Kind, PortRef, ResistorLaw, StorageLaw};
 
-/// A causality that costs more than this is looked at again.
+/// Error growth above which another causality is sought.
 pub(super) const COSTLY: f64 = 1e4;
-/// Larger groups of storages that depend on each other are taken as they are.
+/// Larger groups of storages that depend on each other are not examined.
 const GROUP_AT_MOST: usize = 100;
-/// A divisor that is below this part of the terms it is made of vanishes.
+/// A divisor below this fraction of the sum of its terms' magnitudes counts as zero.
 const VANISHING: f64 = 1e-9;
 
 /// The slope of a law at a point: `X/z` of a storage, `e/f` of a resistor.
@@ -24,11 +24,11 @@ const VANISHING: f64 = 1e-9;
 pub(super) struct Slope {
     /// Its magnitude; finite, above 0.
     pub size: f64,
-    /// Whether it is the same everywhere.
+    /// Whether it is constant.
     pub straight: bool,
 }
 
-/// The slope of the law of a port; `None` if it has none, or one that is no help.
+/// The slope of the law of a port; `None` if it has none, or one that is zero or not finite.
 pub(super) fn slope(x: &Exprs, graph: &BondGraph, point: &NumericPoint, port: PortRef) -> Option<Slope> {
     let element = &graph.elements[port.element];
     let bond = &graph.bonds[graph.bond_of(port)];
@@ -56,7 +56,7 @@ pub(super) fn slope(x: &Exprs, graph: &BondGraph, point: &NumericPoint, port: Po
     (size.is_finite() && size > 0.0).then_some(Slope { size, straight })
 }
 
-/// By what factor rounding grows in what a part computes with this causality; infinite where a divisor vanishes.
+/// The growth factor of rounding errors in a part with this causality; infinite where a divisor vanishes.
 pub(super) fn cost(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut NumericPoint) -> f64 {
     if solved.watched.iter().any(|&divisor| vanishes(x, divisor, point)) {
         return f64::INFINITY;
@@ -72,7 +72,7 @@ pub(super) fn cost(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut Nu
     worse(laws, cost_of_storages(x, graph, solved, point, &mut rows))
 }
 
-/// Whether a divisor is nothing but rounding at a point.
+/// Whether a divisor is zero within rounding error at a point.
 fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
     let value = point.value(x, divisor);
     match x.node(divisor) {
@@ -86,7 +86,7 @@ fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
     }
 }
 
-/// Definitions as numbers at a point, over inputs alone.
+/// Definitions at a point as numeric combinations of inputs alone.
 struct Rows<'a> {
     of: BTreeMap<Symbol, &'a Combination>,
     known: BTreeMap<Symbol, BTreeMap<Symbol, f64>>,
@@ -121,14 +121,14 @@ impl Rows<'_> {
     }
 }
 
-/// The greatest gain there and back between straight laws, each weighed by its slope: the square of the entry between
-/// them. What is left of 1 beside such a gain is what is wanted.
+/// The largest loop gain between two linear laws, each scaled by its slope: the square of the entry between them. The result
+/// `1 + gain` then loses the digits of 1.
 fn cost_of_laws(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut NumericPoint, rows: &mut Rows) -> f64 {
     let laws = solved.ports.iter().filter(|p| matches!(p.role, Role::Algebraic(_)));
     let weighed = laws.filter_map(|p| {
         let slope = slope(x, graph, point, p.port).filter(|s| s.straight)?;
         let effort_given = graph.bonds[graph.bond_of(p.port)].effort == p.input;
-        // What a variable has to be multiplied by to have the unit of the square root of power.
+        // The factor by which a variable gets the unit of the square root of power.
         let effort = 1.0 / slope.size.sqrt();
         Some((p, if effort_given { (effort, 1.0 / effort) } else { (1.0 / effort, effort) }))
     });
@@ -143,7 +143,7 @@ fn cost_of_laws(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut Numer
     most
 }
 
-/// What the matrix `M_i + Sᵀ M_d S` loses, with ones on its diagonal: one over the least pivot.
+/// The error growth of the matrix `M_i + Sᵀ M_d S`, scaled to a unit diagonal: the inverse of its least pivot.
 fn cost_of_storages(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut NumericPoint, rows: &mut Rows) -> f64 {
     let mass = |point: &NumericPoint, port: PortRef| slope(x, graph, point, port).map_or(1.0, |s| s.size);
     let independent = solved.ports.iter().filter(|p| p.role == Role::Independent);

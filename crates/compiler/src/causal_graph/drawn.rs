@@ -1,5 +1,5 @@
-//! The ports as the strokes draw them, neighbour by neighbour, and the ports with constraints left open: what the
-//! formulations other than the minimal one start from. Source: `method.md`, section 4.
+//! The ports with the causality of the strokes, element by element, and the ports with constraints left open: the starting
+//! points of the formulations other than the minimal one. Source: `method.md`, section 4.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortCausali
 use crate::ids::Table;
 
 /// The graph with these strokes, its ports as drawn: roles by stroke, every bond variable defined by the element that
-/// sets it. Such definitions can run in circles. Parts without a complete causality keep the ports that elimination
+/// sets it. Such definitions can be cyclic (causal loops). Parts without a complete causality keep the ports that elimination
 /// found, with their inputs and outputs.
 pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> CausalGraph {
     let graph = &causal.graph;
@@ -46,7 +46,7 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     CausalGraph { graph: graph.with_exprs(x), strokes: strokes.clone(), ports }
 }
 
-/// Whether a source is drawn as if it gave the conjugate of what it imposes: then the strokes do not tell the truth.
+/// Whether a source has the stroke of its conjugate variable: then the strokes do not show the causality of the ports.
 fn turns_sources(causal: &CausalGraph, members: &[ElementId], drawn: local::Drawn) -> bool {
     local::roles(&causal.graph, members, drawn).iter().any(|state| {
         let truth = causal.ports.of(state.port).map(|p| p.role);
@@ -143,7 +143,7 @@ pub fn resistors_first(causal: &CausalGraph) -> Table<BondId, Stroke> {
     let mut table = causal.strokes.clone();
     let kept = kept_junctions(causal);
     for members in parts(graph) {
-        // Where a flow circulates strokes say nothing.
+        // Where a flow circulates, strokes do not determine the causality.
         let drawn = |port: PortRef| sits_at(graph, &causal.strokes, port);
         if !members.iter().all(|&m| is_drawn(graph, &kept, &drawn, m)) {
             continue;
@@ -176,7 +176,7 @@ pub fn by_hand(causal: &CausalGraph) -> Table<BondId, Stroke> {
     table
 }
 
-/// More resistors than this are not turned one by one.
+/// Parts with more resistors are not searched by single inversions.
 const TURNED_SINGLY: usize = 40;
 
 fn resistors(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {

@@ -1,11 +1,11 @@
-//! What strokes say about a part without rings: every variable defined by its neighbours.
+//! Definitions from strokes in a part without rings: each variable by those of the element that sets it.
 
 use super::ports::{Virtual, imposes_effort};
 use super::{Combination, PortState, Role};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
-/// Definitions of variables, and what they divide by that is not known to be nonzero.
+/// Definitions of variables, and their divisors that are not known to be nonzero.
 pub type Definitions = (Vec<(Symbol, Combination)>, Vec<Expr>);
 
 /// Whether the stroke of its bond sits at a port, where it is drawn.
@@ -13,8 +13,8 @@ pub type Drawn<'a> = &'a dyn Fn(PortRef) -> Option<bool>;
 
 /// Definitions of the variables that junctions and two-ports set, one element at a time, and the moduli divided by.
 ///
-/// The common variables of `kept` junctions are given, their reactions are what their bonds add up to. Triangular if no
-/// signal runs in a circle, which is so on trees.
+/// The common variables of `kept` junctions are inputs, their conjugates the sums over their bonds. Triangular if there is no
+/// causal loop, as on trees.
 pub fn definitions(
     x: &mut Exprs,
     graph: &BondGraph,
@@ -98,7 +98,7 @@ pub fn roles(graph: &BondGraph, members: &[ElementId], drawn: Drawn) -> Vec<Port
             };
             let role = match imposes_effort(graph, port) {
                 Some(effort) if effort != effort_in => Role::Source,
-                // What it imposes is met by what it is left to give.
+                // Its imposed variable is redundant; its conjugate is the input instead.
                 Some(_) if effort_in => Role::Algebraic(PortCausality::Conductive),
                 Some(_) => Role::Algebraic(PortCausality::Resistive),
                 None => role,

@@ -1,10 +1,9 @@
-//! Definitions as short as the elements write them.
+//! Definitions as sparse as the constitutive rows of the elements.
 //!
-//! Elimination finds which variables follow from which, but the rows that it leaves last hold everything taken off them:
-//! the force at the root of a chain as a sum over all its links. Once it is known what follows, each row of the junction
-//! structure is given to a variable that it holds, and defines it as it stands. Where such definitions read each other in
-//! a circle, a loop of junctions, elimination works on the rows of that circle alone. The blocks are those of
-//! the block triangular form (Duff and Reid, ACM Transactions on Mathematical Software 4, 1978).
+//! Elimination finds the dependent variables, but fills its last rows in: the force at the root of a chain becomes a sum over
+//! all its links. Once the dependent variables are known, each row of the junction structure is matched to one of them that
+//! occurs in it, and defines it as it stands. Where such definitions depend on each other cyclically (a ring of junctions),
+//! elimination is confined to the rows of that cycle. The blocks are those of the block triangular form (Duff and Reid, ACM Transactions on Mathematical Software 4, 1978).
 
 use std::collections::BTreeMap;
 
@@ -15,11 +14,11 @@ use super::ports::settled;
 use crate::algebra::{Elimination, Expr, Exprs, ONE, SparseRow, eliminate};
 use crate::sparse::Matching;
 
-/// A column, and the others that it is the sum of, with their coefficients.
+/// A column as a linear combination of others.
 pub(super) type Row = (usize, Vec<(usize, Expr)>);
 
-/// What each pivot column of an elimination is in terms of other columns, from the rows that went into it. `None` if
-/// something would have to be divided by that is not known to be nonzero and was not divided by before.
+/// Each pivot column of an elimination as a combination of other columns, from the original rows. `None` if that requires a
+/// divisor that is neither known to be nonzero nor a divisor of the elimination.
 pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination) -> Option<Vec<Row>> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done)?;
@@ -43,7 +42,7 @@ pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination
     Some(definitions)
 }
 
-/// The columns of a circle, each by later ones and by columns outside.
+/// The columns of a cycle, each as a combination of later ones and of columns outside.
 fn circle_solved(x: &mut Exprs, rows: Vec<SparseRow>, mut columns: Vec<usize>, done: &Elimination) -> Option<Vec<Row>> {
     columns.sort_unstable();
     let own = eliminate(x, rows, &[columns.clone()]);
@@ -54,7 +53,7 @@ fn circle_solved(x: &mut Exprs, rows: Vec<SparseRow>, mut columns: Vec<usize>, d
     Some(own.pivots.iter().map(|pivot| (pivot.column, solved_for(x, &pivot.row, pivot.column))).collect())
 }
 
-/// A column in terms of the others in its row.
+/// A column as a combination of the others in its row.
 fn solved_for(x: &mut Exprs, row: &SparseRow, column: usize) -> Vec<(usize, Expr)> {
     let divisor = row.0.iter().find(|e| e.0 == column).map_or(ONE, |e| e.1);
     let mut terms = Vec::with_capacity(row.0.len() - 1);
@@ -72,8 +71,8 @@ struct Edge {
     coefficient: Expr,
 }
 
-/// A row for each pivot column, in which its coefficient is a number, or else what elimination divided by there, or else
-/// a parameter that is not zero. `None` if there are no such rows for all of them.
+/// A matching of rows to pivot columns in which each coefficient is a number, or else the divisor of the elimination, or else
+/// a nonzero parameter. `None` if there is no complete matching.
 fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination) -> Option<BTreeMap<usize, usize>> {
     let place: BTreeMap<usize, usize> = done.pivots.iter().enumerate().map(|(i, p)| (p.column, i)).collect();
     let constant = |e: Expr| !x.depends_on_any(e, &|s| x.facts(s).given.is_none());

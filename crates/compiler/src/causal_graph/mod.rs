@@ -65,11 +65,11 @@ pub struct CausalGraph {
 /// every variable of every determined bond is a linear combination of inputs. Source: `method.md`, 5.1.
 #[derive(Debug, Clone, Default)]
 pub struct Ports {
-    /// The ports in order of their elements, each with its input, the priority class and the truth about it.
+    /// The ports in order of their elements, each with its input and its role, which is exact.
     pub ports: Vec<PortState>,
-    /// Definitions of variables by other variables, triangular: following them ends at inputs.
+    /// Definitions of variables by other variables, triangular: substituted in turn they end at inputs.
     pub definitions: Map<Symbol, Combination>,
-    /// Expressions that were divided by and are not known to be nonzero: they are watched while running.
+    /// Divisors that are not known to be nonzero: they are guarded during a run.
     pub watched: Vec<Expr>,
     /// Expressions that vanish at the given parameters only.
     pub degenerate: Vec<Expr>,
@@ -77,15 +77,15 @@ pub struct Ports {
     pub undetermined: Vec<Symbol>,
     /// Independent variables that sit on no storage, `method.md`, 5.2.
     pub virtual_speeds: Vec<Virtual>,
-    /// Why variables were asked to be independent ahead of the order of the model.
+    /// Why variables have priority as independent ones over the order of the model.
     pub kept: BTreeMap<Symbol, Kept>,
     /// The entries of [`BondGraph::preferences`] that could not be met, by their numbers.
     pub unmet: Vec<usize>,
-    /// Relations among imposed variables alone that the structure demands; they hold, else there were an error.
+    /// Relations among imposed variables alone that the structure implies; they hold, or there would have been an error.
     pub demands: Vec<Combination>,
 }
 
-/// Why a variable is asked to stay independent.
+/// Why a variable has priority as an independent one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
     /// The modeller prefers it.
@@ -138,8 +138,8 @@ impl Ports {
         known.get(&symbol).cloned().unwrap_or_else(|| Combination(vec![(symbol, ONE)]))
     }
 
-    /// Works a variable out as a combination of inputs alone, with all that it reads, into `known`; nothing if it is an
-    /// input.
+    /// Resolves a variable, and all variables in its definition, into combinations of inputs alone, stored in `known`. An
+    /// input stays as it is.
     pub fn resolve_into(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) {
         let mut open = vec![symbol];
         while let Some((next, definition)) = self.next_to_resolve(&mut open, |s| known.contains_key(s)) {
@@ -148,8 +148,8 @@ impl Ports {
         }
     }
 
-    /// Of the open variables and those that they read, near or far, one that is not known although all that it reads is;
-    /// `None` if there are no more.
+    /// An unresolved variable, among the open ones and those that their definitions lead to, whose definition reads resolved
+    /// variables only; `None` if all are resolved.
     pub(crate) fn next_to_resolve(
         &self,
         open: &mut Vec<Symbol>,
@@ -191,7 +191,7 @@ impl Combination {
         self.0.binary_search_by_key(&symbol, |t| t.0).ok().map(|i| self.0[i].1)
     }
 
-    /// The combination with symbols that are others' names replaced; what then stands twice is added up.
+    /// The combination with symbols replaced by those that they are aliases of, like terms collected.
     pub(crate) fn renamed(&self, x: &mut Exprs, other: &impl Fn(Symbol) -> Symbol) -> Combination {
         let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
         for &(s, c) in &self.0 {
@@ -202,7 +202,7 @@ impl Combination {
         Combination(sum.into_iter().collect())
     }
 
-    /// The combination with known ones put in for their symbols.
+    /// The combination with known combinations substituted for their symbols.
     pub(crate) fn substitute<'k>(
         &self,
         x: &mut Exprs,
@@ -233,7 +233,7 @@ impl Combination {
                 *e = x.simplify(*e);
             }
         }
-        // What vanishes at the given parameters alone stays in, but for the share of what nothing determines.
+        // A coefficient that vanishes only at the given parameters is kept, except that of an undetermined variable.
         sum.retain(|s, e| if undetermined.contains(s) { !x.is_zero_given(*e) } else { !x.is_zero(*e) });
         Combination(sum.into_iter().collect())
     }

@@ -7,18 +7,18 @@ use super::{Combination, PortState, Role};
 use crate::algebra::{Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
-/// What the elimination is asked for, beyond the graph itself.
+/// Preferences and conditions for the elimination, beyond the graph itself.
 #[derive(Debug, Clone, Default)]
 pub struct CausalityPreferences {
-    /// Storages that shall become dependent rather than others (drawn in derivative causality).
+    /// Storages that become dependent in preference to others (drawn in derivative causality).
     pub derivative: Vec<PortRef>,
     /// Preferred causality of algebraic ports.
     pub algebraic: BTreeMap<PortRef, PortCausality>,
-    /// Sources that are laws between effort and flow, since what they read depends on what they set.
+    /// Sources treated as laws between effort and flow, since their values depend on the variables that they impose.
     pub sources_as_laws: BTreeSet<PortRef>,
-    /// Storages that shall stay independent, first of all.
+    /// Storages that stay independent, with the highest priority.
     pub independent: Vec<PortRef>,
-    /// Common variables of junctions that shall stay independent although no storage has them.
+    /// Common variables of junctions that stay independent although no storage has them as co-energy variable.
     pub virtual_speeds: Vec<Virtual>,
     /// Constraints that repeat others, each with whether its effort (or its flow) is taken as zero.
     pub dropped: BTreeMap<PortRef, bool>,
@@ -48,9 +48,9 @@ pub struct Solved {
     pub definitions: Vec<(Symbol, Combination)>,
     /// The same as short as the elements write them, where that can be.
     pub short: Option<Vec<(Symbol, Combination)>>,
-    /// Relations among source variables alone that the structure demands: each `Σ = 0`, its support minimal.
+    /// Relations among source variables alone that the structure implies: each `Σ = 0` with minimal support.
     pub demands: Vec<Combination>,
-    /// Divisors to be watched.
+    /// Divisors to be guarded during a run.
     pub watched: Vec<Expr>,
     /// Entries that vanish at the given parameters only.
     pub degenerate: Vec<Expr>,
@@ -65,14 +65,14 @@ pub(super) enum Which {
     Flow,
 }
 
-/// What an element gives to the junction structure, seen by priority.
+/// What an element imposes on the junction structure, in classes of priority.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Offer {
     /// A variable is imposed.
     Imposed(Which),
     /// A storage with this co-energy variable.
     Storage(Which),
-    /// A law that takes either, or prefers to give one.
+    /// A law that admits either variable as input, perhaps with a preference.
     Law,
     /// A storage of value zero.
     Virtual(Which),
@@ -118,7 +118,7 @@ pub fn solve_part(
     let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len());
     work.eliminate(x, &net.inner);
 
-    // Outputs are chosen from the least wanted input to the most wanted one: reactions, rates, laws, co-energies.
+    // Pivots are taken in ascending priority as inputs: reactions, rates, laws, co-energies. Pivot columns are outputs.
     let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
     let storages = net.storage_order(preferences);
     let laws = net.ports_where(|o| o == Offer::Law);
@@ -147,7 +147,7 @@ impl NetPort {
     pub fn column(&self, effort: bool) -> usize {
         if effort { self.effort } else { self.flow }
     }
-    /// The column of the variable that the element gives, if it has its way.
+    /// The column of the variable that the element imposes in its preferred causality.
     pub fn given(&self) -> usize {
         match self.offer {
             Offer::Imposed(which) | Offer::Storage(which) | Offer::Virtual(which) => {
@@ -159,7 +159,7 @@ impl NetPort {
     pub fn conjugate(&self) -> usize {
         self.effort + self.flow - self.given()
     }
-    /// The column of the variable that the structure gives.
+    /// The column of the conjugate, which the structure determines.
     pub fn output(&self, role: Role) -> usize {
         match role {
             Role::Source | Role::Redundant | Role::Independent => self.conjugate(),
@@ -307,7 +307,7 @@ impl Net {
         (0..self.ports.len()).filter(|&p| test(self.ports[p].offer)).collect()
     }
 
-    /// Storages from the most wanted independent one to the least.
+    /// Storages in descending priority as independent ones.
     pub fn storage_order(&self, preferences: &CausalityPreferences) -> Vec<usize> {
         let mut order = self.ports_where(|o| matches!(o, Offer::Storage(_) | Offer::Virtual(_)));
         order.sort_by_key(|&p| match self.ports[p].port {
@@ -326,7 +326,7 @@ impl Net {
         Combination(terms)
     }
 
-    /// What an elimination has found.
+    /// The result of an elimination as roles, definitions and relations.
     pub fn solved(
         &self,
         x: &mut Exprs,
@@ -363,7 +363,7 @@ impl Net {
                 None if role == Role::Independent => solved
                     .virtual_speeds
                     .extend(preferences.virtual_speeds.iter().filter(|v| v.speed == self.symbols[input])),
-                // Nothing stands there: what does not lead takes up nothing.
+                // Entries that do not lead a row have been eliminated from this one.
                 None => solved.definitions.push((self.symbols[input], Combination::default())),
             }
         }
@@ -389,7 +389,7 @@ impl Net {
     }
 }
 
-/// What an outer port offers to the junction structure.
+/// What an outer port imposes on the junction structure.
 fn offer(graph: &BondGraph, port: PortRef) -> Offer {
     use crate::bond_graph::StorageLaw::Known;
     let index = port.port as usize;
@@ -427,7 +427,7 @@ fn law_causality(
     }
 }
 
-/// Pivot columns by what their rows hold.
+/// Pivot columns as combinations of the other entries in their rows.
 fn reduced_rows(x: &mut Exprs, done: &Elimination, regular: Option<&RegularRows>) -> Vec<(usize, Vec<(usize, Expr)>)> {
     let mut rows = Vec::with_capacity(done.pivots.len());
     for (i, pivot) in done.pivots.iter().enumerate() {
@@ -441,7 +441,7 @@ fn reduced_rows(x: &mut Exprs, done: &Elimination, regular: Option<&RegularRows>
     rows
 }
 
-/// Pivot columns by the columns that are none.
+/// Pivot columns as combinations of the columns without a pivot.
 struct RegularRows {
     /// A row for each pivot.
     rows: Vec<SparseRow>,
@@ -449,9 +449,9 @@ struct RegularRows {
     determinant: Expr,
 }
 
-/// The rows of an elimination without the divisors on its way that mean nothing for what comes out: where one pivot is
-/// divided by another, neither has to be nonzero, only their product, the determinant. `None` if all of them count, or
-/// if that would take too long.
+/// The rows of an elimination without divisors that only the order of elimination introduced: where one pivot is divided by
+/// another, not each of them has to be nonzero but their product, the determinant. `None` if no divisor can be dropped, or
+/// if the search would take too long.
 fn regular_rows(x: &mut Exprs, done: &Elimination) -> Option<RegularRows> {
     let divided = |x: &mut Exprs, e: Expr| x.lowest_terms(e).is_some_and(|l| !l.below.is_empty());
     if !done.watched.iter().any(|&e| divided(x, e)) {
@@ -486,7 +486,7 @@ fn continuous(x: &mut Exprs, e: Expr) -> Option<Expr> {
     Some(x.simplify(fraction))
 }
 
-/// An entry with its sign turned, in its simple form.
+/// An entry with its sign reversed, simplified.
 pub(super) fn settled(x: &mut Exprs, e: Expr) -> Expr {
     let minus = x.neg(e);
     if x.is_number(minus).is_some() { minus } else { x.simplify(minus) }

@@ -1,7 +1,7 @@
 //! The directed graph of signals: two a bond, an edge from what an element reads to what it sets.
 //!
 //! It follows the drawn strokes. Storages cut it where they are drawn in integral causality; their edges are kept, by
-//! kind, for the paths between storages. A law met against its direction still has an edge, with its local gain.
+//! kind, for the paths between storages. A law in inverse causality has an edge too, with its local gain.
 //! Source: `method.md`, section 3.
 
 use std::collections::BTreeMap;
@@ -175,8 +175,8 @@ impl SignalGraph {
         (0..self.node_count()).map(heads).collect()
     }
 
-    /// How welcome each signal is as a break variable, 0 first: outputs of resistors, then common variables that a
-    /// junction hands on, then the others.
+    /// The priority of each signal as a break variable, 0 first: outputs of resistors, then common variables of junctions,
+    /// then the others.
     pub fn break_ranks(&self) -> Vec<u8> {
         let mut ranks = vec![2; self.node_count()];
         for edge in &self.edges {
@@ -618,7 +618,7 @@ impl Reading {
     }
 }
 
-/// Gives as many takers as possible one of the `n` things they want; entry `i` is who got thing `i`.
+/// A maximum matching of takers to `n` things, by the things that each admits; entry `i` is the taker of thing `i`.
 fn matching(wanted: &[Vec<usize>], n: usize) -> Vec<Option<usize>> {
     let mut got = vec![None; n];
     for taker in 0..wanted.len() {

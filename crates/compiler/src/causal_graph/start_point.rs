@@ -1,5 +1,5 @@
-//! Where a run starts, as far as that can be told before there are equations: which pivots are small there decides
-//! which variables stay independent.
+//! An estimate of the start point before there are equations: the size of pivots there decides which variables stay
+//! independent.
 
 use std::collections::BTreeSet;
 
@@ -7,9 +7,8 @@ use crate::algebra::{Expr, Exprs, NumericPoint, Symbol};
 use crate::bond_graph::{BondGraph, Kind, Meaning, Storage, StorageLaw};
 use crate::ids::Map;
 
-/// Values of all variables of a graph at the start: of positions those that are given, and for the others what closes
-/// the constraints. Efforts and flows without a start value are taken as 1: they are not known yet, and nothing that
-/// is chosen may rest on their being 0.
+/// Values of all variables of a graph at the start: given positions, and for the others a solution of the constraints.
+/// Efforts and flows without a start value are taken as 1: they are not known yet, and no choice may depend on their being 0.
 pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
     let mut values: Map<Symbol, f64> = Map::new();
     for parameter in graph.parameters.values() {
@@ -67,7 +66,7 @@ fn known_displacements(graph: &BondGraph) -> Vec<(Symbol, Expr)> {
     .collect()
 }
 
-/// What the search for open positions begins with, one after the other: where a constraint is flat, another one.
+/// First guesses for open positions, tried in turn: a constraint may have a vanishing gradient at one of them.
 const BEGINNINGS: [f64; 3] = [0.0, 1e-3, 1.0];
 const ITERATIONS: usize = 60;
 
@@ -99,7 +98,7 @@ fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map
     }
 }
 
-/// Damped steps of least norm towards the constraints; what is missed in the end.
+/// Damped minimum-norm steps towards the constraints; the residual that remains.
 fn approach(
     x: &Exprs,
     constraints: &[Expr],
@@ -137,8 +136,8 @@ fn size(residual: &[f64]) -> f64 {
     if sum.is_nan() { f64::INFINITY } else { sum.sqrt() }
 }
 
-/// The shortest step that the equations `jacobian · step = residual` allow: `Jᵀ (J Jᵀ)⁻¹ residual`, a trace of the unit
-/// matrix added where equations repeat each other.
+/// The minimum-norm solution of `jacobian · step = residual`: `Jᵀ (J Jᵀ)⁻¹ residual`, regularised by a small multiple of the
+/// unit matrix where equations are redundant.
 fn least_step(jacobian: &[Vec<f64>], residual: &[f64]) -> Option<Vec<f64>> {
     let n = jacobian.len();
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -151,7 +150,7 @@ fn least_step(jacobian: &[Vec<f64>], residual: &[f64]) -> Option<Vec<f64>> {
     Some((0..columns).map(|j| (0..n).map(|i| jacobian[i][j] * weights[i]).sum()).collect())
 }
 
-/// Gauss elimination with the greatest pivot of each column; `None` where there is none.
+/// Gaussian elimination with partial pivoting; `None` if the matrix is singular.
 fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
     let n = b.len();
     for k in 0..n {

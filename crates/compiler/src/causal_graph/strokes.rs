@@ -9,7 +9,7 @@ use super::Stroke;
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, PortCausality, PortRef};
 use crate::ids::{Id, Table};
 
-/// An assignment of strokes under way: what is set, and what follows from it, element by element.
+/// A partial assignment of strokes, closed under propagation element by element.
 pub struct Strokes<'a> {
     graph: &'a BondGraph,
     /// Whether the stroke sits at the `to` end, once it is known.
@@ -93,7 +93,7 @@ impl<'a> Strokes<'a> {
         members.iter().copied().filter(|m| self.kept.contains(m)).collect()
     }
 
-    /// Leaves a bond out: it carries what circulates, and says nothing about causality.
+    /// Leaves a bond out: its flow circulates, and it takes no part in causality.
     pub fn leave_out(&mut self, bond: BondId) {
         if self.at_to[bond].is_none() && self.left_out.insert(bond) {
             self.trail.push(bond);

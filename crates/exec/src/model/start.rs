@@ -1,4 +1,5 @@
-//! Start values: what is given holds, the rest is solved for, remaining freedom is zero.
+//! Consistent start values: the given ones hold, the others are solved for by Gauss-Newton iteration of minimum norm, and
+//! what remains undetermined is zero, or as guessed.
 
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
@@ -7,39 +8,39 @@ use halfarrow_compiler::program::{StartGroup, Value};
 use halfarrow_sim::{Affected, Failure};
 use std::collections::BTreeMap;
 
-/// A start condition is met if it is missed by less than this fraction of the terms it is made of.
+/// A start condition is met if its residual is below this fraction of the sum of its terms' magnitudes.
 const MET: f64 = 1e-9;
-/// What solving together leaves of an unknown that should be 0.
+/// Relative rounding error of an unknown whose exact value is 0, beside the largest unknown of its group.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// How much more a constraint weighs than a start value, where they contradict each other.
+/// Weight of a constraint relative to a start value in the least-squares solution of contradicting conditions.
 const FIRM: f64 = 1e4;
-/// Passes over conditions that one unknown is left in.
+/// Most passes over the conditions that have one open unknown.
 const PASSES: usize = 30;
 const ITERATIONS: usize = 60;
-/// Where unknowns begin that nothing determines yet: at zero; then beside it, where laws have a slope, later ones a bit more
-/// than those before.
+/// First guesses of open unknowns: zero; then points beside it, where laws that are flat at zero have a slope. From the fifth
+/// on each unknown of a group gets a slightly larger one than the unknown before, to break symmetry.
 const FIRST_GUESSES: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3];
-/// How far beside its guess an unknown may begin.
+/// Largest offset of a first guess from the value that the modeller guesses.
 const BESIDE: f64 = 1e-3;
-/// Part of the greatest derivative by an unknown that is what rounding left of one.
+/// A derivative below this fraction of the largest one by the same unknown is rounding error.
 const NOISE: f64 = 1e-14;
-/// The linearised motion is believed up to this many times what is there: farther away lies what hardly anything holds.
+/// Largest trusted ratio of an extrapolated to a given magnitude: beyond it lie directions with next to no stiffness.
 const FAR: f64 = 1e3;
-/// More states than this are not linearised to find typical magnitudes.
+/// Models with more states are not linearised to estimate typical magnitudes.
 const MOST_LINEARISED: usize = 200;
 
 /// The unknowns of the start: states, then conserved constants.
 #[derive(Clone)]
 struct Unknowns {
-    /// Those that are not known are where their search begins.
+    /// Their values; of those that are not known the first guesses.
     z: Vec<f64>,
     guessed: Vec<bool>,
     known: Vec<bool>,
-    /// Start conditions that hold because an unknown was solved from them.
+    /// Start conditions from which an unknown was solved.
     met: Vec<bool>,
 }
 
-/// A group at the time of the start, with the routine that computes its residuals.
+/// A group of start conditions at the start time, with the routine for its residuals.
 #[derive(Clone, Copy)]
 struct GroupAtTime<'a> {
     t: f64,
@@ -47,7 +48,7 @@ struct GroupAtTime<'a> {
     group: &'a StartGroup,
 }
 
-/// A constraint on displacements, with the routine that computes its residual.
+/// A holonomic constraint, with the routine for its residual.
 pub(super) struct ConstraintResidual {
     group: StartGroup,
     routine: Routine,
@@ -78,7 +79,7 @@ impl Model {
             if self.run.delays_and_samples.is_empty() || settled {
                 break;
             }
-            // Held signals start with what the start makes of them.
+            // Delayed and sampled signals start with their values at the start.
             self.begin_delays_and_samples(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
@@ -88,7 +89,7 @@ impl Model {
         Ok(z)
     }
 
-    /// The unknowns where their search begins, none of them known.
+    /// The unknowns at their first guesses, none of them known.
     fn begin_search(&mut self, t: f64, n: usize) -> Unknowns {
         let mut z = vec![0.0; n];
         let mut guessed = vec![false; n];
@@ -107,7 +108,7 @@ impl Model {
         Unknowns { z, guessed, known: vec![false; n], met }
     }
 
-    /// That every start value is a number.
+    /// Checks that every start value is finite.
     fn check_asked(&self) -> Result<(), StartError> {
         let value = |asked: &Value| self.code.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
         let given = self.code.program.start.iter().map(|s| (&s.asked, &s.name, s.span));
@@ -119,11 +120,11 @@ impl Model {
         Ok(())
     }
 
-    /// Typical magnitudes of the states: how great they are at the start, how far they are from where the linearised
-    /// motion would take them, and what that motion makes of them in the shortest time it knows. 0 where nothing moves.
+    /// Typical magnitudes of the states: the largest of their start values, their distances from the equilibrium of the
+    /// linearised equations, and their changes within the shortest time constant of these. 0 for states at rest at zero.
     ///
-    /// States go only where the junction structure lets them: by itself, a displacement that moves with a spring's has no
-    /// effect but rounding.
+    /// The equilibrium is sought along directions that the junction structure allows: a displacement that depends on others,
+    /// moved alone, would change no rate by more than rounding error.
     pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
@@ -148,7 +149,7 @@ impl Model {
         sizes
     }
 
-    /// Conditions in which one unknown is left determine it; all of one pass at once.
+    /// Solves the conditions that have one open unknown for it, all of one pass at once.
     fn solve_direct(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
         for _ in 0..PASSES {
             let mut chosen: BTreeMap<u32, usize> = BTreeMap::new();
@@ -168,7 +169,7 @@ impl Model {
         Ok(())
     }
 
-    /// Newton for each of the chosen (unknown, condition) by itself; gives how many were found and marks them known.
+    /// Scalar Newton iteration for each chosen pair of unknown and condition; marks the solved ones known, gives their number.
     fn solve_each(&mut self, t: f64, unknowns: &mut Unknowns, chosen: &BTreeMap<u32, usize>) -> usize {
         let wanted: Vec<Value> = chosen.values().map(|&c| self.code.program.start[c].residual).collect();
         let routine = self.routine_for(&wanted);
@@ -210,7 +211,7 @@ impl Model {
         done.iter().filter(|&&done| done).count()
     }
 
-    /// Whatever is not met yet is solved together with all that shares unknowns with it.
+    /// Solves each condition that is not met simultaneously with all conditions that share unknowns with it.
     fn solve_groups(&mut self, t: f64, unknowns: &mut Unknowns) -> Result<(), StartError> {
         for group in self.code.program.start_groups() {
             if group.conditions.iter().all(|&c| unknowns.met[c]) {
@@ -227,8 +228,8 @@ impl Model {
         Ok(())
     }
 
-    /// A group with all that its freedom is to be; where that cannot be met, with as much of it as can, one after the
-    /// other.
+    /// Solves a group with all conditions on its undetermined unknowns (zero, or a guess); where these cannot all hold, with as
+    /// many of them as can, tried one by one.
     fn solve_with_freedom(
         &mut self,
         t: f64,
@@ -243,7 +244,7 @@ impl Model {
             return all;
         }
         let mut kept = StartGroup { conditions: given, unknowns: group.unknowns.clone() };
-        // What was determined by freedom is open again.
+        // Unknowns that such conditions determined are open again.
         let begin = self.begin_search(t, unknowns.z.len());
         for u in group.unknowns.iter().map(|&u| u as usize) {
             (unknowns.z[u], unknowns.known[u]) = (begin.z[u], false);
@@ -274,7 +275,7 @@ impl Model {
         self.unmet(group, z, &residual, &jacobian).is_empty()
     }
 
-    /// Conditions of a group that are missed, as indices into it.
+    /// Indices of the group's conditions that do not hold.
     fn unmet(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
         let n = group.unknowns.len();
         let asked = |i: usize| {
@@ -285,9 +286,9 @@ impl Model {
             let terms = group.unknowns.iter().enumerate().map(|(j, &u)| (jacobian[i * n + j] * z[u as usize]).abs());
             asked(i) + terms.sum::<f64>()
         };
-        // What rounding leaves of an unknown that should be 0, beside the greatest of the others: each weighed by what
-        // it does to the conditions.
-        // Freedom that makes others grow without bounds is none, so its conditions are no rounding beside these.
+        // Rounding error of an unknown whose exact value is 0, beside the largest of the others, each weighted by its
+        // influence on the conditions. A condition on an undetermined unknown is judged by its own derivatives only: where
+        // the unknowns grow without bound it must not pass for rounding error.
         let own = |i: usize| jacobian[i * n..][..n].iter().fold(0.0f64, |most, j| most.max(j.abs()));
         let weak = |i: usize| self.code.program.start[group.conditions[i]].weak;
         let rows = greatest_of(jacobian, residual.len(), n).into_iter().enumerate();
@@ -300,7 +301,7 @@ impl Model {
         (0..residual.len()).filter(missed).collect()
     }
 
-    /// Gauss-Newton of minimum norm, damped.
+    /// Damped Gauss-Newton iteration with minimum-norm steps, from each first guess in turn.
     fn solve_group(
         &mut self,
         t: f64,
@@ -313,7 +314,7 @@ impl Model {
         let open: Vec<bool> = group.unknowns.iter().map(|&u| !all.known[u as usize]).collect();
         let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
         let at_time = GroupAtTime { t, routine, group };
-        // What is determined already stays, if the rest can be met so; then everything may move.
+        // Known unknowns stay if the conditions can be met so; in the second round all may change.
         let mut first = None;
         let all_open = vec![true; open.len()];
         let rounds = if open.contains(&true) { vec![open.clone(), all_open] } else { vec![all_open] };
@@ -323,7 +324,7 @@ impl Model {
                 let offset = |j: usize| if k < 4 { first_guess } else { first_guess * (1.0 + j as f64 / 16.0) };
                 for j in (0..open.len()).filter(|&j| open[j]) {
                     let u = group.unknowns[j] as usize;
-                    // What is guessed begins there, or close beside it.
+                    // Guessed unknowns begin at the guess, or close to it.
                     z[u] += if all.guessed[u] && first_guess.abs() > BESIDE { 0.0 } else { offset(j) };
                 }
                 if let Some(at) = self.linearised(t, routine, group, &z) {
@@ -337,7 +338,7 @@ impl Model {
                         first.get_or_insert((z, residual, jacobian));
                     }
                 }
-                // Where nothing is open every first guess is the same.
+                // Without an open unknown all first guesses are alike.
                 if !open.contains(&true) {
                     break;
                 }
@@ -347,7 +348,7 @@ impl Model {
             let run = self.residuals(t, routine, &all.z, None);
             return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
         };
-        // What is missed then is missed by as little as possible, with the weights as they are there.
+        // No exact solution: the weighted least-squares one, with the weights at this point.
         let firm = |&c: &usize| if self.code.program.start[c].firm { FIRM } else { 1.0 };
         let weights = weights_of(&jacobian, residual.len(), group.unknowns.len());
         let weights: Vec<f64> = weights.iter().zip(group.conditions.iter().map(firm)).map(|(w, f)| w * f).collect();
@@ -368,14 +369,14 @@ impl Model {
         })
     }
 
-    /// Names of unknowns: states, then conserved constants.
+    /// The names of unknowns: states, then conserved constants.
     fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
         let (states, conserved) = (&self.code.program.states, &self.code.program.conserved);
         let name = |u: usize| states.get(u).map_or_else(|| &conserved[u - states.len()], |s| &s.name).clone();
         unknowns.map(|u| name(u as usize)).collect()
     }
 
-    /// Where damped steps of minimum norm lead, of the unknowns that may move.
+    /// The limit of damped minimum-norm steps in the movable unknowns.
     fn nearest(
         &mut self,
         at_time: GroupAtTime,
@@ -391,7 +392,7 @@ impl Model {
         (z, residual, jacobian)
     }
 
-    /// One damped step; whether it helped.
+    /// One damped step; whether it reduced the residuals.
     fn nearer(
         &mut self,
         GroupAtTime { t, routine, group }: GroupAtTime,
@@ -423,11 +424,11 @@ impl Model {
                 _ => fraction *= 0.5,
             }
         }
-        // No step helps any more: this is as near as it gets.
+        // No damping reduces the residuals: a stationary point.
         false
     }
 
-    /// What contradicts each other, if the point is as near as any to all conditions.
+    /// The contradicting conditions, if the point is a least-squares solution.
     fn conflict(
         &mut self,
         GroupAtTime { t, group, .. }: GroupAtTime,
@@ -438,7 +439,7 @@ impl Model {
         let n = group.unknowns.len();
         let weighed: Vec<f64> = residual.iter().zip(weights).map(|(r, w)| r * w).collect();
         let most = weighed.iter().fold(0.0f64, |most, r| most.max(r.abs()));
-        // At a least-squares point the residual is orthogonal to whatever the unknowns can do.
+        // At a least-squares solution the residual is orthogonal to the range of the Jacobian.
         for j in 0..n {
             let column = |i: usize| jacobian[i * n + j] * weights[i];
             let product: f64 = (0..residual.len()).map(|i| column(i) * weighed[i]).sum();
@@ -448,12 +449,12 @@ impl Model {
             }
         }
         let mut involved: Vec<usize> = (0..residual.len()).filter(|&i| weighed[i].abs() > 1e-6 * most).collect();
-        // Constraints stay: it is the start values that give way, unless there are none.
+        // Constraints are kept: start values are reported, unless there are none.
         let firm = |i: &usize| self.code.program.start[group.conditions[*i]].firm;
         if !involved.iter().all(firm) {
             involved.retain(|i| !firm(i));
         }
-        // A start that misses a constraint is no start to offer.
+        // A point that violates a constraint is not offered as a remedy.
         let met = |i: usize| weighed[i].abs() <= 1e-3 * most || !firm(&i);
         if !involved.iter().all(firm) && !(0..residual.len()).all(met) {
             return None;
@@ -461,7 +462,7 @@ impl Model {
         Some(involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect())
     }
 
-    /// The constraints on displacements.
+    /// The holonomic constraints.
     pub(super) fn constraints(&mut self) -> Vec<ConstraintResidual> {
         let firm = |c: &usize| self.code.program.start[*c].firm;
         let firm: Vec<usize> = (0..self.code.program.start.len()).filter(firm).collect();
@@ -473,8 +474,8 @@ impl Model {
             .collect()
     }
 
-    /// The constraint that is missed most at a state, by which part of what its displacements come to, if that is more
-    /// than `most`; with its miss. `size` is what states count as one of.
+    /// The holonomic constraint with the largest relative violation at a state, if that exceeds `most`, with the violation
+    /// relative to the magnitudes of its displacements. `size`: the scales of the states.
     pub(super) fn unmet_constraint(
         &mut self,
         constraints: &[ConstraintResidual],
@@ -512,7 +513,7 @@ impl Model {
         StartValue { name: start.name, asked, fitting, span: start.span }
     }
 
-    /// Residuals and, row by row, their derivatives by the unknowns of the group; `None` where one has no value.
+    /// The residuals and their Jacobian by the unknowns of the group, row by row; `None` where one is not finite.
     fn linearised(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let (rows, columns) = (group.conditions.len(), group.unknowns.len());
         let mut jacobian = vec![0.0; rows * columns];
@@ -530,7 +531,7 @@ impl Model {
         finite.then_some((residual, jacobian))
     }
 
-    /// Runs a routine at the start, with derivatives along the given unknowns together.
+    /// Runs a routine at the start, with directional derivatives along the given unknowns.
     fn residuals(&mut self, t: f64, routine: &Routine, z: &[f64], along: Option<&[usize]>) -> Result<(), Failure> {
         let states = self.code.program.states.len();
         self.run.conserved.copy_from_slice(&z[states..]);
@@ -557,8 +558,8 @@ impl Model {
     }
 }
 
-/// The greatest derivative of each condition; where all are rounding beside those of other conditions by the same unknown,
-/// the greatest of these, so that nothing is made of rounding.
+/// The largest derivative of each condition; where all of them are rounding errors beside those of other conditions by the
+/// same unknown, the largest of these, so that rounding errors are not scaled up.
 fn greatest_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
     let mut greatest = vec![0.0f64; columns];
     for row in jacobian.chunks(columns.max(1)) {
@@ -569,7 +570,7 @@ fn greatest_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
     (0..rows).map(row).collect()
 }
 
-/// The weights of conditions, each by its greatest derivative.
+/// The weights of conditions: the inverses of their largest derivatives.
 fn weights_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
     greatest_of(jacobian, rows, columns).into_iter().map(minimum_norm::inverse).collect()
 }

@@ -77,9 +77,9 @@ impl RankRevealing {
         self.matrix.last().map_or(f64::INFINITY, |pivot| pivot.abs())
     }
 
-    /// Replaces the right side by the shortest solution, and calls `free` with each unknown and its share in each direction
-    /// of which the equations say nothing.
-    pub fn shortest(&mut self, rank: usize, mut free: impl FnMut(usize, f64)) {
+    /// Replaces the right-hand side by the solution of minimum norm, and calls `free` with each unknown and its component in
+    /// each vector of an orthonormal basis of the null space.
+    pub fn minimum_norm(&mut self, rank: usize, mut free: impl FnMut(usize, f64)) {
         let n = self.order.len();
         self.right[rank..].fill(0.0);
         back(&self.matrix, n, rank, &mut self.right);
@@ -99,7 +99,7 @@ impl RankRevealing {
     }
 }
 
-/// Solves the triangle of the first `rank` places.
+/// Back substitution in the triangle of the first `rank` places.
 fn back(matrix: &[f64], n: usize, rank: usize, b: &mut [f64]) {
     for i in (0..rank).rev() {
         let row = &matrix[i * n..][..rank];
@@ -115,7 +115,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum
 }
 
-/// Takes off what lies along a direction of length 1.
+/// Subtracts the projection on a unit vector.
 fn take_off(from: &mut [f64], along: &[f64]) {
     let share = dot(from, along);
     from.iter_mut().zip(along).for_each(|(v, a)| *v -= share * a);
@@ -136,14 +136,14 @@ mod tests {
         }
         let rank = equations.eliminate();
         assert_eq!(rank, 1);
-        let mut told = [0.0f64; 3];
-        equations.shortest(rank, |unknown, share| told[unknown] = told[unknown].max(share.abs()));
+        let mut free = [0.0f64; 3];
+        equations.minimum_norm(rank, |unknown, component| free[unknown] = free[unknown].max(component.abs()));
         let mut x = [0.0; 3];
         equations.order.iter().zip(&equations.right).for_each(|(&unknown, &value)| x[unknown] = value);
         for (x, wanted) in x.iter().zip([1.2, 1.6, 0.0]) {
             assert!((x - wanted).abs() < 1e-15, "{x} {wanted}");
         }
-        assert!(told[2] == 1.0 && (told[0] - 0.8).abs() < 1e-15 && (told[1] - 0.6).abs() < 1e-15, "{told:?}");
+        assert!(free[2] == 1.0 && (free[0] - 0.8).abs() < 1e-15 && (free[1] - 0.6).abs() < 1e-15, "{free:?}");
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
         equations.right.copy_from_slice(&[8.0, 8.0]);
         assert_eq!(equations.eliminate(), 2);
         assert_eq!(equations.least_pivot(), 4.0);
-        equations.shortest(2, |_, _| unreachable!("all is told"));
+        equations.minimum_norm(2, |_, _| unreachable!("full rank"));
         assert_eq!((equations.order, equations.right), (vec![1, 0], vec![1.0, 1.5]));
     }
 }

@@ -37,7 +37,7 @@ impl Frame {
             let is_continuation = found
                 && (self.is_continuation(solve)
                     || short && self.moves_little(solve) && self.path_is_regular(solve, PATH_POINTS));
-            if is_continuation || self.floats(solve) {
+            if is_continuation || self.solve_rank_deficient(solve) {
                 if is_continuation {
                     self.newton_of(solve).floating.now.fill(false);
                 }

@@ -117,7 +117,7 @@ impl Frame {
         if first.is_ok()
             && (self.is_continuation(solve) || self.newton_of(solve).following && self.is_unique_near_path(solve))
             || self.previous_is_root(solve)
-            || self.floats(solve)
+            || self.solve_rank_deficient(solve)
         {
             return Ok(());
         }
@@ -136,7 +136,7 @@ impl Frame {
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
     /// small against it, but they are against the rounding it is made of.
     fn continue_above_rounding(&mut self, solve: &Solve) -> bool {
-        if !self.newton_of(solve).following || !self.find_floors(solve) {
+        if !self.newton_of(solve).following || !self.find_rounding_floors(solve) {
             return false;
         }
         let newton = self.newton_of(solve);
@@ -163,12 +163,12 @@ impl Frame {
     pub(super) fn search(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
         newton.start.copy_from_slice(&newton.previous);
-        if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
+        if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
             return true;
         }
         for start in std::iter::once(0.0).chain(OTHER_STARTS) {
             self.newton_of(solve).start.fill(start);
-            if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
+            if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
                 return true;
             }
         }
@@ -177,7 +177,7 @@ impl Frame {
         for start in OTHER_STARTS.into_iter().filter(|_| n > 1) {
             let apart = |i: usize| start * ((i + 1) as f64 / n as f64);
             self.newton_of(solve).start.iter_mut().enumerate().for_each(|(i, own)| *own = apart(i));
-            if self.iterate(solve, Globalization::Damped).is_ok() || self.floats(solve) {
+            if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
                 return true;
             }
         }
