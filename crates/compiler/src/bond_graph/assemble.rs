@@ -4,16 +4,39 @@ use std::collections::BTreeMap;
 
 use super::builder::{Builder, NamedDraft, Role};
 use super::dimension::Quantity;
-use super::elaborate::{Asked, Title};
 use super::flatten::Word;
 use super::structure::Structure;
 use super::{
-    BondGraph, Constraint, Guess, HeldId, HeldSignal, Input, InputId, IntegratedSignal, Meaning, Named, Parameter,
-    ParameterId, SignalId, Variable,
+    BondGraph, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input, InputId, IntegratedSignal,
+    Meaning, Named, Parameter, ParameterId, Preference, SignalId, Variable,
 };
 use crate::algebra::{Expr, Symbol};
+use crate::ast::Header;
 use crate::ids::{Id, Map, Table};
 use crate::unit::{Dimension, Unit};
+
+/// What a model is called.
+#[derive(Default)]
+pub(super) struct Title {
+    pub name: String,
+    pub doc: String,
+}
+
+impl Title {
+    /// The name and documentation in the model line.
+    pub fn of(header: &Header) -> Title {
+        let doc = header.doc.as_ref().map_or(String::new(), |d| d.text.clone());
+        Title { name: header.name.text.clone(), doc }
+    }
+}
+
+/// What a model asks of its causality and of its start.
+pub(super) struct Asked {
+    pub guesses: Vec<Guess>,
+    pub preferences: Vec<Preference>,
+    pub forced_causality: Vec<ForcedCausality>,
+    pub forced_strokes: Vec<ForcedStroke>,
+}
 
 /// What has expressions over the symbols of the graph.
 pub(super) struct Laws {

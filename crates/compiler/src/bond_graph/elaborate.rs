@@ -2,18 +2,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::assemble::Laws;
+use super::assemble::{Asked, Laws, Title};
 use super::builder::Builder;
 use super::constraint::Relation;
 use super::files::Files;
 use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
-use super::names::{self, Name, Uses};
+use super::names::{self, Name};
 use super::overrides::{self, Override};
+use super::uses::Uses;
 use super::wire::{Wiring, wire};
-use super::{BondGraph, ForcedCausality, ForcedStroke, Guess, Kind, Preference, verify};
+use super::{BondGraph, Kind, verify};
 use crate::algebra::{Expr, Symbol};
-use crate::ast::{Ast, Header};
+use crate::ast::Ast;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
 
 /// What has become of a model.
@@ -138,26 +139,4 @@ struct Built {
     graph: Option<BondGraph>,
     faults: Vec<Diagnostic>,
     uses: Uses,
-}
-
-/// What a model is called.
-#[derive(Default)]
-pub(super) struct Title {
-    pub name: String,
-    pub doc: String,
-}
-
-impl Title {
-    fn of(header: &Header) -> Title {
-        let doc = header.doc.as_ref().map_or(String::new(), |d| d.text.clone());
-        Title { name: header.name.text.clone(), doc }
-    }
-}
-
-/// What a model asks of its causality and of its start.
-pub(super) struct Asked {
-    pub guesses: Vec<Guess>,
-    pub preferences: Vec<Preference>,
-    pub forced_causality: Vec<ForcedCausality>,
-    pub forced_strokes: Vec<ForcedStroke>,
 }

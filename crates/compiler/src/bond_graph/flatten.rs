@@ -2,8 +2,8 @@
 
 use rustc_hash::FxHashMap;
 
-use super::names::{Used, Uses};
 use super::scope::{Decl, DeclKind, Names, Node, Scope, ScopeId};
+use super::uses::{Used, Uses};
 use crate::ast::{self, StatementKind};
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};

@@ -2,8 +2,8 @@
 
 use super::builder::Builder;
 use super::flatten::Word;
-use super::names::Used;
 use super::scope::{Node, ScopeId};
+use super::uses::Used;
 use super::{ForcedCausality, ForcedStroke, PortCausality, PortRef, Preference};
 use crate::algebra::Symbol;
 use crate::ast::{self, Causality, StrokeBond};

@@ -32,6 +32,7 @@ mod scope;
 mod structure;
 mod symbols;
 mod two_ports;
+mod uses;
 mod value;
 mod verify;
 mod warnings;

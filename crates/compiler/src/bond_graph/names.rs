@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::flatten::Flat;
 use super::scope::{ComponentId, DeclId, DeclKind, Node};
+use super::uses::{Used, Uses};
 use crate::ast::Ast;
 use crate::diagnostic::Sources;
 use crate::span::{FileId, Span};
@@ -93,32 +94,6 @@ pub struct Name {
     /// Where it is used: its name alone, without what stands before or behind the dots. In the order of the files and of
     /// their text, each place once. A place inside a component counts for each instance that names something else by it.
     pub uses: Vec<Span>,
-}
-
-/// What a place in the text uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Used {
-    /// A value or function.
-    Value(DeclId),
-    /// An element, instance, port, bond or constraint.
-    Node(Node),
-    /// A component.
-    Component(ComponentId),
-}
-
-/// The places that use names.
-#[derive(Default)]
-pub(super) struct Uses {
-    places: Vec<(Used, Span)>,
-    /// Tables by the paths under which they were found.
-    pub tables: Vec<(String, Span)>,
-}
-
-impl Uses {
-    /// A name is used at this place.
-    pub fn add(&mut self, used: Used, at: Span) {
-        self.places.push((used, at));
-    }
 }
 
 /// The names of a model, those of one kind in the order of the text.

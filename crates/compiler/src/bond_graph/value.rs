@@ -2,8 +2,8 @@
 
 use super::builder::{Builder, Value};
 use super::dimension::Quantity;
-use super::names::Used;
 use super::scope::{DeclKind, FUNCTIONS, ScopeId};
+use super::uses::Used;
 use crate::algebra::{Comparison, Expr, Function, Symbol};
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
 use crate::diagnostic::{Diagnostic, codes};

@@ -1,0 +1,30 @@
+//! Where the text uses names, recorded where they are resolved.
+
+use super::scope::{ComponentId, DeclId, Node};
+use crate::span::Span;
+
+/// What a place in the text uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Used {
+    /// A value or function.
+    Value(DeclId),
+    /// An element, instance, port, bond or constraint.
+    Node(Node),
+    /// A component.
+    Component(ComponentId),
+}
+
+/// The places that use names.
+#[derive(Default)]
+pub(super) struct Uses {
+    pub places: Vec<(Used, Span)>,
+    /// Tables by the paths under which they were found.
+    pub tables: Vec<(String, Span)>,
+}
+
+impl Uses {
+    /// A name is used at this place.
+    pub fn add(&mut self, used: Used, at: Span) {
+        self.places.push((used, at));
+    }
+}
