@@ -1,19 +1,20 @@
 //! Steps as C functions: straight lines in chunks, what crosses from one to the next in the model's work array.
 
-use std::fmt::Write;
-
-use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::algebra::Function as Elementary;
 use halfarrow_compiler::program::{
     Arg, BlockId, Code, ConditionId, ConditionKind, EventTrigger, Local, Method, Op, Program, Step, Value,
 };
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::Export;
 use super::blocks::Factored;
-use super::derivatives::{Expressions, expression, power};
+use super::derivatives::Expressions;
+use super::function::{Function, Gives, Parameter};
 use super::givens::Givens;
 use super::header::comment;
 use super::patterns::Patterns;
 use super::variables::Variables;
+use super::written::{Line, Needed, Part, Series, Variable, Written, needed, without_the_unread, written};
 use crate::Real;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
@@ -23,24 +24,41 @@ const CHUNK: usize = 250;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
     /// Its parameters.
-    pub parameters: &'static str,
-    /// What its chunks are called with.
-    pub arguments: &'static str,
+    pub parameters: &'static [Parameter],
     /// Whether it gives no status.
     pub void: bool,
     /// Time, where failures note it.
-    pub time: &'static str,
+    pub time: Time,
     /// The givens that move, if derivatives are wanted.
     pub along: Option<Moving>,
     /// Whether what it gives is in double precision whatever real numbers are.
     pub wide: bool,
 }
 
+/// When a function fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Time {
+    /// At the time for which it is called.
+    Given,
+    /// At any time.
+    Always,
+}
+
+impl Time {
+    /// In C.
+    pub fn text(self) -> &'static str {
+        match self {
+            Time::Given => "t",
+            Time::Always => "((double)NAN)",
+        }
+    }
+}
+
 /// What has derivatives.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moving {
-    /// The rate of time in C.
-    pub time: Option<&'static str>,
+    /// The rate of time.
+    pub time: Option<TimeRate>,
     pub inputs: bool,
     pub held: bool,
     pub conserved: bool,
@@ -49,9 +67,20 @@ pub(super) struct Moving {
     pub outer: bool,
 }
 
+/// How fast time runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TimeRate {
+    /// One second a second.
+    One,
+    /// As the direction says.
+    OfDirection,
+}
+
 /// Writes functions.
 pub(super) struct Writer<'a> {
     pub program: &'a Program,
+    /// The name of the model in capitals, before the codes of failures.
+    pub capitals: String,
     pub givens: Givens<'a>,
     pub factored: Factored,
     /// Places of the work array taken so far.
@@ -66,35 +95,30 @@ pub(super) struct Writer<'a> {
     pub patterns: &'a Patterns,
 }
 
-/// A number as C reads it back to the bit.
-pub(super) fn number(value: f64) -> String {
-    match value {
-        v if v.is_nan() => "((double)NAN)".into(),
-        v if v == f64::INFINITY => "HUGE_VAL".into(),
-        v if v == f64::NEG_INFINITY => "(-HUGE_VAL)".into(),
-        v if v.is_sign_negative() => format!("({v:?})"),
-        v => format!("{v:?}"),
-    }
-}
-
-/// Numbers as the lines of a table.
-pub(super) fn numbers(values: &[f64]) -> String {
-    match values {
-        [] => "    0.0".into(),
-        values => values
-            .chunks(4)
-            .map(|row| format!("    {}", row.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ")))
-            .collect::<Vec<_>>()
-            .join(",\n"),
-    }
-}
-
 impl<'a> Writer<'a> {
-    pub fn new(program: &'a Program, newton: &'a [BlockId], patterns: &'a Patterns, real: Real) -> Writer<'a> {
+    pub fn new(export: &Export<'a>, name: &str, newton: &'a [BlockId], patterns: &'a Patterns) -> Writer<'a> {
+        let Export { program, real, .. } = *export;
         let factored = Factored::of(program, real);
         let givens = Givens::new(program, real);
         let variables = Variables::of(program, &givens);
-        Writer { program, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton, patterns }
+        let capitals = name.to_ascii_uppercase();
+        Writer { program, capitals, givens, factored, crossing: 0, variables, real, wide_crossing: 0, newton, patterns }
+    }
+
+    /// The precision of what is in double precision, or in that of real numbers.
+    pub fn precision_of(&self, wide: bool) -> Real {
+        if wide { Real::Double } else { self.real }
+    }
+
+    /// A call that takes note of a failure and gives its code.
+    pub fn failure(&self, code: &str, place: &dyn Part, time: Time) -> Written {
+        written!("{}(m, {}_{}, {}, {})", needed("ha_fail"), self.capitals, code, place, time.text())
+    }
+
+    /// Lines that give up with a failure where a condition holds.
+    pub fn fail_if(&self, condition: &Written, code: &str, place: &dyn Part, time: Time) -> Line {
+        let failure = self.failure(code, place, time);
+        Line::new(written!("    if ({}) {{\n        return {};\n    }}", condition, failure), 0)
     }
 
     /// Which locals are in double precision whatever real numbers are: those that follow from time and parameters alone,
@@ -128,20 +152,40 @@ impl<'a> Writer<'a> {
         all
     }
 
-    /// A function that computes code; `values` says where its outputs go, `rates` where their derivatives go, `kept` what it
-    /// computes of what stands before other routines.
+    /// The functions that compute code, of which the last has this name; `values` says where its outputs go, `rates` where
+    /// their derivatives go, `kept` what it computes of what stands before other routines.
     pub fn function(
         &mut self,
         name: &str,
         shape: Shape,
         (code, kept): (&Code, &[(u32, Value)]),
-        (values, rates): (&[String], &[String]),
-    ) -> String {
-        let moves = self.moves(code, shape, !rates.is_empty());
+        places: (&[String], &[String]),
+    ) -> Vec<Function> {
         let chunks: Vec<&[Step]> = if code.steps.is_empty() { vec![&[]] } else { code.steps.chunks(CHUNK).collect() };
+        let mut f = self.body(shape, (code, kept), &chunks, !places.1.is_empty());
+        let mut functions = Vec::new();
+        for (c, steps) in chunks.iter().enumerate() {
+            f.chunk = c;
+            f.turns = turns(steps);
+            steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
+            self.outputs(&mut f, code, places, chunks.len());
+            let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
+            let mut lines = without_the_unread(std::mem::take(&mut f.lines));
+            lines.extend(shape.parameters.iter().map(|p| Line::new(written!("    (void){};", p.name()), 0)));
+            functions.push(self.finished(called, shape, lines));
+        }
+        if functions.len() > 1 {
+            let lines = functions.iter().map(|f| self.chunk_call(shape, &f.name)).collect();
+            functions.push(self.finished(name.to_string(), shape, lines));
+        }
+        functions
+    }
+
+    /// A function that is to be written, with a home for each local.
+    fn body(&mut self, shape: Shape, (code, kept): (&Code, &[(u32, Value)]), chunks: &[&[Step]], rates: bool) -> Body {
         let mut f = Body {
             shape,
-            moves,
+            moves: self.moves(code, shape, rates),
             wide: self.wide(code),
             read: read_of(code, kept),
             home: vec![0; code.values.len()],
@@ -151,7 +195,7 @@ impl<'a> Writer<'a> {
             turns: FxHashMap::default(),
             names: self.variables.of_locals(code),
             kept: kept.iter().copied().collect(),
-            text: String::new(),
+            lines: Vec::new(),
         };
         for (c, steps) in chunks.iter().enumerate() {
             steps.iter().flat_map(Step::defines).for_each(|out| f.home[out.0 as usize] = c);
@@ -164,45 +208,37 @@ impl<'a> Writer<'a> {
                 });
             }
         }
-        let mut names = Vec::new();
-        let mut text = String::new();
-        let kind = if shape.void { "void" } else { "int" };
-        for (c, steps) in chunks.iter().enumerate() {
-            f.chunk = c;
-            f.turns = turns(steps);
-            f.text.clear();
-            steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
-            self.outputs(&mut f, code, (values, rates), chunks.len());
-            let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
-            let _ = writeln!(text, "static {kind} {called}({})\n{{", shape.parameters);
-            if !shape.void && f.text.contains("status") {
-                text += "    int status;\n";
-            }
-            text += &without_the_unused(&f.text);
-            for parameter in shape.arguments.split(", ") {
-                let _ = writeln!(text, "    (void){parameter};");
-            }
-            text += if shape.void { "}\n\n" } else { "    return MODEL_OK;\n}\n\n" };
-            names.push(called);
+        f
+    }
+
+    /// A function of these lines.
+    fn finished(&self, name: String, shape: Shape, mut lines: Vec<Line>) -> Function {
+        let gives = if shape.void { Gives::Nothing } else { Gives::Status };
+        if lines.iter().any(|line| line.written.notes.reads.contains(&Variable::Status)) {
+            lines.insert(0, Line::new(Written::of("    int status;"), 0));
         }
-        if chunks.len() > 1 {
-            let _ = writeln!(text, "static {kind} {name}({})\n{{", shape.parameters);
-            if !shape.void {
-                text += "    int status;\n";
-            }
-            for called in &names {
-                let _ = match shape.void {
-                    true => writeln!(text, "    {called}({});", shape.arguments),
-                    false => writeln!(
-                        text,
-                        "    status = {called}({});\n    if (status != MODEL_OK) {{\n        return status;\n    }}",
-                        shape.arguments
-                    ),
-                };
-            }
-            text += if shape.void { "}\n\n" } else { "    return MODEL_OK;\n}\n\n" };
+        if !shape.void {
+            lines.push(Line::new(written!("    return {}_OK;", self.capitals), 0));
         }
-        text
+        Function::new(name, gives, shape.parameters, self.real, &lines)
+    }
+
+    /// A call of a piece of a function.
+    fn chunk_call(&self, shape: Shape, called: &str) -> Line {
+        let arguments: Vec<&str> = shape.parameters.iter().map(|p| p.name()).collect();
+        let call = written!("{}({})", Needed(called.to_string().into()), arguments.join(", "));
+        Line::new(
+            match shape.void {
+                true => written!("    {};", call),
+                false => written!(
+                    "    {} = {};\n    if (status != {}_OK) {{\n        return status;\n    }}",
+                    Variable::Status,
+                    call,
+                    self.capitals
+                ),
+            },
+            0,
+        )
     }
 
     fn cross(&mut self, f: &mut Body, local: usize) {
@@ -270,11 +306,12 @@ impl<'a> Writer<'a> {
         for (i, a) in wanted {
             if let Some(place) = values.get(i) {
                 let value = self.arg(f, a, f.shape.wide);
-                let _ = writeln!(f.text, "    {place} = {value};");
+                f.assign(place, &value);
             }
             if let Some(place) = rates.get(i) {
-                let rate = self.rate(f, a, f.shape.wide).unwrap_or_else(|| "0.0".into());
-                let _ = writeln!(f.text, "    {place} = {rate};");
+                let zero = || Written::of(self.precision_of(f.shape.wide).number(0.0));
+                let rate = self.rate(f, a, f.shape.wide).unwrap_or_else(zero);
+                f.assign(place, &rate);
             }
         }
     }
@@ -283,8 +320,8 @@ impl<'a> Writer<'a> {
     fn keep(&self, f: &mut Body, out: u32) {
         let Some(&given) = f.kept.get(&out) else { return };
         let a = Arg::Local(Local(out));
-        let (place, value) = (self.givens.text(given), self.arg(f, a, false));
-        let _ = writeln!(f.text, "    {place} = {value};");
+        let (place, value) = (self.givens.written(given), self.arg(f, a, false));
+        f.assign(&place.text, &value);
         if self.real == Real::Float {
             self.keep_exact(f, given, a);
         }
@@ -294,66 +331,61 @@ impl<'a> Writer<'a> {
     fn keep_exact(&self, f: &mut Body, given: Value, a: Arg) {
         let value = self.arg(f, a, true);
         if self.givens.is_exact(given) {
-            let _ = writeln!(f.text, "    {} = {value};", self.givens.wide_text(given));
+            f.assign(&self.givens.wide_written(given).text, &value);
         }
         let parameter = match self.program.values.op(given) {
             Op::Parameter(i) => i as usize,
             _ => self.program.parameters.len(),
         };
-        let _ = writeln!(
-            f.text,
-            "    if (!ha_fits({value})) {{\n        return ha_fail(m, MODEL_OUT_OF_RANGE, {parameter}, {});\n    }}",
-            f.shape.time
-        );
+        let unfit = written!("!{}({})", needed("ha_fits"), value);
+        f.lines.push(self.fail_if(&unfit, "OUT_OF_RANGE", &parameter, f.shape.time));
     }
 
     /// A value, in double precision or in that of real numbers.
-    fn arg(&self, f: &Body, a: Arg, wide: bool) -> String {
-        let (text, is_wide) = match a {
-            Arg::Given(value) if wide => (self.givens.wide_text(value), true),
-            Arg::Given(value) => (self.givens.text(value), self.givens.is_time(value)),
+    fn arg(&self, f: &Body, a: Arg, wide: bool) -> Written {
+        let (value, is_wide) = match a {
+            Arg::Given(value) if wide => (self.givens.wide_written(value), true),
+            Arg::Given(value) => (self.givens.written(value), self.givens.is_time(value)),
             Arg::Local(local) => {
                 let i = local.0 as usize;
-                let text = match (f.home[i] == f.chunk, f.wide[i]) {
-                    (true, _) => format!("v{i}"),
-                    (false, true) => format!("m->wide[{}]", f.place[i]),
-                    (false, false) => format!("m->w[{}]", f.place[i]),
+                let value = match (f.home[i] == f.chunk, f.wide[i]) {
+                    (true, _) => written!("{}", Variable::Number(Series::Value(local.0))),
+                    (false, true) => written!("m->wide[{}]", f.place[i]),
+                    (false, false) => written!("m->w[{}]", f.place[i]),
                 };
-                (text, f.wide[i])
+                (value, f.wide[i])
             }
-            Arg::Outer(i) => (format!("o[{i}]"), false),
-            Arg::Guess(i) => (format!("g[{i}]"), false),
+            Arg::Outer(i) => (written!("o[{}]", i), false),
+            Arg::Guess(i) => (written!("g[{}]", i), false),
         };
-        self.cast(text, is_wide, wide)
+        self.cast(value, is_wide, wide)
     }
 
-    fn cast(&self, text: String, from_wide: bool, to_wide: bool) -> String {
-        match (from_wide, to_wide) {
-            _ if self.real == Real::Double => text,
-            (true, false) => format!("ha_narrow({text})"),
-            (false, true) => format!("ha_widen({text})"),
-            _ => text,
+    fn cast(&self, value: Written, from_wide: bool, to_wide: bool) -> Written {
+        match (self.precision_of(from_wide), self.precision_of(to_wide)) {
+            (from, to) if from == to => value,
+            (_, to) => written!("({}){}", to.kind(), value),
         }
     }
 
     /// The derivative, if it moves.
-    fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<String> {
+    fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<Written> {
         let moving = f.shape.along?;
-        let (text, is_wide) = match a {
+        let (rate, is_wide) = match a {
             Arg::Given(value) => (self.givens.rate(value, moving)?, false),
             Arg::Local(local) if !f.moves[local.0 as usize] => return None,
             Arg::Local(local) => {
                 let i = local.0 as usize;
                 let (place, is_wide) = (f.rate_place[i], f.wide[i]);
                 match f.home[i] == f.chunk {
-                    true => (format!("d{i}"), is_wide),
-                    false => (format!("m->{}[{place}]", if is_wide { "wide" } else { "w" }), is_wide),
+                    true => (written!("{}", Variable::Number(Series::Rate(local.0))), is_wide),
+                    false => (written!("m->{}[{}]", if is_wide { "wide" } else { "w" }, place), is_wide),
                 }
             }
-            Arg::Outer(i) => (moving.outer.then(|| format!("e[{i}]"))?, false),
+            Arg::Outer(i) => (moving.outer.then(|| written!("e[{}]", i))?, false),
             Arg::Guess(_) => return None,
         };
-        Some(self.cast(text, is_wide, wide))
+        Some(self.cast(rate, is_wide, wide))
     }
 
     /// Whether a step is computed in double precision, and whether its derivative is, if real numbers are less.
@@ -377,21 +409,15 @@ impl<'a> Writer<'a> {
             reads.values.push(self.arg(f, a, wide));
             reads.rates.push(self.rate(f, a, wide_rate));
         });
-        let a = &reads.values;
         match step {
             Step::Guard { guard, .. } => {
-                let rounding = 64.0 * if wide { f64::EPSILON } else { self.real.epsilon() };
-                let holds = format!("{0} != 0.0 && fabs({0}) > {1} * {2}", a[0], number(rounding), a[1]);
-                let holds = if wide { format!("HA_WIDE({holds})") } else { format!("({holds})") };
-                let _ = writeln!(
-                    f.text,
-                    "    if (!{holds}) {{\n        return ha_fail(m, MODEL_VANISHED, {guard}, {});\n    }}",
-                    f.shape.time
-                );
+                let vanishes = self.vanishes(&reads.values, self.precision_of(wide));
+                f.lines.push(self.fail_if(&vanishes, "VANISHED", guard, f.shape.time));
             }
             Step::Parameter { out, index, default: _ } => {
-                let given = format!("m->p{}[{index}]", if self.real == Real::Float { "_exact" } else { "" });
-                self.put(f, out.0, &format!("m->set[{index}] ? {given} : {}", a[0]), None);
+                let array = if self.real == Real::Float { "p_exact" } else { "p" };
+                let value = written!("m->set[{0}] ? m->{1}[{0}] : {2}", index, array, reads.values[0]);
+                self.put(f, out.0, &value, None);
             }
             Step::Solve(solve) => match solve.method {
                 Method::Linear { .. } => self.linear(f, solve, &reads, place),
@@ -401,82 +427,103 @@ impl<'a> Writer<'a> {
         }
     }
 
+    /// Whether a divisor is rounding of what it is the sum of.
+    fn vanishes(&self, values: &[Written], real: Real) -> Written {
+        let (zero, rounding) = (real.number(0.0), real.number(64.0 * real.epsilon()));
+        let (size, divisor, scale) = (real.function("fabs"), &values[0], &values[1]);
+        written!("!({} != {} && {}({}) > {} * {})", divisor, zero, size, divisor, rounding, scale)
+    }
+
     fn operation(&self, f: &mut Body, (out, op): (u32, Op<Arg>), reads: &Reading, place: usize) {
         let (a, d) = (&reads.values[..], &reads.rates[..]);
         match op {
-            Op::Table(table, piece, _) => self.table(f, (out, 0), (&a[0], d[0].as_deref()), (table, piece, place)),
-            Op::TableSlope(table, piece, _) => self.table(f, (out, 1), (&a[0], d[0].as_deref()), (table, piece, place)),
+            Op::Table(table, piece, _) => self.table(f, (out, 0), (&a[0], d[0].as_ref()), (table, piece, place)),
+            Op::TableSlope(table, piece, _) => self.table(f, (out, 1), (&a[0], d[0].as_ref()), (table, piece, place)),
             Op::TableCurvature(table, piece, _) => {
-                self.table(f, (out, 2), (&a[0], d[0].as_deref()), (table, piece, place));
+                self.table(f, (out, 2), (&a[0], d[0].as_ref()), (table, piece, place));
             }
             Op::Sign(condition, _) | Op::Floor(condition, _) => {
-                let taken = self.condition(f, condition, &a[0], d[0].as_deref());
+                let taken = self.condition(f, condition, &a[0], d[0].as_ref());
                 self.put(f, out, &self.cast(taken, true, f.wide[out as usize]), None);
             }
-            Op::Call(function @ (Function::Sin | Function::Cos), angle) if f.turns.contains_key(&angle) => {
+            Op::Call(function @ (Elementary::Sin | Elementary::Cos), angle) if f.turns.contains_key(&angle) => {
                 let value = self.turn(f, (out, function), (&a[0], angle), place);
                 let rate = self.derivative(f, out, op, reads);
-                self.put(f, out, &value, rate.as_deref());
+                self.put(f, out, &value, rate.as_ref());
             }
-            Op::Powi(n, _) => {
-                let value = power(&mut f.text, (&format!("v{out}"), f.wide[out as usize]), &a[0], n);
+            Op::Powi(..) => {
+                let value = self.value(f, out, op, reads);
                 self.put(f, out, &value, None);
                 if let Some(rate) = self.derivative(f, out, op, reads) {
                     self.put_rate(f, out, &rate);
                 }
             }
             _ => {
-                let mut operands = a.iter();
-                let value = expression(op.map_operands(|_| operands.next().expect("as many as operands")));
+                let value = self.value(f, out, op, reads);
                 let rate = self.derivative(f, out, op, reads);
-                self.put(f, out, &value, rate.as_deref());
+                self.put(f, out, &value, rate.as_ref());
             }
         }
     }
 
+    /// A plain operation, as the table says.
+    fn value(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Written {
+        let real = self.precision_of(f.wide[out as usize]);
+        let mut k = Expressions::new(&mut f.lines, Series::Value(out), real);
+        let mut operands = reads.values.iter().map(|a| k.push(a.clone())).collect::<Vec<_>>().into_iter();
+        let value = k.operation(op.map_operands(|_| operands.next().expect("as many as operands")));
+        k.written(value)
+    }
+
     /// The derivative of an operation by the rules of the table, if it moves.
-    fn derivative(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<String> {
+    fn derivative(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<Written> {
         if !f.moves[out as usize] {
             return None;
         }
-        let mut k = Expressions::new(&mut f.text, format!("d{out}"), f.wide[out as usize]);
-        let value = k.whole(&format!("v{out}"));
+        let real = self.precision_of(f.wide[out as usize]);
+        let mut k = Expressions::new(&mut f.lines, Series::Rate(out), real);
+        let value = k.push(written!("{}", Variable::Number(Series::Value(out))));
         let mut operands = reads.values.iter().zip(&reads.rates);
         let slope = op.derivative(&mut k, value, |k, _| {
             let (value, rate) = operands.next().expect("as many as operands");
-            (k.whole(value), rate.as_ref().map(|rate| k.whole(rate)))
+            (k.push(value.clone()), rate.as_ref().map(|rate| k.push(rate.clone())))
         });
-        slope.map(|slope| k.text(slope))
+        slope.map(|slope| k.written(slope))
     }
 
     /// One of a sine and a cosine that are computed together.
-    fn turn(&self, f: &mut Body, (out, function): (u32, Function), (a, angle): (&str, Arg), place: usize) -> String {
+    fn turn(
+        &self,
+        f: &mut Body,
+        (out, function): (u32, Elementary),
+        (a, angle): (&Written, Arg),
+        place: usize,
+    ) -> Written {
         let number = *f.turns.entry(angle).or_default().get_or_insert(place);
+        let both = Variable::Array("h", number);
         if number == place {
-            let call = format!("ha_turn({a}, h{place})");
-            let _ = match f.wide[out as usize] {
-                true => writeln!(f.text, "    ha_wide h{place}[2];\n    HA_WIDE({call});"),
-                false => writeln!(f.text, "    double h{place}[2];\n    {call};"),
-            };
+            let real = self.precision_of(f.wide[out as usize]);
+            let turn = Needed(real.function("ha_turn").into());
+            f.line(written!("    {} {}[2];\n    {}({}, {});", real.kind(), both, turn, a, both), 2);
         }
-        format!("h{number}[{}]", usize::from(function == Function::Cos))
+        written!("{}[{}]", both, usize::from(function == Elementary::Cos))
     }
 
-    fn condition(&self, f: &Body, id: ConditionId, a: &str, d: Option<&str>) -> String {
+    fn condition(&self, f: &Body, id: ConditionId, a: &Written, d: Option<&Written>) -> Written {
         let condition = &self.program.conditions[id];
         let hold = match condition.trigger {
             EventTrigger::LinearTime | EventTrigger::CurvedTime => "m->clock_hold",
             EventTrigger::State => "m->state_hold",
             EventTrigger::RecordedOnly => "HA_FOLLOW",
         };
-        let (name, table) = match condition.kind {
-            ConditionKind::Sign => ("side", String::new()),
-            ConditionKind::Floor => ("whole", String::new()),
-            ConditionKind::Piece(table) => ("piece", format!("{table}, ")),
+        let (plain, along, table) = match condition.kind {
+            ConditionKind::Sign => ("ha_side", "ha_side_along", String::new()),
+            ConditionKind::Floor => ("ha_whole", "ha_whole_along", String::new()),
+            ConditionKind::Piece(table) => ("ha_piece", "ha_piece_along", format!("{table}, ")),
         };
         match d.filter(|_| f.shape.along.is_some_and(|moving| self.takes_rate(id, moving))) {
-            Some(d) => format!("ha_{name}_along(m, {hold}, {}, {table}{a}, {d}, t)", id.0),
-            None => format!("ha_{name}(m, {hold}, {}, {table}{a})", id.0),
+            Some(d) => written!("{}(m, {}, {}, {}{}, {}, t)", needed(along), hold, id.0, table, a, d),
+            None => written!("{}(m, {}, {}, {}{})", needed(plain), hold, id.0, table, a),
         }
     }
 
@@ -484,43 +531,45 @@ impl<'a> Writer<'a> {
         &self,
         f: &mut Body,
         (out, order): (u32, usize),
-        (a, d): (&str, Option<&str>),
+        (a, d): (&Written, Option<&Written>),
         (table, piece, number): (u32, Option<ConditionId>, usize),
     ) {
         let piece = match piece {
-            Some(condition) => format!("(int){}", self.condition(f, condition, a, d)),
-            None => format!("ha_piece_of(&ha_tables[{table}], {a})"),
+            Some(condition) => written!("(int){}", self.condition(f, condition, a, d)),
+            None => written!("{}(&ha_tables[{}], {})", needed("ha_piece_of"), table, a),
         };
-        let _ = writeln!(f.text, "    double q{number}[4];");
-        let _ = writeln!(f.text, "    ha_table_on(&ha_tables[{table}], {piece}, {a}, q{number});");
-        let rate = d.map(|d| format!("ha_along(q{number}[{}], {d})", order + 1));
-        self.put(f, out, &format!("q{number}[{order}]"), rate.as_deref());
+        let cubic = Variable::Array("q", number);
+        f.line(written!("    {} {}[4];", self.real.kind(), cubic), 4);
+        let look = needed("ha_table_on");
+        f.line(written!("    {}(&{}[{}], {}, {}, {});", look, needed("ha_tables"), table, piece, a, cubic), 0);
+        let along = Needed(self.real.function("ha_along").into());
+        let rate = d.map(|d| written!("{}({}[{}], {})", along, cubic, order + 1, d));
+        self.put(f, out, &written!("{}[{}]", cubic, order), rate.as_ref());
     }
 
-    pub fn put(&self, f: &mut Body, out: u32, value: &str, rate: Option<&str>) {
-        let name = f.names[out as usize].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
-        let _ = match f.wide[out as usize] {
-            true => writeln!(f.text, "    const ha_wide v{out} = HA_WIDE({value});{name}"),
-            false => writeln!(f.text, "    const double v{out} = {value};{name}"),
-        };
-        if f.place[out as usize] != usize::MAX {
-            let array = if f.wide[out as usize] { "wide" } else { "w" };
-            let _ = writeln!(f.text, "    m->{array}[{}] = v{out};", f.place[out as usize]);
-        }
+    /// Declares what a step computes, and puts it where it is read elsewhere.
+    pub fn put(&self, f: &mut Body, out: u32, value: &Written, rate: Option<&Written>) {
+        let i = out as usize;
+        let name = f.names[i].as_ref().map_or(String::new(), |name| format!(" /* {} */", comment(name)));
+        self.declare(f, out, (Series::Value(out), value), (f.place[i], &name));
         self.keep(f, out);
         if let Some(rate) = rate {
             self.put_rate(f, out, rate);
         }
     }
 
-    fn put_rate(&self, f: &mut Body, out: u32, rate: &str) {
-        let _ = match f.wide[out as usize] {
-            true => writeln!(f.text, "    const ha_wide d{out} = HA_WIDE({rate});"),
-            false => writeln!(f.text, "    const double d{out} = {rate};"),
-        };
-        if f.rate_place[out as usize] != usize::MAX {
-            let array = if f.wide[out as usize] { "wide" } else { "w" };
-            let _ = writeln!(f.text, "    m->{array}[{}] = d{out};", f.rate_place[out as usize]);
+    fn put_rate(&self, f: &mut Body, out: u32, rate: &Written) {
+        self.declare(f, out, (Series::Rate(out), rate), (f.rate_place[out as usize], ""));
+    }
+
+    /// Declares a number of the precision of a local, with a comment, and stores it where it crosses to other chunks.
+    fn declare(&self, f: &mut Body, out: u32, (series, value): (Series, &Written), (place, about): (usize, &str)) {
+        let (wide, variable) = (f.wide[out as usize], Variable::Number(series));
+        let kind = self.precision_of(wide).kind();
+        f.constant(variable, written!("    const {} {} = {};{}", kind, variable, value, about), 1);
+        if place != usize::MAX {
+            let array = if wide { "wide" } else { "w" };
+            f.assign(&format!("m->{array}[{place}]"), &written!("{}", variable));
         }
     }
 }
@@ -546,10 +595,25 @@ pub(super) struct Body {
     names: Vec<Option<String>>,
     /// What other routines read of what is computed.
     kept: FxHashMap<u32, Value>,
-    pub text: String,
+    pub lines: Vec<Line>,
 }
 
 impl Body {
+    /// A line that declares so many numbers.
+    pub fn line(&mut self, written: Written, numbers: usize) {
+        self.lines.push(Line::new(written, numbers));
+    }
+
+    /// A line that declares a constant of so many numbers.
+    pub fn constant(&mut self, variable: Variable, written: Written, numbers: usize) {
+        self.lines.push(Line::constant(variable, written, numbers));
+    }
+
+    /// A line that puts a value somewhere.
+    pub fn assign(&mut self, place: &str, value: &Written) {
+        self.line(written!("    {} = {};", place, value), 0);
+    }
+
     /// Whether what is computed by now first has this value; what no chunk computes stands in the last one.
     fn is_here(&self, a: Arg, chunks: usize) -> bool {
         match a {
@@ -562,8 +626,8 @@ impl Body {
 /// What a step reads, in C: values and derivatives.
 #[derive(Default)]
 pub(super) struct Reading {
-    pub values: Vec<String>,
-    pub rates: Vec<Option<String>>,
+    pub values: Vec<Written>,
+    pub rates: Vec<Option<Written>>,
 }
 
 /// Whether each local is read by a step or wanted.
@@ -581,32 +645,13 @@ fn read_of(code: &Code, kept: &[(u32, Value)]) -> Vec<bool> {
 
 /// The angles of which some steps want both sine and cosine.
 fn turns(steps: &[Step]) -> FxHashMap<Arg, Option<usize>> {
-    let of = |wanted: Function| {
+    let of = |wanted: Elementary| {
         let angle = move |step: &Step| match step {
             Step::Op { op: Op::Call(f, a), .. } if *f == wanted => Some(*a),
             _ => None,
         };
         steps.iter().filter_map(angle).collect::<FxHashSet<Arg>>()
     };
-    let cosines = of(Function::Cos);
-    of(Function::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()
-}
-
-/// The lines of straight code without values that no later line reads.
-fn without_the_unused(text: &str) -> String {
-    let mut seen: FxHashSet<&str> = FxHashSet::default();
-    let mut kept = Vec::new();
-    for line in text.lines().rev() {
-        let code = line.split(" /* ").next().unwrap_or(line);
-        let bare = code.trim_start();
-        let declared = bare.strip_prefix("const double ").or_else(|| bare.strip_prefix("const ha_wide "));
-        let declared = declared.and_then(|rest| rest.split([' ', '[']).next());
-        if declared.is_some_and(|name| !seen.contains(name)) {
-            continue;
-        }
-        seen.extend(code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
-        kept.push(line);
-    }
-    kept.reverse();
-    kept.iter().flat_map(|line| [line, "\n"]).collect()
+    let cosines = of(Elementary::Cos);
+    of(Elementary::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()
 }

@@ -16,36 +16,88 @@ use halfarrow_compiler::program::{
 use super::blocks::{elimination_room, full_room};
 use super::cost::{Cost, OperationCount};
 use super::flags::Flags;
+use super::fragment::{Fragment, assembled};
+use super::function::{self, Function, Gives, Parameter};
 use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
+use super::template::Filling;
 use super::terms;
-use super::write::{Moving, Shape, Writer, number};
-use super::{Export, messages, real, template};
+use super::write::{Moving, Shape, Time, TimeRate, Writer};
+use super::written::{Line, Needed, Written, needed, written};
+use super::{Export, messages};
 use crate::{EmitError, Method, Real};
 use routines::{Routines, newton_of};
 
 /// A sum of floats below this fraction of its terms is rounding of the operations that lead to it.
 const ROUNDING_OF_FLOATS: f64 = 1e-5;
 
+/// The search of the solutions of nonlinear blocks.
+const NEWTON: &str = concat!(
+    include_str!("../runtime/newton/workspace.c"),
+    include_str!("../runtime/newton/correction.c"),
+    include_str!("../runtime/newton/floating.c"),
+    include_str!("../runtime/newton/damped.c"),
+    include_str!("../runtime/newton/continuation.c"),
+    include_str!("../runtime/newton/search.c"),
+);
+
 /// Points that all delays together may keep.
 const MOST_POINTS: f64 = 1e6;
 
 const PLAIN: Shape = Shape {
-    parameters: "ha_model *m, ha_wide t, const double *x, double *out",
-    arguments: "m, t, x, out",
+    parameters: &[Parameter::Model, Parameter::Wide("t"), Parameter::Reals("x"), Parameter::RealsOut("out")],
     void: false,
-    time: "t",
+    time: Time::Given,
     along: None,
     wide: false,
 };
 const ALONG: Shape = Shape {
-    parameters: "ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates",
-    arguments: "m, t, x, e, out, rates",
+    parameters: &[
+        Parameter::Model,
+        Parameter::Wide("t"),
+        Parameter::Reals("x"),
+        Parameter::Reals("e"),
+        Parameter::RealsOut("out"),
+        Parameter::RealsOut("rates"),
+    ],
     ..PLAIN
 };
-
-/// The rate of time where a direction gives it.
-const ALONG_TIME: Option<&str> = Some("e[0]");
+/// What moves with time alone.
+const CLOCK: Shape = Shape {
+    parameters: &[Parameter::Model, Parameter::Wide("t"), Parameter::WideOut("out"), Parameter::WideOut("rates")],
+    wide: true,
+    ..PLAIN
+};
+/// What parameters determine.
+const PREAMBLE: Shape = Shape { parameters: &[Parameter::Model], time: Time::Always, ..PLAIN };
+/// A Newton block: residuals and their Jacobian.
+const BLOCK: Shape = Shape {
+    parameters: &[
+        Parameter::Model,
+        Parameter::Reals("o"),
+        Parameter::Reals("g"),
+        Parameter::RealsOut("right"),
+        Parameter::RealsOut("matrix"),
+    ],
+    void: true,
+    ..PLAIN
+};
+/// Of what its residuals are the sums.
+const BLOCK_TERMS: Shape = Shape {
+    parameters: &[Parameter::Model, Parameter::Reals("o"), Parameter::Reals("g"), Parameter::RealsOut("terms")],
+    ..BLOCK
+};
+/// Rates of its residuals.
+const BLOCK_ALONG: Shape = Shape {
+    parameters: &[
+        Parameter::Model,
+        Parameter::Reals("o"),
+        Parameter::Reals("e"),
+        Parameter::Reals("g"),
+        Parameter::RealsOut("rates"),
+    ],
+    ..BLOCK
+};
 
 /// The functions of a model.
 pub(super) struct Plan<'a> {
@@ -53,7 +105,7 @@ pub(super) struct Plan<'a> {
     pub program: &'a Program,
     pub name: String,
     /// Functions in C.
-    functions: String,
+    functions: Vec<Function>,
     /// Conditions of the state, in order.
     pub switches: Vec<ConditionId>,
     /// Conditions of time, in order.
@@ -107,17 +159,13 @@ struct Works {
 }
 
 /// Values of parameters alone, from where the preamble leaves them.
-fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> String {
-    let kind = if wide { "ha_wide" } else { "double" };
-    let mut text = format!("static void {name}(const ha_model *m, {kind} *out)\n{{\n");
-    for (i, value) in values.enumerate() {
-        let place = match wide {
-            true => format!("HA_WIDE({})", writer.givens.wide_text(value)),
-            false => writer.givens.text(value),
-        };
-        text += &format!("    out[{i}] = {place};\n");
-    }
-    text + "    (void)m;\n    (void)out;\n}\n\n"
+fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> Function {
+    let out = if wide { Parameter::WideOut("out") } else { Parameter::RealsOut("out") };
+    let value = |value| if wide { writer.givens.wide_written(value) } else { writer.givens.written(value) };
+    let line = |(i, v)| Line::new(written!("    out[{}] = {};", i, value(v)), 0);
+    let mut lines: Vec<Line> = values.enumerate().map(line).collect();
+    lines.extend(["    (void)m;", "    (void)out;"].map(|line| Line::new(Written::of(line), 0)));
+    Function::new(name.into(), Gives::Nothing, &[Parameter::ConstModel, out], writer.real, &lines)
 }
 
 impl<'a> Plan<'a> {
@@ -130,7 +178,7 @@ impl<'a> Plan<'a> {
             export,
             program,
             name: name.to_string(),
-            functions: String::new(),
+            functions: Vec::new(),
             switches: of(|trigger| trigger == EventTrigger::State),
             clocks: of(|trigger| matches!(trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime)),
             delays: delays(export)?,
@@ -156,68 +204,62 @@ impl<'a> Plan<'a> {
         let blocks = routines.newton();
         let used: Vec<BlockId> = blocks.keys().copied().collect();
         let patterns = Rc::clone(&self.patterns);
-        let mut writer = Writer::new(program, &used, &patterns, self.export.real);
+        let mut writer = Writer::new(self.export, &self.name, &used, &patterns);
         let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
         self.shown_blocks = numbers(&routines.observe);
         self.shown_blocks.retain(|block| !self.rates_blocks.contains(block));
 
-        let mut text = String::new();
-        text += &of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false);
-        text += &of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true);
-        text += &of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false);
+        let mut functions = vec![
+            of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false),
+            of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true),
+            of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false),
+        ];
         let plain = |writer: &mut Writer, name: &str, routine: &Routine| {
             let n = routine.code.outputs.len();
             writer.function(name, PLAIN, (&routine.code, &[]), (&values("out", n), &[]))
         };
-        text += &plain(&mut writer, "ha_rates_code", &routines.rates);
-        text += &plain(&mut writer, "ha_observe_code", &routines.observe);
-        text += &plain(&mut writer, "ha_switching_code", &routines.switching);
-        text += &plain(&mut writer, "ha_domains_code", &routines.domains);
-        text += &self.domain_checks(&writer);
-        text += &self.assumption_checks(&writer);
+        functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
+        functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
+        functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
+        functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
+        functions.extend(self.domain_checks(&writer));
+        functions.extend(self.assumption_checks(&writer));
 
         let along = |writer: &mut Writer, name: &str, shape: Shape, routine: &Routine, moving: Moving| {
             let n = routine.code.outputs.len();
             let shape = Shape { along: Some(moving), ..shape };
             writer.function(name, shape, (&routine.code, &[]), (&values("out", n), &values("rates", n)))
         };
-        let clock = Shape {
-            parameters: "ha_model *m, ha_wide t, ha_wide *out, ha_wide *rates",
-            arguments: "m, t, out, rates",
-            wide: true,
-            ..PLAIN
-        };
-        // Time runs at one second a second.
-        let runs = Moving { time: Some("1.0"), ..Moving::default() };
-        text += &along(&mut writer, "ha_clock_code", clock, &routines.clock, runs);
-        let run = Moving { time: ALONG_TIME, inputs: true, held: true, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run);
+        let runs = Moving { time: Some(TimeRate::One), ..Moving::default() };
+        functions.extend(along(&mut writer, "ha_clock_code", CLOCK, &routines.clock, runs));
+        let run =
+            Moving { time: Some(TimeRate::OfDirection), inputs: true, held: true, states: true, ..Moving::default() };
+        functions.extend(along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run));
         let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional);
+        functions.extend(along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional));
         if self.export.method.is_linearly_implicit() {
-            let time_derivative = Moving { time: ALONG_TIME, held: true, ..Moving::default() };
-            text += &along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative);
+            let time_derivative = Moving { time: Some(TimeRate::OfDirection), held: true, ..Moving::default() };
+            functions.extend(along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative));
         }
         if self.export.derivatives {
-            text += &along(&mut writer, "ha_observe_along", ALONG, &routines.observe, directional);
+            functions.extend(along(&mut writer, "ha_observe_along", ALONG, &routines.observe, directional));
         }
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
         for (name, routine) in &routines.starts {
-            text += &along(&mut writer, name, ALONG, routine, begin);
+            functions.extend(along(&mut writer, name, ALONG, routine, begin));
         }
 
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
-        let mut block_text = String::new();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
-            block_text += &self.block(&mut writer, i, program.blocks[*block].size(), code);
+            let block = block_functions(&mut writer, i, program.blocks[*block].size(), code);
+            self.functions.extend(block);
         }
 
         // Last, once it is known what is read in double precision.
-        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
         let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
-        let preamble = writer.function("ha_preamble_code", shape, (&preamble, &routines.kept()), (&[], &[]));
+        let preamble = writer.function("ha_preamble_code", PREAMBLE, (&preamble, &routines.kept()), (&[], &[]));
         let work = |routine: &Routine| OperationCount::of(program, &routine.code);
         self.works = Works {
             rates: work(&routines.rates),
@@ -229,87 +271,61 @@ impl<'a> Plan<'a> {
         };
         self.newton = used.clone();
         self.find_sizes(&writer);
-        self.functions = block_text + &preamble + &text;
-    }
-
-    /// The functions of a Newton block.
-    fn block(&self, writer: &mut Writer, number: usize, n: usize, code: &Code) -> String {
-        let shape = Shape {
-            parameters: "ha_model *m, const double *o, const double *g, double *right, double *matrix",
-            arguments: "m, o, g, right, matrix",
-            void: true,
-            time: "0.0",
-            along: None,
-            wide: false,
-        };
-        let right = (0..n).map(|i| format!("right[{i}]"));
-        let values: Vec<String> = right.chain((n..code.outputs.len()).map(|i| format!("matrix[{}]", i - n))).collect();
-        let mut text = writer.function(&format!("ha_block_{number}"), shape, (code, &[]), (&values, &[]));
-        let terms = Shape {
-            parameters: "ha_model *m, const double *o, const double *g, double *terms",
-            arguments: "m, o, g, terms",
-            ..shape
-        };
-        let values: Vec<String> = (0..n).map(|i| format!("terms[{i}]")).collect();
-        let sums = terms::terms_of(code, n);
-        text += &writer.function(&format!("ha_block_{number}_terms"), terms, (&sums, &[]), (&values, &[]));
-        let shape = Shape {
-            parameters: "ha_model *m, const double *o, const double *e, const double *g, double *rates",
-            arguments: "m, o, e, g, rates",
-            along: Some(Moving { outer: true, ..Moving::default() }),
-            ..shape
-        };
-        let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() };
-        let residuals = terms::without_the_unread(residuals);
-        let rates: Vec<String> = (0..n).map(|i| format!("rates[{i}]")).collect();
-        text += &writer.function(&format!("ha_block_{number}_along"), shape, (&residuals, &[]), (&[], &rates));
-        text
+        self.functions.extend(preamble.into_iter().chain(functions));
     }
 
     /// Which domain an argument has to lie in, and the check of those that parameters alone decide.
-    fn domain_checks(&self, writer: &Writer) -> String {
-        let mut text = String::from("static int ha_is_within(int domain, double a)\n{\n    switch (domain) {\n");
-        for (i, domain) in self.program.domains.iter().enumerate() {
+    fn domain_checks(&self, writer: &Writer) -> [Function; 2] {
+        let (program, real) = (self.program, writer.real);
+        let mut cases = vec![Written::of("    switch (domain) {")];
+        let mut checks = Vec::new();
+        for (i, domain) in program.domains.iter().enumerate() {
             let holds = match domain.kind {
-                DomainKind::Positive => "a > 0.0".to_string(),
-                DomainKind::NotNegative => "a >= 0.0".to_string(),
-                DomainKind::Within(low, high) => format!("{} <= a && a <= {}", number(low), number(high)),
+                DomainKind::Positive => format!("a > {}", real.number(0.0)),
+                DomainKind::NotNegative => format!("a >= {}", real.number(0.0)),
+                DomainKind::Within(low, high) => format!("{} <= a && a <= {}", real.number(low), real.number(high)),
             };
-            text += &format!("    case {i}:\n        return {holds};\n");
-        }
-        text += "    default:\n        return a == a;\n    }\n}\n\nstatic int ha_check_domains(ha_model *m)\n{\n";
-        for (i, domain) in self.program.domains.iter().enumerate() {
-            if self.program.values.reads(domain.argument) == Reads::PARAMETERS {
-                let a = writer.givens.text(domain.argument);
-                text += &format!(
-                    "    if (ha_finite({a}) && !ha_is_within({i}, {a})) {{\n        return ha_fail(m, MODEL_OUT_OF_DOMAIN, {i}, HA_WIDE((double)NAN));\n    }}\n"
-                );
+            cases.push(written!("    case {}:\n        return {};", i, holds));
+            if program.values.reads(domain.argument) == Reads::PARAMETERS {
+                let a = writer.givens.written(domain.argument);
+                let finite = Needed(real.function("ha_finite").into());
+                let beyond = written!("{}({}) && !{}({}, {})", finite, a, needed("ha_is_within"), i, a);
+                checks.push(writer.fail_if(&beyond, "OUT_OF_DOMAIN", &i, Time::Always));
             }
         }
-        text + "    return MODEL_OK;\n}\n\n"
+        cases.push(Written::of("    default:\n        return a == a;\n    }"));
+        checks.push(Line::new(written!("    return {}_OK;", writer.capitals), 0));
+        let cases: Vec<Line> = cases.into_iter().map(|case| Line::new(case, 0)).collect();
+        let argument = [Parameter::Int("domain"), Parameter::Real("a")];
+        [
+            Function::new("ha_is_within".into(), Gives::Status, &argument, real, &cases),
+            Function::new("ha_check_domains".into(), Gives::Status, &[Parameter::Model], real, &checks),
+        ]
     }
 
     /// The number from 1 of the first assumption that parameters break, 0 if there is none.
-    fn assumption_checks(&self, writer: &Writer) -> String {
+    fn assumption_checks(&self, writer: &Writer) -> Option<Function> {
         if self.program.assumptions.is_empty() {
-            return String::new();
+            return None;
         }
-        let rounding = number(match self.export.real {
+        let rounding = writer.real.number(match writer.real {
             Real::Double => Assumption::ROUNDING,
             Real::Float => ROUNDING_OF_FLOATS,
         });
-        let mut text = String::from("static int ha_broken(const ha_model *m)\n{\n");
-        for (i, a) in self.program.assumptions.iter().enumerate() {
-            let (v, s) = (writer.givens.text(a.value), writer.givens.text(a.scale));
+        let zero = writer.real.number(0.0);
+        let check = |(i, a): (usize, &Assumption)| {
+            let (v, s) = (writer.givens.written(a.value), writer.givens.written(a.scale));
             let holds = match a.holds {
                 Holds::Zero => format!("{v} <= {rounding} * {s} && -{v} <= {rounding} * {s}"),
                 Holds::NotZero => format!("{v} > {rounding} * {s} || -{v} > {rounding} * {s}"),
-                Holds::Positive => format!("{v} > 0.0"),
-                Holds::NotNegative => format!("{v} >= 0.0"),
+                Holds::Positive => format!("{v} > {zero}"),
+                Holds::NotNegative => format!("{v} >= {zero}"),
             };
-            text += &format!("    if (!({holds})) {{\n        return {};\n    }}\n", i + 1);
-        }
-        text + "    return 0;\n}\n\n"
+            Line::new(written!("    if (!({})) {{\n        return {};\n    }}", holds, i + 1), 0)
+        };
+        let mut lines: Vec<Line> = self.program.assumptions.iter().enumerate().map(check).collect();
+        lines.push(Line::new(Written::of("    return 0;"), 0));
+        Some(Function::new("ha_broken".into(), Gives::Status, &[Parameter::ConstModel], writer.real, &lines))
     }
 
     fn find_sizes(&mut self, writer: &Writer) {
@@ -340,71 +356,64 @@ impl<'a> Plan<'a> {
     }
 
     /// The functions of the equations.
-    pub fn functions(&self) -> &str {
+    pub fn functions(&self) -> &[Function] {
         &self.functions
     }
 
+    /// With what templates are filled, and with what those that compute in double precision whatever real numbers are.
+    fn fillings(&self, obligations: String) -> [Filling<'_>; 2] {
+        let mut words = self.words();
+        words.insert("OBLIGATION_LINES", Written::of(obligations));
+        words.insert("MODEL_TITLE", Written::of(super::header::comment(&self.program.name)));
+        let filling = |real| Filling { flags: self.flags(), words: words.clone(), model: &self.name, real };
+        [filling(self.export.real), filling(Real::Double)]
+    }
+
     /// The source file; at its head stands what it keeps to.
-    pub fn source(&self, obligations: &str) -> String {
-        let (flags, mut words) = (self.flags(), self.words());
-        words.insert("OBLIGATION_LINES".into(), obligations.to_string());
-        words.insert("MODEL_TITLE".into(), super::header::comment(&self.program.name));
-        let size = self.export.real;
-        let filled = |text: &str| template::fill(&template::choose(text, |word| flags.holds(word)), &words);
-        let piece = |text: &str| real::of(&filled(text), size);
-        let mut text = piece(include_str!("../runtime/top.c"));
-        text += math::C_SOURCE;
-        text += "\n/* ---- small things ---- */\n\n";
-        if size == Real::Float {
-            text += math::C_SOURCE_SINGLE;
-            text += &real::wide(&filled(include_str!("../runtime/small.c")), size);
+    pub fn source(&self, obligations: String) -> String {
+        let [filling, wide] = self.fillings(obligations);
+        let mut all = filling.fragments(include_str!("../runtime/top.c"));
+        let mut put = |fragments: Vec<Fragment>| all.extend(fragments);
+        put(wide.fragments(math::C_SOURCE));
+        put(vec![Fragment::section("small things")]);
+        if self.export.real == Real::Float {
+            put(wide.fragments(math::C_SOURCE_SINGLE));
+            put(wide.fragments(include_str!("../runtime/small.c")));
         }
-        text += &piece(include_str!("../runtime/small.c"));
-        text += &piece(include_str!("../runtime/helpers.c"));
+        put(filling.fragments(include_str!("../runtime/small.c")));
+        put(filling.fragments(include_str!("../runtime/helpers.c")));
         if self.sizes.order > 0 {
-            text += &piece(include_str!("../runtime/lu.c"));
+            put(filling.fragments(include_str!("../runtime/lu.c")));
         }
         if !self.newton.is_empty() {
-            text += &piece(concat!(
-                include_str!("../runtime/newton/workspace.c"),
-                include_str!("../runtime/newton/correction.c"),
-                include_str!("../runtime/newton/floating.c"),
-                include_str!("../runtime/newton/damped.c"),
-                include_str!("../runtime/newton/continuation.c"),
-                include_str!("../runtime/newton/search.c"),
-            ));
+            put(filling.fragments(NEWTON));
         }
-        text += &piece(include_str!("../runtime/tables.c"));
-        text += &real::wide(&filled(include_str!("../runtime/conditions.c")), size);
-        text += "\n/* ---- the equations ---- */\n\n";
-        text += &real::of(&self.functions, size);
+        put(filling.fragments(include_str!("../runtime/tables.c")));
+        put(wide.fragments(include_str!("../runtime/conditions.c")));
+        put(vec![Fragment::section("the equations")]);
+        put(self.functions.iter().cloned().map(Fragment::from).collect());
         if !self.clocks.is_empty() {
-            text += &real::wide(&filled(include_str!("../runtime/clock.c")), size);
+            put(wide.fragments(include_str!("../runtime/clock.c")));
         }
-        text += &piece(include_str!("../runtime/held.c"));
-        text += &piece(include_str!("../runtime/system.c"));
+        put(filling.fragments(include_str!("../runtime/held.c")));
+        put(filling.fragments(include_str!("../runtime/system.c")));
         if self.export.method.is_implicit() {
-            text += &piece(include_str!("../runtime/matrix.c"));
+            put(filling.fragments(include_str!("../runtime/matrix.c")));
         }
-        text += &piece(include_str!("../runtime/advance.c"));
-        let method = match self.export.method {
+        put(filling.fragments(include_str!("../runtime/advance.c")));
+        put(filling.fragments(match self.export.method {
             Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
             method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
             _ => include_str!("../runtime/explicit.c"),
-        };
-        text += &piece(method);
-        text += &piece(include_str!("../runtime/step.c"));
-        let begin = piece(include_str!("../runtime/start.c"));
-        let solve = if self.solves_start() { piece(include_str!("../runtime/start_solve.c")) } else { String::new() };
-        text += &begin.replace("START_CODE\n", &solve);
-        text += &messages::messages(self);
-        let text =
-            template::name(&text, &self.name).replace("#include \"NAME.h\"", &format!("#include \"{}.h\"", self.name));
-        let mut tidy = template::without_empty_sections(&template::without_the_uncalled(&text));
-        while tidy.contains("\n\n\n") {
-            tidy = tidy.replace("\n\n\n", "\n\n");
+        }));
+        put(filling.fragments(include_str!("../runtime/step.c")));
+        put(filling.fragments(include_str!("../runtime/start.c")));
+        if self.solves_start() {
+            put(filling.fragments(include_str!("../runtime/start_solve.c")));
         }
-        tidy
+        put(filling.fragments(include_str!("../runtime/begin.c")));
+        put(messages::messages(self));
+        assembled(&all)
     }
 
     fn kinds(&self) -> impl Iterator<Item = ConditionKind> + '_ {
@@ -538,6 +547,33 @@ impl<'a> Plan<'a> {
         let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
         Cost::new(step, jump, self)
     }
+}
+
+/// The functions of a Newton block.
+fn block_functions(writer: &mut Writer, number: usize, n: usize, code: &Code) -> Vec<Function> {
+    let list = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
+    let mut values = list("right", n);
+    values.extend(list("matrix", code.outputs.len() - n));
+    let mut functions = writer.function(&format!("ha_block_{number}"), BLOCK, (code, &[]), (&values, &[]));
+    let sums = terms::terms_of(code, n);
+    let name = format!("ha_block_{number}_terms");
+    functions.extend(writer.function(&name, BLOCK_TERMS, (&sums, &[]), (&list("terms", n), &[])));
+    let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() };
+    let residuals = terms::without_the_unread(residuals);
+    let along = Shape { along: Some(Moving { outer: true, ..Moving::default() }), ..BLOCK_ALONG };
+    let name = format!("ha_block_{number}_along");
+    functions.extend(writer.function(&name, along, (&residuals, &[]), (&[], &list("rates", n))));
+    functions
+}
+
+/// How the functions of a Newton block are declared, before they are there.
+fn block_declarations(number: usize, real: Real) -> String {
+    let shapes = [("", BLOCK), ("_along", BLOCK_ALONG), ("_terms", BLOCK_TERMS)];
+    let declared = shapes.map(|(kind, shape)| {
+        let name = format!("ha_block_{number}{kind}");
+        function::declaration(&name, Gives::Nothing, shape.parameters, real) + ";\n"
+    });
+    declared.concat()
 }
 
 fn held(program: &Program, kind: HeldKind) -> Vec<usize> {
