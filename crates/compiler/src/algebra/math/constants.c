@@ -1,36 +1,29 @@
 //always
 /* Constants of the elementary functions. Written by constants.py. */
 
-/* 2/pi. */
 //item HA_TWO_OVER_PI
+/* 2/pi. */
 #define HA_TWO_OVER_PI (0.6366197723675814)
-//always
-/* pi/2 in 37 bits: its products with 16 bits are exact. */
 //item HA_PIO2_SHORT
+/* pi/2 in 37 bits: its products with 16 bits are exact. */
 #define HA_PIO2_SHORT (1.5707963267923333)
-//always
-/* The next 36 bits of pi/2. */
 //item HA_PIO2_MIDDLE
+/* The next 36 bits of pi/2. */
 #define HA_PIO2_MIDDLE (2.5633441515839558e-12)
-//always
-/* What is left of pi/2. */
 //item HA_PIO2_REST
+/* What is left of pi/2. */
 #define HA_PIO2_REST (1.0562999066987428e-23)
-//always
-/* pi/2. */
 //item HA_PIO2_HI
+/* pi/2. */
 #define HA_PIO2_HI (1.5707963267948966)
-//always
-/* pi/2 without its nearest number. */
 //item HA_PIO2_LO
+/* pi/2 without its nearest number. */
 #define HA_PIO2_LO (6.123233995736766e-17)
-//always
-/* pi. */
 //item HA_PI_HI
+/* pi. */
 #define HA_PI_HI (3.141592653589793)
-//always
-/* pi without its nearest number. */
 //item HA_PI_LO
+/* pi without its nearest number. */
 #define HA_PI_LO (1.2246467991473532e-16)
 //item HA_TWO_OVER_PI_BITS: HA_DATA
 /* 2/pi in pieces of 32 bits, after two that are zero. */
@@ -61,17 +54,14 @@ HA_DATA double HA_COSINE[6] = {
     2.087591097969816e-09,
     -1.136919780484827e-11
 };
-//always
-/* 64/ln 2. */
 //item HA_STEPS_PER_E
+/* 64/ln 2. */
 #define HA_STEPS_PER_E (92.33248261689366)
-//always
-/* ln 2/64 in 35 bits: its products with 18 bits are exact. */
 //item HA_STEP_SHORT
+/* ln 2/64 in 35 bits: its products with 18 bits are exact. */
 #define HA_STEP_SHORT (0.010830424696450791)
-//always
-/* ln 2/64 without the 35 bits. */
 //item HA_STEP_REST
+/* ln 2/64 without the 35 bits. */
 #define HA_STEP_REST (-2.0164562921995537e-13)
 //item HA_POWERS: HA_DATA
 /* 2^(j/64), and what is left of it. */
@@ -170,9 +160,8 @@ HA_DATA double HA_COSH[6] = {
     2.755723861130491e-07,
     2.0925405364423977e-09
 };
-//always
-/* Where the 128 intervals of the mantissa begin: 1 is the middle of one of them. */
 //item HA_BINS_START
+/* Where the 128 intervals of the mantissa begin: 1 is the middle of one of them. */
 #define HA_BINS_START UINT64_C(0x3fe6b00000000000)
 //item HA_LOGARITHMS: HA_DATA
 /* For each interval a short number c near the inverse of its middle; -ln c in multiples of 2^-42, and what is left. */
@@ -306,13 +295,11 @@ HA_DATA double HA_LOGARITHMS[128][3] = {
     {0.7109375, 0.3411707574027787, -1.156568624616423e-14},
     {0.70703125, 0.3466804132137895, -5.277820018864269e-14}
 };
-//always
-/* ln 2 in multiples of 2^-42. */
 //item HA_LN2_SHORT
+/* ln 2 in multiples of 2^-42. */
 #define HA_LN2_SHORT (0.6931471805598903)
-//always
-/* ln 2 without them. */
 //item HA_LN2_REST
+/* ln 2 without them. */
 #define HA_LN2_REST (5.497923018708371e-14)
 //item HA_LOGARITHM: HA_DATA
 /* (ln(1 + r) - r + r^2/2)/r^3; error 2^-71.34 of the function. */
@@ -325,21 +312,17 @@ HA_DATA double HA_LOGARITHM[7] = {
     -0.12500319196285137,
     0.1111125188506433
 };
-//always
-/* 1/ln 10. */
 //item HA_LOG10_E_HI
+/* 1/ln 10. */
 #define HA_LOG10_E_HI (0.4342944819032518)
-//always
-/* What is left of it. */
 //item HA_LOG10_E_LO
-#define HA_LOG10_E_LO (1.098319650216765e-17)
-//always
-/* 1/ln 2. */
-//item HA_LOG2_E_HI
-#define HA_LOG2_E_HI (1.4426950408889634)
-//always
 /* What is left of it. */
+#define HA_LOG10_E_LO (1.098319650216765e-17)
+//item HA_LOG2_E_HI
+/* 1/ln 2. */
+#define HA_LOG2_E_HI (1.4426950408889634)
 //item HA_LOG2_E_LO
+/* What is left of it. */
 #define HA_LOG2_E_LO (2.0355273740931033e-17)
 //item HA_ARCS: HA_DATA
 /* atan(j/8), and what is left of it. */

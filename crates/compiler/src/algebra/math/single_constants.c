@@ -2,36 +2,29 @@
 //always
 /* Constants of the elementary functions in single precision. Written by `single.py`. */
 
-/* 2/pi. */
 //item HA_QUARTERS_SINGLE
+/* 2/pi. */
 #define HA_QUARTERS_SINGLE 0.6366197466850281f
-//always
-/* pi/2 in multiples of 2^-16. */
 //item HA_QUARTER_FIRST
+/* pi/2 in multiples of 2^-16. */
 #define HA_QUARTER_FIRST 1.57080078125f
-//always
-/* What is left of it, in multiples of 2^-33. */
 //item HA_QUARTER_SECOND
+/* What is left of it, in multiples of 2^-33. */
 #define HA_QUARTER_SECOND -4.454399459064007e-06f
-//always
-/* What is left of that. */
 //item HA_QUARTER_REST
+/* What is left of that. */
 #define HA_QUARTER_REST -5.564431554416771e-11f
-//always
-/* pi/2 as a number of single precision. */
 //item HA_QUARTER_HI
+/* pi/2 as a number of single precision. */
 #define HA_QUARTER_HI 1.5707963705062866f
-//always
-/* What is left of it. */
 //item HA_QUARTER_LO
-#define HA_QUARTER_LO -4.371138828673793e-08f
-//always
-/* pi as a number of single precision. */
-//item HA_HALF_TURN_HI
-#define HA_HALF_TURN_HI 3.1415927410125732f
-//always
 /* What is left of it. */
+#define HA_QUARTER_LO -4.371138828673793e-08f
+//item HA_HALF_TURN_HI
+/* pi as a number of single precision. */
+#define HA_HALF_TURN_HI 3.1415927410125732f
 //item HA_HALF_TURN_LO
+/* What is left of it. */
 #define HA_HALF_TURN_LO -8.742277657347586e-08f
 //item HA_SINE_SINGLE: HA_DATA
 /* (sin a - a)/a^3 by z = a^2; error 2^-28.29 of the function. */
@@ -39,17 +32,14 @@ HA_DATA float HA_SINE_SINGLE[4] = {-0.1666666716337204f, 0.008333331905305386f, 
 //item HA_COSINE_SINGLE: HA_DATA
 /* (cos a - 1 + z/2)/z^2 by z = a^2; error 2^-31.01 of the function. */
 HA_DATA float HA_COSINE_SINGLE[4] = {0.0416666679084301f, -0.00138888880610466f, 2.480059629306197e-05f, -2.730044741383608e-07f};
-//always
-/* 1/ln 2. */
 //item HA_STEPS_SINGLE
+/* 1/ln 2. */
 #define HA_STEPS_SINGLE 1.4426950216293335f
-//always
-/* ln 2 in multiples of 2^-15. */
 //item HA_LN2_FIRST
+/* ln 2 in multiples of 2^-15. */
 #define HA_LN2_FIRST 0.693145751953125f
-//always
-/* ln 2 without them. */
 //item HA_LN2_SECOND
+/* ln 2 without them. */
 #define HA_LN2_SECOND 1.428606765330187e-06f
 //item HA_EXPONENTIAL_SINGLE: HA_DATA
 /* (e^r - 1 - r)/r^2; error 2^-30.75 of the function. */
@@ -57,21 +47,17 @@ HA_DATA float HA_EXPONENTIAL_SINGLE[6] = {0.5f, 0.1666666716337204f, 0.041666455
 //item HA_LOGARITHM_SINGLE: HA_DATA
 /* (ln((1 + s)/(1 - s)) - 2 s)/s^3 by z = s^2; error 2^-31.64 of the function. */
 HA_DATA float HA_LOGARITHM_SINGLE[4] = {0.6666666865348816f, 0.4000012278556824f, 0.28550735116004944f, 0.23332762718200684f};
-//always
-/* 1/ln 10. */
 //item HA_LOG10_FIRST
+/* 1/ln 10. */
 #define HA_LOG10_FIRST 0.4342944920063019f
-//always
-/* What is left of it. */
 //item HA_LOG10_REST
-#define HA_LOG10_REST -1.0103049952192578e-08f
-//always
-/* 1/ln 2. */
-//item HA_LOG2_FIRST
-#define HA_LOG2_FIRST 1.4426950216293335f
-//always
 /* What is left of it. */
+#define HA_LOG10_REST -1.0103049952192578e-08f
+//item HA_LOG2_FIRST
+/* 1/ln 2. */
+#define HA_LOG2_FIRST 1.4426950216293335f
 //item HA_LOG2_REST
+/* What is left of it. */
 #define HA_LOG2_REST 1.925963033500011e-08f
 //item HA_ARC_SINGLE: HA_DATA
 /* (atan t - t)/t^3 by z = t^2; error 2^-28.46 of the function. */

@@ -151,7 +151,7 @@ impl Plan<'_> {
         let mut list = String::from("static const ha_block ha_blocks[] = {\n");
         let mut memory = 0;
         for (i, (block, reads)) in self.newton.iter().zip(&self.reads).enumerate() {
-            text += &super::block_declarations(i, self.export.real);
+            text += &super::shapes::block_declarations(i, self.export.real);
             let n = self.program.blocks[*block].size();
             let (pattern, entries) = self.patterns.of_block(self.program, *block);
             let [code, terms, along] = ["", "_terms", "_along"].map(|k| Needed(format!("ha_block_{i}{k}").into()));
