@@ -24,6 +24,10 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
     };
     let states = |text: &dyn Fn(&str) -> String| p.states.iter().map(|s| text(&s.name)).collect::<Vec<_>>();
     let conditions = plan.switches.iter().flat_map(|&c| vec![c; p.conditions[c].kind.switches()]);
+    let range = match plan.export.real {
+        Real::Double => "",
+        Real::Float => "; a law may also leave the range of float where the search begins, as exp does above 88",
+    };
     let group = |g: &super::start::Group| {
         let names: Vec<&str> = g.conditions.iter().map(|&c| p.start[c].name.as_str()).collect();
         format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
@@ -33,7 +37,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ("SINGULAR", block(&singular)),
         (
             "NO_CONVERGENCE",
-            block(&|what| format!("the iteration for {what} did not converge; a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the unknowns any more")),
+            block(&|what| format!("the iteration for {what} did not converge; a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the unknowns any more{range}")),
         ),
         (
             "BRANCH",

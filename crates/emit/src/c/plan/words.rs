@@ -231,14 +231,22 @@ impl Plan<'_> {
 }
 
 /// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value, of
-/// residuals in units of their own; and how far beside a point is another one.
-fn tolerances(real: Real) -> [(&'static str, String); 5] {
-    let words = ["CLOSE_TO_ROUNDING", "ROUNDING_OF_ENTRIES", "ROUNDING_OF_RANK", "BORROWED_ROUNDING", "BESIDE"];
+/// residuals in units of their own; how far beside a point is another one; and the least damping of Newton's method at a start.
+fn tolerances(real: Real) -> [(&'static str, String); 6] {
+    let words = [
+        "CLOSE_TO_ROUNDING",
+        "ROUNDING_OF_ENTRIES",
+        "ROUNDING_OF_RANK",
+        "BORROWED_ROUNDING",
+        "BESIDE",
+        "LEAST_DAMPING",
+    ];
+    // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6],
     };
-    [0, 1, 2, 3, 4].map(|i| (words[i], real.number(values[i])))
+    [0, 1, 2, 3, 4, 5].map(|i| (words[i], real.number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.

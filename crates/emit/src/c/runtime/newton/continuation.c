@@ -247,24 +247,24 @@ static int ha_find_floors(ha_model *m, ha_newton *w)
         return 0;
     }
     w->block->terms(m, w->present, w->x, w->terms);
-    $ha_fill(w->$floor, $0.0, n);
+    $ha_fill(w->floor, $0.0, n);
     for (j = 0; j < n; ++j) {
         $ha_fill(w->simplified, $0.0, n);
         w->simplified[j] = $8.0 * $DBL_EPSILON * w->terms[j];
         $ha_lu_solve(&w->lu, w->simplified);
         for (i = 0; i < n; ++i) {
-            w->$floor[i] += $fabs(w->simplified[i]);
+            w->floor[i] += $fabs(w->simplified[i]);
         }
     }
     for (i = 0; i < n; ++i) {
-        w->$floor[i] /= $CLOSE_TO_ROUNDING;
-        if (w->$floor[i] > w->magnitude[i]) {
+        w->floor[i] /= $CLOSE_TO_ROUNDING;
+        if (w->floor[i] > w->magnitude[i]) {
             hidden = 1;
         }
-        w->magnitude[i] = $ha_max(w->magnitude[i], w->$floor[i]);
+        w->magnitude[i] = $ha_max(w->magnitude[i], w->floor[i]);
     }
-    if (!hidden || !$ha_all_finite(w->$floor, n)) {
-        $ha_fill(w->$floor, $0.0, n);
+    if (!hidden || !$ha_all_finite(w->floor, n)) {
+        $ha_fill(w->floor, $0.0, n);
         return 0;
     }
     return 1;
@@ -285,7 +285,7 @@ static int ha_continue_above_rounding(ha_model *m, ha_newton *w)
         || $ha_continue_in_steps(m, w)) {
         return 1;
     }
-    $ha_fill(w->$floor, $0.0, w->n);
+    $ha_fill(w->floor, $0.0, w->n);
     return 0;
 }
 

@@ -86,7 +86,7 @@ static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w)
  * step does. */
 static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalization, int *contracts)
 {
-    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (w->following ? $1e-6 : $1e-12);
+    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (w->following ? $1e-6 : $LEAST_DAMPING);
     $real damping = $1.0;
     int halving;
     int i;
@@ -142,11 +142,12 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
     $ha_fill(w->first_correction, $0.0, n);
     $ha_fill(w->first_right, $0.0, n);
     for (i = 0; i < n; ++i) {
-        w->scale[i] = $ha_max($fabs(w->x[i]), w->$floor[i]);
+        w->scale[i] = $ha_max($fabs(w->x[i]), w->floor[i]);
     }
     if (!$ha_evaluate(m, w, w->x)) {
         return 0;
     }
+    w->valued = 1;
     for (iteration = 0; iteration < most; ++iteration) {
         $real norm;
         int contracts;

@@ -90,6 +90,42 @@ static int ha_scan(ha_model *m, ha_newton *w)
 }
 
 //end
+//item ha_search_from
+/* A root by an iteration that begins at w->start. */
+static int ha_search_from(ha_model *m, ha_newton *w)
+{
+    return $ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w);
+}
+
+//item ha_search_in_pairs
+/* Where the laws have no value at any of the starts so far, as an exponential that overflows: one or two unknowns elsewhere,
+ * the others 0, on up to half the evaluations. */
+static int ha_search_in_pairs(ha_model *m, ha_newton *w, const $real *starts, int count)
+{
+    int one;
+    int other;
+    int i;
+    int j;
+    for (one = 0; one < w->n; ++one) {
+        for (other = one; other < w->n; ++other) {
+            for (i = 0; i < count; ++i) {
+                for (j = 0; j < (other == one ? 1 : count); ++j) {
+                    if (w->evaluations > w->limit / 2) {
+                        return 0;
+                    }
+                    $ha_fill(w->start, $0.0, w->n);
+                    w->start[other] = starts[j];
+                    w->start[one] = starts[i];
+                    if ($ha_search_from(m, w)) {
+                        return 1;
+                    }
+                }
+            }
+        }
+    }
+    return 0;
+}
+
 //item ha_search
 /* Any root. */
 static int ha_search(ha_model *m, ha_newton *w)
@@ -97,12 +133,12 @@ static int ha_search(ha_model *m, ha_newton *w)
     static const $real starts[] = {$0.0, $1e-3, -$1e-3, $1.0, -$1.0, $1e3, -$1e3};
     int i;
     $ha_copy(w->start, w->previous, w->n);
-    if ($ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w)) {
+    if ($ha_search_from(m, w)) {
         return 1;
     }
     for (i = 0; i < 7; ++i) {
         $ha_fill(w->start, starts[i], w->n);
-        if ($ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w)) {
+        if ($ha_search_from(m, w)) {
             return 1;
         }
     }
@@ -113,9 +149,12 @@ static int ha_search(ha_model *m, ha_newton *w)
             const $real part = ($real)(j + 1) / ($real)w->n;
             w->start[j] = starts[i] * part;
         }
-        if ($ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w)) {
+        if ($ha_search_from(m, w)) {
             return 1;
         }
+    }
+    if (!w->valued && w->n > 1 && $ha_search_in_pairs(m, w, starts + 1, 6)) {
+        return 1;
     }
 //if newton_single
     return w->n == 1 && $ha_scan(m, w);
@@ -132,7 +171,7 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     int status;
     $ha_copy(w.outer, o, w.block->reads);
     $ha_copy(w.present, o, w.block->reads);
-    $ha_fill(w.$floor, $0.0, w.n);
+    $ha_fill(w.floor, $0.0, w.n);
     status = $ha_continue_root(m, &w);
     if (status != $MODEL_OK && w.following) {
 //if newton_single

@@ -35,6 +35,8 @@ typedef struct {
     int evaluations;
     /* Whether the first step, undamped, contracted by 1/4. */
     int contracts;
+    /* Whether the laws had a value where an iteration began. */
+    int valued;
     /* The previous solution, what the block read there, and its Jacobian. */
     $real *previous;
     $real *previous_outer;
@@ -72,7 +74,7 @@ typedef struct {
     $real *rest;
     $real *unseen;
     /* Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them. */
-    $real *$floor;
+    $real *floor;
     ha_lu lu;
 } ha_newton;
 
@@ -102,6 +104,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.limit = w.following ? m->most_evaluations : 20000;
     w.evaluations = 0;
     w.contracts = 0;
+    w.valued = 0;
     w.previous = $ha_take(&place, n);
     w.previous_outer = $ha_take(&place, reads);
     w.previous_jacobian = $ha_take(&place, entries);
@@ -128,7 +131,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.units = $ha_take(&place, n);
     w.order = $ha_take(&place, n);
     w.rest = $ha_take(&place, n);
-    w.$floor = $ha_take(&place, n);
+    w.floor = $ha_take(&place, n);
     w.loose = NULL;
     w.unseen = NULL;
 //if sparse
