@@ -5,6 +5,7 @@ mod reference;
 
 use halfarrow_compiler::algebra::{Function, math};
 use reference::{Kernel, points};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -208,5 +209,32 @@ fn c_has_the_same_bits() {
             let (ours, theirs) = (kernel.value(x, y), f64::from_le_bytes(bytes.try_into().unwrap()));
             assert!(same(ours, theirs), "{kernel:?} of {x:e} {y:e}: {ours:e} here, {theirs:e} in C");
         }
+    }
+}
+
+/// What stands before an item of the C names just what it reads: whoever takes single ones has all that they need.
+#[test]
+fn items_of_c_say_what_they_read() {
+    let text = math::C_SOURCE.to_string() + math::C_SOURCE_SINGLE;
+    let mut items: Vec<(&str, BTreeSet<&str>, String)> = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if let Some(item) = line.strip_prefix("//item ") {
+            let (name, needs) = item.split_once(": ").unwrap_or((item, ""));
+            items.push((name, needs.split(' ').filter(|n| !n.is_empty()).collect(), String::new()));
+        } else if let (Some(last), true) = (items.last_mut(), inside) {
+            last.2 += &(line.to_string() + "\n");
+        }
+        inside = line.starts_with("//item ") || (inside && line != "//always");
+    }
+    let names: BTreeSet<&str> = items.iter().map(|item| item.0).collect();
+    for function in ["ha_sin", "ha_pow", "ha_turnf", "ha_atan2f", "HA_FUNCTION"] {
+        assert!(names.contains(function), "{function}");
+    }
+    for (name, needs, text) in &items {
+        let code: String = text.split("/*").map(|part| part.split_once("*/").map_or(part, |(_, code)| code)).collect();
+        let words = code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        let read: BTreeSet<&str> = words.filter(|word| names.contains(word) && word != name).collect();
+        assert_eq!(*needs, read, "{name}");
     }
 }

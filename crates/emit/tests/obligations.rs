@@ -211,10 +211,14 @@ fn values_have_the_names_of_the_model() {
         let named = |line: &str| line.contains("const double v") && line.contains("/*") && line.contains(name);
         assert!(rates.lines().any(named), "{name}:\n{rates}");
     }
-    for name in ["v12", "x"] {
-        let text = format!("model M\n1:{name} -> I:i(2)\n{name} -> R:r(e = 3*f^3)\nSe:s(sin(t)) -> {name}\n");
+    // Names of the generated code are names like others to a modeller, and no text is mistaken for what it looks like.
+    for name in ["v12", "x", "MODEL_OK", "status", "ha_fill", "fabs", "double"] {
+        let text = format!("model M\n1:{name} -> I:{name}_i(2)\n{name} -> R:r(e = 3*f^3)\nSe:s(sin(t)) -> {name}\n");
         let path = folder().join("named.bond");
         fs::write(&path, text).expect("a model");
-        compiled(&export(&path, Method::Heun, 1e-3));
+        for one in [export(&path, Method::Heun, 1e-3), export_single(&path, Method::Heun, 1e-3)] {
+            compiled(&one);
+            assert!(one.written.source.contains(&format!("/* {name}_i.")), "{name}:\n{}", one.written.source);
+        }
     }
 }

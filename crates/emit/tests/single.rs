@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use common::{Exported, FLAGS, Rows, build_with, export_as, export_single, models, own, read_program};
+use common::{Exported, FLAGS, Rows, build_with, diodes, export_as, export_single, models, own, read_program};
 use halfarrow_compiler::algebra::math;
 use halfarrow_emit::{EmitError, Method, Real};
 use std::fmt::Write;
@@ -82,6 +82,7 @@ fn floats_follow_the_interpreter() {
     for name in ["bridge", "delay", "tables", "closure", "mesh", "net_cubic"] {
         all.push(export_single(&own(name), Method::ImplicitMidpoint, 0.9e-3));
     }
+    all.extend([Method::Rk4, Method::Rosenbrock].map(|method| export_single(&diodes(), method, 1e-3)));
     assert!(all.len() >= 50, "{} models", all.len());
     let text = build_with("single", &all, &driver(&all, &|_| PLAIN), &STRICT).run(&[]);
     let mut faults = Vec::new();

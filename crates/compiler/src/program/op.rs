@@ -13,7 +13,7 @@ use crate::algebra::Function;
 ///
 /// - `given` stand before anything is computed, or are found by a solve block;
 /// - `plain` follow from what they read. `cost` is what they are counted as, `value` the meaning in `f64`, `text` how programs
-///   are printed, `c` the expression in C, `derivative` its rule: of `value`, for the calculus `k`, a
+///   are printed, `c` the expression in C, by what writes it, `k`, `derivative` its rule: of `value`, for the calculus `k`, a
 ///   number that may be none where nothing moves;
 /// - `held` read a condition or a table as well, so whoever runs them has a way of its own.
 ///
@@ -48,76 +48,75 @@ macro_rules! for_each_op {
             plain {
                 /// `-a`.
                 Neg() [a da A] {
-                    cost: Addition, value: -a, text: "-{a}", c: "-{a}",
+                    cost: Addition, value: -a, text: "-{a}", c: k.neg(a),
                     derivative: $crate::program::calculus::opposite(k, da),
                 }
                 /// `a + b`.
                 Add() [a da A, b db A] {
-                    cost: Addition, value: a + b, text: "{a} + {b}", c: "{a} + {b}",
+                    cost: Addition, value: a + b, text: "{a} + {b}", c: k.add(a, b),
                     derivative: $crate::program::calculus::sum(k, da, db),
                 }
                 /// `a - b`.
                 Sub() [a da A, b db A] {
-                    cost: Addition, value: a - b, text: "{a} - {b}", c: "{a} - {b}",
+                    cost: Addition, value: a - b, text: "{a} - {b}", c: k.sub(a, b),
                     derivative: $crate::program::calculus::difference(k, da, db),
                 }
                 /// `a * b`.
                 Mul() [a da A, b db A] {
-                    cost: Multiplication, value: a * b, text: "{a} * {b}", c: "{a} * {b}",
+                    cost: Multiplication, value: a * b, text: "{a} * {b}", c: k.mul(a, b),
                     derivative: $crate::program::calculus::of_product(k, (a, da), (b, db)),
                 }
                 /// `a / b`.
                 Div() [a da A, b db A] {
-                    cost: Division, value: a / b, text: "{a} / {b}", c: "{a} / {b}",
+                    cost: Division, value: a / b, text: "{a} / {b}", c: k.div(a, b),
                     derivative: $crate::program::calculus::of_quotient(k, value, da, (b, db)),
                 }
                 /// `a^n`, by repeated multiplication.
                 Powi(n: u32) [a da A] {
-                    cost: Power, value: $crate::algebra::math::powi(a, n), text: "{a}^{n}", c: "ha_powi({a}, {n})",
+                    cost: Power, value: $crate::algebra::math::powi(a, n), text: "{a}^{n}", c: k.powi(a, n),
                     derivative: $crate::program::calculus::of_whole_power(k, n, (a, da)),
                 }
                 /// `a^b`.
                 Pow() [a da A, b db A] {
-                    cost: Call, value: $crate::algebra::math::pow(a, b), text: "{a} ^ {b}", c: "ha_pow({a}, {b})",
+                    cost: Call, value: $crate::algebra::math::pow(a, b), text: "{a} ^ {b}", c: k.pow(a, b),
                     derivative: $crate::program::calculus::of_power(k, value, (a, da), (b, db)),
                 }
                 /// A function of one argument; `abs`, `sign` and `floor` only where no condition is held.
                 Call(f: Function) [a da A] {
-                    cost: Call, value: $crate::algebra::math::call(f, a), text: "{f}({a})", c: "{f}({a})",
+                    cost: Call, value: $crate::algebra::math::call(f, a), text: "{f}({a})", c: k.call(f, a),
                     derivative: $crate::program::calculus::of_call(k, f, value, (a, da)),
                 }
                 /// The angle of the point at `b` along and `a` across.
                 Atan2() [a da A, b db A] {
-                    cost: Call, value: $crate::algebra::math::atan2(a, b), text: "atan2({a}, {b})",
-                    c: "ha_atan2({a}, {b})",
+                    cost: Call, value: $crate::algebra::math::atan2(a, b), text: "atan2({a}, {b})", c: k.atan2(a, b),
                     derivative: $crate::program::calculus::of_angle(k, (a, da), (b, db)),
                 }
                 /// 1 if `a > 0`, else 0; never held.
                 Positive() [a da A] {
-                    cost: Addition, value: f64::from(a > 0.0), text: "{a} > 0", c: "{a} > 0.0 ? 1.0 : 0.0",
+                    cost: Addition, value: f64::from(a > 0.0), text: "{a} > 0", c: k.positive(a),
                     derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// 1 if neither is 0.
                 And() [a da A, b db A] {
                     cost: Addition, value: f64::from(a != 0.0 && b != 0.0), text: "{a} and {b}",
-                    c: "{a} != 0.0 && {b} != 0.0 ? 1.0 : 0.0",
+                    c: k.and(a, b),
                     derivative: $crate::program::calculus::none(k, [da, db]),
                 }
                 /// 1 if one of them is not 0.
                 Or() [a da A, b db A] {
                     cost: Addition, value: f64::from(a != 0.0 || b != 0.0), text: "{a} or {b}",
-                    c: "{a} != 0.0 || {b} != 0.0 ? 1.0 : 0.0",
+                    c: k.or(a, b),
                     derivative: $crate::program::calculus::none(k, [da, db]),
                 }
                 /// 1 if it is 0.
                 Not() [a da A] {
-                    cost: Addition, value: f64::from(a == 0.0), text: "not {a}", c: "{a} == 0.0 ? 1.0 : 0.0",
+                    cost: Addition, value: f64::from(a == 0.0), text: "not {a}", c: k.not(a),
                     derivative: $crate::program::calculus::none(k, [da]),
                 }
                 /// The second if the first is not 0, else the third.
                 Select() [c dc A, a da A, b db A] {
                     cost: Addition, value: if c != 0.0 { a } else { b }, text: "if {c} then {a} else {b}",
-                    c: "{c} != 0.0 ? {a} : {b}",
+                    c: k.select(c, a, b),
                     derivative: $crate::program::calculus::of_choice(k, (c, dc), da, db),
                 }
             }
@@ -191,7 +190,7 @@ macro_rules! define {
     (($k:ident $value:ident)
      given { $($(#[$given_doc:meta])* $given:ident$(($($given_part:ident: $given_kind:ty),*))?;)* }
      plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-        cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
+        cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:expr, derivative: $derivative:expr,
      })* }
      held { $($(#[$held_doc:meta])* $held:ident($($held_part:ident: $held_kind:ty),*) [$x:ident $dx:ident $X:ident] {
         cost: $held_cost:ident, text: $held_text:literal, derivative: $held_derivative:expr,

@@ -1,7 +1,5 @@
 //! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton/`.
 
-use std::fmt::Write;
-
 use halfarrow_compiler::program::elimination::Definite;
 use halfarrow_compiler::program::{Block, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
@@ -9,6 +7,7 @@ use rustc_hash::FxHashMap;
 use super::derivatives::Expressions;
 use super::patterns::FULL_AT_MOST;
 use super::write::{Body, Reading, Writer};
+use super::written::{Series, Variable, Written, needed, written};
 use crate::Real;
 
 /// Symmetric linear equations of up to this many unknowns are written out.
@@ -64,139 +63,155 @@ impl Factored {
 
 impl Writer<'_> {
     pub fn linear(&self, f: &mut Body, solve: &Solve, reads: &Reading, number: usize) {
-        let (a, d, block) = (&reads.values[..], &reads.rates[..], solve.block.0);
+        let a = &reads.values[..];
         let n = solve.unknowns.len();
-        let fail = format!("        return ha_fail(m, MODEL_SINGULAR, {block}, {});\n    }}", f.shape.time);
         let moves = solve.unknowns.iter().any(|out| f.moves[out.0 as usize]);
         if n == 1 {
-            let _ = writeln!(f.text, "    if (!ha_is_pivot({})) {{\n{fail}", a[0]);
-            let out = solve.unknowns[0].0;
-            if !f.read[out as usize] {
-                return;
-            }
-            let rate = moves.then(|| {
-                let right = d[1].clone().unwrap_or_else(|| "0.0".into());
-                match &d[0] {
-                    Some(da) => format!("({right} - {da} * v{out}) / {}", a[0]),
-                    None => format!("{right} / {}", a[0]),
-                }
-            });
-            return self.put(f, out, &format!("{} / {}", a[1], a[0]), rate.as_deref());
+            return self.quotient(f, solve, reads, moves);
+        }
+        let symmetric = self.program.blocks[solve.block].is_symmetric();
+        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&solve.block.0) {
+            self.definite(f, solve, a, number);
+            return self.solved(f, solve, number);
         }
         let (matrix, right) = a.split_at(solve.pattern.len());
         let (pattern, entries) = self.patterns.of_block(self.program, solve.block);
-        let symmetric = self.program.blocks[solve.block].is_symmetric();
-        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&block) {
-            let zero = || "0.0".to_string();
-            let mut full = vec![zero(); n * n];
-            solve.pattern.places().zip(matrix).for_each(|((i, j), entry)| full[i * n + j] = entry.clone());
-            let call = format!("!ha_linear(m, {pattern}, a, b, s{number})");
-            let written = Written { number, rounding: self.real.epsilon() * n as f64, call: &call, fail: &fail };
-            written.definite(&mut f.text, &full, matrix, right);
-            return self.solved(f, solve, number);
-        }
-        let _ = writeln!(f.text, "    const double a{number}[] = {{{}}};", matrix.join(", "));
-        let _ = writeln!(f.text, "    const double b{number}[] = {{{}}};", right.join(", "));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let lu = match self.factored.places.get(&block) {
+        let (matrix, right) = (self.array(f, "a", number, matrix), self.array(f, "b", number, right));
+        let solution = self.room(f, "s", number, n);
+        let (call, factors) = match self.factored.places.get(&solve.block.0) {
             Some((which, place, order)) => {
-                let call = format!(
-                    "ha_linear_constant(m, {which}, {place}, {order}, {pattern}, a{number}, b{number}, s{number})"
-                );
-                let _ = writeln!(f.text, "    if (!{call}) {{\n{fail}");
-                format!("m->factors + {place}, m->factors_order + {order}, {pattern}")
+                let function = needed("ha_linear_constant");
+                let call = written!("{}(m, {}, {}, {}, {}, {}", function, which, place, order, pattern, matrix);
+                (call, format!("m->factors + {place}, m->factors_order + {order}"))
             }
             None => {
-                let _ =
-                    writeln!(f.text, "    if (!ha_linear(m, {pattern}, a{number}, b{number}, s{number})) {{\n{fail}");
-                format!("m->work, m->order, {pattern}")
+                let call = written!("{}(m, {}, {}", needed("ha_linear"), pattern, matrix);
+                (call, "m->work, m->order".to_string())
             }
         };
+        let unsolved = written!("!{}, {}, {})", call, right, solution);
+        f.lines.push(self.fail_if(&unsolved, "SINGULAR", &solve.block.0, f.shape.time));
         if moves {
-            let zero = |d: &Option<String>| d.clone().unwrap_or_else(|| "0.0".into());
-            let (matrix, right) = d.split_at(entries);
-            let (matrix, right): (Vec<_>, Vec<_>) =
-                (matrix.iter().map(zero).collect(), right.iter().map(zero).collect());
-            let _ = writeln!(f.text, "    const double da{number}[] = {{{}}};", matrix.join(", "));
-            let _ = writeln!(f.text, "    const double db{number}[] = {{{}}};", right.join(", "));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(f.text, "    ha_linear_rate({lu}, da{number}, db{number}, s{number}, ds{number});");
+            let (matrix, right) = reads.rates.split_at(entries);
+            let (matrix, right) = (self.rates(f, "da", number, matrix), self.rates(f, "db", number, right));
+            let rates = self.room(f, "ds", number, n);
+            let function = needed("ha_linear_rate");
+            f.line(
+                written!("    {}({}, {}, {}, {}, {}, {});", function, factors, pattern, matrix, right, solution, rates),
+                0,
+            );
         }
         self.solved(f, solve, number);
     }
 
-    pub fn newton(&self, f: &mut Body, solve: &Solve, reads: &Reading, number: usize) {
-        let (a, d, block) = (&reads.values[..], &reads.rates[..], solve.block.0);
-        let n = solve.unknowns.len();
-        let list = |values: Vec<String>| if values.is_empty() { "0.0".to_string() } else { values.join(", ") };
-        let _ = writeln!(f.text, "    const double o{number}[] = {{{}}};", list(a.to_vec()));
-        let _ = writeln!(f.text, "    double s{number}[{n}];");
-        let which = self.newton.binary_search(&solve.block).expect("all blocks in use are known");
-        if solve.unknowns.iter().any(|out| f.moves[out.0 as usize]) {
-            let rates = d.iter().map(|d| d.clone().unwrap_or_else(|| "0.0".into())).collect();
-            let _ = writeln!(f.text, "    const double e{number}[] = {{{}}};", list(rates));
-            let _ = writeln!(f.text, "    double ds{number}[{n}];");
-            let _ = writeln!(
-                f.text,
-                "    status = ha_root_along(m, {which}, o{number}, e{number}, s{number}, ds{number});"
-            );
-        } else {
-            let _ = writeln!(f.text, "    status = ha_find_root(m, {which}, o{number}, s{number});");
+    /// One equation.
+    fn quotient(&self, f: &mut Body, solve: &Solve, reads: &Reading, moves: bool) {
+        let (a, d) = (&reads.values[..], &reads.rates[..]);
+        let vanishes = written!("!{}({})", needed("ha_is_pivot"), a[0]);
+        f.lines.push(self.fail_if(&vanishes, "SINGULAR", &solve.block.0, f.shape.time));
+        let out = solve.unknowns[0].0;
+        if !f.read[out as usize] {
+            return;
         }
-        let _ = writeln!(
-            f.text,
-            "    if (status != MODEL_OK) {{\n        return ha_fail(m, status, {block}, {});\n    }}",
-            f.shape.time
-        );
+        let rate = moves.then(|| {
+            let right = d[1].clone().unwrap_or_else(|| Written::of(self.real.number(0.0)));
+            match &d[0] {
+                Some(da) => written!("({} - {} * {}) / {}", right, da, Variable::Number(Series::Value(out)), a[0]),
+                None => written!("{} / {}", right, a[0]),
+            }
+        });
+        self.put(f, out, &written!("{} / {}", a[1], a[0]), rate.as_ref());
+    }
+
+    pub fn newton(&self, f: &mut Body, solve: &Solve, reads: &Reading, number: usize) {
+        let outer = self.array(f, "o", number, &reads.values);
+        let solution = self.room(f, "s", number, solve.unknowns.len());
+        let which = self.newton.binary_search(&solve.block).expect("all blocks in use are known");
+        let call = match solve.unknowns.iter().any(|out| f.moves[out.0 as usize]) {
+            true => {
+                let rates = self.rates(f, "e", number, &reads.rates);
+                let moved = self.room(f, "ds", number, solve.unknowns.len());
+                let function = needed("ha_root_along");
+                written!("{}(m, {}, {}, {}, {}, {})", function, which, outer, rates, solution, moved)
+            }
+            false => written!("{}(m, {}, {}, {})", needed("ha_find_root"), which, outer, solution),
+        };
+        f.line(written!("    {} = {};", Variable::Status, call), 0);
+        let failure = written!("{}(m, status, {}, {})", needed("ha_fail"), solve.block.0, f.shape.time.text());
+        f.line(written!("    if (status != {}_OK) {{\n        return {};\n    }}", self.capitals, failure), 0);
         self.solved(f, solve, number);
+    }
+
+    /// Declares an array of values.
+    fn array(&self, f: &mut Body, kind: &'static str, number: usize, values: &[Written]) -> Variable {
+        let array = Variable::Array(kind, number);
+        let list = match values {
+            [] => Written::of(self.real.number(0.0)),
+            values => Written::list(values),
+        };
+        let declared = written!("    const {} {}[] = {{{}}};", self.real.kind(), array, list);
+        f.constant(array, declared, values.len().max(1));
+        array
+    }
+
+    /// Declares an array of rates, 0 where nothing moves.
+    fn rates(&self, f: &mut Body, kind: &'static str, number: usize, rates: &[Option<Written>]) -> Variable {
+        let zero = || Written::of(self.real.number(0.0));
+        let rates: Vec<Written> = rates.iter().map(|d| d.clone().unwrap_or_else(zero)).collect();
+        self.array(f, kind, number, &rates)
+    }
+
+    /// Declares room for a solution.
+    fn room(&self, f: &mut Body, kind: &'static str, number: usize, n: usize) -> Variable {
+        let array = Variable::Array(kind, number);
+        f.line(written!("    {} {}[{}];", self.real.kind(), array, n), n);
+        array
     }
 
     fn solved(&self, f: &mut Body, solve: &Solve, number: usize) {
         for (i, out) in solve.unknowns.iter().enumerate() {
             if f.read[out.0 as usize] {
-                let rate = f.moves[out.0 as usize].then(|| format!("ds{number}[{i}]"));
-                self.put(f, out.0, &format!("s{number}[{i}]"), rate.as_deref());
+                let rate = f.moves[out.0 as usize].then(|| written!("{}[{}]", Variable::Array("ds", number), i));
+                self.put(f, out.0, &written!("{}[{}]", Variable::Array("s", number), i), rate.as_ref());
             }
         }
     }
-}
 
-/// Symmetric linear equations that are written out; the solution stands in `s<number>`.
-struct Written<'a> {
-    number: usize,
-    /// Pivots below this fraction of the entry that they come from are rounding.
-    rounding: f64,
-    /// The call for matrices that are not definite, with their entries in `a` and right side in `b`, and what is done
-    /// where it fails.
-    call: &'a str,
-    fail: &'a str,
-}
-
-impl Written<'_> {
-    /// As `lu.c` does where the matrix, given row by row and by its entries, is definite; else by it.
-    fn definite(&self, text: &mut String, full: &[String], entries: &[String], right: &[String]) {
-        let (n, number) = (right.len(), self.number);
-        let _ = writeln!(text, "    double s{number}[{n}];\n    {{");
-        let mut k = Expressions::new(text, "e".into(), false);
+    /// Symmetric equations written out, as `lu.c` solves them where the matrix is definite; else it does.
+    fn definite(&self, f: &mut Body, solve: &Solve, a: &[Written], number: usize) {
+        let n = solve.unknowns.len();
+        let (entries, right) = a.split_at(solve.pattern.len());
+        let (pattern, _) = self.patterns.of_block(self.program, solve.block);
+        let solution = self.room(f, "s", number, n);
+        let failure = self.failure("SINGULAR", &solve.block.0, f.shape.time);
+        f.line(Written::of("    {"), 0);
+        let mut k = Expressions::new(&mut f.lines, Series::Elimination, self.real);
         k.indent = "        ";
-        let matrix: Vec<_> = full.iter().map(|entry| k.whole(entry)).collect();
-        let factors = Definite::factor(&mut k, &matrix, n, self.rounding);
-        let asked = std::mem::take(&mut k.asked).join(" && ");
-        k.line(&format!("if ({asked}) {{"));
+        let zero = k.push(Written::of(self.real.number(0.0)));
+        let mut full = vec![zero; n * n];
+        solve.pattern.places().zip(entries).for_each(|((i, j), entry)| full[i * n + j] = k.push(entry.clone()));
+        let factors = Definite::factor(&mut k, &full, n, self.real.epsilon() * n as f64);
+        let asked = std::mem::take(&mut k.asked);
+        let asked = asked.into_iter().reduce(|all, one| written!("{} && {}", all, one)).expect("a pivot");
+        k.line(&written!("if ({}) {{", asked), 0);
         k.indent = "            ";
-        let mut solution: Vec<_> = right.iter().map(|b| k.whole(b)).collect();
-        factors.solve(&mut k, &mut solution);
-        for (i, x) in solution.into_iter().enumerate() {
-            let x = k.text(x);
-            k.line(&format!("s{number}[{i}] = {x};"));
+        let mut unknowns: Vec<_> = right.iter().map(|b| k.push(b.clone())).collect();
+        factors.solve(&mut k, &mut unknowns);
+        for (i, x) in unknowns.into_iter().enumerate() {
+            let x = k.written(x);
+            k.line(&written!("{}[{}] = {};", solution, i, x), 0);
         }
         k.indent = "        ";
-        k.line("} else {");
-        k.line(&format!("    const double a[] = {{{}}};", entries.join(", ")));
-        k.line(&format!("    const double b[] = {{{}}};", right.join(", ")));
-        k.line(&format!("    if ({}) {{", self.call));
-        self.fail.lines().for_each(|l| k.line(l));
-        k.line("}");
-        text.push_str("    }\n");
+        k.line(&Written::of("} else {"), 0);
+        k.indent = "            ";
+        let kind = self.real.kind();
+        k.line(&written!("const {} a[] = {{{}}};", kind, Written::list(entries)), entries.len());
+        k.line(&written!("const {} b[] = {{{}}};", kind, Written::list(right)), n);
+        k.line(&written!("if (!{}(m, {}, a, b, {})) {{", needed("ha_linear"), pattern, solution), 0);
+        k.line(&written!("    return {};", failure), 0);
+        k.line(&Written::of("}"), 0);
+        k.indent = "        ";
+        k.line(&Written::of("}"), 0);
+        f.line(Written::of("    }"), 0);
     }
 }

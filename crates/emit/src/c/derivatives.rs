@@ -1,158 +1,136 @@
 //! Values and derivatives of single operations as C expressions.
 
-use std::fmt::{self, Display, Write};
-
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::for_each_op;
 use halfarrow_compiler::program::calculus::{Calculus, Moving};
 use halfarrow_compiler::program::elimination::Elimination;
 use halfarrow_compiler::program::{ConditionId, Op};
 
-use super::write::number;
-
-/// A whole power by repeated squaring, in the order of `math::powi`; gives the expression of the result.
-pub(super) fn power(text: &mut String, (name, wide): (&str, bool), a: &str, n: u32) -> String {
-    if n == 0 {
-        return "1.0".into();
-    }
-    let kind = if wide { "ha_wide" } else { "double" };
-    let (mut result, mut square, mut left, mut at) = (None::<String>, a.to_string(), n, 0);
-    loop {
-        if left & 1 == 1 {
-            result = Some(match result {
-                None => square.clone(),
-                Some(before) if left == 1 => return format!("{before} * {square}"),
-                Some(before) => {
-                    let _ = writeln!(text, "    const {kind} {name}_r{at} = {before} * {square};");
-                    format!("{name}_r{at}")
-                }
-            });
-        }
-        left >>= 1;
-        if left == 0 {
-            return result.unwrap_or_else(|| "1.0".into());
-        }
-        at += 1;
-        let _ = writeln!(text, "    const {kind} {name}_s{at} = {square} * {square};");
-        square = format!("{name}_s{at}");
-    }
-}
-
-/// What is fixed in an operation, in C.
-struct InC<T>(T);
-
-impl Display for InC<Function> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Function::Sqrt => f.write_str("sqrt"),
-            Function::Abs => f.write_str("fabs"),
-            Function::Floor => f.write_str("floor"),
-            other => write!(f, "ha_{}", other.name()),
-        }
-    }
-}
-
-impl Display for InC<u32> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.0)
-    }
-}
-
-/// A plain operation as a C expression.
-pub(super) fn expression<A: Copy + Display>(op: Op<A>) -> String {
-    macro_rules! write_c {
-        (($k:ident $value:ident)
-         given $given:tt
-         plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-            cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
-         })* }
-         held $held:tt) => {
-            match op {
-                $(Op::$plain($($part,)* $($a),*) => {
-                    $(let $part = InC($part);)*
-                    format!($c)
-                })*
-                _ => unreachable!("written where it is given, or where its condition or table is"),
-            }
-        };
-    }
-    for_each_op!(write_c)
-}
-
-/// How closely the parts of an expression hang together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Binds {
-    Choice,
-    Sum,
-    Product,
-    Sign,
-    Whole,
-}
+use super::written::{Binds, Line, Needed, Series, Variable, Written, written};
+use crate::Real;
 
 /// Expressions, as numbers of the rules of derivatives.
 pub(super) struct Expressions<'t> {
-    all: Vec<(String, Binds)>,
+    all: Vec<Written>,
     /// Where the lines before the expression are written.
-    lines: &'t mut String,
-    /// How temporaries are called, and whether they are in double precision whatever real numbers are.
-    name: String,
-    wide: bool,
+    lines: &'t mut Vec<Line>,
+    /// What temporaries belong to, and their precision.
+    series: Series,
+    real: Real,
     /// How far lines are indented, and how many temporaries there are.
     pub indent: &'static str,
-    kept: usize,
+    kept: u32,
     /// What has to hold for the rest to count.
-    pub asked: Vec<String>,
+    pub asked: Vec<Written>,
 }
 
 /// An expression: its place among the others.
 pub(super) type Expression = usize;
 
 impl<'t> Expressions<'t> {
-    pub fn new(lines: &'t mut String, name: String, wide: bool) -> Self {
-        Expressions { all: Vec::new(), lines, name, wide, indent: "    ", kept: 0, asked: Vec::new() }
+    pub fn new(lines: &'t mut Vec<Line>, series: Series, real: Real) -> Self {
+        Expressions { all: Vec::new(), lines, series, real, indent: "    ", kept: 0, asked: Vec::new() }
     }
 
-    /// A name, or what else needs no brackets.
-    pub fn whole(&mut self, text: &str) -> Expression {
-        self.push(text.to_string(), Binds::Whole)
-    }
-
-    pub fn text(&self, expression: Expression) -> String {
-        self.all[expression].0.clone()
-    }
-
-    /// Writes a line.
-    pub fn line(&mut self, text: &str) {
-        let _ = writeln!(self.lines, "{}{text}", self.indent);
-    }
-
-    fn push(&mut self, text: String, binds: Binds) -> Expression {
-        self.all.push((text, binds));
+    /// An expression from elsewhere.
+    pub fn push(&mut self, written: Written) -> Expression {
+        self.all.push(written);
         self.all.len() - 1
     }
 
-    /// An expression beside an operator that asks so much of it.
-    fn part(&self, expression: Expression, least: Binds) -> String {
-        let (text, binds) = &self.all[expression];
-        if *binds >= least { text.clone() } else { format!("({text})") }
+    pub fn written(&self, expression: Expression) -> Written {
+        self.all[expression].clone()
+    }
+
+    /// Writes a line that declares so many numbers.
+    pub fn line(&mut self, written: &Written, numbers: usize) {
+        self.lines.push(Line::new(written!("{}{}", self.indent, written), numbers));
+    }
+
+    /// Declares a temporary.
+    fn declare(&mut self, variable: Variable, value: &Written) -> Written {
+        let line = written!("{}const {} {} = {};", self.indent, self.real.kind(), variable, value);
+        self.lines.push(Line::constant(variable, line, 1));
+        written!("{}", variable)
     }
 
     /// `a sign b`, which is evaluated from the left.
     fn infix(&mut self, a: Expression, sign: &str, b: Expression, binds: Binds) -> Expression {
         let tighter = if binds == Binds::Sum { Binds::Product } else { Binds::Whole };
-        let text = format!("{} {sign} {}", self.part(a, binds), self.part(b, tighter));
-        self.push(text, binds)
+        let both = written!("{} {} {}", self.all[a].beside(binds), sign, self.all[b].beside(tighter));
+        self.push(both.binding(binds))
+    }
+
+    /// A call of a function that there is for either precision.
+    fn calling(&mut self, name: &str, arguments: &[Written]) -> Expression {
+        let function = Needed(self.real.function(name).into());
+        let call = written!("{}({})", function, Written::list(arguments));
+        self.push(call)
+    }
+
+    /// 1 where something holds, else 0.
+    fn truth(&mut self, holds: &Written) -> Expression {
+        let truth = written!("{} ? {} : {}", holds, self.real.number(1.0), self.real.number(0.0));
+        self.push(truth.binding(Binds::Choice))
+    }
+
+    /// Whether something is 0, or is not.
+    fn beside_zero(&self, a: Expression, sign: &str) -> Written {
+        written!("{} {} {}", self.all[a].beside(Binds::Sum), sign, self.real.number(0.0))
+    }
+}
+
+/// What the table of operations writes, besides a calculus.
+impl Expressions<'_> {
+    fn pow(&mut self, a: Expression, b: Expression) -> Expression {
+        self.calling("ha_pow", &[self.written(a), self.written(b)])
+    }
+    fn atan2(&mut self, a: Expression, b: Expression) -> Expression {
+        self.calling("ha_atan2", &[self.written(a), self.written(b)])
+    }
+    fn positive(&mut self, a: Expression) -> Expression {
+        self.truth(&self.beside_zero(a, ">"))
+    }
+    fn and(&mut self, a: Expression, b: Expression) -> Expression {
+        self.truth(&written!("{} && {}", self.beside_zero(a, "!="), self.beside_zero(b, "!=")))
+    }
+    fn or(&mut self, a: Expression, b: Expression) -> Expression {
+        self.truth(&written!("{} || {}", self.beside_zero(a, "!="), self.beside_zero(b, "!=")))
+    }
+    fn not(&mut self, a: Expression) -> Expression {
+        self.truth(&self.beside_zero(a, "=="))
+    }
+
+    /// A plain operation.
+    pub fn operation(&mut self, op: Op<Expression>) -> Expression {
+        macro_rules! write_c {
+            (($k:ident $value:ident)
+             given $given:tt
+             plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:expr, derivative: $derivative:expr,
+             })* }
+             held $held:tt) => {
+                match op {
+                    $(Op::$plain($($part,)* $($a),*) => {
+                        let $k = self;
+                        $c
+                    })*
+                    _ => unreachable!("written where it is given, or where its condition or table is"),
+                }
+            };
+        }
+        for_each_op!(write_c)
     }
 }
 
 impl Calculus for Expressions<'_> {
     type Number = Expression;
     fn number(&mut self, value: f64) -> Expression {
-        self.push(number(value), Binds::Whole)
+        self.push(Written::of(self.real.number(value)))
     }
     fn neg(&mut self, a: Expression) -> Expression {
-        let text = format!("-{}", self.part(a, Binds::Whole));
-        self.push(text, Binds::Sign)
+        let opposite = written!("-{}", self.all[a].beside(Binds::Whole));
+        self.push(opposite.binding(Binds::Sign))
     }
     fn add(&mut self, a: Expression, b: Expression) -> Expression {
         self.infix(a, "+", b, Binds::Sum)
@@ -166,29 +144,59 @@ impl Calculus for Expressions<'_> {
     fn div(&mut self, a: Expression, b: Expression) -> Expression {
         self.infix(a, "/", b, Binds::Product)
     }
+    /// By repeated squaring, in the order of `math::powi`.
     fn powi(&mut self, a: Expression, n: u32) -> Expression {
-        let a = self.part(a, Binds::Whole);
-        let text = power(self.lines, (&self.name, self.wide), &a, n);
-        self.push(text, Binds::Product)
+        let mut square = self.all[a].beside(Binds::Whole);
+        let (mut result, mut left, mut at) = (None::<Written>, n, 0);
+        while left > 0 {
+            if left & 1 == 1 {
+                result = Some(match result {
+                    None => square.clone(),
+                    Some(before) => {
+                        let product = written!("{} * {}", before, square).binding(Binds::Product);
+                        if left == 1 {
+                            return self.push(product);
+                        }
+                        self.declare(Variable::Part(self.series, "r", at), &product)
+                    }
+                });
+            }
+            left >>= 1;
+            if left > 0 {
+                at += 1;
+                square = self.declare(Variable::Part(self.series, "s", at), &written!("{} * {}", square, square));
+            }
+        }
+        let one = Written::of(self.real.number(1.0));
+        self.push(result.unwrap_or(one).binding(Binds::Product))
     }
     fn call(&mut self, f: Function, a: Expression) -> Expression {
-        let text = expression(Op::Call(f, &self.all[a].0));
-        self.push(text, Binds::Whole)
+        let name = match f {
+            Function::Sqrt => "sqrt".to_string(),
+            Function::Abs => "fabs".to_string(),
+            Function::Floor => "floor".to_string(),
+            other => format!("ha_{}", other.name()),
+        };
+        self.calling(&name, &[self.written(a)])
     }
     fn select(&mut self, c: Expression, a: Expression, b: Expression) -> Expression {
-        let [c, a, b] = [c, a, b].map(|e| self.part(e, Binds::Sum));
-        self.push(expression(Op::Select(&c, &a, &b)), Binds::Choice)
+        let choice = written!(
+            "{} ? {} : {}",
+            self.beside_zero(c, "!="),
+            self.all[a].beside(Binds::Sum),
+            self.all[b].beside(Binds::Sum)
+        );
+        self.push(choice.binding(Binds::Choice))
     }
     fn along(&mut self, slope: impl FnOnce(&mut Self) -> Expression, rate: Expression) -> Expression {
         let slope = slope(self);
-        let text = format!("ha_along({}, {})", self.all[slope].0, self.all[rate].0);
-        self.push(text, Binds::Whole)
+        self.calling("ha_along", &[self.written(slope), self.written(rate)])
     }
     fn along_power(&mut self, value: Expression, (a, da): Moving<Self>, (b, db): Moving<Self>) -> Option<Expression> {
-        let rate = |d: Option<Expression>| d.map_or("0.0".to_string(), |d| self.text(d));
-        let [value, a, b] = [value, a, b].map(|e| self.text(e));
-        let text = format!("ha_pow_along({value}, {a}, {}, {b}, {})", rate(da), rate(db));
-        Some(self.push(text, Binds::Whole))
+        let rate = |d: Option<Expression>| d.map_or(Written::of(self.real.number(0.0)), |d| self.written(d));
+        let [da, db] = [da, db].map(rate);
+        let [value, a, b] = [value, a, b].map(|e| self.written(e));
+        Some(self.calling("ha_pow_along", &[value, a, da, b, db]))
     }
     fn table(&mut self, _: (u32, Option<ConditionId>), _: u32, _: Expression) -> Expression {
         unreachable!("tables are looked up with their derivative")
@@ -197,17 +205,19 @@ impl Calculus for Expressions<'_> {
 
 impl Elimination for Expressions<'_> {
     fn sign_of(&mut self, a: Expression) -> Expression {
-        let text = format!("copysign(1.0, {})", self.all[a].0);
-        self.push(text, Binds::Whole)
+        let one = Written::of(self.real.number(1.0));
+        self.calling("copysign", &[one, self.written(a)])
     }
     fn require(&mut self, pivot: Expression, least: Expression) {
-        let [p, least] = [pivot, least].map(|e| self.part(e, Binds::Product));
-        self.asked.push(format!("{p} > 0.0 && {p} > {least} && ha_finite({p})"));
+        let [p, least] = [pivot, least].map(|e| self.all[e].beside(Binds::Product));
+        let finite = Needed(self.real.function("ha_finite").into());
+        let asked = written!("{} > {} && {} > {} && {}({})", p, self.real.number(0.0), p, least, finite, p);
+        self.asked.push(asked);
     }
     fn keep(&mut self, a: Expression) -> Expression {
-        let (name, text) = (format!("{}_{}", self.name, self.kept), self.text(a));
+        let variable = Variable::Part(self.series, "", self.kept);
         self.kept += 1;
-        self.line(&format!("const double {name} = {text};"));
-        self.whole(&name)
+        let kept = self.declare(variable, &self.written(a));
+        self.push(kept)
     }
 }

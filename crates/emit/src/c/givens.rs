@@ -5,7 +5,8 @@ use std::cell::RefCell;
 use halfarrow_compiler::program::{Op, Program, Reads, Value};
 use rustc_hash::FxHashMap;
 
-use super::write::{Moving, number};
+use super::write::{Moving, TimeRate};
+use super::written::{Written, written};
 use crate::Real;
 
 /// The places of givens: parameters, what follows from them, time, inputs, held signals, conserved constants, states.
@@ -53,31 +54,32 @@ impl<'a> Givens<'a> {
     }
 
     /// A value in C.
-    pub fn text(&self, value: Value) -> String {
+    pub fn written(&self, value: Value) -> Written {
         match self.program.values.op(value) {
-            Op::Constant(bits) => number(bits.number()),
-            Op::Parameter(i) => format!("m->p[{i}]"),
-            Op::Time => "t".into(),
-            Op::Input(i) => format!("m->u[{i}]"),
-            Op::Held(i) => format!("m->z[{i}]"),
-            Op::Conserved(i) => format!("m->k[{i}]"),
-            Op::State(i) => format!("x[{i}]"),
-            _ => format!("m->c[{}]", self.derived[&value]),
+            Op::Constant(bits) => Written::of(self.real.number(bits.number())),
+            Op::Parameter(i) => written!("m->p[{}]", i),
+            Op::Time => Written::of("t"),
+            Op::Input(i) => written!("m->u[{}]", i),
+            Op::Held(i) => written!("m->z[{}]", i),
+            Op::Conserved(i) => written!("m->k[{}]", i),
+            Op::State(i) => written!("x[{}]", i),
+            _ => written!("m->c[{}]", self.derived[&value]),
         }
     }
 
     /// A value in C, in double precision.
-    pub fn wide_text(&self, value: Value) -> String {
+    pub fn wide_written(&self, value: Value) -> Written {
         match self.program.values.op(value) {
-            _ if self.real == Real::Double => self.text(value),
-            Op::Constant(_) | Op::Time => self.text(value),
-            Op::Parameter(i) => format!("m->p_exact[{i}]"),
+            _ if self.real == Real::Double => self.written(value),
+            Op::Constant(bits) => Written::of(Real::Double.number(bits.number())),
+            Op::Time => self.written(value),
+            Op::Parameter(i) => written!("m->p_exact[{}]", i),
             _ if self.derived.contains_key(&value) => {
                 let mut exact = self.exact.borrow_mut();
                 let next = exact.len();
-                format!("m->c_exact[{}]", exact.entry(value).or_insert(next))
+                written!("m->c_exact[{}]", *exact.entry(value).or_insert(next))
             }
-            _ => format!("ha_widen({})", self.text(value)),
+            _ => written!("({}){}", Real::Double.kind(), self.written(value)),
         }
     }
 
@@ -104,15 +106,16 @@ impl<'a> Givens<'a> {
     }
 
     /// Its derivative in C, if it moves.
-    pub fn rate(&self, value: Value, moving: Moving) -> Option<String> {
+    pub fn rate(&self, value: Value, moving: Moving) -> Option<Written> {
         let place = self.direction(value)?;
         let moves = match self.program.values.op(value) {
-            Op::Time => return moving.time.map(str::to_string),
+            Op::Time if moving.time == Some(TimeRate::One) => return Some(Written::of(self.real.number(1.0))),
+            Op::Time => moving.time.is_some(),
             Op::Input(_) => moving.inputs,
             Op::Held(_) => moving.held,
             Op::Conserved(_) => moving.conserved,
             _ => moving.states,
         };
-        moves.then(|| format!("e[{place}]"))
+        moves.then(|| written!("e[{}]", place))
     }
 }

@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use halfarrow_compiler::program::{Assumption, DomainKind, LawDomain, PivotGuard, first_of};
 
+use super::fragment::{Fragment, Kind};
 use super::plan::Plan;
+use super::written::Written;
 use crate::Real;
 
 /// Failures, each with the texts of all places where it may happen.
@@ -22,6 +24,10 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
     };
     let states = |text: &dyn Fn(&str) -> String| p.states.iter().map(|s| text(&s.name)).collect::<Vec<_>>();
     let conditions = plan.switches.iter().flat_map(|&c| vec![c; p.conditions[c].kind.switches()]);
+    let range = match plan.export.real {
+        Real::Double => "",
+        Real::Float => "; a law may also leave the range of float where the search begins, as exp does above 88",
+    };
     let group = |g: &super::start::Group| {
         let names: Vec<&str> = g.conditions.iter().map(|&c| p.start[c].name.as_str()).collect();
         format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
@@ -31,7 +37,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ("SINGULAR", block(&singular)),
         (
             "NO_CONVERGENCE",
-            block(&|what| format!("the iteration for {what} did not converge; a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the unknowns any more")),
+            block(&|what| format!("the iteration for {what} did not converge; a law may have no solution there, the step may be too long, or laws saturate so that nothing tells the unknowns any more{range}")),
         ),
         (
             "BRANCH",
@@ -143,28 +149,29 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
     texts(plan).into_iter().filter(|(code, _)| there(code)).map(|(code, _)| (code, meaning(code))).collect()
 }
 
-/// The function that gives them.
-pub(super) fn messages(plan: &Plan) -> String {
-    let mut text = String::from("\n/* ---- what failures mean ---- */\n\n");
-    let mut cases = String::new();
+/// The function that gives them, under a heading.
+pub(super) fn messages(plan: &Plan) -> Vec<Fragment> {
+    let (model, capitals) = (&plan.name, plan.name.to_ascii_uppercase());
+    let (mut tables, mut cases) = (String::new(), String::new());
     for (code, texts) in texts(plan).iter().filter(|(_, texts)| !texts.is_empty()) {
         let name = code.to_ascii_lowercase();
-        let _ = writeln!(text, "static const char *const ha_text_{name}[] = {{");
+        let _ = writeln!(tables, "static const char *const ha_text_{name}[] = {{");
         for one in texts {
-            let _ = writeln!(text, "    \"{}\",", escaped(one));
+            let _ = writeln!(tables, "    \"{}\",", escaped(one));
         }
-        text += "};\n";
+        tables += "};\n";
         let count = texts.len();
         let _ = writeln!(
             cases,
-            "    case MODEL_{code}:\n        return m->failure.where >= 0 && m->failure.where < {count} ? ha_text_{name}[m->failure.where] : \"\";"
+            "    case {capitals}_{code}:\n        return m->failure.where >= 0 && m->failure.where < {count} ? ha_text_{name}[m->failure.where] : \"\";"
         );
     }
-    let _ = writeln!(
-        text,
-        "\nconst char *MODEL_message(const MODEL *m)\n{{\n    switch (m->failure.code) {{\n{cases}    default:\n        return \"\";\n    }}\n}}"
+    let message = format!(
+        "\nconst char *{model}_message(const {model} *m)\n{{\n    switch (m->failure.code) {{\n{cases}    default:\n        return \"\";\n    }}\n}}"
     );
-    text
+    let mut all = Fragment::new(Kind::Always);
+    all.line(&Written::of(tables + &message));
+    vec![Fragment::section("what failures mean"), all]
 }
 
 /// A text within quotes of C: what is not ASCII as bytes of UTF-8 in octal.

@@ -7,8 +7,11 @@ mod blocks;
 mod cost;
 mod derivatives;
 pub(crate) mod flags;
+mod fragment;
+mod function;
 mod givens;
 mod header;
+mod members;
 mod messages;
 mod obligations;
 mod patterns;
@@ -21,6 +24,7 @@ pub(crate) mod template;
 mod terms;
 mod variables;
 mod write;
+pub(crate) mod written;
 
 pub use cost::Cost;
 
@@ -106,8 +110,8 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     };
     let plan = plan::Plan::new(export, &name)?;
     let cost = plan.cost();
-    let header = header::header(export, &plan, &names, &cost);
-    let source = plan.source(&obligations::lines(&plan, &header));
+    let header = header::header(&plan, &names, &cost);
+    let source = plan.source(obligations::lines(&plan));
     let main = project::main(export, &name);
     let cmake = project::cmake(&name);
     Ok(Written { header, source, main, cmake, cost, names, name })

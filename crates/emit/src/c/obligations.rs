@@ -2,16 +2,15 @@
 
 use halfarrow_compiler::bond_graph::HeldKind;
 
+use super::members;
 use super::plan::Plan;
 use crate::{Method, Real};
 
 /// Bytes of stack for all functions that do not depend on the model.
-const OWN_STACK: usize = 6 * 1024;
-/// Bytes of a frame besides its variables.
-const FRAME: usize = 96;
+const OWN_STACK: usize = 6 * 1024 + 96;
 
 /// The lines, as they stand in the comment at the head of the source.
-pub(super) fn lines(plan: &Plan, header: &str) -> String {
+pub(super) fn lines(plan: &Plan) -> String {
     let tables = !plan.newton.is_empty() || plan.solves_start();
     let implicit = plan.export.method.is_implicit();
     let indirect = match (tables, implicit) {
@@ -43,10 +42,7 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
             "no goto (15.1), no union (19.2), no stdarg (17.1); functions have several returns (against 15.5)".into(),
         ),
         ("stack", format!("at most {} bytes (gcc, 64 bits, -O2)", stack(plan))),
-        (
-            "state",
-            format!("at most {} bytes, all in one MODEL", state(header, &plan.name, plan.export.real == Real::Float)),
-        ),
+        ("state", format!("at most {} bytes, all in one {}", members::bytes(plan), plan.name)),
         ("conversions", format!("no warning by gcc -std=c99 -Wall -Wextra -Wconversion -pedantic{flags}")),
     ];
     all.iter()
@@ -58,7 +54,10 @@ pub(super) fn lines(plan: &Plan, header: &str) -> String {
 
 /// What bounds the loops.
 fn bounds(plan: &Plan) -> String {
-    let mut bounds = vec!["sizes in the header".to_string(), "MODEL_MOST_JUMPS parts of a step".into()];
+    let mut bounds = vec![
+        "sizes in the header".to_string(),
+        format!("{}_MOST_JUMPS parts of a step", plan.name.to_ascii_uppercase()),
+    ];
     if !plan.newton.is_empty() {
         bounds.push("evaluations of Newton blocks by most_evaluations (20000 at the start and at jumps)".into());
     }
@@ -73,58 +72,9 @@ fn bounds(plan: &Plan) -> String {
 
 /// Bytes of stack: every value of the equations in a place of its own, and what solves for the start.
 fn stack(plan: &Plan) -> usize {
-    let generated: usize = plan.functions().split("\n}\n").map(frame).sum();
+    let generated: usize = plan.functions().iter().map(|f| f.stack).sum();
     let most = |of: &dyn Fn(&super::start::Group) -> usize| plan.groups.iter().map(of).max().unwrap_or(1);
     let (rows, columns) = (most(&|g| g.conditions.len()), most(&|g| g.unknowns.len()));
     let start = 8 * (rows * rows + 4 * rows * columns + 8 * (rows + columns) + 8 * plan.program.start.len());
     OWN_STACK + generated + start
-}
-
-/// Bytes of the variables of a function.
-fn frame(function: &str) -> usize {
-    let array = |line: &str| {
-        let size = line.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(size, _)| size);
-        match size.and_then(|size| size.parse::<usize>().ok()) {
-            Some(size) => size,
-            None => 1 + line.matches(',').count(),
-        }
-    };
-    let of_line = |line: &str| match line.trim_start().strip_prefix("const ").unwrap_or(line.trim_start()) {
-        declared if declared.starts_with("double ") || declared.starts_with("ha_wide ") => {
-            match declared.split_once(" = ") {
-                Some((name, value)) if !value.starts_with('{') => 8 * array(name),
-                _ => 8 * array(declared),
-            }
-        }
-        _ => 0,
-    };
-    FRAME + function.lines().map(of_line).sum::<usize>()
-}
-
-/// Bytes of the model: its members, each in whole words.
-fn state(header: &str, name: &str, single: bool) -> usize {
-    let members = header.split(&format!("typedef struct {name} {{")).nth(1);
-    let members = members.and_then(|rest| rest.split(&format!("}} {name};")).next()).unwrap_or_default();
-    members.lines().map(|line| member(line, single)).sum()
-}
-
-fn member(line: &str, single: bool) -> usize {
-    let line = line.split("/*").next().unwrap_or_default().trim().trim_end_matches(';');
-    let line = line.strip_prefix("unsigned ").unwrap_or(line);
-    let Some((kind, names)) = line.split_once(' ') else { return 0 };
-    let bytes = match kind {
-        "char" => 1,
-        "int" => 4,
-        "double" => 8,
-        "float" => 4,
-        kind if kind.ends_with("_failure") => 16,
-        kind if kind.ends_with("_point") && single => 24,
-        kind if ["_delay", "_point", "_sample"].iter().any(|end| kind.ends_with(end)) => 32,
-        _ => return 0,
-    };
-    let count = |name: &str| {
-        let size = name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(size, _)| size);
-        size.map_or(1, |size| size.parse::<usize>().unwrap_or(1))
-    };
-    names.split(',').map(|name| (bytes * count(name)).next_multiple_of(8)).sum()
 }

@@ -3,6 +3,8 @@
 use halfarrow_compiler::program::{BlockId, Matrix, Program};
 use halfarrow_compiler::sparse::SymbolicFactors;
 
+use super::written::{Written, needed, written};
+
 /// Sparse matrices of more rows are not treated as full ones where the pivots of their order do not do: the room that
 /// this takes is there for good.
 pub(super) const FULL_AT_MOST: usize = 200;
@@ -27,10 +29,10 @@ impl Patterns {
     }
 
     /// A pointer to the pattern of a block, and the number of its entries.
-    pub fn of_block(&self, program: &Program, block: BlockId) -> (String, usize) {
+    pub fn of_block(&self, program: &Program, block: BlockId) -> (Written, usize) {
         let pattern = program.blocks[block].matrix().values.pattern();
         let number = self.different.iter().position(|m| m.values.pattern() == pattern).expect("all blocks are known");
-        (format!("&ha_patterns[{number}]"), pattern.len())
+        (written!("&{}[{}]", needed("ha_patterns"), number), pattern.len())
     }
 
     /// Whether one of them has an order of its own.
@@ -54,7 +56,7 @@ impl Patterns {
             };
             list += &format!("    {{{}, ha_starts_{i}, ha_columns_{i}{order}}},\n", pattern.size());
         }
-        text + &list + "};\n"
+        text + &list + "};"
     }
 }
 

@@ -1,11 +1,12 @@
 //! A program that steps the model, and how to build it.
 
-use std::fmt::Write;
-
 use halfarrow_compiler::program::Observed;
 use halfarrow_compiler::unit::Unit;
 
-use super::{Export, messages, template};
+use super::flags::Flags;
+use super::template::{Filling, Words};
+use super::written::Written;
+use super::{Export, messages};
 use crate::Real;
 
 /// `main.c`.
@@ -15,20 +16,22 @@ pub(super) fn main(export: &Export, name: &str) -> String {
     let names: String = recorded.iter().map(|o| field(&o.name)).collect();
     let unit = |o: &Observed| o.unit.as_ref().map(ToString::to_string).unwrap_or_default();
     let units: String = recorded.iter().map(|o| field(&unit(o))).collect();
-    let mut lines = String::new();
-    for (i, o) in recorded.iter().enumerate() {
+    let print = |(i, o): (usize, &&Observed)| {
         let (digits, value) = match export.real {
             Real::Double => (17, format!("m->y[{i}]")),
             Real::Float => (9, format!("(double)m->y[{i}]")),
         };
-        let _ = writeln!(lines, "    printf(\",%.{digits}g\", {});", declared(&value, o.unit.as_ref()));
-    }
-    let text = include_str!("runtime/main.c")
-        .replace("PRINT_OUTPUTS\n", &lines)
-        .replace("OUTPUT_NAMES", &names)
-        .replace("OUTPUT_UNITS", &units)
-        .replace("NAME.h", &format!("{name}.h"));
-    template::name(&text, name)
+        format!("    printf(\",%.{digits}g\", {});", declared(&value, o.unit.as_ref()))
+    };
+    let lines: Vec<String> = recorded.iter().enumerate().map(print).collect();
+    let words = [("PRINT_OUTPUTS", lines.join("\n")), ("OUTPUT_NAMES", names), ("OUTPUT_UNITS", units)];
+    let words = words.map(|(word, text)| (word, Written::of(text))).into();
+    filling(name, words).text(include_str!("runtime/main.c"))
+}
+
+/// With what templates are filled that compute nothing.
+fn filling(model: &str, words: Words) -> Filling<'_> {
+    Filling { flags: Flags::default(), words, model, real: Real::Double }
 }
 
 /// An output in the unit that the model declares for it, as C.
@@ -46,5 +49,5 @@ fn declared(si: &str, unit: Option<&Unit>) -> String {
 
 /// `CMakeLists.txt`.
 pub(super) fn cmake(name: &str) -> String {
-    template::name(include_str!("runtime/CMakeLists.txt"), name)
+    filling(name, Words::new()).text(include_str!("runtime/CMakeLists.txt"))
 }

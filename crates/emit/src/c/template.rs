@@ -1,204 +1,198 @@
-//! C text with gaps: parts that stand only under a condition, words to be replaced, functions that nobody calls.
+//! C with gaps: the texts of `runtime/`, and how they are filled.
+//!
+//! Lines of their own say what stands there:
+//!
+//! - `//if flag`, `//else`, `//end`: only under a condition;
+//! - `//item name: others`: a function, table or macro that is put in only where it is needed, and needs others;
+//! - `//always`: what is put in whether anybody needs it or not;
+//! - `//section`: a heading, put in where something stands under it.
+//!
+//! Within a line `$` marks what depends on the model or on its real numbers:
+//!
+//! - `$WORD`: what the model has for the word;
+//! - `$model`, `$model_step`, `$MODEL_OK`: a name of the model;
+//! - `$real`, `$1e-9`, `$fabs`, `$DBL_EPSILON`: the type of its real numbers, a literal of it, a function or number for it;
+//! - `$narrow a`, `$widen a`: a cast from double precision to it, or back, where these are not the same;
+//! - `$ha_name`: an item, which is needed then; `$$ha_name` the one for double precision.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
-/// The lines whose conditions hold: `//if word`, `//else` and `//end` stand on lines of their own.
-pub(crate) fn choose(text: &str, holds: impl Fn(&str) -> bool) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut open: Vec<bool> = Vec::new();
-    for line in text.lines() {
-        if let Some(flag) = line.strip_prefix("//if ") {
-            open.push(holds(flag.trim()));
-        } else if line == "//else" {
-            if let Some(last) = open.last_mut() {
+use super::flags::Flags;
+use super::fragment::{Fragment, Kind};
+use super::written::{Needed, Part, Written};
+use crate::Real;
+
+/// What stands in the place of words.
+pub(crate) type Words = BTreeMap<&'static str, Written>;
+
+/// What templates are filled with.
+pub(crate) struct Filling<'a> {
+    pub flags: Flags,
+    pub words: Words,
+    /// The name of the model in C.
+    pub model: &'a str,
+    /// Its real numbers.
+    pub real: Real,
+}
+
+impl Filling<'_> {
+    /// The fragments of a template.
+    ///
+    /// # Panics
+    /// It has a word or a flag that there is not.
+    pub fn fragments(&self, template: &'static str) -> Vec<Fragment> {
+        let mut fragments = vec![Fragment::new(Kind::Always)];
+        let mut open: Vec<bool> = Vec::new();
+        for line in template.lines() {
+            if let Some(flag) = line.strip_prefix("//if ") {
+                open.push(self.flags.holds(flag));
+            } else if line == "//else" {
+                let last = open.last_mut().expect("a condition before `//else`");
                 *last = !*last;
+            } else if line == "//end" {
+                open.pop().expect("a condition before `//end`");
+            } else if open.contains(&false) {
+            } else if line == "//always" {
+                fragments.push(Fragment::new(Kind::Always));
+            } else if line == "//section" {
+                fragments.push(Fragment::new(Kind::Section));
+            } else if let Some(item) = line.strip_prefix("//item ") {
+                fragments.push(self.item(item));
+            } else {
+                let line = self.line(line);
+                fragments.last_mut().expect("one at least").line(&line);
             }
-        } else if line == "//end" {
-            open.pop();
-        } else if open.iter().all(|&holds| holds) {
-            out.push_str(line);
-            out.push('\n');
         }
+        assert!(open.is_empty(), "a condition without end");
+        fragments
     }
-    debug_assert!(open.is_empty(), "a condition without end");
-    out
-}
 
-/// Puts texts in the place of words.
-pub(crate) fn fill(text: &str, words: &BTreeMap<String, String>) -> String {
-    let mut out = String::with_capacity(text.len());
-    for (word, is_word) in pieces(text) {
-        match words.get(word).filter(|_| is_word) {
-            Some(instead) => out.push_str(instead),
-            None => out.push_str(word),
-        }
+    /// The text of a template without items.
+    ///
+    /// # Panics
+    /// As [`Filling::fragments`].
+    pub fn text(&self, template: &'static str) -> String {
+        super::fragment::assembled(&self.fragments(template))
     }
-    out
-}
 
-/// `MODEL_rates` and `MODEL` become names of the model, `MODEL_OK` one in capitals.
-pub(crate) fn name(text: &str, lower: &str) -> String {
-    let upper = lower.to_ascii_uppercase();
-    let mut out = String::with_capacity(text.len());
-    for (word, is_word) in pieces(text) {
-        match word.strip_prefix("MODEL").filter(|rest| is_word && (rest.is_empty() || rest.starts_with('_'))) {
-            Some(rest) if rest[1.min(rest.len())..].starts_with(|c: char| c.is_ascii_uppercase()) => {
-                out.push_str(&upper);
-                out.push_str(rest);
-            }
-            Some(rest) => {
-                out.push_str(lower);
-                out.push_str(rest);
-            }
-            None => out.push_str(word),
-        }
+    fn item(&self, declared: &'static str) -> Fragment {
+        let (name, needs) = declared.split_once(": ").unwrap_or((declared, ""));
+        let name = match name.strip_prefix('$') {
+            Some(name) => self.real.function(name).into(),
+            None => Cow::Borrowed(name),
+        };
+        let mut item = Fragment::new(Kind::Item(name));
+        item.needs.extend(needs.split_whitespace().map(Cow::Borrowed));
+        item
     }
-    out
-}
 
-/// Words and what stands between them.
-fn pieces(text: &str) -> impl Iterator<Item = (&str, bool)> {
-    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let mut rest = text;
-    std::iter::from_fn(move || {
-        let first = rest.chars().next()?;
-        let word = is_word(first);
-        let end = rest.find(|c: char| is_word(c) != word).unwrap_or(rest.len());
-        let (piece, after) = rest.split_at(end);
-        rest = after;
-        Some((piece, word))
-    })
-}
-
-/// The text without static functions, tables and macros that nothing else reads, with the comments above them.
-pub(super) fn without_the_uncalled(text: &str) -> String {
-    let parts = parts(text);
-    let mut kept = vec![true; parts.len()];
-    loop {
-        let mut words: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
-        for (i, part) in parts.iter().enumerate().filter(|(i, _)| kept[*i]) {
-            for (word, is_word) in pieces(part.text) {
-                if is_word {
-                    words.entry(word).or_default().insert(i);
+    /// A line with its gaps filled.
+    fn line(&self, line: &str) -> Written {
+        let mut parts = line.split('$');
+        let mut filled = Written::of(parts.next().unwrap_or_default());
+        let mut plain = false;
+        for part in parts {
+            let (token, rest) = part.split_at(token_length(part));
+            match (token, plain) {
+                ("", true) => filled.text += "$$",
+                ("", false) if rest.is_empty() => {
+                    plain = true;
+                    continue;
                 }
+                ("", false) => filled.text.push('$'),
+                (name, true) => self.put(&mut filled, &Needed(name.to_string().into())),
+                (token, false) => self.gap(&mut filled, token),
             }
+            plain = false;
+            filled.text += if matches!(token, "narrow" | "widen") { rest.trim_start() } else { rest };
         }
-        let mut changed = false;
-        for (i, part) in parts.iter().enumerate() {
-            let Some(name) = part.name else { continue };
-            let read_elsewhere = words.get(name).is_some_and(|at| at.iter().any(|&j| parts[j].name != Some(name)));
-            if kept[i] && !read_elsewhere {
-                kept[i] = false;
-                changed = true;
+        filled
+    }
+
+    fn put(&self, filled: &mut Written, part: &dyn Part) {
+        filled.text += &part.to_string();
+        part.note(&mut filled.notes);
+    }
+
+    /// What stands behind one `$`.
+    fn gap(&self, filled: &mut Written, token: &str) {
+        if let Some(word) = self.words.get(token) {
+            return self.put(filled, word);
+        }
+        let single = self.real == Real::Float;
+        let function = self.real.function(token);
+        match token {
+            "real" => filled.text += self.real.kind(),
+            "narrow" => filled.text += if single { "(float)" } else { "" },
+            "widen" => filled.text += if single { "(double)" } else { "" },
+            _ if token.starts_with(|c: char| c.is_ascii_digit()) => filled.text += &self.real.literal(token),
+            _ if token.starts_with("model") => {
+                filled.text += self.model;
+                filled.text += &token["model".len()..];
             }
-        }
-        if !changed {
-            break;
+            _ if token.starts_with("MODEL") => {
+                filled.text += &self.model.to_ascii_uppercase();
+                filled.text += &token["MODEL".len()..];
+            }
+            _ if token.starts_with("ha_") => self.put(filled, &Needed(Cow::Owned(function))),
+            _ if token.starts_with(|c: char| c.is_ascii_lowercase()) => filled.text += &function,
+            _ => filled.text += self.real.named(token),
         }
     }
-    parts.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(part, _)| part.text).collect()
 }
 
-/// The text without headings that nothing stands under.
-pub(super) fn without_empty_sections(text: &str) -> String {
-    let is_heading = |line: &str| line.starts_with("/* ---- ") && line.ends_with(" ---- */");
-    let lines: Vec<&str> = text.lines().collect();
-    let empty = |i: usize| {
-        let next = lines[i + 1..].iter().find(|line| !line.is_empty());
-        is_heading(lines[i]) && next.is_none_or(|line| is_heading(line))
+/// How far a word or a number goes.
+fn token_length(text: &str) -> usize {
+    let number = text.starts_with(|c: char| c.is_ascii_digit());
+    let mut before = ' ';
+    let mut inside = |c: char| {
+        let exponent = number && matches!(c, '+' | '-') && before == 'e';
+        before = c;
+        c.is_ascii_alphanumeric() || c == '_' || (number && c == '.') || exponent
     };
-    (0..lines.len()).filter(|&i| !empty(i)).flat_map(|i| [lines[i], "\n"]).collect()
-}
-
-/// A piece of a source file; a static function or table has a name.
-struct TopLevelItem<'a> {
-    name: Option<&'a str>,
-    text: &'a str,
-}
-
-/// Cuts a source at its top level.
-fn parts(text: &str) -> Vec<TopLevelItem<'_>> {
-    let mut parts = Vec::new();
-    let (mut start, mut at) = (0, 0);
-    let mut name = None;
-    let mut inside = false;
-    for line in text.split_inclusive('\n') {
-        let bare = line.trim_end();
-        let end = at + line.len();
-        if let Some(define) = bare.strip_prefix("#define ").filter(|_| !inside && !bare.ends_with('\\')) {
-            parts.push(TopLevelItem { name: None, text: &text[start..at] });
-            let word = define.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(define.len());
-            parts.push(TopLevelItem { name: Some(&define[..word]), text: &text[at..end] });
-            start = end;
-        }
-        if !inside
-            && name.is_none()
-            && ["static ", "HA_FUNCTION ", "HA_INLINE ", "HA_SELDOM ", "HA_DATA "]
-                .iter()
-                .any(|word| bare.starts_with(word))
-        {
-            // The comment above goes with it.
-            let above = comment_above(&text[start..at]);
-            if above > 0 {
-                parts.push(TopLevelItem { name: None, text: &text[start..start + above] });
-                start += above;
-            }
-            name = name_of(bare);
-            inside = !bare.ends_with(';');
-            if !inside {
-                parts.push(TopLevelItem { name, text: &text[start..end] });
-                (start, name) = (end, None);
-            }
-        } else if inside && (bare == "}" || bare == "};") {
-            inside = false;
-            parts.push(TopLevelItem { name, text: &text[start..end] });
-            (start, name) = (end, None);
-        }
-        at = end;
-    }
-    parts.push(TopLevelItem { name: None, text: &text[start..] });
-    parts
-}
-
-/// Where the comment that ends this text begins.
-fn comment_above(text: &str) -> usize {
-    let trimmed = text.trim_end_matches('\n');
-    let blank_between = text.len() > trimmed.len() + 1;
-    match trimmed.rfind("/*") {
-        Some(at) if trimmed.ends_with("*/") && !blank_between && (at == 0 || text[..at].ends_with('\n')) => at,
-        _ => text.len(),
-    }
-}
-
-/// The name that a line declares: the word before its first bracket.
-fn name_of(line: &str) -> Option<&str> {
-    let end = line.find(['(', '[', '=', ';'])?;
-    let before = line[..end].trim_end();
-    let start = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |at| at + 1);
-    Some(&before[start..]).filter(|name| !name.is_empty())
+    text.find(|c: char| !inside(c)).unwrap_or(text.len())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn parts_and_words_are_chosen() {
-        let text = "a\n//if x\nb\n//if y\nc\n//else\nd\n//end\n//else\ne\n//end\nf\n";
-        assert_eq!(choose(text, |word| word == "x"), "a\nb\nd\nf\n");
-        assert_eq!(choose(text, |word| word == "y"), "a\ne\nf\n");
-        assert_eq!(name("MODEL *m; MODEL_rates(MODEL_OK, MODELLED)", "car"), "car *m; car_rates(CAR_OK, MODELLED)");
-        let words = BTreeMap::from([("N".to_string(), "3".to_string())]);
-        assert_eq!(fill("a[N] NN", &words), "a[3] NN");
+    fn filling(real: Real, states: bool) -> Filling<'static> {
+        let words = Words::from([("COUNT", Written::of("3"))]);
+        Filling { flags: Flags { states, ..Flags::default() }, words, model: "car", real }
     }
 
     #[test]
-    fn what_nobody_calls_is_left_out() {
-        let text = "int f(void);\n\n/* Adds. */\nstatic int add(int a)\n{\n    return a;\n}\n\n/* Adds twice. */\n\
-                    static int twice(int a)\n{\n    return add(a);\n}\n\nstatic const int t[] = {\n    1\n};\nint f(void)\n{\n    return t[0];\n}\n";
-        let left = without_the_uncalled(text);
-        assert!(
-            !left.contains("add") && !left.contains("Adds") && left.contains("t[] = {") && left.contains("return t[0]")
+    fn gaps_are_filled() {
+        let template = "$model *m; $model_rates($MODEL_OK, $COUNT, \"$model.h\", ${X});\n//if states\n\
+                        $real a = $1e-9 * $fabs(b) + 2.5; double t = $widen m->x[$COUNT] + $$ha_max(a, $narrow(t - 1.0));\n\
+                        //else\nnone\n//end\n";
+        assert_eq!(
+            filling(Real::Double, true).text(template),
+            "car *m; car_rates(CAR_OK, 3, \"car.h\", ${X});\n\
+             double a = 1e-9 * fabs(b) + 2.5; double t = m->x[3] + ha_max(a, (t - 1.0));\n"
         );
+        assert_eq!(
+            filling(Real::Float, true).text(template),
+            "car *m; car_rates(CAR_OK, 3, \"car.h\", ${X});\n\
+             float a = 1e-9f * fabsf(b) + 2.5; double t = (double)m->x[3] + ha_max(a, (float)(t - 1.0));\n"
+        );
+        assert!(filling(Real::Double, false).text(template).ends_with("\nnone\n"));
+    }
+
+    #[test]
+    fn items_are_there_where_they_are_needed() {
+        let template = "//section\n/* ---- a ---- */\n\n//item ha_one\none\n\n//section\n/* ---- b ---- */\n\n\
+                        //item $ha_min\nmin $ha_max\n\n//item $ha_max: HA_FUNCTION\nmax\n\n//item HA_FUNCTION\nmacro\n\n\
+                        //always\n$ha_min\n";
+        let text = filling(Real::Float, true).text(template);
+        assert_eq!(text, "/* ---- b ---- */\n\nmin ha_maxf\n\nmax\n\nmacro\n\nha_minf\n");
+    }
+
+    #[test]
+    #[should_panic(expected = "flag")]
+    fn unknown_flags_are_faults_of_the_template() {
+        filling(Real::Double, true).text("//if nothing\n//end\n");
     }
 }

@@ -12,8 +12,11 @@ mod units;
 mod variables;
 
 use crate::c::flags::Flags;
-use crate::c::{self, Cost, template};
+use crate::c::template::{Filling, Words};
+use crate::c::written::Written as Text;
+use crate::c::{self, Cost};
 use crate::{EmitError, File, Real};
+use halfarrow_compiler::program::EventTrigger;
 use variables::Variables;
 
 /// Versions of the interface.
@@ -60,10 +63,10 @@ pub fn write(export: &c::Export, version: Version) -> Result<Written, EmitError>
         Version::V2 => include_str!("runtime/fmi2.c"),
         Version::V3 => include_str!("runtime/fmi3.c"),
     };
-    let api = wrapper(api, &export, &variables, &written);
+    let api = |token: &str| wrapper(api, &export, &variables, &written.name, token);
     let token = token(&[
         written.source.as_str(),
-        api.as_str(),
+        api("TOKEN").as_str(),
         &description::description(&export, &variables, version, &written.name, ""),
     ]);
     let description = description::description(&export, &variables, version, &written.name, &token);
@@ -76,7 +79,7 @@ pub fn write(export: &c::Export, version: Version) -> Result<Written, EmitError>
         File::text("modelDescription.xml", description),
         File::text(format!("sources/{}.h", written.name), &*written.header),
         File::text(format!("sources/{}.c", written.name), &*written.source),
-        File::text(format!("sources/{file}"), api.replace("\"TOKEN\"", &format!("\"{token}\""))),
+        File::text(format!("sources/{file}"), api(&token)),
     ];
     if version == Version::V3 {
         files.push(File::text("sources/buildDescription.xml", description::build(&written.name, &sources)));
@@ -132,21 +135,25 @@ pub fn binary_path(version: Version, name: &str, os: &str, architecture: &str) -
     Some(format!("binaries/{folder}/{name}.{ending}"))
 }
 
-fn wrapper(text: &str, export: &c::Export, variables: &Variables, written: &c::Written) -> String {
-    let common = include_str!("runtime/common.c");
-    let text = text.replace("COMMON\n", common).replace("MODEL_TITLE", &export.program.name.replace("*/", "* /"));
-    let switches = written.source.contains(&format!("int {}_indicators(", written.name));
-    let flags = Flags { switches, ..Flags::default() };
+/// The functions of the interface around a model.
+fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model: &str, token: &str) -> String {
+    let switches = export.program.conditions.values().any(|c| c.trigger == EventTrigger::State);
     let list = |values: Vec<String>| match values.is_empty() {
         true => "    0".to_string(),
         false => values.chunks(20).map(|row| format!("    {}", row.join(", "))).collect::<Vec<_>>().join(",\n"),
     };
     let words = [
-        ("SETTABLE".to_string(), list(variables.settable().iter().map(u8::to_string).collect())),
-        ("NOMINALS".to_string(), list(variables.nominals(export).iter().map(|v| format!("{v:?}")).collect())),
+        ("MODEL_TITLE", export.program.name.replace("*/", "* /")),
+        ("TOKEN", token.to_string()),
+        ("SETTABLE", list(variables.settable().iter().map(u8::to_string).collect())),
+        ("NOMINALS", list(variables.nominals(export).iter().map(|v| format!("{v:?}")).collect())),
     ];
-    let text = template::choose(&text, |word| flags.holds(word));
-    template::name(&template::fill(&text, &words.into_iter().collect()), &written.name)
+    let words = words.map(|(word, text)| (word, Text::of(text)));
+    let mut filling =
+        Filling { flags: Flags { switches, ..Flags::default() }, words: Words::from(words), model, real: Real::Double };
+    let common = filling.text(include_str!("runtime/common.c"));
+    filling.words.insert("COMMON", Text::of(common.trim_end()));
+    filling.text(text)
 }
 
 /// A token that tells one model from another: from all that is written, in the form of a GUID.

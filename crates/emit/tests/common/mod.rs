@@ -55,6 +55,11 @@ pub fn own(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(format!("{name}.bond"))
 }
 
+/// Diodes: where rounding hides small unknowns, and where a law overflows at rest.
+pub fn diodes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/diodes.bond")
+}
+
 /// A model whose structure is another where two of its parameters differ.
 pub fn difference() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/difference.bond")

@@ -143,7 +143,7 @@ impl<const N: usize> WideFrame<N> {
             (($k:ident $value:ident)
              given { $($(#[$given_doc:meta])* $given:ident $(($($given_part:ident: $given_kind:ty),*))?;)* }
              plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
+                cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:expr, derivative: $derivative:expr,
              })* }
              held $held:tt) => {
                 match operation.op {

@@ -37,7 +37,7 @@ pub(super) fn of<A: Copy>(op: Op<A>) -> Option<usize> {
         (($k:ident $value:ident)
          given $given:tt
          plain { $($(#[$plain_doc:meta])* $plain:ident($($part:ident: $kind:ty),*) [$($a:ident $da:ident $A:ident),*] {
-            cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:literal, derivative: $derivative:expr,
+            cost: $cost:ident, value: $meaning:expr, text: $text:literal, c: $c:expr, derivative: $derivative:expr,
          })* }
          held $held:tt) => {
             match op {

@@ -1,21 +1,31 @@
+//always
 /* Constants of the elementary functions. Written by constants.py. */
 
+//item HA_TWO_OVER_PI
 /* 2/pi. */
 #define HA_TWO_OVER_PI (0.6366197723675814)
+//item HA_PIO2_SHORT
 /* pi/2 in 37 bits: its products with 16 bits are exact. */
 #define HA_PIO2_SHORT (1.5707963267923333)
+//item HA_PIO2_MIDDLE
 /* The next 36 bits of pi/2. */
 #define HA_PIO2_MIDDLE (2.5633441515839558e-12)
+//item HA_PIO2_REST
 /* What is left of pi/2. */
 #define HA_PIO2_REST (1.0562999066987428e-23)
+//item HA_PIO2_HI
 /* pi/2. */
 #define HA_PIO2_HI (1.5707963267948966)
+//item HA_PIO2_LO
 /* pi/2 without its nearest number. */
 #define HA_PIO2_LO (6.123233995736766e-17)
+//item HA_PI_HI
 /* pi. */
 #define HA_PI_HI (3.141592653589793)
+//item HA_PI_LO
 /* pi without its nearest number. */
 #define HA_PI_LO (1.2246467991473532e-16)
+//item HA_TWO_OVER_PI_BITS: HA_DATA
 /* 2/pi in pieces of 32 bits, after two that are zero. */
 HA_DATA uint32_t HA_TWO_OVER_PI_BITS[40] = {
     0x00000000, 0x00000000, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041,
@@ -24,6 +34,7 @@ HA_DATA uint32_t HA_TWO_OVER_PI_BITS[40] = {
     0x1ff897ff, 0xde05980f, 0xef2f118b, 0x5a0a6d1f, 0x6d367ecf, 0x27cb09b7, 0x4f463f66, 0x9e5fea2d,
     0x7527bac7, 0xebe5f17b, 0x3d0739f7, 0x8a5292ea, 0x6bfb5fb1, 0x1f8d5d08, 0x56033046, 0xfc7b6bab
 };
+//item HA_SINE: HA_DATA
 /* (a - sin a)/a^3 by z = a^2; error 2^-56.81 of the function. */
 HA_DATA double HA_SINE[6] = {
     0.16666666666666632,
@@ -33,6 +44,7 @@ HA_DATA double HA_SINE[6] = {
     2.5050755724869933e-08,
     -1.5896653512707057e-10
 };
+//item HA_COSINE: HA_DATA
 /* (cos a - 1 + a^2/2)/a^4 by z = a^2; error 2^-60.11 of the function. */
 HA_DATA double HA_COSINE[6] = {
     0.041666666666666644,
@@ -42,12 +54,16 @@ HA_DATA double HA_COSINE[6] = {
     2.087591097969816e-09,
     -1.136919780484827e-11
 };
+//item HA_STEPS_PER_E
 /* 64/ln 2. */
 #define HA_STEPS_PER_E (92.33248261689366)
+//item HA_STEP_SHORT
 /* ln 2/64 in 35 bits: its products with 18 bits are exact. */
 #define HA_STEP_SHORT (0.010830424696450791)
+//item HA_STEP_REST
 /* ln 2/64 without the 35 bits. */
 #define HA_STEP_REST (-2.0164562921995537e-13)
+//item HA_POWERS: HA_DATA
 /* 2^(j/64), and what is left of it. */
 HA_DATA double HA_POWERS[64][2] = {
     {1.0, 0.0},
@@ -115,6 +131,7 @@ HA_DATA double HA_POWERS[64][2] = {
     {1.9571441241754002, 8.960767791036668e-17},
     {1.978456026387951, 4.0388753109278167e-17}
 };
+//item HA_EXPONENTIAL: HA_DATA
 /* (e^r - 1 - r)/r^2; error 2^-57.79 of the function. */
 HA_DATA double HA_EXPONENTIAL[4] = {
     0.4999999999998501,
@@ -122,6 +139,7 @@ HA_DATA double HA_EXPONENTIAL[4] = {
     0.041666707476689775,
     0.00833333916333604
 };
+//item HA_SINH: HA_DATA
 /* (sinh x - x)/x^3 by z = x^2; error 2^-56.6 of the function. */
 HA_DATA double HA_SINH[7] = {
     0.16666666666666669,
@@ -132,6 +150,7 @@ HA_DATA double HA_SINH[7] = {
     1.605724069572046e-10,
     7.759301947000023e-13
 };
+//item HA_COSH: HA_DATA
 /* (cosh x - 1)/x^2 by z = x^2; error 2^-63.67 of the function. */
 HA_DATA double HA_COSH[6] = {
     0.5,
@@ -141,8 +160,10 @@ HA_DATA double HA_COSH[6] = {
     2.755723861130491e-07,
     2.0925405364423977e-09
 };
+//item HA_BINS_START
 /* Where the 128 intervals of the mantissa begin: 1 is the middle of one of them. */
 #define HA_BINS_START UINT64_C(0x3fe6b00000000000)
+//item HA_LOGARITHMS: HA_DATA
 /* For each interval a short number c near the inverse of its middle; -ln c in multiples of 2^-42, and what is left. */
 HA_DATA double HA_LOGARITHMS[128][3] = {
     {1.40625, -0.34092658697068146, 8.82452633212564e-14},
@@ -274,10 +295,13 @@ HA_DATA double HA_LOGARITHMS[128][3] = {
     {0.7109375, 0.3411707574027787, -1.156568624616423e-14},
     {0.70703125, 0.3466804132137895, -5.277820018864269e-14}
 };
+//item HA_LN2_SHORT
 /* ln 2 in multiples of 2^-42. */
 #define HA_LN2_SHORT (0.6931471805598903)
+//item HA_LN2_REST
 /* ln 2 without them. */
 #define HA_LN2_REST (5.497923018708371e-14)
+//item HA_LOGARITHM: HA_DATA
 /* (ln(1 + r) - r + r^2/2)/r^3; error 2^-71.34 of the function. */
 HA_DATA double HA_LOGARITHM[7] = {
     0.3333333333333333,
@@ -288,14 +312,19 @@ HA_DATA double HA_LOGARITHM[7] = {
     -0.12500319196285137,
     0.1111125188506433
 };
+//item HA_LOG10_E_HI
 /* 1/ln 10. */
 #define HA_LOG10_E_HI (0.4342944819032518)
+//item HA_LOG10_E_LO
 /* What is left of it. */
 #define HA_LOG10_E_LO (1.098319650216765e-17)
+//item HA_LOG2_E_HI
 /* 1/ln 2. */
 #define HA_LOG2_E_HI (1.4426950408889634)
+//item HA_LOG2_E_LO
 /* What is left of it. */
 #define HA_LOG2_E_LO (2.0355273740931033e-17)
+//item HA_ARCS: HA_DATA
 /* atan(j/8), and what is left of it. */
 HA_DATA double HA_ARCS[9][2] = {
     {0.0, 0.0},
@@ -308,6 +337,7 @@ HA_DATA double HA_ARCS[9][2] = {
     {0.7188299996216245, -2.1478388444456983e-17},
     {0.7853981633974483, 3.061616997868383e-17}
 };
+//item HA_ARC: HA_DATA
 /* (t - atan t)/t^3 by z = t^2; error 2^-61.74 of the function. */
 HA_DATA double HA_ARC[5] = {
     0.3333333333333314,

@@ -70,15 +70,16 @@ class Files:
     def __init__(self):
         self.rust = ["//! Constants of the elementary functions. Written by `constants.py`.", "",
                      "#![allow(clippy::excessive_precision, clippy::approx_constant)]", ""]
-        self.c = ["/* Constants of the elementary functions. Written by constants.py. */", ""]
+        # Exported C puts in only the items that are needed.
+        self.c = ["//always", "/* Constants of the elementary functions. Written by constants.py. */", ""]
 
     def number(self, name, value, what):
         self.rust += [f"/// {what}", f"pub const {name}: f64 = {text(value)};"]
-        self.c += [f"/* {what} */", f"#define HA_{name} ({text(value)})"]
+        self.c += [f"//item HA_{name}", f"/* {what} */", f"#define HA_{name} ({text(value)})"]
 
     def word(self, name, value, what):
         self.rust += [f"/// {what}", f"pub const {name}: u64 = {value:#x};"]
-        self.c += [f"/* {what} */", f"#define HA_{name} UINT64_C({value:#x})"]
+        self.c += [f"//item HA_{name}", f"/* {what} */", f"#define HA_{name} UINT64_C({value:#x})"]
 
     def table(self, name, rows, what):
         width = len(rows[0])
@@ -87,14 +88,14 @@ class Files:
         join = lambda r, a, b: a + ", ".join(map(text, r)) + b if width > 1 else text(r[0])
         self.rust += [f"/// {what}", "#[rustfmt::skip]", f"pub static {name}: {shape} = ["]
         self.rust += [f"    {join(r, '[', ']')}," for r in rows] + ["];"]
-        self.c += [f"/* {what} */", f"HA_DATA double HA_{name}{dims} = {{"]
+        self.c += [f"//item HA_{name}: HA_DATA", f"/* {what} */", f"HA_DATA double HA_{name}{dims} = {{"]
         self.c += [f"    {join(r, '{', '}')}{',' if i + 1 < len(rows) else ''}" for i, r in enumerate(rows)] + ["};"]
 
     def words(self, name, values, what):
         rows = [", ".join(f"{v:#010x}" for v in values[i:i + 8]) for i in range(0, len(values), 8)]
         self.rust += [f"/// {what}", "#[rustfmt::skip]", f"pub static {name}: [u32; {len(values)}] = ["]
         self.rust += [f"    {r}," for r in rows] + ["];"]
-        self.c += [f"/* {what} */", f"HA_DATA uint32_t HA_{name}[{len(values)}] = {{"]
+        self.c += [f"//item HA_{name}: HA_DATA", f"/* {what} */", f"HA_DATA uint32_t HA_{name}[{len(values)}] = {{"]
         self.c += [f"    {r}{',' if i + 1 < len(rows) else ''}" for i, r in enumerate(rows)] + ["};"]
 
     def polynomial(self, name, what, f, weight, low, high, n):

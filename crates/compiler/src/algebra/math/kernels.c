@@ -1,10 +1,16 @@
 
+//item HA_SIGN
 #define HA_SIGN (UINT64_C(1) << 63)
+//item HA_BIAS
 #define HA_BIAS (UINT64_C(1023) << 52)
+//item HA_ROUNDER
 #define HA_ROUNDER 6755399441055744.0
+//item HA_TINY
 #define HA_TINY (1.0 / 134217728.0)
+//item HA_PLAIN
 #define HA_PLAIN 708.0
 
+//always
 /* A sum hi + lo, lo small against hi. */
 typedef struct { double hi; double lo; } ha_double;
 /* An angle a + b, and quarter turns, of which the last two bits count. */
@@ -12,6 +18,7 @@ typedef struct { double a; double b; uint64_t quarters; } ha_reduced;
 /* 2^power (t + rest); the power stands in its low 12 bits. */
 typedef struct { double t; double rest; uint64_t power; } ha_exponential;
 
+//item ha_bits: HA_INLINE
 HA_INLINE uint64_t ha_bits(double x)
 {
     uint64_t bits;
@@ -19,6 +26,7 @@ HA_INLINE uint64_t ha_bits(double x)
     return bits;
 }
 
+//item ha_number: HA_INLINE
 HA_INLINE double ha_number(uint64_t bits)
 {
     double x;
@@ -26,6 +34,7 @@ HA_INLINE double ha_number(uint64_t bits)
     return x;
 }
 
+//item ha_pair: HA_INLINE
 HA_INLINE ha_double ha_pair(double hi, double lo)
 {
     ha_double pair;
@@ -34,12 +43,14 @@ HA_INLINE ha_double ha_pair(double hi, double lo)
     return pair;
 }
 
+//item ha_fast_two_sum: HA_INLINE ha_pair
 HA_INLINE ha_double ha_fast_two_sum(double a, double b)
 {
     const double sum = a + b;
     return ha_pair(sum, b - (sum - a));
 }
 
+//item ha_two_sum: HA_INLINE ha_pair
 HA_INLINE ha_double ha_two_sum(double a, double b)
 {
     const double sum = a + b;
@@ -47,11 +58,13 @@ HA_INLINE ha_double ha_two_sum(double a, double b)
     return ha_pair(sum, (a - (sum - part)) + (b - part));
 }
 
+//item ha_leading: HA_INLINE ha_bits ha_number
 HA_INLINE double ha_leading(double a)
 {
     return ha_number(ha_bits(a) & ~((UINT64_C(1) << 27) - 1));
 }
 
+//item ha_two_product: HA_FUNCTION ha_leading ha_pair
 HA_FUNCTION ha_double ha_two_product(double a, double b)
 {
     const double product = a * b;
@@ -62,29 +75,34 @@ HA_FUNCTION ha_double ha_two_product(double a, double b)
     return ha_pair(product, (((ah * bh - product) + ah * bl) + al * bh) + al * bl);
 }
 
+//item ha_times: HA_FUNCTION ha_fast_two_sum ha_two_product
 HA_FUNCTION ha_double ha_times(ha_double a, double b)
 {
     const ha_double p = ha_two_product(a.hi, b);
     return ha_fast_two_sum(p.hi, p.lo + a.lo * b);
 }
 
+//item ha_product: HA_FUNCTION ha_fast_two_sum ha_two_product
 HA_FUNCTION ha_double ha_product(ha_double a, ha_double b)
 {
     const ha_double p = ha_two_product(a.hi, b.hi);
     return ha_fast_two_sum(p.hi, p.lo + (a.hi * b.lo + a.lo * b.hi));
 }
 
+//item ha_sum: HA_FUNCTION ha_fast_two_sum ha_two_sum
 HA_FUNCTION ha_double ha_sum(ha_double a, ha_double b)
 {
     const ha_double s = ha_two_sum(a.hi, b.hi);
     return ha_fast_two_sum(s.hi, s.lo + (a.lo + b.lo));
 }
 
+//item ha_minus: HA_INLINE ha_pair
 HA_INLINE ha_double ha_minus(ha_double a)
 {
     return ha_pair(-a.hi, -a.lo);
 }
 
+//item ha_quotient: HA_FUNCTION ha_fast_two_sum ha_two_product
 HA_FUNCTION ha_double ha_quotient(ha_double a, ha_double b)
 {
     const double first = a.hi / b.hi;
@@ -93,8 +111,10 @@ HA_FUNCTION ha_double ha_quotient(ha_double a, ha_double b)
     return ha_fast_two_sum(first, rest / b.hi);
 }
 
+//always
 /* Sine, cosine, tangent. */
 
+//item ha_far: HA_PIO2_HI HA_PIO2_LO HA_SELDOM HA_TWO_OVER_PI_BITS ha_bits ha_fast_two_sum ha_minus ha_two_product
 HA_SELDOM ha_reduced ha_far(double x)
 {
     const uint64_t limb = UINT64_C(0xffffffff);
@@ -165,6 +185,7 @@ HA_SELDOM ha_reduced ha_far(double x)
     return r;
 }
 
+//item ha_near: HA_INLINE HA_PIO2_MIDDLE HA_PIO2_REST HA_PIO2_SHORT HA_ROUNDER HA_TWO_OVER_PI ha_bits ha_two_sum
 /* Where |x| <= 1e5. */
 HA_INLINE ha_reduced ha_near(double x)
 {
@@ -179,6 +200,7 @@ HA_INLINE ha_reduced ha_near(double x)
     return r;
 }
 
+//item ha_sine_rest: HA_INLINE HA_SINE
 HA_INLINE double ha_sine_rest(ha_reduced r, double z)
 {
     const double zz = z * z;
@@ -187,6 +209,7 @@ HA_INLINE double ha_sine_rest(ha_reduced r, double z)
     return r.b * (1.0 - 0.5 * z) - (r.a * z) * p;
 }
 
+//item ha_cosine_parts: HA_COSINE HA_INLINE ha_pair
 HA_INLINE ha_double ha_cosine_parts(ha_reduced r, double z)
 {
     const double zz = z * z;
@@ -197,6 +220,7 @@ HA_INLINE ha_double ha_cosine_parts(ha_reduced r, double z)
     return ha_pair(w, ((1.0 - w) - half) + (zz * p - r.a * r.b));
 }
 
+//item ha_turned: HA_INLINE HA_SIGN ha_bits ha_cosine_parts ha_number ha_sine_rest
 HA_INLINE double ha_turned(ha_reduced r, uint64_t quarters)
 {
     const double z = r.a * r.a;
@@ -210,18 +234,21 @@ HA_INLINE double ha_turned(ha_reduced r, uint64_t quarters)
     return ha_number(ha_bits(value) ^ ((quarters & 2) << 62));
 }
 
+//item ha_sin_far: HA_SELDOM ha_far ha_turned
 HA_SELDOM double ha_sin_far(double x)
 {
     const ha_reduced r = ha_far(x);
     return ha_turned(r, r.quarters);
 }
 
+//item ha_cos_far: HA_SELDOM ha_far ha_turned
 HA_SELDOM double ha_cos_far(double x)
 {
     const ha_reduced r = ha_far(x);
     return ha_turned(r, r.quarters + 1);
 }
 
+//item ha_sin: HA_FUNCTION ha_near ha_sin_far ha_turned
 HA_FUNCTION double ha_sin(double x)
 {
     ha_reduced r;
@@ -232,6 +259,7 @@ HA_FUNCTION double ha_sin(double x)
     return ha_turned(r, r.quarters);
 }
 
+//item ha_cos: HA_FUNCTION ha_cos_far ha_near ha_turned
 HA_FUNCTION double ha_cos(double x)
 {
     ha_reduced r;
@@ -242,6 +270,7 @@ HA_FUNCTION double ha_cos(double x)
     return ha_turned(r, r.quarters + 1);
 }
 
+//item ha_turn: HA_FUNCTION HA_SIGN ha_bits ha_cos_far ha_cosine_parts ha_near ha_number ha_sin_far ha_sine_rest
 /* Sine and cosine. */
 HA_FUNCTION void ha_turn(double x, double *both)
 {
@@ -266,6 +295,7 @@ HA_FUNCTION void ha_turn(double x, double *both)
     both[1] = ha_number(ha_bits(odd ? sine : cosine) ^ (((r.quarters + 1) & 2) << 62));
 }
 
+//item ha_tan: HA_FUNCTION HA_TINY ha_cosine_parts ha_far ha_fast_two_sum ha_minus ha_near ha_quotient ha_sine_rest
 HA_FUNCTION double ha_tan(double x)
 {
     ha_reduced r;
@@ -283,8 +313,10 @@ HA_FUNCTION double ha_tan(double x)
     return ((r.quarters & 1) == 0 ? ha_quotient(sine, cosine) : ha_quotient(cosine, ha_minus(sine))).hi;
 }
 
+//always
 /* Exponential and hyperbolic functions. */
 
+//item ha_parts: HA_EXPONENTIAL HA_FUNCTION HA_POWERS HA_ROUNDER HA_STEPS_PER_E HA_STEP_REST HA_STEP_SHORT ha_bits
 HA_FUNCTION ha_exponential ha_parts(double a, double b)
 {
     const double rounded = a * HA_STEPS_PER_E + HA_ROUNDER;
@@ -301,22 +333,26 @@ HA_FUNCTION ha_exponential ha_parts(double a, double b)
     return e;
 }
 
+//item ha_value: HA_BIAS HA_FUNCTION ha_number
 HA_FUNCTION double ha_value(ha_exponential e)
 {
     return ha_number((e.power << 52) + HA_BIAS) * (e.t + e.rest);
 }
 
+//item ha_scale: HA_FUNCTION ha_number
 HA_FUNCTION double ha_scale(int64_t power)
 {
     return ha_number((uint64_t)(power + 1023) << 52);
 }
 
+//item ha_half_of: HA_FUNCTION
 /* Floor of half of a number. */
 HA_FUNCTION int64_t ha_half_of(int64_t n)
 {
     return n >= 0 ? n / 2 : -((1 - n) / 2);
 }
 
+//item ha_extreme_value: HA_FUNCTION ha_half_of ha_scale
 HA_FUNCTION double ha_extreme_value(ha_exponential e)
 {
     const int64_t low = (int64_t)(e.power & 0xfff);
@@ -325,18 +361,21 @@ HA_FUNCTION double ha_extreme_value(ha_exponential e)
     return (e.t + e.rest) * ha_scale(first) * ha_scale(power - first);
 }
 
+//item ha_halved: HA_FUNCTION
 HA_FUNCTION ha_exponential ha_halved(ha_exponential e)
 {
     e.power -= 1;
     return e;
 }
 
+//item ha_half: HA_BIAS HA_FUNCTION ha_number ha_pair
 HA_FUNCTION ha_double ha_half(ha_exponential e)
 {
     const double scale = ha_number((e.power << 52) + (HA_BIAS - (UINT64_C(1) << 52)));
     return ha_pair(scale * e.t, scale * e.rest);
 }
 
+//item ha_exp: HA_FUNCTION HA_PLAIN ha_extreme_value ha_parts ha_value
 HA_FUNCTION double ha_exp(double x)
 {
     if (fabs(x) <= HA_PLAIN) {
@@ -354,6 +393,7 @@ HA_FUNCTION double ha_exp(double x)
     return ha_extreme_value(ha_parts(x, 0.0));
 }
 
+//item ha_sinh_rest: HA_FUNCTION HA_SINH
 HA_FUNCTION double ha_sinh_rest(double x, double z)
 {
     const double zz = z * z;
@@ -362,6 +402,7 @@ HA_FUNCTION double ha_sinh_rest(double x, double z)
     return (x * z) * (low + zz * high);
 }
 
+//item ha_sinh: HA_FUNCTION HA_PLAIN HA_TINY ha_extreme_value ha_half ha_halved ha_parts ha_sinh_rest
 HA_FUNCTION double ha_sinh(double x)
 {
     const double size = fabs(x);
@@ -381,6 +422,7 @@ HA_FUNCTION double ha_sinh(double x)
     return x < 0.0 ? -value : value;
 }
 
+//item ha_cosh: HA_FUNCTION HA_PLAIN ha_extreme_value ha_half ha_halved ha_parts
 HA_FUNCTION double ha_cosh(double x)
 {
     const double size = fabs(x);
@@ -395,6 +437,7 @@ HA_FUNCTION double ha_cosh(double x)
     return h.hi + (h.lo + 0.25 / (h.hi + h.lo));
 }
 
+//item ha_tanh: HA_COSH HA_FUNCTION HA_TINY ha_fast_two_sum ha_half ha_parts ha_quotient ha_sinh_rest ha_two_sum
 HA_FUNCTION double ha_tanh(double x)
 {
     const double size = fabs(x);
@@ -417,13 +460,16 @@ HA_FUNCTION double ha_tanh(double x)
     return x < 0.0 ? -value : value;
 }
 
+//always
 /* Logarithms and powers. */
 
+//item ha_is_plain: HA_FUNCTION ha_bits
 HA_FUNCTION int ha_is_plain(double x)
 {
     return ha_bits(x) - (UINT64_C(1) << 52) < (UINT64_C(0x7fe) << 52);
 }
 
+//item ha_parts_of_log: HA_BIAS HA_BINS_START HA_FUNCTION HA_LN2_REST HA_LN2_SHORT HA_LOGARITHM HA_LOGARITHMS ha_bits ha_fast_two_sum ha_leading ha_number
 HA_FUNCTION ha_double ha_parts_of_log(double x, double shift)
 {
     const uint64_t bits = ha_bits(x);
@@ -449,11 +495,13 @@ HA_FUNCTION ha_double ha_parts_of_log(double x, double shift)
     return ha_fast_two_sum(u.hi, rests + (cube - square_rest));
 }
 
+//item ha_positive: HA_FUNCTION ha_is_plain ha_parts_of_log
 HA_FUNCTION ha_double ha_positive(double x)
 {
     return ha_is_plain(x) ? ha_parts_of_log(x, 0.0) : ha_parts_of_log(x * 18014398509481984.0, 54.0);
 }
 
+//item ha_extreme_log: HA_FUNCTION ha_pair ha_positive ha_product
 HA_FUNCTION double ha_extreme_log(double x, double hi, double lo)
 {
     if (x != x) {
@@ -471,21 +519,25 @@ HA_FUNCTION double ha_extreme_log(double x, double hi, double lo)
     return ha_product(ha_positive(x), ha_pair(hi, lo)).hi;
 }
 
+//item ha_log: HA_FUNCTION ha_extreme_log ha_is_plain ha_parts_of_log
 HA_FUNCTION double ha_log(double x)
 {
     return ha_is_plain(x) ? ha_parts_of_log(x, 0.0).hi : ha_extreme_log(x, 1.0, 0.0);
 }
 
+//item ha_log10: HA_FUNCTION HA_LOG10_E_HI HA_LOG10_E_LO ha_extreme_log
 HA_FUNCTION double ha_log10(double x)
 {
     return ha_extreme_log(x, HA_LOG10_E_HI, HA_LOG10_E_LO);
 }
 
+//item ha_log2: HA_FUNCTION HA_LOG2_E_HI HA_LOG2_E_LO ha_extreme_log
 HA_FUNCTION double ha_log2(double x)
 {
     return ha_extreme_log(x, HA_LOG2_E_HI, HA_LOG2_E_LO);
 }
 
+//item ha_extreme_pow: HA_FUNCTION HA_SIGN ha_bits ha_extreme_value ha_parts ha_positive ha_times
 HA_FUNCTION double ha_extreme_pow(double x, double y)
 {
     const double greatest = 1180591620717411303424.0;
@@ -525,6 +577,7 @@ HA_FUNCTION double ha_extreme_pow(double x, double y)
     return value;
 }
 
+//item ha_pow: HA_FUNCTION HA_PLAIN ha_extreme_pow ha_is_plain ha_parts ha_parts_of_log ha_times ha_value
 HA_FUNCTION double ha_pow(double x, double y)
 {
     if (ha_is_plain(x) && fabs(y) <= 1180591620717411303424.0) {
@@ -536,8 +589,10 @@ HA_FUNCTION double ha_pow(double x, double y)
     return ha_extreme_pow(x, y);
 }
 
+//always
 /* Inverse trigonometric functions. */
 
+//item ha_below_diagonal: HA_ARC HA_ARCS HA_FUNCTION HA_ROUNDER ha_bits ha_fast_two_sum ha_minus ha_pair ha_product ha_quotient ha_sum ha_two_sum
 HA_FUNCTION ha_double ha_below_diagonal(ha_double n, ha_double d)
 {
     const double rounded = 8.0 * (n.hi / d.hi) + HA_ROUNDER;
@@ -554,6 +609,7 @@ HA_FUNCTION ha_double ha_below_diagonal(ha_double n, ha_double d)
     return ha_fast_two_sum(s.hi, s.lo + (arc[1] + (t.lo - (t.hi * z) * p)));
 }
 
+//item ha_angle: HA_FUNCTION HA_PIO2_HI HA_PIO2_LO ha_below_diagonal ha_minus ha_pair ha_sum
 HA_FUNCTION ha_double ha_angle(ha_double n, ha_double d)
 {
     if (n.hi > d.hi) {
@@ -562,6 +618,7 @@ HA_FUNCTION ha_double ha_angle(ha_double n, ha_double d)
     return ha_below_diagonal(n, d);
 }
 
+//item ha_complement: HA_FUNCTION ha_fast_two_sum ha_pair ha_product ha_two_product ha_two_sum
 HA_FUNCTION ha_double ha_complement(double x)
 {
     const ha_double v = ha_product(ha_two_sum(1.0, -x), ha_two_sum(1.0, x));
@@ -574,6 +631,7 @@ HA_FUNCTION ha_double ha_complement(double x)
     return ha_fast_two_sum(root, (((v.hi - p.hi) - p.lo) + v.lo) / (2.0 * root));
 }
 
+//item ha_asin: HA_FUNCTION HA_TINY ha_angle ha_complement ha_pair
 HA_FUNCTION double ha_asin(double x)
 {
     const double size = fabs(x);
@@ -588,6 +646,7 @@ HA_FUNCTION double ha_asin(double x)
     return x < 0.0 ? -value : value;
 }
 
+//item ha_acos: HA_FUNCTION HA_PIO2_HI HA_PI_HI HA_PI_LO ha_angle ha_complement ha_minus ha_pair ha_sum
 HA_FUNCTION double ha_acos(double x)
 {
     const double size = fabs(x);
@@ -605,6 +664,7 @@ HA_FUNCTION double ha_acos(double x)
     return x < 0.0 ? ha_sum(ha_pair(HA_PI_HI, HA_PI_LO), ha_minus(value)).hi : value.hi;
 }
 
+//item ha_atan: HA_FUNCTION HA_PIO2_HI HA_TINY ha_angle ha_pair
 HA_FUNCTION double ha_atan(double x)
 {
     const double size = fabs(x);
@@ -616,6 +676,7 @@ HA_FUNCTION double ha_atan(double x)
     return x < 0.0 ? -value : value;
 }
 
+//item ha_finite_angle: HA_FUNCTION HA_PI_HI HA_PI_LO HA_TINY ha_angle ha_bits ha_half_of ha_minus ha_pair ha_scale ha_sum
 HA_FUNCTION double ha_finite_angle(double n, double d, int behind)
 {
     const double most = n > d ? n : d;
@@ -637,6 +698,7 @@ HA_FUNCTION double ha_finite_angle(double n, double d, int behind)
     return behind ? ha_sum(ha_pair(HA_PI_HI, HA_PI_LO), ha_minus(value)).hi : value.hi;
 }
 
+//item ha_atan2: HA_FUNCTION HA_PIO2_HI HA_PI_HI ha_bits ha_finite_angle
 HA_FUNCTION double ha_atan2(double y, double x)
 {
     const double n = fabs(y);
@@ -663,43 +725,52 @@ HA_FUNCTION double ha_atan2(double y, double x)
     return (ha_bits(y) >> 63) == 1 ? -value : value;
 }
 
+//always
 /* The rest. */
 
+//item ha_sqrt: HA_FUNCTION
 HA_FUNCTION double ha_sqrt(double x)
 {
     return sqrt(x);
 }
 
+//item ha_abs: HA_FUNCTION
 HA_FUNCTION double ha_abs(double x)
 {
     return fabs(x);
 }
 
+//item ha_floor: HA_FUNCTION
 HA_FUNCTION double ha_floor(double x)
 {
     return floor(x);
 }
 
+//item ha_sign: HA_FUNCTION
 HA_FUNCTION double ha_sign(double x)
 {
     return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x == 0.0 ? 0.0 : x;
 }
 
+//item ha_min: HA_FUNCTION
 HA_FUNCTION double ha_min(double x, double y)
 {
     return y < x || x != x ? y : x;
 }
 
+//item ha_max: HA_FUNCTION
 HA_FUNCTION double ha_max(double x, double y)
 {
     return y > x || x != x ? y : x;
 }
 
+//item ha_mod: HA_FUNCTION
 HA_FUNCTION double ha_mod(double x, double y)
 {
     return x - y * floor(x / y);
 }
 
+//item ha_powi: HA_FUNCTION
 /* x to the power n by repeated squaring. */
 HA_FUNCTION double ha_powi(double x, uint32_t n)
 {

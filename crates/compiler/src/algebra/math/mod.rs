@@ -33,6 +33,9 @@ use super::Function;
 /// in `ha_atan2(y, x)`, `ha_pow(x, y)`, and `ha_powi(x, n)` for [`powi`].
 /// It includes `<math.h>` (for `sqrt`, `fabs`, `floor`), `<stdint.h>` and `<string.h>`, and must be compiled without
 /// contraction of `a * b + c` (`-std=c99`, or `-ffp-contract=off`).
+///
+/// A line `//item name: others` stands before each function, table and macro, with the others that it reads, `//always` before
+/// what goes with all of them: who needs a few of them can take these alone.
 pub const C_SOURCE: &str = concat!(include_str!("head.c"), include_str!("constants.c"), include_str!("kernels.c"));
 
 /// The same functions in single precision, with an `f` behind their names, and `ha_turnf` for sine and cosine at once; after

@@ -1,3 +1,4 @@
+//always
 /* Elementary functions in single precision: what is far from the ordinary is left to those of double precision. */
 
 /* A sum hi + lo, lo small against hi. */
@@ -5,8 +6,10 @@ typedef struct { float hi; float lo; } ha_float;
 /* An angle a + b, and quarter turns, of which the last two bits count. */
 typedef struct { float a; float b; int quarters; } ha_turned_single;
 
+//item HA_ROUNDER_SINGLE
 #define HA_ROUNDER_SINGLE 12582912.0f
 
+//item ha_bits_single: HA_INLINE
 HA_INLINE uint32_t ha_bits_single(float x)
 {
     uint32_t bits;
@@ -14,6 +17,7 @@ HA_INLINE uint32_t ha_bits_single(float x)
     return bits;
 }
 
+//item ha_number_single: HA_INLINE
 HA_INLINE float ha_number_single(uint32_t bits)
 {
     float x;
@@ -21,6 +25,7 @@ HA_INLINE float ha_number_single(uint32_t bits)
     return x;
 }
 
+//item ha_pair_single: HA_INLINE
 HA_INLINE ha_float ha_pair_single(float hi, float lo)
 {
     ha_float pair;
@@ -29,12 +34,14 @@ HA_INLINE ha_float ha_pair_single(float hi, float lo)
     return pair;
 }
 
+//item ha_leading_single: HA_INLINE ha_bits_single ha_number_single
 /* The first 12 bits. */
 HA_INLINE float ha_leading_single(float a)
 {
     return ha_number_single(ha_bits_single(a) & UINT32_C(0xfffff000));
 }
 
+//item ha_two_product_single: HA_FUNCTION ha_leading_single
 HA_FUNCTION ha_float ha_two_product_single(float a, float b)
 {
     const float product = a * b;
@@ -48,8 +55,10 @@ HA_FUNCTION ha_float ha_two_product_single(float a, float b)
     return pair;
 }
 
+//always
 /* Sine, cosine, tangent; where |x| <= 200. */
 
+//item ha_near_single: HA_FUNCTION HA_QUARTERS_SINGLE HA_QUARTER_FIRST HA_QUARTER_REST HA_QUARTER_SECOND HA_ROUNDER_SINGLE
 HA_FUNCTION ha_turned_single ha_near_single(float x)
 {
     const float k = (x * HA_QUARTERS_SINGLE + HA_ROUNDER_SINGLE) - HA_ROUNDER_SINGLE;
@@ -64,12 +73,14 @@ HA_FUNCTION ha_turned_single ha_near_single(float x)
     return r;
 }
 
+//item ha_sine_rest_single: HA_INLINE HA_SINE_SINGLE
 HA_INLINE float ha_sine_rest_single(ha_turned_single r, float z)
 {
     const float p = (HA_SINE_SINGLE[0] + z * HA_SINE_SINGLE[1]) + (z * z) * (HA_SINE_SINGLE[2] + z * HA_SINE_SINGLE[3]);
     return r.b * (1.0f - 0.5f * z) + (r.a * z) * p;
 }
 
+//item ha_cosine_parts_single: HA_COSINE_SINGLE HA_INLINE
 HA_INLINE ha_float ha_cosine_parts_single(ha_turned_single r, float z)
 {
     const float low = HA_COSINE_SINGLE[0] + z * HA_COSINE_SINGLE[1];
@@ -81,6 +92,7 @@ HA_INLINE ha_float ha_cosine_parts_single(ha_turned_single r, float z)
     return c;
 }
 
+//item ha_sine_of_single: HA_INLINE ha_cosine_parts_single ha_sine_rest_single
 HA_INLINE float ha_sine_of_single(ha_turned_single r, int quarters)
 {
     const float z = r.a * r.a;
@@ -94,6 +106,7 @@ HA_INLINE float ha_sine_of_single(ha_turned_single r, int quarters)
     return (quarters & 2) != 0 ? -value : value;
 }
 
+//item ha_sinf: HA_FUNCTION ha_near_single ha_sin ha_sine_of_single
 HA_FUNCTION float ha_sinf(float x)
 {
     ha_turned_single r;
@@ -107,6 +120,7 @@ HA_FUNCTION float ha_sinf(float x)
     return ha_sine_of_single(r, r.quarters);
 }
 
+//item ha_cosf: HA_FUNCTION ha_cos ha_near_single ha_sine_of_single
 HA_FUNCTION float ha_cosf(float x)
 {
     ha_turned_single r;
@@ -117,6 +131,7 @@ HA_FUNCTION float ha_cosf(float x)
     return ha_sine_of_single(r, r.quarters + 1);
 }
 
+//item ha_turnf: HA_FUNCTION ha_cosf ha_cosine_parts_single ha_near_single ha_sine_rest_single ha_sinf
 /* Sine and cosine. */
 HA_FUNCTION void ha_turnf(float x, float *both)
 {
@@ -143,6 +158,7 @@ HA_FUNCTION void ha_turnf(float x, float *both)
     }
 }
 
+//item ha_tanf: HA_FUNCTION ha_cosine_parts_single ha_near_single ha_sine_rest_single ha_tan
 HA_FUNCTION float ha_tanf(float x)
 {
     ha_turned_single r;
@@ -166,14 +182,17 @@ HA_FUNCTION float ha_tanf(float x)
     return -((cosine.hi + cosine.lo) / (r.a + rest));
 }
 
+//always
 /* Exponential and hyperbolic functions. */
 
+//item ha_scale_single: HA_INLINE ha_number_single
 /* 2^power, from -126 to 127. */
 HA_INLINE float ha_scale_single(int power)
 {
     return ha_number_single((uint32_t)(power + 127) << 23);
 }
 
+//item ha_exponential_single: HA_EXPONENTIAL_SINGLE HA_FUNCTION HA_LN2_FIRST HA_LN2_SECOND HA_ROUNDER_SINGLE HA_STEPS_SINGLE ha_scale_single
 /* e^(a + b) times 2^shift, where it is no more than twice the greatest number. */
 HA_FUNCTION float ha_exponential_single(float a, float b, int shift)
 {
@@ -193,6 +212,7 @@ HA_FUNCTION float ha_exponential_single(float a, float b, int shift)
                                          : value * ha_scale_single(half) * ha_scale_single(power - half);
 }
 
+//item ha_expf: HA_FUNCTION ha_exponential_single
 HA_FUNCTION float ha_expf(float x)
 {
     if (x > 89.0f) {
@@ -204,6 +224,7 @@ HA_FUNCTION float ha_expf(float x)
     return x != x ? x : ha_exponential_single(x, 0.0f, 0);
 }
 
+//item ha_sinhf: HA_FUNCTION HA_SINH_SINGLE ha_exponential_single
 HA_FUNCTION float ha_sinhf(float x)
 {
     const float size = fabsf(x);
@@ -222,6 +243,7 @@ HA_FUNCTION float ha_sinhf(float x)
     return x < 0.0f ? -value : value;
 }
 
+//item ha_coshf: HA_FUNCTION ha_exponential_single
 HA_FUNCTION float ha_coshf(float x)
 {
     const float size = fabsf(x);
@@ -233,6 +255,7 @@ HA_FUNCTION float ha_coshf(float x)
     return half + 0.25f / half;
 }
 
+//item ha_tanhf: HA_FUNCTION HA_TANH_SINGLE ha_exponential_single
 HA_FUNCTION float ha_tanhf(float x)
 {
     const float size = fabsf(x);
@@ -254,8 +277,10 @@ HA_FUNCTION float ha_tanhf(float x)
     return x < 0.0f ? -value : value;
 }
 
+//always
 /* Logarithms and powers. */
 
+//item ha_parts_of_log_single: HA_FUNCTION HA_LN2_FIRST HA_LN2_SECOND HA_LOGARITHM_SINGLE ha_bits_single ha_number_single ha_pair_single ha_two_product_single
 /* The logarithm of a finite number above zero: s = f/(2 + f) of the mantissa 1 + f. */
 HA_FUNCTION ha_float ha_parts_of_log_single(float x)
 {
@@ -282,6 +307,7 @@ HA_FUNCTION ha_float ha_parts_of_log_single(float x)
     return ha_pair_single(hi, lost + ((2.0f * rest + k * HA_LN2_SECOND) + tail));
 }
 
+//item ha_extreme_log_single: HA_FUNCTION
 /* Where the logarithm is no finite number. */
 HA_FUNCTION float ha_extreme_log_single(float x)
 {
@@ -291,16 +317,19 @@ HA_FUNCTION float ha_extreme_log_single(float x)
     return x == 0.0f ? -(float)INFINITY : (float)NAN;
 }
 
+//item ha_has_log_single: HA_FUNCTION
 HA_FUNCTION int ha_has_log_single(float x)
 {
     return x > 0.0f && x <= 3.40282347e38f;
 }
 
+//item ha_logf: HA_FUNCTION ha_extreme_log_single ha_has_log_single ha_parts_of_log_single
 HA_FUNCTION float ha_logf(float x)
 {
     return ha_has_log_single(x) ? ha_parts_of_log_single(x).hi : ha_extreme_log_single(x);
 }
 
+//item ha_log_by_single: HA_FUNCTION ha_extreme_log_single ha_has_log_single ha_parts_of_log_single ha_two_product_single
 HA_FUNCTION float ha_log_by_single(float x, float first, float rest)
 {
     ha_float l;
@@ -313,16 +342,19 @@ HA_FUNCTION float ha_log_by_single(float x, float first, float rest)
     return p.hi + (p.lo + (l.lo * first + l.hi * rest));
 }
 
+//item ha_log10f: HA_FUNCTION HA_LOG10_FIRST HA_LOG10_REST ha_log_by_single
 HA_FUNCTION float ha_log10f(float x)
 {
     return ha_log_by_single(x, HA_LOG10_FIRST, HA_LOG10_REST);
 }
 
+//item ha_log2f: HA_FUNCTION HA_LOG2_FIRST HA_LOG2_REST ha_log_by_single
 HA_FUNCTION float ha_log2f(float x)
 {
     return ha_log_by_single(x, HA_LOG2_FIRST, HA_LOG2_REST);
 }
 
+//item ha_powf: HA_FUNCTION ha_exponential_single ha_has_log_single ha_parts_of_log_single ha_pow ha_two_product_single
 HA_FUNCTION float ha_powf(float x, float y)
 {
     if (ha_has_log_single(x) && fabsf(y) <= 1e9f) {
@@ -335,8 +367,10 @@ HA_FUNCTION float ha_powf(float x, float y)
     return (float)ha_pow((double)x, (double)y);
 }
 
+//always
 /* Inverse trigonometric functions. */
 
+//item ha_below_diagonal_single: HA_ARC_SINGLE HA_FUNCTION HA_QUARTER_HI HA_QUARTER_LO
 /* atan t for 0 <= t <= 1. */
 HA_FUNCTION float ha_below_diagonal_single(float t)
 {
@@ -350,6 +384,7 @@ HA_FUNCTION float ha_below_diagonal_single(float t)
     return high ? 0.5f * HA_QUARTER_HI + (u + (rest + 0.5f * HA_QUARTER_LO)) : u + rest;
 }
 
+//item ha_atanf: HA_FUNCTION HA_QUARTER_HI HA_QUARTER_LO ha_below_diagonal_single
 HA_FUNCTION float ha_atanf(float x)
 {
     const float size = fabsf(x);
@@ -365,6 +400,7 @@ HA_FUNCTION float ha_atanf(float x)
     return x < 0.0f ? -value : value;
 }
 
+//item ha_atan2f: HA_FUNCTION HA_HALF_TURN_HI HA_HALF_TURN_LO HA_QUARTER_HI HA_QUARTER_LO ha_atan2 ha_below_diagonal_single ha_bits_single
 HA_FUNCTION float ha_atan2f(float y, float x)
 {
     const float n = fabsf(y);
@@ -386,6 +422,7 @@ HA_FUNCTION float ha_atan2f(float y, float x)
     return below ? -value : value;
 }
 
+//item ha_arc_sine_rest_single: HA_ARC_SINE_SINGLE HA_INLINE
 HA_INLINE float ha_arc_sine_rest_single(float x, float z)
 {
     const float zz = z * z;
@@ -395,6 +432,7 @@ HA_INLINE float ha_arc_sine_rest_single(float x, float z)
     return (x * z) * (low + zz * (middle + zz * high));
 }
 
+//item ha_arc_of_root_single: HA_FUNCTION ha_arc_sine_rest_single ha_pair_single ha_two_product_single
 /* asin sqrt(z) for z <= 1/4, as a pair: the root has a rest. */
 HA_FUNCTION ha_float ha_arc_of_root_single(float z)
 {
@@ -404,6 +442,7 @@ HA_FUNCTION ha_float ha_arc_of_root_single(float z)
     return ha_pair_single(root, left + ha_arc_sine_rest_single(root, z));
 }
 
+//item ha_asinf: HA_FUNCTION HA_QUARTER_HI HA_QUARTER_LO ha_arc_of_root_single ha_arc_sine_rest_single
 HA_FUNCTION float ha_asinf(float x)
 {
     const float size = fabsf(x);
@@ -420,6 +459,7 @@ HA_FUNCTION float ha_asinf(float x)
     return x < 0.0f ? -value : value;
 }
 
+//item ha_acosf: HA_FUNCTION HA_HALF_TURN_HI HA_HALF_TURN_LO HA_QUARTER_HI HA_QUARTER_LO ha_arc_of_root_single ha_arc_sine_rest_single
 HA_FUNCTION float ha_acosf(float x)
 {
     const float size = fabsf(x);
@@ -437,18 +477,22 @@ HA_FUNCTION float ha_acosf(float x)
     return HA_HALF_TURN_HI - (2.0f * half.hi + (2.0f * half.lo - HA_HALF_TURN_LO));
 }
 
+//always
 /* The rest. */
 
+//item ha_signf: HA_FUNCTION
 HA_FUNCTION float ha_signf(float x)
 {
     return x > 0.0f ? 1.0f : x < 0.0f ? -1.0f : x == 0.0f ? 0.0f : x;
 }
 
+//item ha_minf: HA_FUNCTION
 HA_FUNCTION float ha_minf(float x, float y)
 {
     return y < x || x != x ? y : x;
 }
 
+//item ha_maxf: HA_FUNCTION
 HA_FUNCTION float ha_maxf(float x, float y)
 {
     return y > x || x != x ? y : x;

@@ -12,7 +12,7 @@ from mpmath import mp, mpf, pi, log, exp, sin, cos, sinh, tanh, atan, asin, sqrt
 
 mp.prec = 400
 HERE = pathlib.Path(__file__).parent
-LINES = ["", "/* Constants of the elementary functions in single precision. Written by `single.py`. */", ""]
+LINES = ["", "//always", "/* Constants of the elementary functions in single precision. Written by `single.py`. */", ""]
 
 
 def nearest(x):
@@ -33,7 +33,7 @@ def text(x):
 
 
 def number(name, value, what):
-    LINES.extend([f"/* {what} */", f"#define HA_{name} {text(value)}"])
+    LINES.extend([f"//item HA_{name}", f"/* {what} */", f"#define HA_{name} {text(value)}"])
 
 
 def polynomial(name, what, f, weight, high, n, low=0):
@@ -48,6 +48,7 @@ def polynomial(name, what, f, weight, high, n, low=0):
     places = [mpf(low) + (mpf(high) - low) * (i + mpf(0.5)) / 400 for i in range(400)]
     error = max(abs(weight(z) * (sum(c * z ** j for j, c in enumerate(coefficients)) - f(z))) for z in places)
     exponent = float(log(error) / log(2))
+    LINES.append(f"//item HA_{name}: HA_DATA")
     LINES.append(f"/* {what}; error 2^{exponent:.2f} of the function. */")
     LINES.append(f"HA_DATA float HA_{name}[{n}] = {{{', '.join(text(c) for c in coefficients)}}};")
 

@@ -1,51 +1,30 @@
 //! All functions of a model, and the source that they make.
 
+mod checks;
 mod routines;
+mod shapes;
+mod source;
 mod words;
+mod work;
 
 use std::rc::Rc;
 
-use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program;
-use halfarrow_compiler::program::{
-    Assumption, Block, BlockId, Code, ConditionId, ConditionKind, DomainKind, EventTrigger, Holds, Program, Reads,
-    Routine, Value,
-};
+use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine};
 
+use super::Export;
 use super::blocks::{elimination_room, full_room};
-use super::cost::{Cost, OperationCount};
-use super::flags::Flags;
+use super::cost::OperationCount;
+use super::function::Function;
 use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
-use super::terms;
-use super::write::{Moving, Shape, Writer, number};
-use super::{Export, messages, real, template};
-use crate::{EmitError, Method, Real};
+use super::write::{Moving, Shape, TimeRate, Writer};
+use crate::EmitError;
 use routines::{Routines, newton_of};
-
-/// A sum of floats below this fraction of its terms is rounding of the operations that lead to it.
-const ROUNDING_OF_FLOATS: f64 = 1e-5;
+use shapes::{ALONG, CLOCK, PLAIN, PREAMBLE, block_functions, of_parameters};
 
 /// Points that all delays together may keep.
 const MOST_POINTS: f64 = 1e6;
-
-const PLAIN: Shape = Shape {
-    parameters: "ha_model *m, ha_wide t, const double *x, double *out",
-    arguments: "m, t, x, out",
-    void: false,
-    time: "t",
-    along: None,
-    wide: false,
-};
-const ALONG: Shape = Shape {
-    parameters: "ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates",
-    arguments: "m, t, x, e, out, rates",
-    ..PLAIN
-};
-
-/// The rate of time where a direction gives it.
-const ALONG_TIME: Option<&str> = Some("e[0]");
 
 /// The functions of a model.
 pub(super) struct Plan<'a> {
@@ -53,7 +32,7 @@ pub(super) struct Plan<'a> {
     pub program: &'a Program,
     pub name: String,
     /// Functions in C.
-    functions: String,
+    functions: Vec<Function>,
     /// Conditions of the state, in order.
     pub switches: Vec<ConditionId>,
     /// Conditions of time, in order.
@@ -106,20 +85,6 @@ struct Works {
     clock: OperationCount,
 }
 
-/// Values of parameters alone, from where the preamble leaves them.
-fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<Item = Value>, wide: bool) -> String {
-    let kind = if wide { "ha_wide" } else { "double" };
-    let mut text = format!("static void {name}(const ha_model *m, {kind} *out)\n{{\n");
-    for (i, value) in values.enumerate() {
-        let place = match wide {
-            true => format!("HA_WIDE({})", writer.givens.wide_text(value)),
-            false => writer.givens.text(value),
-        };
-        text += &format!("    out[{i}] = {place};\n");
-    }
-    text + "    (void)m;\n    (void)out;\n}\n\n"
-}
-
 impl<'a> Plan<'a> {
     pub fn new(export: &'a Export<'a>, name: &str) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
@@ -130,7 +95,7 @@ impl<'a> Plan<'a> {
             export,
             program,
             name: name.to_string(),
-            functions: String::new(),
+            functions: Vec::new(),
             switches: of(|trigger| trigger == EventTrigger::State),
             clocks: of(|trigger| matches!(trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime)),
             delays: delays(export)?,
@@ -156,68 +121,62 @@ impl<'a> Plan<'a> {
         let blocks = routines.newton();
         let used: Vec<BlockId> = blocks.keys().copied().collect();
         let patterns = Rc::clone(&self.patterns);
-        let mut writer = Writer::new(program, &used, &patterns, self.export.real);
+        let mut writer = Writer::new(self.export, &self.name, &used, &patterns);
         let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
         self.shown_blocks = numbers(&routines.observe);
         self.shown_blocks.retain(|block| !self.rates_blocks.contains(block));
 
-        let mut text = String::new();
-        text += &of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false);
-        text += &of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true);
-        text += &of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false);
+        let mut functions = vec![
+            of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false),
+            of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true),
+            of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false),
+        ];
         let plain = |writer: &mut Writer, name: &str, routine: &Routine| {
             let n = routine.code.outputs.len();
             writer.function(name, PLAIN, (&routine.code, &[]), (&values("out", n), &[]))
         };
-        text += &plain(&mut writer, "ha_rates_code", &routines.rates);
-        text += &plain(&mut writer, "ha_observe_code", &routines.observe);
-        text += &plain(&mut writer, "ha_switching_code", &routines.switching);
-        text += &plain(&mut writer, "ha_domains_code", &routines.domains);
-        text += &self.domain_checks(&writer);
-        text += &self.assumption_checks(&writer);
+        functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
+        functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
+        functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
+        functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
+        functions.extend(self.domain_checks(&writer));
+        functions.extend(self.assumption_checks(&writer));
 
         let along = |writer: &mut Writer, name: &str, shape: Shape, routine: &Routine, moving: Moving| {
             let n = routine.code.outputs.len();
             let shape = Shape { along: Some(moving), ..shape };
             writer.function(name, shape, (&routine.code, &[]), (&values("out", n), &values("rates", n)))
         };
-        let clock = Shape {
-            parameters: "ha_model *m, ha_wide t, ha_wide *out, ha_wide *rates",
-            arguments: "m, t, out, rates",
-            wide: true,
-            ..PLAIN
-        };
-        // Time runs at one second a second.
-        let runs = Moving { time: Some("1.0"), ..Moving::default() };
-        text += &along(&mut writer, "ha_clock_code", clock, &routines.clock, runs);
-        let run = Moving { time: ALONG_TIME, inputs: true, held: true, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run);
+        let runs = Moving { time: Some(TimeRate::One), ..Moving::default() };
+        functions.extend(along(&mut writer, "ha_clock_code", CLOCK, &routines.clock, runs));
+        let run =
+            Moving { time: Some(TimeRate::OfDirection), inputs: true, held: true, states: true, ..Moving::default() };
+        functions.extend(along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run));
         let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
-        text += &along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional);
+        functions.extend(along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional));
         if self.export.method.is_linearly_implicit() {
-            let time_derivative = Moving { time: ALONG_TIME, held: true, ..Moving::default() };
-            text += &along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative);
+            let time_derivative = Moving { time: Some(TimeRate::OfDirection), held: true, ..Moving::default() };
+            functions.extend(along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative));
         }
         if self.export.derivatives {
-            text += &along(&mut writer, "ha_observe_along", ALONG, &routines.observe, directional);
+            functions.extend(along(&mut writer, "ha_observe_along", ALONG, &routines.observe, directional));
         }
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
         for (name, routine) in &routines.starts {
-            text += &along(&mut writer, name, ALONG, routine, begin);
+            functions.extend(along(&mut writer, name, ALONG, routine, begin));
         }
 
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
-        let mut block_text = String::new();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
-            block_text += &self.block(&mut writer, i, program.blocks[*block].size(), code);
+            let block = block_functions(&mut writer, i, program.blocks[*block].size(), code);
+            self.functions.extend(block);
         }
 
         // Last, once it is known what is read in double precision.
-        let shape = Shape { parameters: "ha_model *m", arguments: "m", time: "HA_WIDE((double)NAN)", ..PLAIN };
         let preamble = Code { outputs: Vec::new(), ..routines.preamble.code.clone() };
-        let preamble = writer.function("ha_preamble_code", shape, (&preamble, &routines.kept()), (&[], &[]));
+        let preamble = writer.function("ha_preamble_code", PREAMBLE, (&preamble, &routines.kept()), (&[], &[]));
         let work = |routine: &Routine| OperationCount::of(program, &routine.code);
         self.works = Works {
             rates: work(&routines.rates),
@@ -229,87 +188,7 @@ impl<'a> Plan<'a> {
         };
         self.newton = used.clone();
         self.find_sizes(&writer);
-        self.functions = block_text + &preamble + &text;
-    }
-
-    /// The functions of a Newton block.
-    fn block(&self, writer: &mut Writer, number: usize, n: usize, code: &Code) -> String {
-        let shape = Shape {
-            parameters: "ha_model *m, const double *o, const double *g, double *right, double *matrix",
-            arguments: "m, o, g, right, matrix",
-            void: true,
-            time: "0.0",
-            along: None,
-            wide: false,
-        };
-        let right = (0..n).map(|i| format!("right[{i}]"));
-        let values: Vec<String> = right.chain((n..code.outputs.len()).map(|i| format!("matrix[{}]", i - n))).collect();
-        let mut text = writer.function(&format!("ha_block_{number}"), shape, (code, &[]), (&values, &[]));
-        let terms = Shape {
-            parameters: "ha_model *m, const double *o, const double *g, double *terms",
-            arguments: "m, o, g, terms",
-            ..shape
-        };
-        let values: Vec<String> = (0..n).map(|i| format!("terms[{i}]")).collect();
-        let sums = terms::terms_of(code, n);
-        text += &writer.function(&format!("ha_block_{number}_terms"), terms, (&sums, &[]), (&values, &[]));
-        let shape = Shape {
-            parameters: "ha_model *m, const double *o, const double *e, const double *g, double *rates",
-            arguments: "m, o, e, g, rates",
-            along: Some(Moving { outer: true, ..Moving::default() }),
-            ..shape
-        };
-        let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() };
-        let residuals = terms::without_the_unread(residuals);
-        let rates: Vec<String> = (0..n).map(|i| format!("rates[{i}]")).collect();
-        text += &writer.function(&format!("ha_block_{number}_along"), shape, (&residuals, &[]), (&[], &rates));
-        text
-    }
-
-    /// Which domain an argument has to lie in, and the check of those that parameters alone decide.
-    fn domain_checks(&self, writer: &Writer) -> String {
-        let mut text = String::from("static int ha_is_within(int domain, double a)\n{\n    switch (domain) {\n");
-        for (i, domain) in self.program.domains.iter().enumerate() {
-            let holds = match domain.kind {
-                DomainKind::Positive => "a > 0.0".to_string(),
-                DomainKind::NotNegative => "a >= 0.0".to_string(),
-                DomainKind::Within(low, high) => format!("{} <= a && a <= {}", number(low), number(high)),
-            };
-            text += &format!("    case {i}:\n        return {holds};\n");
-        }
-        text += "    default:\n        return a == a;\n    }\n}\n\nstatic int ha_check_domains(ha_model *m)\n{\n";
-        for (i, domain) in self.program.domains.iter().enumerate() {
-            if self.program.values.reads(domain.argument) == Reads::PARAMETERS {
-                let a = writer.givens.text(domain.argument);
-                text += &format!(
-                    "    if (ha_finite({a}) && !ha_is_within({i}, {a})) {{\n        return ha_fail(m, MODEL_OUT_OF_DOMAIN, {i}, HA_WIDE((double)NAN));\n    }}\n"
-                );
-            }
-        }
-        text + "    return MODEL_OK;\n}\n\n"
-    }
-
-    /// The number from 1 of the first assumption that parameters break, 0 if there is none.
-    fn assumption_checks(&self, writer: &Writer) -> String {
-        if self.program.assumptions.is_empty() {
-            return String::new();
-        }
-        let rounding = number(match self.export.real {
-            Real::Double => Assumption::ROUNDING,
-            Real::Float => ROUNDING_OF_FLOATS,
-        });
-        let mut text = String::from("static int ha_broken(const ha_model *m)\n{\n");
-        for (i, a) in self.program.assumptions.iter().enumerate() {
-            let (v, s) = (writer.givens.text(a.value), writer.givens.text(a.scale));
-            let holds = match a.holds {
-                Holds::Zero => format!("{v} <= {rounding} * {s} && -{v} <= {rounding} * {s}"),
-                Holds::NotZero => format!("{v} > {rounding} * {s} || -{v} > {rounding} * {s}"),
-                Holds::Positive => format!("{v} > 0.0"),
-                Holds::NotNegative => format!("{v} >= 0.0"),
-            };
-            text += &format!("    if (!({holds})) {{\n        return {};\n    }}\n", i + 1);
-        }
-        text + "    return 0;\n}\n\n"
+        self.functions.extend(preamble.into_iter().chain(functions));
     }
 
     fn find_sizes(&mut self, writer: &Writer) {
@@ -340,120 +219,8 @@ impl<'a> Plan<'a> {
     }
 
     /// The functions of the equations.
-    pub fn functions(&self) -> &str {
+    pub fn functions(&self) -> &[Function] {
         &self.functions
-    }
-
-    /// The source file; at its head stands what it keeps to.
-    pub fn source(&self, obligations: &str) -> String {
-        let (flags, mut words) = (self.flags(), self.words());
-        words.insert("OBLIGATION_LINES".into(), obligations.to_string());
-        words.insert("MODEL_TITLE".into(), super::header::comment(&self.program.name));
-        let size = self.export.real;
-        let filled = |text: &str| template::fill(&template::choose(text, |word| flags.holds(word)), &words);
-        let piece = |text: &str| real::of(&filled(text), size);
-        let mut text = piece(include_str!("../runtime/top.c"));
-        text += math::C_SOURCE;
-        text += "\n/* ---- small things ---- */\n\n";
-        if size == Real::Float {
-            text += math::C_SOURCE_SINGLE;
-            text += &real::wide(&filled(include_str!("../runtime/small.c")), size);
-        }
-        text += &piece(include_str!("../runtime/small.c"));
-        text += &piece(include_str!("../runtime/helpers.c"));
-        if self.sizes.order > 0 {
-            text += &piece(include_str!("../runtime/lu.c"));
-        }
-        if !self.newton.is_empty() {
-            text += &piece(concat!(
-                include_str!("../runtime/newton/workspace.c"),
-                include_str!("../runtime/newton/correction.c"),
-                include_str!("../runtime/newton/floating.c"),
-                include_str!("../runtime/newton/damped.c"),
-                include_str!("../runtime/newton/continuation.c"),
-                include_str!("../runtime/newton/search.c"),
-            ));
-        }
-        text += &piece(include_str!("../runtime/tables.c"));
-        text += &real::wide(&filled(include_str!("../runtime/conditions.c")), size);
-        text += "\n/* ---- the equations ---- */\n\n";
-        text += &real::of(&self.functions, size);
-        if !self.clocks.is_empty() {
-            text += &real::wide(&filled(include_str!("../runtime/clock.c")), size);
-        }
-        text += &piece(include_str!("../runtime/held.c"));
-        text += &piece(include_str!("../runtime/system.c"));
-        if self.export.method.is_implicit() {
-            text += &piece(include_str!("../runtime/matrix.c"));
-        }
-        text += &piece(include_str!("../runtime/advance.c"));
-        let method = match self.export.method {
-            Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
-            method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
-            _ => include_str!("../runtime/explicit.c"),
-        };
-        text += &piece(method);
-        text += &piece(include_str!("../runtime/step.c"));
-        let begin = piece(include_str!("../runtime/start.c"));
-        let solve = if self.solves_start() { piece(include_str!("../runtime/start_solve.c")) } else { String::new() };
-        text += &begin.replace("START_CODE\n", &solve);
-        text += &messages::messages(self);
-        let text =
-            template::name(&text, &self.name).replace("#include \"NAME.h\"", &format!("#include \"{}.h\"", self.name));
-        let mut tidy = template::without_empty_sections(&template::without_the_uncalled(&text));
-        while tidy.contains("\n\n\n") {
-            tidy = tidy.replace("\n\n\n", "\n\n");
-        }
-        tidy
-    }
-
-    fn kinds(&self) -> impl Iterator<Item = ConditionKind> + '_ {
-        self.program.conditions.values().map(|c| c.kind)
-    }
-
-    /// What the model has.
-    pub fn flags(&self) -> Flags {
-        let Plan { export, program: p, .. } = *self;
-        let held = !p.held.is_empty();
-        let time_derivative = export.method.is_linearly_implicit();
-        let always = |d: &program::LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
-        Flags {
-            single: export.real == Real::Float,
-            states: !p.states.is_empty(),
-            inputs: !p.inputs.is_empty(),
-            parameters: !p.parameters.is_empty(),
-            outputs: !export.recorded.is_empty(),
-            conserved: !p.conserved.is_empty(),
-            tables: !p.tables.is_empty(),
-            conditions: !p.conditions.is_empty(),
-            sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),
-            floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
-            piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
-            clocks: !self.clocks.is_empty(),
-            curves: self.clocks.iter().any(|&c| p.conditions[c].trigger == EventTrigger::CurvedTime),
-            switches: !self.switches.is_empty(),
-            held,
-            delays: !self.delays.is_empty(),
-            samples: !self.samples.is_empty(),
-            only_samples: held && self.delays.is_empty(),
-            newton: !self.newton.is_empty(),
-            sparse: self.patterns.any_sparse(),
-            newton_single: self.newton.iter().any(|&b| p.blocks[b].size() == 1),
-            follows: !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty()),
-            rates_newton: !self.rates_blocks.is_empty(),
-            shown_newton: !self.shown_blocks.is_empty(),
-            domains: !p.domains.is_empty(),
-            domains_always: p.domains.iter().any(always),
-            assumptions: !p.assumptions.is_empty(),
-            directional_derivative: self.has_directional_derivative(),
-            derivatives: export.derivatives,
-            time_derivative,
-            time_passes: time_derivative || held,
-            linear_constant: self.sizes.factored > 0,
-            solves_start: self.solves_start(),
-            guesses: !p.guesses.is_empty(),
-            start_groups: self.groups.iter().any(|g| g.together),
-        }
     }
 
     /// Whether a start may differ from the exported one.
@@ -464,79 +231,6 @@ impl<'a> Plan<'a> {
     /// Whether the rates have a function for their derivatives.
     pub fn has_directional_derivative(&self) -> bool {
         self.export.derivatives || self.export.method.is_implicit()
-    }
-
-    /// Rows of the nonzeros of each column of the Jacobian.
-    pub fn columns(&self) -> Vec<Vec<usize>> {
-        let mut columns = vec![Vec::new(); self.program.states.len()];
-        for (row, reads) in self.program.dependence.iter().enumerate() {
-            reads.iter().for_each(|&column| columns[column as usize].push(row));
-        }
-        columns
-    }
-
-    /// Columns in groups, no two of a group with a nonzero in the same row; as `halfarrow_sim::Sparsity::groups`.
-    fn column_groups(&self) -> Vec<Vec<usize>> {
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        let mut taken: Vec<Vec<bool>> = Vec::new();
-        for (column, rows) in self.columns().iter().enumerate() {
-            let free = taken.iter().position(|taken| rows.iter().all(|&row| !taken[row]));
-            let group = free.unwrap_or_else(|| {
-                groups.push(Vec::new());
-                taken.push(vec![false; self.program.states.len()]);
-                groups.len() - 1
-            });
-            groups[group].push(column);
-            rows.iter().for_each(|&row| taken[group][row] = true);
-        }
-        groups
-    }
-
-    /// What a step costs at most.
-    pub fn cost(&self) -> Cost {
-        let w = &self.works;
-        let method = self.export.method;
-        let n = self.program.states.len() as u64;
-        let mut step = match method {
-            Method::ImplicitMidpoint => {
-                let groups = self.column_groups().len() as u64;
-                let mut one = w.rates.clone() + w.directional.clone() * groups;
-                one.operations += n * n * n + 4 * n * n;
-                one * 20
-            }
-            Method::LinearlyImplicitEuler | Method::Rosenbrock => {
-                let (groups, stages) = (self.column_groups().len() as u64, method.stages() as u64);
-                let mut all = w.rates.clone() * stages + w.directional.clone() * (groups + 1);
-                all.operations += n * n * n + 4 * n * n + stages * (2 * n * n + (2 * stages + 4) * n);
-                all
-            }
-            _ => {
-                let stages = method.stages() as u64;
-                let mut all = w.rates.clone() * stages;
-                all.operations += stages * (stages + 3) * n;
-                all
-            }
-        };
-        step = step + w.switching.clone() + w.observe.clone();
-        let follows = |blocks: &[BlockId], work: &OperationCount| {
-            if blocks.is_empty() { OperationCount::default() } else { work.clone() }
-        };
-        let followed = follows(&self.rates_blocks, &w.rates) + follows(&self.shown_blocks, &w.observe);
-        let sources = if self.delays.is_empty() {
-            OperationCount::default()
-        } else {
-            w.rates.clone() + w.sources.clone().along()
-        };
-        step = step + followed.clone() + sources.clone();
-        let held = self.program.held.len() as u64;
-        let curves =
-            self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()
-                as u64;
-        let looks = 2 + curves * (2 * 4000 + 4 * 2200);
-        let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
-        let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
-        let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
-        Cost::new(step, jump, self)
     }
 }
 

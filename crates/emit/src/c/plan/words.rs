@@ -1,19 +1,18 @@
 //! What stands in the place of words in the parts that do not depend on the model: sizes, tables, lists.
 
-use std::collections::BTreeMap;
-
 use halfarrow_compiler::algebra::{Outside, math};
 use halfarrow_compiler::program::{BlockId, ConditionId, ConditionKind, EventTrigger};
 
 use super::super::patterns::FULL_AT_MOST;
 use super::super::start::Group;
-use super::super::write::{number, numbers};
+use super::super::template::Words;
+use super::super::written::{Needed, Notes, Part, Written, written};
 use super::Plan;
 use crate::{Method, Real};
 
 impl Plan<'_> {
     /// Each word with its text.
-    pub(super) fn words(&self) -> BTreeMap<String, String> {
+    pub(super) fn words(&self) -> Words {
         let program = self.program;
         let join = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
         let lines = |values: Vec<String>| match values.is_empty() {
@@ -42,13 +41,13 @@ impl Plan<'_> {
         };
         let flat = |lists: &[Vec<usize>]| lists.iter().flatten().map(usize::to_string).collect::<Vec<_>>();
         let columns = self.columns();
-        let (nodes, weights) = tableau(self.export.method);
+        let real = self.export.real;
+        let (nodes, weights) = tableau(self.export.method, real);
         let constants = program.parameters.iter().map(|p| u8::from(p.constant).to_string()).collect();
         let most =
             |of: &dyn Fn(&Group) -> usize| self.groups.iter().filter(|g| g.together).map(of).max().unwrap_or(1).max(1);
         let [_, held, conserved, states, direction] = self.sizes.directions.map(|place| place.to_string());
         let words: Vec<(&str, String)> = vec![
-            ("TABLES", self.tables()),
             ("KINDS", lines(self.kinds().map(|k| kind(k).to_string()).collect())),
             ("CLOCK_CONDITIONS", lines(numbers_of(&self.clocks))),
             (
@@ -69,14 +68,13 @@ impl Plan<'_> {
             ("SAMPLES", self.samples.len().to_string()),
             ("SAMPLE_PLACES", join(self.samples.iter().map(usize::to_string).collect())),
             ("BLOCKS", self.newton.len().to_string()),
-            ("BLOCK_TABLE", self.block_table()),
             ("PATTERNS", self.patterns.tables()),
             ("SPARSE_FULL_AT_MOST", FULL_AT_MOST.to_string()),
             ("RATES_BLOCKS", join(block_numbers(&self.rates_blocks))),
             ("RATES_BLOCK_COUNT", self.rates_blocks.len().to_string()),
             ("SHOWN_BLOCKS", join(block_numbers(&self.shown_blocks))),
             ("SHOWN_BLOCK_COUNT", self.shown_blocks.len().to_string()),
-            ("DISTANCES", numbers(&distances)),
+            ("DISTANCES", real.numbers(&distances)),
             ("DOMAINS", program.domains.len().to_string()),
             ("MEMORY", self.sizes.memory.to_string()),
             ("FACTORED", self.sizes.factored.to_string()),
@@ -85,15 +83,14 @@ impl Plan<'_> {
             ("GROUPS", groups.len().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),
             ("COLUMN_ROWS", lines(flat(&columns))),
-            ("SCALES", numbers(&self.export.start.scales)),
+            ("SCALES", real.numbers(&self.export.start.scales)),
             ("NODES", nodes),
             ("WEIGHTS", weights),
             ("STAGES", self.export.method.stages().to_string()),
-            ("STEP_LENGTH", number(self.export.step)),
-            ("START_STATES", numbers(&self.export.start.states)),
-            ("START_CONSERVED", numbers(&self.export.start.conserved)),
+            ("STEP_LENGTH", Real::Double.number(self.export.step)),
+            ("START_STATES", real.numbers(&self.export.start.states)),
+            ("START_CONSERVED", real.numbers(&self.export.start.conserved)),
             ("CONSTANT_PARAMETERS", lines(constants)),
-            ("START_TABLES", self.start_tables()),
             ("START_CONDITIONS", program.start.len().to_string()),
             ("START_GROUPS", self.groups.len().to_string()),
             ("GUESSES", program.guesses.len().to_string()),
@@ -109,35 +106,32 @@ impl Plan<'_> {
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
-        let more = linearly_implicit(self.export.method);
+        let more = linearly_implicit(self.export.method, real);
+        let tables = [
+            ("TABLES", Written::of(self.tables())),
+            ("BLOCK_TABLE", self.block_table()),
+            ("START_TABLES", self.start_tables()),
+        ];
         words
             .into_iter()
             .chain(more)
-            .chain(tolerances(self.export.real))
-            .map(|(word, text)| (word.to_string(), text))
+            .chain(tolerances(real))
+            .map(|(word, text)| (word, Written::of(text)))
+            .chain(tables)
             .collect()
     }
 
-    /// Numbers of a table in double precision whatever real numbers are.
-    fn wide_numbers(&self, values: &[f64]) -> String {
-        match self.export.real {
-            Real::Double => numbers(values),
-            Real::Float => {
-                let rows = values.chunks(4).map(|row| row.iter().map(|&v| format!("HA_WIDE({})", number(v))));
-                rows.map(|row| format!("    {}", row.collect::<Vec<_>>().join(", "))).collect::<Vec<_>>().join(",\n")
-            }
-        }
-    }
-
     fn tables(&self) -> String {
+        let real = self.export.real;
         let mut text = String::new();
         let mut list = String::from("static const ha_table ha_tables[] = {\n");
         for (i, table) in self.program.tables.iter().enumerate() {
             let pieces: Vec<String> =
-                table.pieces().iter().map(|c| format!("    {{{}}}", c.map(number).join(", "))).collect();
-            text += &format!("static const ha_wide ha_table_{i}_x[] = {{\n{}\n}};\n", self.wide_numbers(table.x()));
-            text += &format!("static const double ha_table_{i}_y[] = {{\n{}\n}};\n", numbers(table.y()));
-            text += &format!("static const double ha_table_{i}_pieces[][4] = {{\n{}\n}};\n", pieces.join(",\n"));
+                table.pieces().iter().map(|c| format!("    {{{}}}", c.map(|v| real.number(v)).join(", "))).collect();
+            text += &format!("static const double ha_table_{i}_x[] = {{\n{}\n}};\n", Real::Double.numbers(table.x()));
+            text += &format!("static const {} ha_table_{i}_y[] = {{\n{}\n}};\n", real.kind(), real.numbers(table.y()));
+            text +=
+                &format!("static const {} ha_table_{i}_pieces[][4] = {{\n{}\n}};\n", real.kind(), pieces.join(",\n"));
             let outside = match table.outside() {
                 Outside::Error => 0,
                 Outside::Clamp => 1,
@@ -148,35 +142,29 @@ impl Plan<'_> {
                 table.x().len()
             );
         }
-        text + &list + "};\n"
+        text + &list + "};"
     }
 
-    fn block_table(&self) -> String {
+    fn block_table(&self) -> Written {
+        let mut notes = Notes::default();
         let mut text = String::new();
         let mut list = String::from("static const ha_block ha_blocks[] = {\n");
         let mut memory = 0;
         for (i, (block, reads)) in self.newton.iter().zip(&self.reads).enumerate() {
-            text += &format!(
-                "static void ha_block_{i}(ha_model *m, const double *o, const double *g, double *right, double *matrix);\n"
-            );
-            text += &format!(
-                "static void ha_block_{i}_along(ha_model *m, const double *o, const double *e, const double *g, double *rates);\n"
-            );
-            text += &format!(
-                "static void ha_block_{i}_terms(ha_model *m, const double *o, const double *g, double *terms);\n"
-            );
+            text += &super::shapes::block_declarations(i, self.export.real);
             let n = self.program.blocks[*block].size();
             let (pattern, entries) = self.patterns.of_block(self.program, *block);
-            list += &format!(
-                "    {{{pattern}, {reads}, {memory}, ha_block_{i}, ha_block_{i}_terms, ha_block_{i}_along}},\n"
-            );
+            let [code, terms, along] = ["", "_terms", "_along"].map(|k| Needed(format!("ha_block_{i}{k}").into()));
+            let row = written!("    {{{}, {}, {}, {}, {}, {}}},\n", pattern, reads, memory, code, terms, along);
+            row.note(&mut notes);
+            list += &row.text;
             memory += 2 * (n + reads + entries);
         }
-        text + "\n" + &list + "};\n"
+        Written { notes, ..Written::of(text + "\n" + &list + "};") }
     }
 
     /// Where the search of the start begins, and for which unknowns; nothing without guesses.
-    fn guess_tables(&self) -> String {
+    fn guess_tables(&self, notes: &mut Notes) -> String {
         let program = self.program;
         if program.guesses.is_empty() {
             return String::new();
@@ -185,7 +173,9 @@ impl Plan<'_> {
         let guessed = (0..program.states.len() + program.conserved.len()).map(|u| u8::from(guessed(u)).to_string());
         let mut text = "static const ha_guess ha_guesses[] = {\n".to_string();
         for (i, guess) in program.guesses.iter().enumerate() {
-            text += &format!("    {{{}, ha_start_guess_{i}}},\n", guess.unknown);
+            let row = written!("    {{{}, {}}},\n", guess.unknown, Needed(format!("ha_start_guess_{i}").into()));
+            row.note(notes);
+            text += &row.text;
         }
         text += "};\n";
         if self.groups.iter().any(|g| g.together) {
@@ -195,7 +185,8 @@ impl Plan<'_> {
         text
     }
 
-    fn start_tables(&self) -> String {
+    fn start_tables(&self) -> Written {
+        let mut notes = Notes::default();
         let mut text = String::new();
         let ints = |values: Vec<String>| if values.is_empty() { "0".to_string() } else { values.join(", ") };
         let mut list = String::from("static const ha_pass ha_passes[] = {\n");
@@ -204,10 +195,10 @@ impl Plan<'_> {
             let conditions = ints(pass.conditions.iter().map(usize::to_string).collect());
             text += &format!("static const int ha_pass_{i}_unknowns[] = {{{unknowns}}};\n");
             text += &format!("static const int ha_pass_{i}_conditions[] = {{{conditions}}};\n");
-            list += &format!(
-                "    {{{}, ha_pass_{i}_unknowns, ha_pass_{i}_conditions, ha_start_pass_{i}}},\n",
-                pass.unknowns.len()
-            );
+            let (count, code) = (pass.unknowns.len(), Needed(format!("ha_start_pass_{i}").into()));
+            let row = written!("    {{{}, ha_pass_{1}_unknowns, ha_pass_{1}_conditions, {2}}},\n", count, i, code);
+            row.note(&mut notes);
+            list += &row.text;
         }
         if self.passes.is_empty() {
             list += "    {0, NULL, NULL, NULL}\n";
@@ -218,7 +209,11 @@ impl Plan<'_> {
             let conditions = ints(group.conditions.iter().map(usize::to_string).collect());
             text += &format!("static const int ha_group_{i}_unknowns[] = {{{unknowns}}};\n");
             text += &format!("static const int ha_group_{i}_conditions[] = {{{conditions}}};\n");
-            let code = if group.together { format!("ha_start_group_{i}") } else { "NULL".into() };
+            let code = match group.together {
+                true => written!("{}", Needed(format!("ha_start_group_{i}").into())),
+                false => Written::of("NULL"),
+            };
+            code.note(&mut notes);
             groups += &format!(
                 "    {{{}, {}, ha_group_{i}_conditions, ha_group_{i}_unknowns, {code}, {}}},\n",
                 group.conditions.len(),
@@ -229,23 +224,33 @@ impl Plan<'_> {
         if self.groups.is_empty() {
             groups += "    {0, 0, NULL, NULL, NULL, 0}\n";
         }
-        text + &list + "};\n" + &groups + "};\n" + &self.guess_tables()
+        let guesses = self.guess_tables(&mut notes);
+        let text = text + &list + "};\n" + &groups + "};\n" + &guesses;
+        Written { notes, ..Written::of(text.trim_end()) }
     }
 }
 
 /// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value, of
-/// residuals in units of their own; and how far beside a point is another one.
-fn tolerances(real: Real) -> [(&'static str, String); 5] {
-    let words = ["CLOSE_TO_ROUNDING", "ROUNDING_OF_ENTRIES", "ROUNDING_OF_RANK", "BORROWED_ROUNDING", "BESIDE"];
+/// residuals in units of their own; how far beside a point is another one; and the least damping of Newton's method at a start.
+fn tolerances(real: Real) -> [(&'static str, String); 6] {
+    let words = [
+        "CLOSE_TO_ROUNDING",
+        "ROUNDING_OF_ENTRIES",
+        "ROUNDING_OF_RANK",
+        "BORROWED_ROUNDING",
+        "BESIDE",
+        "LEAST_DAMPING",
+    ];
+    // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6],
     };
-    [0, 1, 2, 3, 4].map(|i| (words[i], number(values[i])))
+    [0, 1, 2, 3, 4, 5].map(|i| (words[i], real.number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.
-fn tableau(method: Method) -> (String, String) {
+fn tableau(method: Method, real: Real) -> (String, String) {
     let (nodes, weights): (&[f64], Vec<Vec<f64>>) = match method {
         Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler => {
             (&[0.0], vec![vec![0.0], vec![1.0]])
@@ -272,12 +277,12 @@ fn tableau(method: Method) -> (String, String) {
             ],
         ),
     };
-    (list(nodes), rows(&weights))
+    (list(nodes, real), rows(&weights, real))
 }
 
 /// What linearly implicit methods have besides: γ, parts of the derivative by time, weights of earlier stages on the right
 /// side of each, and which stages stand where the one before does.
-fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
+fn linearly_implicit(method: Method, real: Real) -> [(&'static str, String); 4] {
     let (gamma, time_weights, right, repeats): (f64, &[f64], Vec<Vec<f64>>, &[bool]) = match method {
         Method::Rosenbrock => (
             0.5,
@@ -289,17 +294,17 @@ fn linearly_implicit(method: Method) -> [(&'static str, String); 4] {
     };
     let repeats: Vec<&str> = repeats.iter().map(|&repeats| if repeats { "1" } else { "0" }).collect();
     [
-        ("GAMMA", number(gamma)),
-        ("TIME_WEIGHTS", list(time_weights)),
-        ("RIGHT_WEIGHTS", rows(&right)),
+        ("GAMMA", real.number(gamma)),
+        ("TIME_WEIGHTS", list(time_weights, real)),
+        ("RIGHT_WEIGHTS", rows(&right, real)),
         ("REPEATS", repeats.join(", ")),
     ]
 }
 
-fn list(values: &[f64]) -> String {
-    values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(", ")
+fn list(values: &[f64], real: Real) -> String {
+    values.iter().map(|&v| real.number(v)).collect::<Vec<_>>().join(", ")
 }
 
-fn rows(all: &[Vec<f64>]) -> String {
-    all.iter().map(|row| format!("{{{}}}", list(row))).collect::<Vec<_>>().join(", ")
+fn rows(all: &[Vec<f64>], real: Real) -> String {
+    all.iter().map(|row| format!("{{{}}}", list(row, real))).collect::<Vec<_>>().join(", ")
 }

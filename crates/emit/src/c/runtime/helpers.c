@@ -1,23 +1,26 @@
 //if single
+//item ha_fits
 /* Whether a number computed in double precision fits single precision, with all its digits. */
-static int ha_fits(ha_wide a)
+static int ha_fits(double a)
 {
-    return HA_WIDE(!ha_finite(a) || a == 0.0 || (fabs(a) >= (double)FLT_MIN && fabs(a) <= (double)FLT_MAX));
+    return !$$ha_finite(a) || a == 0.0 || (fabs(a) >= (double)FLT_MIN && fabs(a) <= (double)FLT_MAX);
 }
 
 //end
-static int ha_all_finite(const double *a, int n)
+//item ha_all_finite
+static int ha_all_finite(const $real *a, int n)
 {
     int i;
     for (i = 0; i < n; ++i) {
-        if (!ha_finite(a[i])) {
+        if (!$ha_finite(a[i])) {
             return 0;
         }
     }
     return 1;
 }
 
-static void ha_copy(double *to, const double *from, int n)
+//item ha_copy
+static void ha_copy($real *to, const $real *from, int n)
 {
     int i;
     for (i = 0; i < n; ++i) {
@@ -25,7 +28,8 @@ static void ha_copy(double *to, const double *from, int n)
     }
 }
 
-static void ha_fill(double *to, double value, int n)
+//item ha_fill
+static void ha_fill($real *to, $real value, int n)
 {
     int i;
     for (i = 0; i < n; ++i) {
@@ -33,16 +37,18 @@ static void ha_fill(double *to, double value, int n)
     }
 }
 
+//item ha_is_pivot
 /* Whether an entry can be divided by: not 0 to rounding, and finite. */
-static int ha_is_pivot(double a)
+static int ha_is_pivot($real a)
 {
-    const double size = fabs(a);
-    const double weight = size / (size > DBL_MIN ? size : DBL_MIN);
-    return weight > DBL_EPSILON && ha_finite(weight);
+    const $real size = $fabs(a);
+    const $real weight = size / (size > $DBL_MIN ? size : $DBL_MIN);
+    return weight > $DBL_EPSILON && $ha_finite(weight);
 }
 
+//item ha_fail
 /* Takes note of a failure. */
-static int ha_fail(ha_model *m, int code, int where, ha_wide t)
+static int ha_fail(ha_model *m, int code, int where, double t)
 {
     m->failure.code = code;
     m->failure.where = where;
@@ -50,21 +56,22 @@ static int ha_fail(ha_model *m, int code, int where, ha_wide t)
     return code;
 }
 
+//item ha_pivot_row
 /* The row of a matrix of n rows to bring to place k, and its weight there: the diagonal stays if it is good enough. */
-static int ha_pivot_row(const double *a, const double *scale, int n, int k, double *weight)
+static int ha_pivot_row(const $real *a, const $real *scale, int n, int k, $real *weight)
 {
-    const double diagonal = fabs(a[k * n + k]) / scale[k];
+    const $real diagonal = $fabs(a[k * n + k]) / scale[k];
     int best = k;
     int row;
     *weight = diagonal;
     for (row = k + 1; row < n; ++row) {
-        const double other = fabs(a[row * n + k]) / scale[row];
+        const $real other = $fabs(a[row * n + k]) / scale[row];
         if (other > *weight || other != other) {
             best = row;
             *weight = other;
         }
     }
-    if (diagonal >= 0.1 * *weight) {
+    if (diagonal >= $0.1 * *weight) {
         best = k;
         *weight = diagonal;
     }

@@ -1,8 +1,10 @@
 
+//section
 /* ---- linear equations: a symmetric matrix that is definite as U'DU; all others with rows scaled, threshold
  * pivoting and one refinement; large sparse ones in an order that is fixed ---- */
 
 //if sparse
+//always
 /* An order of elimination, and the entries of the factors: places are positions in it. */
 typedef struct {
     int odd;
@@ -18,6 +20,7 @@ typedef struct {
 } ha_order;
 
 //end
+//always
 /* Where the entries of a matrix stand: for each row the first one, and the column of each. */
 typedef struct {
     int n;
@@ -29,38 +32,43 @@ typedef struct {
 //end
 } ha_pattern;
 
-PATTERNS
+//item ha_patterns
+$PATTERNS
+
+//always
 typedef struct {
     int n;
     const ha_pattern *pattern;
-    double *matrix;
-    double *factors;
-    double *scale;
-    double *work;
-    double *rest;
+    $real *matrix;
+    $real *factors;
+    $real *scale;
+    $real *work;
+    $real *rest;
 //if single
-    double *columns;
+    $real *columns;
 //end
 //if sparse
     /* Of a sparse one: the entries of the matrix and of the factors, inverse pivots and their weights, and a row. */
-    double *entries;
-    double *lower;
-    double *upper;
-    double *inverse;
-    double *weight;
-    double *row;
+    $real *entries;
+    $real *lower;
+    $real *upper;
+    $real *inverse;
+    $real *weight;
+    $real *row;
 //end
     int *order;
 } ha_lu;
 
+//item ha_entries
 /* The number of entries of a pattern. */
 static int ha_entries(const ha_pattern *pattern)
 {
     return pattern->starts[pattern->n];
 }
 
+//item ha_lu_at
 /* Its parts in a row. */
-static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
+static ha_lu ha_lu_at($real *place, int *order, const ha_pattern *pattern)
 {
     const int n = pattern->n;
     ha_lu l;
@@ -69,7 +77,7 @@ static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
 //if sparse
     if (pattern->order != NULL) {
         l.entries = place;
-        l.lower = l.entries + ha_entries(pattern);
+        l.lower = l.entries + $ha_entries(pattern);
         l.upper = l.lower + pattern->order->lower_starts[n];
         l.inverse = l.upper + pattern->order->upper_starts[n];
         l.weight = l.inverse + n;
@@ -83,7 +91,7 @@ static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
         place += n;
 //end
         l.matrix = place;
-        l.factors = n > SPARSE_FULL_AT_MOST ? place : place + n * n;
+        l.factors = n > $SPARSE_FULL_AT_MOST ? place : place + n * n;
         l.order = order;
         return l;
     }
@@ -100,28 +108,30 @@ static ha_lu ha_lu_at(double *place, int *order, const ha_pattern *pattern)
     return l;
 }
 
+//item ha_lu_pivot
 /* The row to bring to place k, -1 if all are 0 to rounding. */
 static int ha_lu_pivot(const ha_lu *l, int k)
 {
-    double weight;
-    const int best = ha_pivot_row(l->factors, l->scale, l->n, k, &weight);
+    $real weight;
+    const int best = $ha_pivot_row(l->factors, l->scale, l->n, k, &weight);
 //if single
     weight /= l->columns[k];
 //end
-    return weight > DBL_EPSILON * (double)l->n && ha_finite(weight) ? best : -1;
+    return weight > $DBL_EPSILON * ($real)l->n && $ha_finite(weight) ? best : -1;
 }
 
+//item ha_lu_swap
 static void ha_lu_swap(ha_lu *l, int a, int b)
 {
     const int n = l->n;
-    const double scale = l->scale[a];
+    const $real scale = l->scale[a];
     const int order = l->order[a];
     int j;
     if (a == b) {
         return;
     }
     for (j = 0; j < n; ++j) {
-        const double entry = l->factors[a * n + j];
+        const $real entry = l->factors[a * n + j];
         l->factors[a * n + j] = l->factors[b * n + j];
         l->factors[b * n + j] = entry;
     }
@@ -131,35 +141,37 @@ static void ha_lu_swap(ha_lu *l, int a, int b)
     l->order[b] = order;
 }
 
+//item ha_less_products
 /* start - a.b: the sum of groups of four products, each of the four places apart, then the products that are left. */
-static double ha_less_products(double start, const double *a, const double *b, int n)
+static $real ha_less_products($real start, const $real *a, const $real *b, int n)
 {
-    double result = start;
+    $real result = start;
     int i = 0;
     int j;
     if (n >= 4) {
-        double sums[4] = {0.0, 0.0, 0.0, 0.0};
+        $real sums[4] = {$0.0, $0.0, $0.0, $0.0};
         for (; i + 4 <= n; i += 4) {
             for (j = 0; j < 4; ++j) {
-                const double product = a[i + j] * b[i + j];
+                const $real product = a[i + j] * b[i + j];
                 sums[j] += product;
             }
         }
         result -= (sums[0] + sums[1]) + (sums[2] + sums[3]);
     }
     for (; i < n; ++i) {
-        const double product = a[i] * b[i];
+        const $real product = a[i] * b[i];
         result -= product;
     }
     return result;
 }
 
+//item ha_lu_factor_definite
 /* Factors a symmetric matrix that is definite: U above the diagonal and its mirror image below, the inverse of D in
  * scale, -1 as the first of the order. 0 if it is not such a matrix. */
 static int ha_lu_factor_definite(ha_lu *l)
 {
     const int n = l->n;
-    const double sign = copysign(1.0, l->matrix[0]);
+    const $real sign = $copysign($1.0, l->matrix[0]);
     int i;
     int j;
     int k;
@@ -173,24 +185,24 @@ static int ha_lu_factor_definite(ha_lu *l)
             }
         }
     }
-    ha_copy(l->factors, l->matrix, n * n);
+    $ha_copy(l->factors, l->matrix, n * n);
     for (k = 0; k < n; ++k) {
-        const double *row = l->factors + k * n;
-        const double pivot = row[k];
-        const double size = sign * pivot;
-        double inverse;
-        if (!(size > 0.0 && size > DBL_EPSILON * (double)n * (sign * l->matrix[k * n + k]) && ha_finite(size))) {
+        const $real *row = l->factors + k * n;
+        const $real pivot = row[k];
+        const $real size = sign * pivot;
+        $real inverse;
+        if (!(size > $0.0 && size > $DBL_EPSILON * ($real)n * (sign * l->matrix[k * n + k]) && $ha_finite(size))) {
             return 0;
         }
-        inverse = 1.0 / pivot;
+        inverse = $1.0 / pivot;
         for (j = k + 1; j < n; ++j) {
-            const double factor = row[j] * inverse;
+            const $real factor = row[j] * inverse;
             l->factors[j * n + k] = factor;
-            if (row[j] == 0.0) {
+            if (row[j] == $0.0) {
                 continue;
             }
             for (i = j; i < n; ++i) {
-                const double product = factor * row[i];
+                const $real product = factor * row[i];
                 l->factors[j * n + i] -= product;
             }
         }
@@ -203,32 +215,34 @@ static int ha_lu_factor_definite(ha_lu *l)
     return 1;
 }
 
-static void ha_lu_solve_definite(const ha_lu *l, double *b)
+//item ha_lu_solve_definite
+static void ha_lu_solve_definite(const ha_lu *l, $real *b)
 {
     const int n = l->n;
     int i;
     int k;
     for (i = 0; i < n; ++i) {
-        b[i] += 0.0;
+        b[i] += $0.0;
     }
     for (k = 0; k < n; ++k) {
         for (i = k + 1; i < n; ++i) {
-            const double product = l->factors[k * n + i] * b[k];
+            const $real product = l->factors[k * n + i] * b[k];
             b[i] -= product;
         }
     }
     for (k = 0; k < n; ++k) {
-        const double scaled = b[k] * l->scale[k];
-        b[k] = scaled + 0.0;
+        const $real scaled = b[k] * l->scale[k];
+        b[k] = scaled + $0.0;
     }
     for (k = n - 1; k >= 0; --k) {
         for (i = 0; i < k; ++i) {
-            const double product = l->factors[k * n + i] * b[k];
+            const $real product = l->factors[k * n + i] * b[k];
             b[i] -= product;
         }
     }
 }
 
+//item ha_lu_factor_full
 /* Factors a full matrix; 0 if no pivot is left, or if an entry is not finite. */
 static int ha_lu_factor_full(ha_lu *l)
 {
@@ -236,25 +250,25 @@ static int ha_lu_factor_full(ha_lu *l)
     int row;
     int j;
     int k;
-    if (ha_lu_factor_definite(l)) {
+    if ($ha_lu_factor_definite(l)) {
         return 1;
     }
 //if single
     /* The magnitudes of columns: few digits tell units from a singular matrix only if these are known. */
     for (j = 0; j < n; ++j) {
-        l->columns[j] = DBL_MIN;
+        l->columns[j] = $DBL_MIN;
         for (row = 0; row < n; ++row) {
-            l->columns[j] = ha_max(l->columns[j], fabs(l->matrix[row * n + j]));
+            l->columns[j] = $ha_max(l->columns[j], $fabs(l->matrix[row * n + j]));
         }
     }
 //end
     for (row = 0; row < n; ++row) {
-        double most = DBL_MIN;
+        $real most = $DBL_MIN;
         for (j = 0; j < n; ++j) {
 //if single
-            const double size = fabs(l->matrix[row * n + j]) / l->columns[j];
+            const $real size = $fabs(l->matrix[row * n + j]) / l->columns[j];
 //else
-            const double size = fabs(l->matrix[row * n + j]);
+            const $real size = $fabs(l->matrix[row * n + j]);
 //end
             l->factors[row * n + j] = l->matrix[row * n + j];
             if (size > most) {
@@ -265,17 +279,17 @@ static int ha_lu_factor_full(ha_lu *l)
         l->scale[row] = most;
     }
     for (k = 0; k < n; ++k) {
-        const int pivot = ha_lu_pivot(l, k);
+        const int pivot = $ha_lu_pivot(l, k);
         if (pivot < 0) {
             return 0;
         }
-        ha_lu_swap(l, k, pivot);
+        $ha_lu_swap(l, k, pivot);
         for (row = k + 1; row < n; ++row) {
-            if (l->factors[row * n + k] != 0.0) {
-                const double factor = l->factors[row * n + k] / l->factors[k * n + k];
+            if (l->factors[row * n + k] != $0.0) {
+                const $real factor = l->factors[row * n + k] / l->factors[k * n + k];
                 l->factors[row * n + k] = factor;
                 for (j = k + 1; j < n; ++j) {
-                    const double product = factor * l->factors[k * n + j];
+                    const $real product = factor * l->factors[k * n + j];
                     l->factors[row * n + j] -= product;
                 }
             }
@@ -284,72 +298,75 @@ static int ha_lu_factor_full(ha_lu *l)
     return 1;
 }
 
-static void ha_lu_substitute(ha_lu *l, double *b)
+//item ha_lu_substitute
+static void ha_lu_substitute(ha_lu *l, $real *b)
 {
     const int n = l->n;
     int row;
     for (row = 0; row < n; ++row) {
-        l->work[row] = ha_less_products(b[l->order[row]], l->factors + row * n, l->work, row);
+        l->work[row] = $ha_less_products(b[l->order[row]], l->factors + row * n, l->work, row);
     }
     for (row = n - 1; row >= 0; --row) {
-        const double *factors = l->factors + row * n;
-        const double left = ha_less_products(l->work[row], factors + row + 1, b + row + 1, n - row - 1);
+        const $real *factors = l->factors + row * n;
+        const $real left = $ha_less_products(l->work[row], factors + row + 1, b + row + 1, n - row - 1);
         b[row] = left / factors[row];
     }
 }
 
 //if sparse
+//item ha_sparse_row
 /* Factors the row in a place of the order; 0 if a pivot does not do. */
 static int ha_sparse_row(ha_lu *l, int place)
 {
     const ha_order *o = l->pattern->order;
-    double scale = DBL_MIN;
-    double weight;
+    $real scale = $DBL_MIN;
+    $real weight;
     int i;
     int j;
     for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
-        l->row[o->lower[i]] = 0.0;
+        l->row[o->lower[i]] = $0.0;
     }
     for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
-        l->row[o->upper[i]] = 0.0;
+        l->row[o->upper[i]] = $0.0;
     }
-    l->row[place] = 0.0;
+    l->row[place] = $0.0;
     for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
 //if single
-        const double size = fabs(l->entries[i]) / l->columns[o->matrix[i]];
+        const $real size = $fabs(l->entries[i]) / l->columns[o->matrix[i]];
 //else
-        const double size = fabs(l->entries[i]);
+        const $real size = $fabs(l->entries[i]);
 //end
         l->row[o->matrix[i]] = l->entries[i];
-        scale = ha_max(scale, size);
+        scale = $ha_max(scale, size);
     }
     for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
         const int k = o->lower[i];
-        const double factor = l->row[k] * l->inverse[k];
-        if (!(1e-3 * fabs(l->row[k]) <= l->weight[k] * scale)) {
+        const $real factor = l->row[k] * l->inverse[k];
+        if (!($1e-3 * $fabs(l->row[k]) <= l->weight[k] * scale)) {
             return 0;
         }
         l->lower[i] = factor;
         for (j = o->upper_starts[k]; j < o->upper_starts[k + 1]; ++j) {
-            const double product = factor * l->upper[j];
+            const $real product = factor * l->upper[j];
             l->row[o->upper[j]] -= product;
         }
     }
-    weight = fabs(l->row[place]) / scale;
+    weight = $fabs(l->row[place]) / scale;
     l->weight[place] = weight;
 //if single
     weight /= l->columns[place];
 //end
-    if (!(weight > DBL_EPSILON * (double)l->n && ha_finite(weight))) {
+    if (!(weight > $DBL_EPSILON * ($real)l->n && $ha_finite(weight))) {
         return 0;
     }
-    l->inverse[place] = 1.0 / l->row[place];
+    l->inverse[place] = $1.0 / l->row[place];
     for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
         l->upper[i] = l->row[o->upper[i]];
     }
     return 1;
 }
 
+//item ha_sparse_factor
 /* Factors a sparse matrix; where the pivots of its order do not do, as a full one if it is not too large. */
 static int ha_sparse_factor(ha_lu *l)
 {
@@ -358,51 +375,52 @@ static int ha_sparse_factor(ha_lu *l)
     int place;
     int i;
 //if single
-    ha_fill(l->columns, DBL_MIN, n);
+    $ha_fill(l->columns, $DBL_MIN, n);
     for (i = 0; i < o->starts[n]; ++i) {
         const int column = o->matrix[i];
-        l->columns[column] = ha_max(l->columns[column], fabs(l->entries[i]));
+        l->columns[column] = $ha_max(l->columns[column], $fabs(l->entries[i]));
     }
 //end
     l->order[n] = 0;
     for (place = 0; place < n; ++place) {
-        if (!ha_sparse_row(l, place)) {
+        if (!$ha_sparse_row(l, place)) {
             break;
         }
     }
     if (place == n) {
         return 1;
     }
-    if (n > SPARSE_FULL_AT_MOST) {
+    if (n > $SPARSE_FULL_AT_MOST) {
         return 0;
     }
     l->order[n] = 1;
-    ha_fill(l->matrix, 0.0, n * n);
+    $ha_fill(l->matrix, $0.0, n * n);
     for (place = 0; place < n; ++place) {
         for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
             l->matrix[o->rows[place] * n + o->columns[o->matrix[i]]] = l->entries[i];
         }
     }
-    return ha_lu_factor_full(l);
+    return $ha_lu_factor_full(l);
 }
 
-static void ha_sparse_substitute(ha_lu *l, double *b)
+//item ha_sparse_substitute
+static void ha_sparse_substitute(ha_lu *l, $real *b)
 {
     const ha_order *o = l->pattern->order;
     int place;
     int i;
     for (place = 0; place < l->n; ++place) {
-        double left = b[o->rows[place]];
+        $real left = b[o->rows[place]];
         for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
-            const double product = l->lower[i] * l->work[o->lower[i]];
+            const $real product = l->lower[i] * l->work[o->lower[i]];
             left -= product;
         }
         l->work[place] = left;
     }
     for (place = l->n - 1; place >= 0; --place) {
-        double left = l->work[place];
+        $real left = l->work[place];
         for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
-            const double product = l->upper[i] * l->work[o->upper[i]];
+            const $real product = l->upper[i] * l->work[o->upper[i]];
             left -= product;
         }
         l->work[place] = left * l->inverse[place];
@@ -410,63 +428,66 @@ static void ha_sparse_substitute(ha_lu *l, double *b)
     }
 }
 
-static void ha_sparse_solve(ha_lu *l, double *b)
+//item ha_sparse_solve
+static void ha_sparse_solve(ha_lu *l, $real *b)
 {
     const ha_order *o = l->pattern->order;
     const int n = l->n;
     int place;
     int i;
-    ha_copy(l->rest, b, n);
-    ha_sparse_substitute(l, b);
+    $ha_copy(l->rest, b, n);
+    $ha_sparse_substitute(l, b);
     for (place = 0; place < n; ++place) {
-        double left = l->rest[o->rows[place]];
+        $real left = l->rest[o->rows[place]];
         for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
-            const double product = l->entries[i] * b[o->columns[o->matrix[i]]];
+            const $real product = l->entries[i] * b[o->columns[o->matrix[i]]];
             left -= product;
         }
         l->rest[o->rows[place]] = left;
     }
-    ha_sparse_substitute(l, l->rest);
+    $ha_sparse_substitute(l, l->rest);
     for (i = 0; i < n; ++i) {
-        if (ha_finite(l->rest[i])) {
+        if ($ha_finite(l->rest[i])) {
             b[i] += l->rest[i];
         }
     }
 }
 
 //end
+//item ha_lu_factor
 /* Takes up the entries of a matrix and factors it; 0 if no pivot is left, or if an entry is not finite. */
-static int ha_lu_factor(ha_lu *l, const double *entries)
+static int ha_lu_factor(ha_lu *l, const $real *entries)
 {
     const ha_pattern *p = l->pattern;
     int i;
     int e;
 //if sparse
     if (p->order != NULL) {
-        for (e = 0; e < ha_entries(p); ++e) {
+        for (e = 0; e < $ha_entries(p); ++e) {
             l->entries[p->order->positions[e]] = entries[e];
         }
-        return ha_sparse_factor(l);
+        return $ha_sparse_factor(l);
     }
 //end
-    ha_fill(l->matrix, 0.0, l->n * l->n);
+    $ha_fill(l->matrix, $0.0, l->n * l->n);
     for (i = 0; i < l->n; ++i) {
         for (e = p->starts[i]; e < p->starts[i + 1]; ++e) {
             l->matrix[i * l->n + p->columns[e]] = entries[e];
         }
     }
-    return ha_lu_factor_full(l);
+    return $ha_lu_factor_full(l);
 }
 
+//item ha_lu_solve
 /* Replaces b by the solution. */
-static void ha_lu_solve(ha_lu *l, double *b)
+static void ha_lu_solve(ha_lu *l, $real *b)
 {
     const int n = l->n;
     int row;
     int j;
 //if sparse
     if (l->pattern->order != NULL && !l->order[n]) {
-        ha_sparse_solve(l, b);
+        $ha_sparse_solve(l, b);
         return;
     }
 //end
@@ -475,26 +496,27 @@ static void ha_lu_solve(ha_lu *l, double *b)
         return;
     }
     if (l->order[0] < 0) {
-        ha_lu_solve_definite(l, b);
+        $ha_lu_solve_definite(l, b);
         return;
     }
-    ha_copy(l->rest, b, n);
-    ha_lu_substitute(l, b);
+    $ha_copy(l->rest, b, n);
+    $ha_lu_substitute(l, b);
     for (row = 0; row < n; ++row) {
         for (j = 0; j < n; ++j) {
-            const double product = l->matrix[row * n + j] * b[j];
+            const $real product = l->matrix[row * n + j] * b[j];
             l->rest[row] -= product;
         }
     }
-    ha_lu_substitute(l, l->rest);
+    $ha_lu_substitute(l, l->rest);
     for (row = 0; row < n; ++row) {
         /* A refinement that is no small correction is none: the equations are not finite. */
-        if (ha_finite(l->rest[row])) {
+        if ($ha_finite(l->rest[row])) {
             b[row] += l->rest[row];
         }
     }
 }
 
+//item ha_lu_is_positive
 /* Whether the determinant of the factored matrix is above zero. */
 static int ha_lu_is_positive(const ha_lu *l)
 {
@@ -506,16 +528,16 @@ static int ha_lu_is_positive(const ha_lu *l)
     if (l->pattern->order != NULL && !l->order[n]) {
         changes = l->pattern->order->odd;
         for (k = 0; k < n; ++k) {
-            changes += l->inverse[k] > 0.0 ? 0 : 1;
+            changes += l->inverse[k] > $0.0 ? 0 : 1;
         }
         return changes % 2 == 0;
     }
 //end
     if (l->order[0] < 0) {
-        return n % 2 == 0 || l->scale[0] > 0.0;
+        return n % 2 == 0 || l->scale[0] > $0.0;
     }
     for (k = 0; k < n; ++k) {
-        if (l->factors[k * n + k] < 0.0) {
+        if (l->factors[k * n + k] < $0.0) {
             ++changes;
         }
         for (j = k + 1; j < n; ++j) {
@@ -527,46 +549,49 @@ static int ha_lu_is_positive(const ha_lu *l)
     return changes % 2 == 0;
 }
 
+//item ha_linear
 /* a x = b with a matrix that varies: the solution in x. 0 if there is none or more than one. */
-static int ha_linear(ha_model *m, const ha_pattern *pattern, const double *a, const double *b, double *x)
+static int ha_linear(ha_model *m, const ha_pattern *pattern, const $real *a, const $real *b, $real *x)
 {
-    ha_lu l = ha_lu_at(m->work, m->order, pattern);
-    if (!ha_lu_factor(&l, a)) {
+    ha_lu l = $ha_lu_at(m->work, m->order, pattern);
+    if (!$ha_lu_factor(&l, a)) {
         return 0;
     }
-    ha_copy(x, b, l.n);
-    ha_lu_solve(&l, x);
+    $ha_copy(x, b, l.n);
+    $ha_lu_solve(&l, x);
     return 1;
 }
 
+//item ha_linear_constant
 /* The same with a matrix of parameters alone, factored once for a set of parameters. */
-static int ha_linear_constant(ha_model *m, int number, int place, int order, const ha_pattern *pattern, const double *a, const double *b, double *x)
+static int ha_linear_constant(ha_model *m, int number, int place, int order, const ha_pattern *pattern, const $real *a, const $real *b, $real *x)
 {
-    ha_lu l = ha_lu_at(m->factors + place, m->factors_order + order, pattern);
+    ha_lu l = $ha_lu_at(m->factors + place, m->factors_order + order, pattern);
     if (!m->factored[number]) {
-        m->factored[number] = ha_lu_factor(&l, a);
+        m->factored[number] = $ha_lu_factor(&l, a);
     }
     if (!m->factored[number]) {
         return 0;
     }
-    ha_copy(x, b, l.n);
-    ha_lu_solve(&l, x);
+    $ha_copy(x, b, l.n);
+    $ha_lu_solve(&l, x);
     return 1;
 }
 
+//item ha_linear_rate
 /* The rate of the solution, once it has been computed with the matrix whose factors stand in a place. */
-static void ha_linear_rate(double *place, int *order, const ha_pattern *p, const double *da, const double *db, const double *x, double *dx)
+static void ha_linear_rate($real *place, int *order, const ha_pattern *p, const $real *da, const $real *db, const $real *x, $real *dx)
 {
-    ha_lu l = ha_lu_at(place, order, p);
+    ha_lu l = $ha_lu_at(place, order, p);
     int i;
     int e;
     for (i = 0; i < l.n; ++i) {
-        double moved = -0.0;
+        $real moved = -$0.0;
         for (e = p->starts[i]; e < p->starts[i + 1]; ++e) {
-            const double product = da[e] * x[p->columns[e]];
+            const $real product = da[e] * x[p->columns[e]];
             moved += product;
         }
         dx[i] = db[i] - moved;
     }
-    ha_lu_solve(&l, dx);
+    $ha_lu_solve(&l, dx);
 }

@@ -4,41 +4,41 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "NAME.h"
+#include "$model.h"
 
-static void print(const MODEL *m)
+static void print(const $model *m)
 {
     printf("%.17g", m->t);
-PRINT_OUTPUTS
+$PRINT_OUTPUTS
     printf("\n");
 }
 
 int main(int argc, char **argv)
 {
-    static MODEL m;
+    static $model m;
     const double to = argc > 1 ? strtod(argv[1], NULL) : 1.0;
     const long every = argc > 2 ? strtol(argv[2], NULL, 10) : 1;
     long steps = 0;
-    int status = MODEL_reset(&m);
-    printf("tOUTPUT_NAMES\n");
+    int status = $model_reset(&m);
+    printf("t$OUTPUT_NAMES\n");
     if (argc > 3 && strcmp(argv[3], "units") == 0) {
-        printf("sOUTPUT_UNITS\n");
+        printf("s$OUTPUT_UNITS\n");
     }
-    if (status == MODEL_OK) {
-        status = MODEL_start(&m, 0.0);
+    if (status == $MODEL_OK) {
+        status = $model_start(&m, 0.0);
     }
-    if (status == MODEL_OK) {
+    if (status == $MODEL_OK) {
         print(&m);
     }
-    while (status == MODEL_OK && m.t < to - 1e-9 * m.step) {
-        status = MODEL_step(&m);
+    while (status == $MODEL_OK && m.t < to - 1e-9 * m.step) {
+        status = $model_step(&m);
         ++steps;
-        if (status == MODEL_OK && (every <= 1 || steps % every == 0)) {
+        if (status == $MODEL_OK && (every <= 1 || steps % every == 0)) {
             print(&m);
         }
     }
-    if (status != MODEL_OK) {
-        fprintf(stderr, "at t = %g s: %s\n", m.failure.time, MODEL_message(&m));
+    if (status != $MODEL_OK) {
+        fprintf(stderr, "at t = %g s: %s\n", m.failure.time, $model_message(&m));
         return 3;
     }
     if (fflush(stdout) != 0 || ferror(stdout)) {

@@ -1,41 +1,47 @@
+//section
 /* ---- the matrix of an implicit step ---- */
 
+//item ha_group_starts
 /* Columns of the Jacobian in groups: no two of a group have a nonzero in the same row. */
 static const int ha_group_starts[] = {
-GROUP_STARTS
+$GROUP_STARTS
 };
+//item ha_group_columns
 static const int ha_group_columns[] = {
-GROUP_COLUMNS
+$GROUP_COLUMNS
 };
+//item ha_column_starts
 static const int ha_column_starts[] = {
-COLUMN_STARTS
+$COLUMN_STARTS
 };
+//item ha_column_rows
 static const int ha_column_rows[] = {
-COLUMN_ROWS
+$COLUMN_ROWS
 };
+//item ha_dense_factor
 /* Factors m->matrix in place; the column without pivot, or -1. */
 static int ha_dense_factor(ha_model *m)
 {
-    double *a = m->matrix;
+    $real *a = m->matrix;
     int row;
     int j;
     int k;
 //if single
     /* The magnitudes of columns: few digits tell units from a singular matrix only if these are known. */
     for (j = 0; j < HA_NX; ++j) {
-        m->matrix_columns[j] = DBL_MIN;
+        m->matrix_columns[j] = $DBL_MIN;
         for (row = 0; row < HA_NX; ++row) {
-            m->matrix_columns[j] = ha_max(m->matrix_columns[j], fabs(a[row * HA_NX + j]));
+            m->matrix_columns[j] = $ha_max(m->matrix_columns[j], $fabs(a[row * HA_NX + j]));
         }
     }
 //end
     for (row = 0; row < HA_NX; ++row) {
-        double most = DBL_MIN;
+        $real most = $DBL_MIN;
         for (j = 0; j < HA_NX; ++j) {
 //if single
-            const double size = fabs(a[row * HA_NX + j]) / m->matrix_columns[j];
+            const $real size = $fabs(a[row * HA_NX + j]) / m->matrix_columns[j];
 //else
-            const double size = fabs(a[row * HA_NX + j]);
+            const $real size = $fabs(a[row * HA_NX + j]);
 //end
             if (size > most) {
                 most = size;
@@ -45,19 +51,19 @@ static int ha_dense_factor(ha_model *m)
         m->matrix_scale[row] = most;
     }
     for (k = 0; k < HA_NX; ++k) {
-        double weight;
-        const int best = ha_pivot_row(a, m->matrix_scale, HA_NX, k, &weight);
+        $real weight;
+        const int best = $ha_pivot_row(a, m->matrix_scale, HA_NX, k, &weight);
 //if single
         weight /= m->matrix_columns[k];
 //end
-        if (!(weight > DBL_EPSILON * (double)HA_NX)) {
+        if (!(weight > $DBL_EPSILON * ($real)HA_NX)) {
             return k;
         }
         if (best != k) {
-            const double scale = m->matrix_scale[k];
+            const $real scale = m->matrix_scale[k];
             const int order = m->matrix_order[k];
             for (j = 0; j < HA_NX; ++j) {
-                const double entry = a[k * HA_NX + j];
+                const $real entry = a[k * HA_NX + j];
                 a[k * HA_NX + j] = a[best * HA_NX + j];
                 a[best * HA_NX + j] = entry;
             }
@@ -67,11 +73,11 @@ static int ha_dense_factor(ha_model *m)
             m->matrix_order[best] = order;
         }
         for (row = k + 1; row < HA_NX; ++row) {
-            const double factor = a[row * HA_NX + k] / a[k * HA_NX + k];
+            const $real factor = a[row * HA_NX + k] / a[k * HA_NX + k];
             a[row * HA_NX + k] = factor;
-            if (factor != 0.0) {
+            if (factor != $0.0) {
                 for (j = k + 1; j < HA_NX; ++j) {
-                    const double product = factor * a[k * HA_NX + j];
+                    const $real product = factor * a[k * HA_NX + j];
                     a[row * HA_NX + j] -= product;
                 }
             }
@@ -80,59 +86,61 @@ static int ha_dense_factor(ha_model *m)
     return -1;
 }
 
-static void ha_dense_solve(ha_model *m, double *b)
+//item ha_dense_solve
+static void ha_dense_solve(ha_model *m, $real *b)
 {
-    const double *a = m->matrix;
+    const $real *a = m->matrix;
     int row;
     int j;
     for (row = 0; row < HA_NX; ++row) {
-        double sum = -0.0;
+        $real sum = -$0.0;
         for (j = 0; j < row; ++j) {
-            const double product = a[row * HA_NX + j] * m->matrix_work[j];
+            const $real product = a[row * HA_NX + j] * m->matrix_work[j];
             sum += product;
         }
         m->matrix_work[row] = b[m->matrix_order[row]] - sum;
     }
     for (row = HA_NX - 1; row >= 0; --row) {
-        double sum = -0.0;
+        $real sum = -$0.0;
         for (j = row + 1; j < HA_NX; ++j) {
-            const double product = a[row * HA_NX + j] * b[j];
+            const $real product = a[row * HA_NX + j] * b[j];
             sum += product;
         }
         b[row] = (m->matrix_work[row] - sum) / a[row * HA_NX + row];
     }
 }
 
+//item ha_step_matrix
 /* Puts 1 - factor * Jacobian at x into m->matrix; m->sizes takes up what its rows add up where the states are. */
-static int ha_step_matrix(ha_model *m, ha_wide t, const double *x, double factor)
+static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
 {
     int group;
     int i;
     int j;
-    ha_fill(m->matrix, 0.0, HA_NX * HA_NX);
+    $ha_fill(m->matrix, $0.0, HA_NX * HA_NX);
     for (i = 0; i < HA_NX; ++i) {
-        m->matrix[i * HA_NX + i] = 1.0;
+        m->matrix[i * HA_NX + i] = $1.0;
     }
-    for (group = 0; group < GROUPS; ++group) {
+    for (group = 0; group < $GROUPS; ++group) {
         int status;
-        ha_fill(m->direction, 0.0, HA_NX);
-        for (i = ha_group_starts[group]; i < ha_group_starts[group + 1]; ++i) {
-            m->direction[ha_group_columns[i]] = 1.0;
+        $ha_fill(m->direction, $0.0, HA_NX);
+        for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
+            m->direction[$ha_group_columns[i]] = $1.0;
         }
-        status = MODEL_tangent(m, t, x, m->direction, m->product);
-        if (status != MODEL_OK) {
+        status = $model_tangent(m, t, x, m->direction, m->product);
+        if (status != $MODEL_OK) {
             return status;
         }
-        for (i = ha_group_starts[group]; i < ha_group_starts[group + 1]; ++i) {
-            const int column = ha_group_columns[i];
-            for (j = ha_column_starts[column]; j < ha_column_starts[column + 1]; ++j) {
-                const int row = ha_column_rows[j];
-                const double value = factor * m->product[row];
+        for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
+            const int column = $ha_group_columns[i];
+            for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
+                const int row = $ha_column_rows[j];
+                const $real value = factor * m->product[row];
                 m->matrix[row * HA_NX + column] += -factor * m->product[row];
-                m->sizes[row] += fabs(value * x[column]);
+                m->sizes[row] += $fabs(value * x[column]);
             }
         }
     }
-    i = ha_dense_factor(m);
-    return i >= 0 ? ha_fail(m, MODEL_STEP_SINGULAR, i, t) : MODEL_OK;
+    i = $ha_dense_factor(m);
+    return i >= 0 ? $ha_fail(m, $MODEL_STEP_SINGULAR, i, t) : $MODEL_OK;
 }

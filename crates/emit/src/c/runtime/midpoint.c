@@ -1,36 +1,39 @@
 
+//section
 /* ---- the implicit midpoint rule: Newton with the exact Jacobian ---- */
 
+//item ha_scales
 /* Typical magnitudes of the states. */
-static const double ha_scales[] = {
-SCALES
+static const $real ha_scales[] = {
+$SCALES
 };
 
+//item ha_correct
 /* One Newton iteration on the midpoint. */
-static int ha_correct(ha_model *m, ha_wide t, double half, const double *x)
+static int ha_correct(ha_model *m, double t, $real half, const $real *x)
 {
-    int status = MODEL_rates(m, t, m->middle, m->stages);
+    int status = $model_rates(m, t, m->middle, m->stages);
     int i;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NX; ++i) {
-        m->sizes[i] = fabs(x[i]);
+        m->sizes[i] = $fabs(x[i]);
     }
-    status = ha_step_matrix(m, t, m->middle, half);
-    if (status != MODEL_OK) {
+    status = $ha_step_matrix(m, t, m->middle, half);
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NX; ++i) {
-        const double move = half * m->stages[i];
+        const $real move = half * m->stages[i];
 //if single
         m->correction[i] = move - m->half_way[i];
 //else
-        const double end = x[i] + move;
+        const $real end = x[i] + move;
         m->correction[i] = end - m->middle[i];
 //end
     }
-    ha_dense_solve(m, m->correction);
+    $ha_dense_solve(m, m->correction);
     for (i = 0; i < HA_NX; ++i) {
 //if single
         m->half_way[i] += m->correction[i];
@@ -39,17 +42,18 @@ static int ha_correct(ha_model *m, ha_wide t, double half, const double *x)
         m->middle[i] += m->correction[i];
 //end
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
+//item ha_relative_correction
 /* The greatest correction, each relative to its state or to what its equation adds up. */
-static double ha_relative_correction(const ha_model *m)
+static $real ha_relative_correction(const ha_model *m)
 {
-    double most = 0.0;
+    $real most = $0.0;
     int i;
     for (i = 0; i < HA_NX; ++i) {
-        const double size = ha_max(ha_max(fabs(m->middle[i]), m->sizes[i]), ha_scales[i]);
-        const double relative = m->correction[i] == 0.0 ? 0.0 : fabs(m->correction[i]) / size;
+        const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), $ha_scales[i]);
+        const $real relative = m->correction[i] == $0.0 ? $0.0 : $fabs(m->correction[i]) / size;
         if (relative > most || relative != relative) {
             most = relative;
         }
@@ -57,31 +61,32 @@ static double ha_relative_correction(const ha_model *m)
     return most;
 }
 
+//item ha_method
 /* From t to t + h: the end in m->trial. */
-static int ha_method(ha_model *m, ha_wide t, double h, const double *x)
+static int ha_method(ha_model *m, double t, $real h, const $real *x)
 {
-    const ha_wide middle_time = t + ha_widen(0.5 * h);
+    const double middle_time = t + $widen($0.5 * h);
     int iteration;
     int i;
-    ha_copy(m->middle, x, HA_NX);
+    $ha_copy(m->middle, x, HA_NX);
 //if single
-    ha_fill(m->half_way, 0.0, HA_NX);
+    $ha_fill(m->half_way, $0.0, HA_NX);
 //end
     for (iteration = 0; iteration < 20; ++iteration) {
-        const int status = ha_correct(m, middle_time, 0.5 * h, x);
-        if (status != MODEL_OK) {
+        const int status = $ha_correct(m, middle_time, $0.5 * h, x);
+        if (status != $MODEL_OK) {
             return status;
         }
-        if (ha_relative_correction(m) <= CLOSE_TO_ROUNDING) {
+        if ($ha_relative_correction(m) <= $CLOSE_TO_ROUNDING) {
             for (i = 0; i < HA_NX; ++i) {
 //if single
-                ha_move(m, x, i, 2.0 * m->half_way[i]);
+                $ha_move(m, x, i, $2.0 * m->half_way[i]);
 //else
-                m->trial[i] = 2.0 * m->middle[i] - x[i];
+                m->trial[i] = $2.0 * m->middle[i] - x[i];
 //end
             }
-            return MODEL_OK;
+            return $MODEL_OK;
         }
     }
-    return ha_fail(m, MODEL_NO_STEP, 0, middle_time);
+    return $ha_fail(m, $MODEL_NO_STEP, 0, middle_time);
 }

@@ -1,5 +1,5 @@
 /* Start conditions in which one unknown is left, solved together: unknowns (states, then conserved constants) and code. */
-typedef int (*ha_start_code)(ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates);
+typedef int (*ha_start_code)(ha_model *m, double t, const $real *x, const $real *e, $real *out, $real *rates);
 
 typedef struct {
     int count;
@@ -20,6 +20,7 @@ typedef struct {
 } ha_group;
 
 //if guesses
+//always
 /* Where the search of an unknown begins: as far as one step of Newton tells, where the code gives 0. */
 typedef struct {
     int unknown;
@@ -27,87 +28,93 @@ typedef struct {
 } ha_guess;
 
 //end
-START_TABLES
-enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = MOST_AT_ONCE, HA_MOST_ROWS = MOST_ROWS, HA_MOST_COLUMNS = MOST_COLUMNS };
+//always
+$START_TABLES
 
+enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = $MOST_AT_ONCE, HA_MOST_ROWS = $MOST_ROWS, HA_MOST_COLUMNS = $MOST_COLUMNS };
+
+//item ha_start_residuals
 /* Residuals at z and their derivatives along the direction in m->along. */
-static int ha_start_residuals(ha_model *m, ha_wide t, ha_start_code code, const double *z, double *out, double *rates)
+static int ha_start_residuals(ha_model *m, double t, ha_start_code code, const $real *z, $real *out, $real *rates)
 {
 //if conserved
-    ha_copy(m->k, z + HA_NX, HA_NK);
+    $ha_copy(m->k, z + HA_NX, HA_NK);
 //end
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
     return code(m, t, z, m->along, out, rates);
 }
 
-static double *ha_along_unknown(ha_model *m, int unknown)
+//item ha_along_unknown
+static $real *ha_along_unknown(ha_model *m, int unknown)
 {
     return &m->along[unknown < HA_NX ? HA_STATES_AT + unknown : HA_CONSERVED_AT + unknown - HA_NX];
 }
 
 //if guesses
+//item ha_begin_search
 /* Places the unknowns that are guessed. */
-static void ha_begin_search(ha_model *m, ha_wide t, double *z)
+static void ha_begin_search(ha_model *m, double t, $real *z)
 {
     int i;
-    for (i = 0; i < GUESSES; ++i) {
+    for (i = 0; i < $GUESSES; ++i) {
         const int unknown = ha_guesses[i].unknown;
-        double out;
-        double slope;
-        ha_fill(m->along, 0.0, HA_DIRECTION);
-        *ha_along_unknown(m, unknown) = 1.0;
-        if (ha_start_residuals(m, t, ha_guesses[i].code, z, &out, &slope) == MODEL_OK) {
-            const double place = z[unknown] - out / slope;
-            z[unknown] = ha_finite(place) ? place : z[unknown];
+        $real out;
+        $real slope;
+        $ha_fill(m->along, $0.0, HA_DIRECTION);
+        *$ha_along_unknown(m, unknown) = $1.0;
+        if ($ha_start_residuals(m, t, ha_guesses[i].code, z, &out, &slope) == $MODEL_OK) {
+            const $real place = z[unknown] - out / slope;
+            z[unknown] = $ha_finite(place) ? place : z[unknown];
         }
     }
 }
 
 //end
+//item ha_solve_each
 /* Newton for each unknown of a pass by itself. */
-static void ha_solve_each(ha_model *m, ha_wide t, const ha_pass *pass, double *z, unsigned char *known, unsigned char *met)
+static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, $real *z, unsigned char *known, unsigned char *met)
 {
-    double out[HA_MOST_AT_ONCE];
-    double slope[HA_MOST_AT_ONCE];
-    double least[HA_MOST_AT_ONCE];
-    double best[HA_MOST_AT_ONCE] = {0.0};
-    double step[HA_MOST_AT_ONCE] = {0.0};
-    double begin[HA_MOST_AT_ONCE] = {0.0};
+    $real out[HA_MOST_AT_ONCE];
+    $real slope[HA_MOST_AT_ONCE];
+    $real least[HA_MOST_AT_ONCE];
+    $real best[HA_MOST_AT_ONCE] = {$0.0};
+    $real step[HA_MOST_AT_ONCE] = {$0.0};
+    $real begin[HA_MOST_AT_ONCE] = {$0.0};
     unsigned char done[HA_MOST_AT_ONCE];
     int iteration;
     int i;
     for (i = 0; i < pass->count; ++i) {
-        least[i] = HUGE_VAL;
+        least[i] = $HUGE_VAL;
         begin[i] = z[pass->unknowns[i]];
         best[i] = begin[i];
-        step[i] = 0.0;
+        step[i] = $0.0;
         done[i] = 0;
     }
     for (iteration = 0; iteration < 60; ++iteration) {
         int all = 1;
-        ha_fill(m->along, 0.0, HA_DIRECTION);
+        $ha_fill(m->along, $0.0, HA_DIRECTION);
         for (i = 0; i < pass->count; ++i) {
-            *ha_along_unknown(m, pass->unknowns[i]) = 1.0;
+            *$ha_along_unknown(m, pass->unknowns[i]) = $1.0;
         }
-        if (ha_start_residuals(m, t, pass->code, z, out, slope) != MODEL_OK) {
+        if ($ha_start_residuals(m, t, pass->code, z, out, slope) != $MODEL_OK) {
             break;
         }
         for (i = 0; i < pass->count; ++i) {
-            double *place = &z[pass->unknowns[i]];
+            $real *place = &z[pass->unknowns[i]];
             if (done[i]) {
                 continue;
             }
-            if (fabs(out[i]) < least[i]) {
-                least[i] = fabs(out[i]);
+            if ($fabs(out[i]) < least[i]) {
+                least[i] = $fabs(out[i]);
                 best[i] = *place;
                 step[i] = -out[i] / slope[i];
             } else {
-                step[i] *= 0.5;
+                step[i] *= $0.5;
             }
-            done[i] = out[i] == 0.0 || fabs(step[i]) <= 2.0 * DBL_EPSILON * fabs(best[i]);
-            *place = done[i] || !ha_finite(step[i]) ? best[i] : best[i] + step[i];
+            done[i] = out[i] == $0.0 || $fabs(step[i]) <= $2.0 * $DBL_EPSILON * $fabs(best[i]);
+            *place = done[i] || !$ha_finite(step[i]) ? best[i] : best[i] + step[i];
             all = all && done[i];
         }
         if (all) {
@@ -124,103 +131,107 @@ static void ha_solve_each(ha_model *m, ha_wide t, const ha_pass *pass, double *z
 }
 
 //if start_groups
+//item ha_linearised
 /* Residuals of a group and their derivatives, row by row, 0 for conditions that are left out; whether all are finite. */
-static int ha_linearised(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const double *z, double *residual, double *jacobian)
+static int ha_linearised(ha_model *m, double t, const ha_group *g, const unsigned char *left_out, const $real *z, $real *residual, $real *jacobian)
 {
-    double rates[HA_MOST_ROWS];
+    $real rates[HA_MOST_ROWS];
     int i;
     int j;
     for (j = 0; j < (g->columns > 0 ? g->columns : 1); ++j) {
-        ha_fill(m->along, 0.0, HA_DIRECTION);
+        $ha_fill(m->along, $0.0, HA_DIRECTION);
         if (g->columns > 0) {
-            *ha_along_unknown(m, g->unknowns[j]) = 1.0;
+            *$ha_along_unknown(m, g->unknowns[j]) = $1.0;
         }
-        if (ha_start_residuals(m, t, g->code, z, residual, rates) != MODEL_OK) {
+        if ($ha_start_residuals(m, t, g->code, z, residual, rates) != $MODEL_OK) {
             return 0;
         }
         for (i = 0; i < g->rows && g->columns > 0; ++i) {
-            jacobian[i * g->columns + j] = left_out[i] ? 0.0 : rates[i];
+            jacobian[i * g->columns + j] = left_out[i] ? $0.0 : rates[i];
         }
     }
     for (i = 0; i < g->rows; ++i) {
-        residual[i] = left_out[i] ? 0.0 : residual[i];
+        residual[i] = left_out[i] ? $0.0 : residual[i];
     }
-    return ha_all_finite(residual, g->rows) && ha_all_finite(jacobian, g->rows * g->columns);
+    return $ha_all_finite(residual, g->rows) && $ha_all_finite(jacobian, g->rows * g->columns);
 }
 
+//item ha_weights
 /* The weights of rows, each by its greatest entry; entries that are rounding beside others in their column weigh as these. */
-static void ha_weights(int rows, int columns, const double *jacobian, double *weights)
+static void ha_weights(int rows, int columns, const $real *jacobian, $real *weights)
 {
-    double greatest[HA_MOST_COLUMNS] = {0.0};
+    $real greatest[HA_MOST_COLUMNS] = {$0.0};
     int i;
     int j;
     for (i = 0; i < rows; ++i) {
         for (j = 0; j < columns; ++j) {
-            greatest[j] = ha_max(greatest[j], fabs(jacobian[i * columns + j]));
+            greatest[j] = $ha_max(greatest[j], $fabs(jacobian[i * columns + j]));
         }
     }
     for (i = 0; i < rows; ++i) {
-        double most = 0.0;
+        $real most = $0.0;
         for (j = 0; j < columns; ++j) {
-            const double size = fabs(jacobian[i * columns + j]);
-            most = ha_max(most, size > 0.0 && size <= ROUNDING_OF_ENTRIES * greatest[j] ? greatest[j] : size);
+            const $real size = $fabs(jacobian[i * columns + j]);
+            most = $ha_max(most, size > $0.0 && size <= $ROUNDING_OF_ENTRIES * greatest[j] ? greatest[j] : size);
         }
-        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
+        weights[i] = most > $0.0 ? $1.0 / most : $1.0;
     }
 }
 
+//item ha_is_met
 /* Whether all conditions of a group are met to rounding of the terms they are made of, and of what solving together leaves
  * of an unknown that should be 0, beside the greatest of the others. */
-static int ha_is_met(ha_model *m, const ha_group *g, const double *z, const double *residual, const double *jacobian)
+static int ha_is_met(ha_model *m, const ha_group *g, const $real *z, const $real *residual, const $real *jacobian)
 {
-    double asked[START_CONDITIONS];
-    double weights[HA_MOST_ROWS];
-    double greatest = 0.0;
+    $real asked[$START_CONDITIONS];
+    $real weights[HA_MOST_ROWS];
+    $real greatest = $0.0;
     int i;
     int j;
-    ha_asked_code(m, asked);
-    ha_weights(g->rows, g->columns, jacobian, weights);
+    $ha_asked_code(m, asked);
+    $ha_weights(g->rows, g->columns, jacobian, weights);
     /* Freedom that makes others grow without bounds is none, so its conditions are no rounding beside these. */
     for (i = g->given; i < g->rows; ++i) {
-        double most = 0.0;
+        $real most = $0.0;
         for (j = 0; j < g->columns; ++j) {
-            most = ha_max(most, fabs(jacobian[i * g->columns + j]));
+            most = $ha_max(most, $fabs(jacobian[i * g->columns + j]));
         }
-        weights[i] = most > 0.0 ? 1.0 / most : 1.0;
+        weights[i] = most > $0.0 ? $1.0 / most : $1.0;
     }
     for (j = 0; j < g->columns; ++j) {
-        double share = 0.0;
+        $real share = $0.0;
         for (i = 0; i < g->rows; ++i) {
-            share = ha_max(share, fabs(jacobian[i * g->columns + j]) * weights[i]);
+            share = $ha_max(share, $fabs(jacobian[i * g->columns + j]) * weights[i]);
         }
-        greatest = ha_max(greatest, share * fabs(z[g->unknowns[j]]));
+        greatest = $ha_max(greatest, share * $fabs(z[g->unknowns[j]]));
     }
     for (i = 0; i < g->rows; ++i) {
-        const double rounding = 64.0 * DBL_EPSILON * greatest / weights[i];
-        double size = fabs(asked[g->conditions[i]]);
+        const $real rounding = $64.0 * $DBL_EPSILON * greatest / weights[i];
+        $real size = $fabs(asked[g->conditions[i]]);
         for (j = 0; j < g->columns; ++j) {
-            const double term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
-            size += fabs(term);
+            const $real term = jacobian[i * g->columns + j] * z[g->unknowns[j]];
+            size += $fabs(term);
         }
-        if (!(fabs(residual[i]) <= CLOSE_TO_ROUNDING * size + rounding)) {
+        if (!($fabs(residual[i]) <= $CLOSE_TO_ROUNDING * size + rounding)) {
             return 0;
         }
     }
     return 1;
 }
 
+//item ha_shortest_step
 /* The shortest of the steps that reduce jacobian * step + residual most, rows weighed, and columns so that the greatest
  * entry of each is 1: singular values by rotations of columns in pairs. */
-static int ha_shortest_step(int rows, int columns, const double *jacobian, const double *residual, const double *weights, double *step)
+static int ha_shortest_step(int rows, int columns, const $real *jacobian, const $real *residual, const $real *weights, $real *step)
 {
-    double b[HA_MOST_ROWS * HA_MOST_COLUMNS];
-    double v[HA_MOST_ROWS * HA_MOST_ROWS];
-    double sizes[HA_MOST_COLUMNS] = {0.0};
-    double right[HA_MOST_ROWS] = {0.0};
+    $real b[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    $real v[HA_MOST_ROWS * HA_MOST_ROWS];
+    $real sizes[HA_MOST_COLUMNS] = {$0.0};
+    $real right[HA_MOST_ROWS] = {$0.0};
     const int wide = rows < columns;
     const int n = wide ? rows : columns;
     const int length = wide ? columns : rows;
-    double greatest = 0.0;
+    $real greatest = $0.0;
     int sweep;
     int i;
     int j;
@@ -229,48 +240,48 @@ static int ha_shortest_step(int rows, int columns, const double *jacobian, const
         right[i] = -residual[i] * weights[i];
     }
     for (j = 0; j < columns; ++j) {
-        double most = 0.0;
+        $real most = $0.0;
         for (i = 0; i < rows; ++i) {
-            most = ha_max(most, fabs(jacobian[i * columns + j] * weights[i]));
+            most = $ha_max(most, $fabs(jacobian[i * columns + j] * weights[i]));
         }
-        sizes[j] = most > 0.0 ? 1.0 / most : 1.0;
+        sizes[j] = most > $0.0 ? $1.0 / most : $1.0;
     }
     for (i = 0; i < rows; ++i) {
         for (j = 0; j < columns; ++j) {
-            const double entry = jacobian[i * columns + j] * weights[i] * sizes[j];
+            const $real entry = jacobian[i * columns + j] * weights[i] * sizes[j];
             b[wide ? j * n + i : i * n + j] = entry;
         }
     }
     for (i = 0; i < n; ++i) {
         for (j = 0; j < n; ++j) {
-            v[i * n + j] = i == j ? 1.0 : 0.0;
+            v[i * n + j] = i == j ? $1.0 : $0.0;
         }
     }
     for (sweep = 0; sweep < 60; ++sweep) {
         int turned = 0;
         for (i = 0; i + 1 < n; ++i) {
             for (j = i + 1; j < n; ++j) {
-                double a = 0.0;
-                double c = 0.0;
-                double d = 0.0;
+                $real a = $0.0;
+                $real c = $0.0;
+                $real d = $0.0;
                 for (k = 0; k < length; ++k) {
                     a += b[k * n + i] * b[k * n + i];
                     c += b[k * n + j] * b[k * n + j];
                     d += b[k * n + i] * b[k * n + j];
                 }
-                if (fabs(d) > DBL_EPSILON * sqrt(a * c) && d != 0.0) {
-                    const double zeta = (c - a) / (2.0 * d);
-                    const double tangent = (zeta < 0.0 ? -1.0 : 1.0) / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
-                    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
-                    const double sine = cosine * tangent;
+                if ($fabs(d) > $DBL_EPSILON * $sqrt(a * c) && d != $0.0) {
+                    const $real zeta = (c - a) / ($2.0 * d);
+                    const $real tangent = (zeta < $0.0 ? -$1.0 : $1.0) / ($fabs(zeta) + $sqrt($1.0 + zeta * zeta));
+                    const $real cosine = $1.0 / $sqrt($1.0 + tangent * tangent);
+                    const $real sine = cosine * tangent;
                     turned = 1;
                     for (k = 0; k < length; ++k) {
-                        const double one = b[k * n + i];
+                        const $real one = b[k * n + i];
                         b[k * n + i] = cosine * one - sine * b[k * n + j];
                         b[k * n + j] = sine * one + cosine * b[k * n + j];
                     }
                     for (k = 0; k < n; ++k) {
-                        const double one = v[k * n + i];
+                        const $real one = v[k * n + i];
                         v[k * n + i] = cosine * one - sine * v[k * n + j];
                         v[k * n + j] = sine * one + cosine * v[k * n + j];
                     }
@@ -282,20 +293,20 @@ static int ha_shortest_step(int rows, int columns, const double *jacobian, const
         }
     }
     for (j = 0; j < n; ++j) {
-        double square = 0.0;
+        $real square = $0.0;
         for (k = 0; k < length; ++k) {
             square += b[k * n + j] * b[k * n + j];
         }
-        greatest = ha_max(greatest, square);
+        greatest = $ha_max(greatest, square);
     }
-    ha_fill(step, 0.0, columns);
+    $ha_fill(step, $0.0, columns);
     for (j = 0; j < n; ++j) {
-        double square = 0.0;
-        double part = 0.0;
+        $real square = $0.0;
+        $real part = $0.0;
         for (k = 0; k < length; ++k) {
             square += b[k * n + j] * b[k * n + j];
         }
-        if (!(sqrt(square) > ROUNDING_OF_RANK * sqrt(greatest))) {
+        if (!($sqrt(square) > $ROUNDING_OF_RANK * $sqrt(greatest))) {
             continue;
         }
         for (k = 0; k < rows; ++k) {
@@ -308,60 +319,62 @@ static int ha_shortest_step(int rows, int columns, const double *jacobian, const
     for (j = 0; j < columns; ++j) {
         step[j] *= sizes[j];
     }
-    return ha_all_finite(step, columns);
+    return $ha_all_finite(step, columns);
 }
 
-static double ha_weighed(const double *residual, const double *weights, int n)
+//item ha_weighed
+static $real ha_weighed(const $real *residual, const $real *weights, int n)
 {
-    double sum = 0.0;
+    $real sum = $0.0;
     int i;
     for (i = 0; i < n; ++i) {
-        const double part = residual[i] * weights[i];
+        const $real part = residual[i] * weights[i];
         sum += part * part;
     }
-    return sqrt(sum);
+    return $sqrt(sum);
 }
 
+//item ha_nearer
 /* One damped step of Gauss-Newton of minimum norm, of the unknowns that are not fixed; whether it helped. */
-static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const unsigned char *fixed, double *z, double *residual, double *jacobian)
+static int ha_nearer(ha_model *m, double t, const ha_group *g, const unsigned char *left_out, const unsigned char *fixed, $real *z, $real *residual, $real *jacobian)
 {
-    double moving[HA_MOST_ROWS * HA_MOST_COLUMNS];
-    double weights[HA_MOST_ROWS];
-    double step[HA_MOST_COLUMNS];
-    double before[HA_MOST_COLUMNS] = {0.0};
-    double next[HA_MOST_ROWS];
-    double next_jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
-    double fraction = 1.0;
-    double norm;
+    $real moving[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    $real weights[HA_MOST_ROWS];
+    $real step[HA_MOST_COLUMNS];
+    $real before[HA_MOST_COLUMNS] = {$0.0};
+    $real next[HA_MOST_ROWS];
+    $real next_jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    $real fraction = $1.0;
+    $real norm;
     int moves = 0;
     int halving;
     int j;
     for (j = 0; j < g->rows * g->columns; ++j) {
-        moving[j] = fixed[g->unknowns[j % g->columns]] ? 0.0 : jacobian[j];
+        moving[j] = fixed[g->unknowns[j % g->columns]] ? $0.0 : jacobian[j];
     }
-    ha_weights(g->rows, g->columns, jacobian, weights);
-    if (!ha_shortest_step(g->rows, g->columns, moving, residual, weights, step)) {
+    $ha_weights(g->rows, g->columns, jacobian, weights);
+    if (!$ha_shortest_step(g->rows, g->columns, moving, residual, weights, step)) {
         return 0;
     }
-    norm = ha_weighed(residual, weights, g->rows);
+    norm = $ha_weighed(residual, weights, g->rows);
     for (j = 0; j < g->columns; ++j) {
         before[j] = z[g->unknowns[j]];
-        moves = moves || fabs(step[j]) > 4.0 * DBL_EPSILON * fabs(before[j]);
+        moves = moves || $fabs(step[j]) > $4.0 * $DBL_EPSILON * $fabs(before[j]);
     }
-    if (norm == 0.0 || !moves) {
+    if (norm == $0.0 || !moves) {
         return 0;
     }
     for (halving = 0; halving < 30; ++halving) {
         for (j = 0; j < g->columns; ++j) {
-            const double move = fraction * step[j];
+            const $real move = fraction * step[j];
             z[g->unknowns[j]] = before[j] + move;
         }
-        if (ha_linearised(m, t, g, left_out, z, next, next_jacobian) && ha_weighed(next, weights, g->rows) < norm) {
-            ha_copy(residual, next, g->rows);
-            ha_copy(jacobian, next_jacobian, g->rows * g->columns);
+        if ($ha_linearised(m, t, g, left_out, z, next, next_jacobian) && $ha_weighed(next, weights, g->rows) < norm) {
+            $ha_copy(residual, next, g->rows);
+            $ha_copy(jacobian, next_jacobian, g->rows * g->columns);
             return 1;
         }
-        fraction *= 0.5;
+        fraction *= $0.5;
     }
     for (j = 0; j < g->columns; ++j) {
         z[g->unknowns[j]] = before[j];
@@ -369,46 +382,48 @@ static int ha_nearer(ha_model *m, ha_wide t, const ha_group *g, const unsigned c
     return 0;
 }
 
+//item ha_solve_from
 /* From one beginning of the unknowns that are open: whether all conditions are met. */
-static int ha_solve_from(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, const unsigned char *open, const unsigned char *fixed, double beginning, double offset, double *z)
+static int ha_solve_from(ha_model *m, double t, const ha_group *g, const unsigned char *left_out, const unsigned char *open, const unsigned char *fixed, $real beginning, $real offset, $real *z)
 {
-    double residual[HA_MOST_ROWS];
-    double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+    $real residual[HA_MOST_ROWS];
+    $real jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
     int i;
     for (i = 0; i < g->columns; ++i) {
         if (open[g->unknowns[i]]) {
 //if guesses
             /* What is guessed begins there, or close beside it. */
-            if (fabs(beginning) > 1e-3 && ha_guessed[g->unknowns[i]]) {
+            if ($fabs(beginning) > $1e-3 && ha_guessed[g->unknowns[i]]) {
                 continue;
             }
 //end
-            z[g->unknowns[i]] += beginning * (1.0 + offset * (double)i);
+            z[g->unknowns[i]] += beginning * ($1.0 + offset * ($real)i);
         }
     }
-    if (!ha_linearised(m, t, g, left_out, z, residual, jacobian)) {
+    if (!$ha_linearised(m, t, g, left_out, z, residual, jacobian)) {
         return 0;
     }
     for (i = 0; i < 60; ++i) {
-        if (!ha_nearer(m, t, g, left_out, fixed, z, residual, jacobian)) {
+        if (!$ha_nearer(m, t, g, left_out, fixed, z, residual, jacobian)) {
             break;
         }
     }
-    return ha_is_met(m, g, z, residual, jacobian);
+    return $ha_is_met(m, g, z, residual, jacobian);
 }
 
+//item ha_solve_group
 /* What is determined already stays, if the rest can be met so; then everything may move. */
-static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, const unsigned char *left_out, double *z, unsigned char *known)
+static int ha_solve_group(ha_model *m, double t, const ha_group *g, const unsigned char *left_out, $real *z, unsigned char *known)
 {
-    static const double beginnings[] = {0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0, 1e3, -1e3};
-    double before[HA_START_UNKNOWNS + 1];
+    static const $real beginnings[] = {$0.0, $1e-6, $1e-3, $1.0, -$1.0, -$1e-3, $30.0, -$30.0, $1e3, -$1e3};
+    $real before[HA_START_UNKNOWNS + 1];
     unsigned char open[HA_START_UNKNOWNS + 1];
     unsigned char fixed[HA_START_UNKNOWNS + 1];
     int any = 0;
-    int round;
+    int $round;
     int i;
     int j;
-    ha_copy(before, z, HA_START_UNKNOWNS);
+    $ha_copy(before, z, HA_START_UNKNOWNS);
     for (j = 0; j < HA_START_UNKNOWNS; ++j) {
         open[j] = !known[j];
         fixed[j] = known[j];
@@ -419,10 +434,10 @@ static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, const unsig
     if (!any) {
         memset(fixed, 0, sizeof fixed);
     }
-    for (round = any ? 0 : 1; round < 2; ++round) {
+    for ($round = any ? 0 : 1; $round < 2; ++$round) {
         for (i = 0; i < (any ? 10 : 1); ++i) {
-            ha_copy(z, before, HA_START_UNKNOWNS);
-            if (ha_solve_from(m, t, g, left_out, open, fixed, beginnings[i], i < 4 ? 0.0 : 1.0 / 16.0, z)) {
+            $ha_copy(z, before, HA_START_UNKNOWNS);
+            if ($ha_solve_from(m, t, g, left_out, open, fixed, beginnings[i], i < 4 ? $0.0 : $1.0 / $16.0, z)) {
                 for (j = 0; j < g->columns; ++j) {
                     known[g->unknowns[j]] = 1;
                 }
@@ -434,6 +449,7 @@ static int ha_solve_group(ha_model *m, ha_wide t, const ha_group *g, const unsig
     return 0;
 }
 
+//item ha_open
 static void ha_open(const ha_group *g, unsigned char *known)
 {
     int i;
@@ -442,14 +458,15 @@ static void ha_open(const ha_group *g, unsigned char *known)
     }
 }
 
+//item ha_solve_with_freedom
 /* A group with all that its freedom is to be; where that cannot be met, with as much of it as can, one after the other. */
-static int ha_solve_with_freedom(ha_model *m, ha_wide t, const ha_group *g, unsigned char *left_out, double *z, unsigned char *known)
+static int ha_solve_with_freedom(ha_model *m, double t, const ha_group *g, unsigned char *left_out, $real *z, unsigned char *known)
 {
-    double before[HA_START_UNKNOWNS + 1];
-    double found[HA_START_UNKNOWNS + 1];
+    $real before[HA_START_UNKNOWNS + 1];
+    $real found[HA_START_UNKNOWNS + 1];
     int i;
-    ha_copy(found, z, HA_START_UNKNOWNS);
-    if (ha_solve_group(m, t, g, left_out, z, known)) {
+    $ha_copy(found, z, HA_START_UNKNOWNS);
+    if ($ha_solve_group(m, t, g, left_out, z, known)) {
         return 1;
     }
     if (g->given == g->rows) {
@@ -459,31 +476,31 @@ static int ha_solve_with_freedom(ha_model *m, ha_wide t, const ha_group *g, unsi
         left_out[i] = 1;
     }
     /* What was determined by freedom is open again. */
-    ha_fill(before, 0.0, HA_START_UNKNOWNS);
+    $ha_fill(before, $0.0, HA_START_UNKNOWNS);
 //if guesses
-    ha_begin_search(m, t, before);
+    $ha_begin_search(m, t, before);
 //end
     for (i = 0; i < g->columns; ++i) {
         found[g->unknowns[i]] = before[g->unknowns[i]];
     }
-    ha_open(g, known);
-    ha_copy(before, found, HA_START_UNKNOWNS);
-    ha_copy(z, before, HA_START_UNKNOWNS);
-    if (g->given > 0 && !ha_solve_group(m, t, g, left_out, z, known)) {
+    $ha_open(g, known);
+    $ha_copy(before, found, HA_START_UNKNOWNS);
+    $ha_copy(z, before, HA_START_UNKNOWNS);
+    if (g->given > 0 && !$ha_solve_group(m, t, g, left_out, z, known)) {
         return 0;
     }
-    ha_copy(found, z, HA_START_UNKNOWNS);
+    $ha_copy(found, z, HA_START_UNKNOWNS);
     for (i = g->given; i < g->rows; ++i) {
         left_out[i] = 0;
-        ha_copy(z, before, HA_START_UNKNOWNS);
-        ha_open(g, known);
-        if (ha_solve_group(m, t, g, left_out, z, known)) {
-            ha_copy(found, z, HA_START_UNKNOWNS);
+        $ha_copy(z, before, HA_START_UNKNOWNS);
+        $ha_open(g, known);
+        if ($ha_solve_group(m, t, g, left_out, z, known)) {
+            $ha_copy(found, z, HA_START_UNKNOWNS);
         } else {
             left_out[i] = 1;
         }
     }
-    ha_copy(z, found, HA_START_UNKNOWNS);
+    $ha_copy(z, found, HA_START_UNKNOWNS);
     for (i = 0; i < g->columns; ++i) {
         known[g->unknowns[i]] = 1;
     }
@@ -491,23 +508,24 @@ static int ha_solve_with_freedom(ha_model *m, ha_wide t, const ha_group *g, unsi
 }
 
 //end
+//item ha_solve_start_once
 /* What is given holds, the rest is solved for, remaining freedom is zero or what is guessed. */
-static int ha_solve_start_once(ha_model *m, ha_wide t, double *z)
+static int ha_solve_start_once(ha_model *m, double t, $real *z)
 {
     unsigned char known[HA_START_UNKNOWNS + 1];
-    unsigned char met[START_CONDITIONS + 1];
+    unsigned char met[$START_CONDITIONS + 1];
     int i;
     int j;
     memset(known, 0, sizeof known);
     memset(met, 0, sizeof met);
-    ha_fill(z, 0.0, HA_START_UNKNOWNS);
+    $ha_fill(z, $0.0, HA_START_UNKNOWNS);
 //if guesses
-    ha_begin_search(m, t, z);
+    $ha_begin_search(m, t, z);
 //end
-    for (i = 0; i < PASSES; ++i) {
-        ha_solve_each(m, t, &ha_passes[i], z, known, met);
+    for (i = 0; i < $PASSES; ++i) {
+        $ha_solve_each(m, t, &ha_passes[i], z, known, met);
     }
-    for (i = 0; i < START_GROUPS; ++i) {
+    for (i = 0; i < $START_GROUPS; ++i) {
         const ha_group *g = &ha_groups[i];
         int all = 1;
         for (j = 0; j < g->rows; ++j) {
@@ -518,44 +536,45 @@ static int ha_solve_start_once(ha_model *m, ha_wide t, double *z)
         }
 //if start_groups
         if (g->code != NULL) {
-            double residual[HA_MOST_ROWS];
-            double jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
+            $real residual[HA_MOST_ROWS];
+            $real jacobian[HA_MOST_ROWS * HA_MOST_COLUMNS];
             unsigned char left_out[HA_MOST_ROWS];
             int solved = 1;
             memset(left_out, 0, sizeof left_out);
             for (j = 0; j < g->columns; ++j) {
                 solved = solved && known[g->unknowns[j]];
             }
-            if (solved && ha_linearised(m, t, g, left_out, z, residual, jacobian) && ha_is_met(m, g, z, residual, jacobian)) {
+            if (solved && $ha_linearised(m, t, g, left_out, z, residual, jacobian) && $ha_is_met(m, g, z, residual, jacobian)) {
                 continue;
             }
-            if (ha_solve_with_freedom(m, t, g, left_out, z, known)) {
+            if ($ha_solve_with_freedom(m, t, g, left_out, z, known)) {
                 continue;
             }
         }
 //end
-        return ha_fail(m, MODEL_NO_START, i, t);
+        return $ha_fail(m, $MODEL_NO_START, i, t);
     }
-    ha_copy(m->x, z, HA_NX);
+    $ha_copy(m->x, z, HA_NX);
 //if conserved
-    ha_copy(m->k, z + HA_NX, HA_NK);
+    $ha_copy(m->k, z + HA_NX, HA_NK);
 //end
-    m->failure.code = MODEL_OK;
-    return MODEL_OK;
+    m->failure.code = $MODEL_OK;
+    return $MODEL_OK;
 }
 
-static int ha_solve_start(ha_model *m, ha_wide t)
+//item ha_solve_start
+static int ha_solve_start(ha_model *m, double t)
 {
 //if held
-    double before[HA_START_UNKNOWNS + 1];
-    double z[HA_START_UNKNOWNS + 1];
-    int round;
-    ha_fill(before, 0.0, HA_START_UNKNOWNS);
-    for (round = 0; round < 20; ++round) {
+    $real before[HA_START_UNKNOWNS + 1];
+    $real z[HA_START_UNKNOWNS + 1];
+    int $round;
+    $ha_fill(before, $0.0, HA_START_UNKNOWNS);
+    for ($round = 0; $round < 20; ++$round) {
         int same = 1;
         int i;
-        int status = ha_solve_start_once(m, t, z);
-        if (status != MODEL_OK) {
+        int status = $ha_solve_start_once(m, t, z);
+        if (status != $MODEL_OK) {
             return status;
         }
         for (i = 0; i < HA_START_UNKNOWNS; ++i) {
@@ -566,14 +585,14 @@ static int ha_solve_start(ha_model *m, ha_wide t)
             break;
         }
         /* Held signals start with what the start makes of them. */
-        status = ha_begin_held(m, t, m->x);
-        if (status != MODEL_OK) {
+        status = $ha_begin_held(m, t, m->x);
+        if (status != $MODEL_OK) {
             return status;
         }
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 //else
-    double z[HA_START_UNKNOWNS + 1];
-    return ha_solve_start_once(m, t, z);
+    $real z[HA_START_UNKNOWNS + 1];
+    return $ha_solve_start_once(m, t, z);
 //end
 }

@@ -1,23 +1,25 @@
 
+//section
 /* ---- rates, outputs, jumps ---- */
 
 //if held
+//item ha_place
 /* Puts what is delayed or sampled where it is read. */
-static void ha_place(ha_model *m, ha_wide t)
+static void ha_place(ha_model *m, double t)
 {
 //if delays
-    static const int places[] = {DELAY_PLACES};
+    static const int places[] = {$DELAY_PLACES};
     int d;
-    for (d = 0; d < DELAYS; ++d) {
-        double slope;
-        m->z[places[d]] = ha_delay_at(m, d, t, &slope);
+    for (d = 0; d < $DELAYS; ++d) {
+        $real slope;
+        m->z[places[d]] = $ha_delay_at(m, d, t, &slope);
     }
 //end
 //if samples
     {
-        static const int held[] = {SAMPLE_PLACES};
+        static const int held[] = {$SAMPLE_PLACES};
         int s;
-        for (s = 0; s < SAMPLES; ++s) {
+        for (s = 0; s < $SAMPLES; ++s) {
             m->z[held[s]] = m->samples[s].value;
         }
     }
@@ -28,35 +30,37 @@ static void ha_place(ha_model *m, ha_wide t)
 }
 
 //end
-typedef int (*ha_code)(ha_model *m, ha_wide t, const double *x, double *out);
+//always
+typedef int (*ha_code)(ha_model *m, double t, const $real *x, $real *out);
 
+//item ha_run
 /* Runs code with conditions as held. Beyond a switch the held branch may have no value any more: then the conditions are
  * followed instead. */
-static int ha_run(ha_model *m, ha_code code, ha_wide t, const double *x, double *out, int n)
+static int ha_run(ha_model *m, ha_code code, double t, const $real *x, $real *out, int n)
 {
     int status;
 //if assumptions
     if (m->broken) {
-        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+        return $ha_fail(m, $MODEL_STRUCTURE, m->broken - 1, ((double)NAN));
     }
 //end
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
     status = code(m, t, x, out);
 //if switches
-    if (m->state_hold != HA_KEEP || (status == MODEL_OK && ha_all_finite(out, n))) {
+    if (m->state_hold != HA_KEEP || (status == $MODEL_OK && $ha_all_finite(out, n))) {
         return status;
     }
     m->state_hold = HA_FOLLOW;
     status = code(m, t, x, out);
-    if (status != MODEL_OK || !ha_all_finite(out, n)) {
+    if (status != $MODEL_OK || !$ha_all_finite(out, n)) {
         m->state_hold = HA_KEEP;
         status = code(m, t, x, out);
     }
     m->state_hold = HA_KEEP;
-    if (status == MODEL_OK) {
-        m->failure.code = MODEL_OK;
+    if (status == $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
     }
 //else
     (void)n;
@@ -65,91 +69,94 @@ static int ha_run(ha_model *m, ha_code code, ha_wide t, const double *x, double 
 }
 
 //if domains
+//item ha_explain
 /* The failure behind a value that is not a number: the first law without a value, if there is one. */
-static int ha_explain(ha_model *m, ha_wide t, const double *x, int code, int where)
+static int ha_explain(ha_model *m, double t, const $real *x, int code, int where)
 {
-    double arguments[DOMAINS];
+    $real arguments[$DOMAINS];
     int i;
-    ha_fill(arguments, 0.0, DOMAINS);
-    if (ha_domains_code(m, t, x, arguments) != MODEL_OK) {
-        return ha_fail(m, code, where, t);
+    $ha_fill(arguments, $0.0, $DOMAINS);
+    if ($ha_domains_code(m, t, x, arguments) != $MODEL_OK) {
+        return $ha_fail(m, code, where, t);
     }
-    for (i = 0; i < DOMAINS; ++i) {
-        if (ha_finite(arguments[i]) && !ha_is_within(i, arguments[i])) {
-            return ha_fail(m, MODEL_OUT_OF_DOMAIN, i, t);
+    for (i = 0; i < $DOMAINS; ++i) {
+        if ($ha_finite(arguments[i]) && !$ha_is_within(i, arguments[i])) {
+            return $ha_fail(m, $MODEL_OUT_OF_DOMAIN, i, t);
         }
     }
-    return ha_fail(m, code, where, t);
+    return $ha_fail(m, code, where, t);
 }
 
 //end
-int MODEL_rates(MODEL *m, ha_wide t, const double *x, double *dx)
+//always
+int $model_rates($model *m, double t, const $real *x, $real *dx)
 {
-    const int status = ha_run(m, ha_rates_code, t, x, dx, HA_NX);
+    const int status = $ha_run(m, $ha_rates_code, t, x, dx, HA_NX);
     int i;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NX; ++i) {
-        if (!ha_finite(dx[i])) {
+        if (!$ha_finite(dx[i])) {
 //if domains
-            return ha_explain(m, t, x, MODEL_RATE_NOT_FINITE, i);
+            return $ha_explain(m, t, x, $MODEL_RATE_NOT_FINITE, i);
 //else
-            return ha_fail(m, MODEL_RATE_NOT_FINITE, i, t);
+            return $ha_fail(m, $MODEL_RATE_NOT_FINITE, i, t);
 //end
         }
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
-int MODEL_observe(MODEL *m, ha_wide t, const double *x, double *y)
+int $model_observe($model *m, double t, const $real *x, $real *y)
 {
 //if outputs
-    const int status = ha_run(m, ha_observe_code, t, x, y, HA_NY);
+    const int status = $ha_run(m, $ha_observe_code, t, x, y, HA_NY);
     int infinite = -1;
     int i;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NY; ++i) {
         if (y[i] != y[i]) {
 //if domains
-            return ha_explain(m, t, x, MODEL_OUTPUT_NOT_FINITE, i);
+            return $ha_explain(m, t, x, $MODEL_OUTPUT_NOT_FINITE, i);
 //else
-            return ha_fail(m, MODEL_OUTPUT_NOT_FINITE, i, t);
+            return $ha_fail(m, $MODEL_OUTPUT_NOT_FINITE, i, t);
 //end
         }
-        if (!ha_finite(y[i]) && infinite < 0) {
+        if (!$ha_finite(y[i]) && infinite < 0) {
             infinite = i;
         }
     }
 //if domains
     /* What a modeller computes for himself may be infinite, what a law gives may not. */
-    return infinite < 0 ? MODEL_OK : ha_explain(m, t, x, MODEL_OK, 0);
+    return infinite < 0 ? $MODEL_OK : $ha_explain(m, t, x, $MODEL_OK, 0);
 //else
-    return MODEL_OK;
+    return $MODEL_OK;
 //end
 //else
     (void)m;
     (void)t;
     (void)x;
     (void)y;
-    return MODEL_OK;
+    return $MODEL_OK;
 //end
 }
 
 //if time_passes
+//item ha_let_time_pass
 /* Sets the direction of derivatives to that of time: what is delayed moves, states and inputs do not. */
-static void ha_let_time_pass(ha_model *m, ha_wide t)
+static void ha_let_time_pass(ha_model *m, double t)
 {
-    ha_fill(m->along, 0.0, HA_DIRECTION);
-    m->along[0] = 1.0;
+    $ha_fill(m->along, $0.0, HA_DIRECTION);
+    m->along[0] = $1.0;
 //if delays
     {
-        static const int places[] = {DELAY_PLACES};
+        static const int places[] = {$DELAY_PLACES};
         int d;
-        for (d = 0; d < DELAYS; ++d) {
-            (void)ha_delay_at(m, d, t, &m->along[HA_HELD_AT + places[d]]);
+        for (d = 0; d < $DELAYS; ++d) {
+            (void)$ha_delay_at(m, d, t, &m->along[HA_HELD_AT + places[d]]);
         }
     }
 //else
@@ -159,97 +166,103 @@ static void ha_let_time_pass(ha_model *m, ha_wide t)
 
 //end
 //if directional_derivative
+//always
 /* Code for derivatives along e. */
-typedef int ha_along_code(ha_model *m, ha_wide t, const double *x, const double *e, double *out, double *rates);
+typedef int ha_along_code(ha_model *m, double t, const $real *x, const $real *e, $real *out, $real *rates);
 
+//item ha_slopes_at
 /* Derivatives of the rates along m->along, by code for it, as they are at x. */
-static int ha_slopes_at(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
+static int ha_slopes_at(ha_model *m, double t, const $real *x, ha_along_code *code, $real *dv)
 {
-    double *e = m->along;
-    double *dx = m->along_out;
+    $real *e = m->along;
+    $real *dx = m->along_out;
     int status = code(m, t, x, e, dx, dv);
 //if switches
-    if (m->state_hold == HA_KEEP && (status != MODEL_OK || !ha_all_finite(dv, HA_NX))) {
+    if (m->state_hold == HA_KEEP && (status != $MODEL_OK || !$ha_all_finite(dv, HA_NX))) {
         m->state_hold = HA_FOLLOW;
         status = code(m, t, x, e, dx, dv);
-        if (status != MODEL_OK || !ha_all_finite(dv, HA_NX)) {
+        if (status != $MODEL_OK || !$ha_all_finite(dv, HA_NX)) {
             m->state_hold = HA_KEEP;
             status = code(m, t, x, e, dx, dv);
         }
         m->state_hold = HA_KEEP;
-        if (status == MODEL_OK) {
-            m->failure.code = MODEL_OK;
+        if (status == $MODEL_OK) {
+            m->failure.code = $MODEL_OK;
         }
     }
 //end
     return status;
 }
 
+//item ha_derivative_along
 /* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead. */
-static int ha_derivative_along(ha_model *m, ha_wide t, const double *x, ha_along_code *code, double *dv)
+static int ha_derivative_along(ha_model *m, double t, const $real *x, ha_along_code *code, $real *dv)
 {
-    const double *dx = m->along_out;
-    int status = ha_slopes_at(m, t, x, code, dv);
+    const $real *dx = m->along_out;
+    int status = $ha_slopes_at(m, t, x, code, dv);
     int i;
-    if (status == MODEL_OK && !ha_all_finite(dv, HA_NX)) {
+    if (status == $MODEL_OK && !$ha_all_finite(dv, HA_NX)) {
         for (i = 0; i < HA_NX; ++i) {
-            const double rate = ha_finite(dx[i]) ? dx[i] : 0.0;
-            const double size = rate < 0.0 ? -fabs(x[i]) : fabs(x[i]);
-            const double way = BESIDE * (size + rate);
-            m->beside[i] = x[i] + (way == 0.0 ? BESIDE * BESIDE : way);
+            const $real rate = $ha_finite(dx[i]) ? dx[i] : $0.0;
+            const $real size = rate < $0.0 ? -$fabs(x[i]) : $fabs(x[i]);
+            const $real way = $BESIDE * (size + rate);
+            m->beside[i] = x[i] + (way == $0.0 ? $BESIDE * $BESIDE : way);
         }
-        status = ha_slopes_at(m, t, m->beside, code, dv);
+        status = $ha_slopes_at(m, t, m->beside, code, dv);
     }
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NX; ++i) {
-        if (!ha_finite(dv[i])) {
-            return ha_fail(m, MODEL_DERIVATIVE_NOT_FINITE, i, t);
+        if (!$ha_finite(dv[i])) {
+            return $ha_fail(m, $MODEL_DERIVATIVE_NOT_FINITE, i, t);
         }
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
-int MODEL_tangent(MODEL *m, ha_wide t, const double *x, const double *v, double *dv)
+//always
+int $model_tangent($model *m, double t, const $real *x, const $real *v, $real *dv)
 {
-    ha_fill(m->along, 0.0, HA_DIRECTION);
-    ha_copy(m->along + HA_STATES_AT, v, HA_NX);
+    $ha_fill(m->along, $0.0, HA_DIRECTION);
+    $ha_copy(m->along + HA_STATES_AT, v, HA_NX);
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
-    return ha_derivative_along(m, t, x, ha_rates_along, dv);
+    return $ha_derivative_along(m, t, x, $ha_rates_along, dv);
 }
 
 //end
 //if time_derivative
+//item ha_time_derivative
 /* Derivatives of the rates by time, states and inputs at rest. */
-static int ha_time_derivative(ha_model *m, ha_wide t, const double *x, double *dv)
+static int ha_time_derivative(ha_model *m, double t, const $real *x, $real *dv)
 {
-    ha_let_time_pass(m, t);
+    $ha_let_time_pass(m, t);
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
-    return ha_derivative_along(m, t, x, ha_rates_by_time, dv);
+    return $ha_derivative_along(m, t, x, $ha_rates_by_time, dv);
 }
 
 //end
 //if derivatives
-int MODEL_directional(MODEL *m, ha_wide t, const double *x, const double *v, const double *w, double *dv, double *dy)
+//always
+int $model_directional($model *m, double t, const $real *x, const $real *v, const $real *w, $real *dv, $real *dy)
 {
-    double *e = m->along;
-    int status = MODEL_OK;
-    ha_fill(e, 0.0, HA_DIRECTION);
-    ha_copy(e + HA_STATES_AT, v, HA_NX);
-    ha_copy(e + 1, w, HA_NU);
+    $real *e = m->along;
+    int status = $MODEL_OK;
+    $ha_fill(e, $0.0, HA_DIRECTION);
+    $ha_copy(e + HA_STATES_AT, v, HA_NX);
+    $ha_copy(e + 1, w, HA_NU);
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
     if (dv != NULL) {
-        status = ha_rates_along(m, t, x, e, m->along_out, dv);
+        status = $ha_rates_along(m, t, x, e, m->along_out, dv);
     }
 //if outputs
-    if (status == MODEL_OK && dy != NULL) {
-        status = ha_observe_along(m, t, x, e, m->along_out, dy);
+    if (status == $MODEL_OK && dy != NULL) {
+        status = $ha_observe_along(m, t, x, e, m->along_out, dy);
     }
 //else
     (void)dy;
@@ -259,57 +272,67 @@ int MODEL_directional(MODEL *m, ha_wide t, const double *x, const double *v, con
 
 //end
 //if switches
-int MODEL_indicators(MODEL *m, ha_wide t, const double *x, double *g)
+//always
+int $model_indicators($model *m, double t, const $real *x, $real *g)
 {
-    static const int conditions[] = {SWITCH_CONDITIONS};
-    const int status = ha_run(m, ha_switching_code, t, x, m->operands, SWITCHES);
+    static const int conditions[] = {$SWITCH_CONDITIONS};
+    const int status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
     int next = 0;
     int i;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
-    for (i = 0; i < SWITCHES; ++i) {
-        ha_wide low;
-        ha_wide high;
-        if (ha_kinds[conditions[i]] == 0) {
+    for (i = 0; i < $SWITCHES; ++i) {
+        double low;
+        double high;
+        if ($ha_kinds[conditions[i]] == 0) {
             g[next] = m->operands[i];
             ++next;
             continue;
         }
-        ha_borders(m, conditions[i], &low, &high);
-        g[next] = ha_narrow(low - ha_widen(m->operands[i]));
-        g[next + 1] = ha_narrow(ha_widen(m->operands[i]) - high);
+        $ha_borders(m, conditions[i], &low, &high);
+//if single
+        g[next] = (float)(low - $widen m->operands[i]);
+//else
+        g[next] = low - $widen m->operands[i];
+//end
+//if single
+        g[next + 1] = (float)($widen m->operands[i] - high);
+//else
+        g[next + 1] = $widen m->operands[i] - high;
+//end
         next += 2;
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
+//item ha_take_sides
 /* Takes the sides at (t, x). */
-static int ha_take_sides(ha_model *m, ha_wide t, const double *x)
+static int ha_take_sides(ha_model *m, double t, const $real *x)
 {
-    static const int conditions[] = {SWITCH_CONDITIONS};
+    static const int conditions[] = {$SWITCH_CONDITIONS};
     int status;
     int i;
     m->state_hold = HA_TAKE;
 //if held
-    ha_place(m, t);
+    $ha_place(m, t);
 //end
-    status = ha_switching_code(m, t, x, m->operands);
-    for (i = 0; i < SWITCHES; ++i) {
-        switch (ha_kinds[conditions[i]]) {
+    status = $ha_switching_code(m, t, x, m->operands);
+    for (i = 0; i < $SWITCHES; ++i) {
+        switch ($ha_kinds[conditions[i]]) {
 //if sign_conditions
         case 0:
-            (void)ha_side(m, HA_TAKE, conditions[i], ha_widen(m->operands[i]));
+            (void)$ha_side(m, HA_TAKE, conditions[i], $widen m->operands[i]);
             break;
 //end
 //if floor_conditions
         case 1:
-            (void)ha_whole(m, HA_TAKE, conditions[i], ha_widen(m->operands[i]));
+            (void)$ha_whole(m, HA_TAKE, conditions[i], $widen m->operands[i]);
             break;
 //end
         default:
 //if piece_conditions
-            (void)ha_piece(m, HA_TAKE, conditions[i], ha_kinds[conditions[i]] - 2, ha_widen(m->operands[i]));
+            (void)$ha_piece(m, HA_TAKE, conditions[i], $ha_kinds[conditions[i]] - 2, $widen m->operands[i]);
 //end
             break;
         }
@@ -318,124 +341,129 @@ static int ha_take_sides(ha_model *m, ha_wide t, const double *x)
     return status;
 }
 
-int MODEL_switched(MODEL *m, ha_wide t, const double *x, int *switched)
+//always
+int $model_switched($model *m, double t, const $real *x, int *switched)
 {
-    const int status = MODEL_indicators(m, t, x, m->beyond);
+    const int status = $model_indicators(m, t, x, m->beyond);
     int i;
     *switched = 0;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NG; ++i) {
         if (m->beyond[i] != m->beyond[i]) {
-            return ha_fail(m, MODEL_CONDITION_NOT_FINITE, i, t);
+            return $ha_fail(m, $MODEL_CONDITION_NOT_FINITE, i, t);
         }
-        if (m->sides[i] != (m->beyond[i] > 0.0)) {
+        if (m->sides[i] != (m->beyond[i] > $0.0)) {
             *switched = 1;
         }
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
 //end
 //if held
+//item ha_sources
 /* Values and rates of what is delayed or sampled. */
-static int ha_sources(ha_model *m, ha_wide t, const double *x)
+static int ha_sources(ha_model *m, double t, const $real *x)
 {
-    const int status = MODEL_rates(m, t, x, m->dx);
-    if (status != MODEL_OK) {
+    const int status = $model_rates(m, t, x, m->dx);
+    if (status != $MODEL_OK) {
         return status;
     }
-    ha_let_time_pass(m, t);
-    ha_copy(m->along + HA_STATES_AT, m->dx, HA_NX);
-    return ha_sources_along(m, t, x, m->along, m->source, m->source_rate);
+    $ha_let_time_pass(m, t);
+    $ha_copy(m->along + HA_STATES_AT, m->dx, HA_NX);
+    return $ha_sources_along(m, t, x, m->along, m->source, m->source_rate);
 }
 
+//item ha_begin_held
 /* Held signals at the start of a run. They may read each other: passes until nothing changes. */
-static int ha_begin_held(ha_model *m, ha_wide t, const double *x)
+static int ha_begin_held(ha_model *m, double t, const $real *x)
 {
     int pass;
     for (pass = 0; pass < HA_NZ; ++pass) {
-        const int status = ha_sources(m, t, x);
-        if (status != MODEL_OK) {
+        const int status = $ha_sources(m, t, x);
+        if (status != $MODEL_OK) {
             return status;
         }
 //if delays
         {
-            static const int places[] = {DELAY_PLACES};
+            static const int places[] = {$DELAY_PLACES};
             int d;
-            for (d = 0; d < DELAYS; ++d) {
-                ha_delay_begin(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+            for (d = 0; d < $DELAYS; ++d) {
+                $ha_delay_begin(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
             }
         }
 //end
 //if samples
         {
-            static const int held[] = {SAMPLE_PLACES};
+            static const int held[] = {$SAMPLE_PLACES};
             int s;
-            for (s = 0; s < SAMPLES; ++s) {
+            for (s = 0; s < $SAMPLES; ++s) {
                 m->samples[s].value = m->source[held[s]];
                 m->samples[s].taken = t;
-                m->samples[s].next = HA_WIDE(floor(t / m->samples[s].period));
-                ha_sample_pass(m, s, t);
+                m->samples[s].next = floor(t / m->samples[s].period);
+                $ha_sample_pass(m, s, t);
             }
         }
 //end
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
 //end
 //if samples
+//item ha_take_samples
 /* Takes the samples that are due, in order: each sees those taken before it. One that was taken at this very instant is
  * taken again if an input or a parameter has changed. */
-static int ha_take_samples(ha_model *m, ha_wide t, const double *x)
+static int ha_take_samples(ha_model *m, double t, const $real *x)
 {
-    static const int held[] = {SAMPLE_PLACES};
+    static const int held[] = {$SAMPLE_PLACES};
     int s;
-    for (s = 0; s < SAMPLES; ++s) {
-        if (t >= ha_sample_next(m, s) || (m->cross_due && t == m->samples[s].taken)) {
-            const int status = ha_sources(m, t, x);
-            if (status != MODEL_OK) {
+    for (s = 0; s < $SAMPLES; ++s) {
+        if (t >= $ha_sample_next(m, s) || (m->cross_due && t == m->samples[s].taken)) {
+            const int status = $ha_sources(m, t, x);
+            if (status != $MODEL_OK) {
                 return status;
             }
             m->samples[s].value = m->source[held[s]];
             m->samples[s].taken = t;
-            ha_sample_pass(m, s, t);
+            $ha_sample_pass(m, s, t);
         }
     }
-    return MODEL_OK;
+    return $MODEL_OK;
 }
 
 //end
 //if follows
+//item ha_follow_solutions
 /* Goes on with the Newton solutions at (t, x). */
-static int ha_follow_solutions(ha_model *m, ha_wide t, const double *x)
+static int ha_follow_solutions(ha_model *m, double t, const $real *x)
 {
-    int status = MODEL_OK;
+    int status = $MODEL_OK;
 //if rates_newton
     {
-        static const int blocks[] = {RATES_BLOCKS};
+        static const int blocks[] = {$RATES_BLOCKS};
         int i;
-        status = MODEL_rates(m, t, x, m->dx);
-        if (status != MODEL_OK) {
+        status = $model_rates(m, t, x, m->dx);
+        if (status != $MODEL_OK) {
             return status;
         }
-        for (i = 0; i < RATES_BLOCK_COUNT; ++i) {
-            ha_newton_accept(m, blocks[i]);
+        for (i = 0; i < $RATES_BLOCK_COUNT; ++i) {
+            $ha_newton_accept(m, blocks[i]);
         }
     }
 //end
 //if shown_newton
     {
-        static const int blocks[] = {SHOWN_BLOCKS};
+        static const int blocks[] = {$SHOWN_BLOCKS};
         int i;
-        status = ha_run(m, ha_observe_code, t, x, m->shown, HA_NY);
-        if (status != MODEL_OK) {
+        status = $ha_run(m, $ha_observe_code, t, x, m->shown, HA_NY);
+        if (status != $MODEL_OK) {
             return status;
         }
-        for (i = 0; i < SHOWN_BLOCK_COUNT; ++i) {
-            ha_newton_accept(m, blocks[i]);
+        for (i = 0; i < $SHOWN_BLOCK_COUNT; ++i) {
+            $ha_newton_accept(m, blocks[i]);
         }
     }
 //end
@@ -443,42 +471,43 @@ static int ha_follow_solutions(ha_model *m, ha_wide t, const double *x)
 }
 
 //end
-int MODEL_accept(MODEL *m, ha_wide t, const double *x)
+//always
+int $model_accept($model *m, double t, const $real *x)
 {
 //if delays
-    static const int places[] = {DELAY_PLACES};
+    static const int places[] = {$DELAY_PLACES};
     int d;
-    const int status = ha_sources(m, t, x);
-    if (status != MODEL_OK) {
+    const int status = $ha_sources(m, t, x);
+    if (status != $MODEL_OK) {
         return status;
     }
-    for (d = 0; d < DELAYS; ++d) {
-        ha_delay_append(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+    for (d = 0; d < $DELAYS; ++d) {
+        $ha_delay_append(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
         if (m->delays[d].full) {
-            return ha_fail(m, MODEL_NO_ROOM, d, t);
+            return $ha_fail(m, $MODEL_NO_ROOM, d, t);
         }
     }
 //end
 //if follows
-    return ha_follow_solutions(m, t, x);
+    return $ha_follow_solutions(m, t, x);
 //else
     (void)m;
     (void)t;
     (void)x;
-    return MODEL_OK;
+    return $MODEL_OK;
 //end
 }
 
-ha_wide MODEL_next_jump(MODEL *m, ha_wide t)
+double $model_next_jump($model *m, double t)
 {
-    ha_wide next = HA_WIDE(HUGE_VAL);
+    double next = HUGE_VAL;
     (void)m;
     (void)t;
 //if delays
     {
         int d;
-        for (d = 0; d < DELAYS; ++d) {
-            const ha_wide at = ha_delay_next(m, d, t);
+        for (d = 0; d < $DELAYS; ++d) {
+            const double at = $ha_delay_next(m, d, t);
             if (at > t && at < next) {
                 next = at;
             }
@@ -488,8 +517,8 @@ ha_wide MODEL_next_jump(MODEL *m, ha_wide t)
 //if samples
     {
         int s;
-        for (s = 0; s < SAMPLES; ++s) {
-            const ha_wide at = ha_sample_next(m, s);
+        for (s = 0; s < $SAMPLES; ++s) {
+            const double at = $ha_sample_next(m, s);
             if (at > t && at < next) {
                 next = at;
             }
@@ -504,16 +533,16 @@ ha_wide MODEL_next_jump(MODEL *m, ha_wide t)
     return next;
 }
 
-int MODEL_cross(MODEL *m, ha_wide t, const double *x)
+int $model_cross($model *m, double t, const $real *x)
 {
-    int status = MODEL_OK;
+    int status = $MODEL_OK;
 //if assumptions
     if (m->broken) {
-        return ha_fail(m, MODEL_STRUCTURE, m->broken - 1, HA_WIDE((double)NAN));
+        return $ha_fail(m, $MODEL_STRUCTURE, m->broken - 1, ((double)NAN));
     }
 //end
     m->crossed = t;
-    ha_copy(m->u_crossed, m->u, HA_NU);
+    $ha_copy(m->u_crossed, m->u, HA_NU);
 //if switches
     m->state_hold = HA_FOLLOW;
 //end
@@ -521,62 +550,62 @@ int MODEL_cross(MODEL *m, ha_wide t, const double *x)
     {
         /* A solution may leap where something jumps. */
         int i;
-        for (i = 0; i < BLOCKS; ++i) {
+        for (i = 0; i < $BLOCKS; ++i) {
             m->following[i] = 0;
         }
     }
 //end
 //if clocks
-    ha_clock_cross(m, t);
+    $ha_clock_cross(m, t);
 //end
 //if held
     if (!m->begun) {
-        status = ha_begin_held(m, t, x);
+        status = $ha_begin_held(m, t, x);
 //if samples
     } else {
-        status = ha_take_samples(m, t, x);
+        status = $ha_take_samples(m, t, x);
 //end
     }
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
 //end
     m->begun = 1;
     m->cross_due = 0;
 //if switches
-    status = ha_take_sides(m, t, x);
-    if (status != MODEL_OK) {
+    status = $ha_take_sides(m, t, x);
+    if (status != $MODEL_OK) {
         return status;
     }
 //end
 //if delays
     {
-        static const int places[] = {DELAY_PLACES};
+        static const int places[] = {$DELAY_PLACES};
         int d;
-        status = ha_sources(m, t, x);
-        if (status != MODEL_OK) {
+        status = $ha_sources(m, t, x);
+        if (status != $MODEL_OK) {
             return status;
         }
-        for (d = 0; d < DELAYS; ++d) {
-            ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+        for (d = 0; d < $DELAYS; ++d) {
+            $ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
             if (m->delays[d].full) {
-                return ha_fail(m, MODEL_NO_ROOM, d, t);
+                return $ha_fail(m, $MODEL_NO_ROOM, d, t);
             }
         }
     }
 //end
 //if follows
-    status = ha_follow_solutions(m, t, x);
-    if (status != MODEL_OK) {
+    status = $ha_follow_solutions(m, t, x);
+    if (status != $MODEL_OK) {
         return status;
     }
 //end
 //if switches
-    status = MODEL_indicators(m, t, x, m->beyond);
-    if (status == MODEL_OK) {
+    status = $model_indicators(m, t, x, m->beyond);
+    if (status == $MODEL_OK) {
         int i;
         for (i = 0; i < HA_NG; ++i) {
-            m->sides[i] = m->beyond[i] > 0.0;
+            m->sides[i] = m->beyond[i] > $0.0;
         }
     }
 //else

@@ -1,7 +1,7 @@
-/* MODEL_TITLE, written by halfarrow. What it keeps to:
-OBLIGATION_LINES
+/* $MODEL_TITLE, written by halfarrow. What it keeps to:
+$OBLIGATION_LINES
  */
-#include "NAME.h"
+#include "$model.h"
 
 #include <float.h>
 #include <math.h>
@@ -15,20 +15,20 @@ OBLIGATION_LINES
 #error "results need arithmetic by the standard: compile without -ffast-math"
 #endif
 
-typedef MODEL ha_model;
+typedef $model ha_model;
 
 enum {
-    HA_NX = MODEL_STATES,
-    HA_NU = MODEL_INPUTS,
-    HA_NP = MODEL_PARAMETERS,
-    HA_NY = MODEL_OUTPUTS,
-    HA_NZ = COUNT_HELD,
-    HA_NK = COUNT_CONSERVED,
-    HA_NG = COUNT_INDICATORS,
+    HA_NX = $MODEL_STATES,
+    HA_NU = $MODEL_INPUTS,
+    HA_NP = $MODEL_PARAMETERS,
+    HA_NY = $MODEL_OUTPUTS,
+    HA_NZ = $COUNT_HELD,
+    HA_NK = $COUNT_CONSERVED,
+    HA_NG = $COUNT_INDICATORS,
     /* A direction: time, inputs, held signals, conserved constants, states. */
-    HA_DIRECTION = LAYOUT_DIRECTION,
-    HA_HELD_AT = LAYOUT_HELD,
-    HA_CONSERVED_AT = LAYOUT_CONSERVED,
-    HA_STATES_AT = LAYOUT_STATES
+    HA_DIRECTION = $LAYOUT_DIRECTION,
+    HA_HELD_AT = $LAYOUT_HELD,
+    HA_CONSERVED_AT = $LAYOUT_CONSERVED,
+    HA_STATES_AT = $LAYOUT_STATES
 };
 

@@ -5,11 +5,11 @@
 /* ---- what both versions of the interface share ---- */
 
 enum {
-    HA_NX = MODEL_STATES,
-    HA_NU = MODEL_INPUTS,
-    HA_NP = MODEL_PARAMETERS,
-    HA_NY = MODEL_OUTPUTS,
-    HA_NG = MODEL_INDICATORS,
+    HA_NX = $MODEL_STATES,
+    HA_NU = $MODEL_INPUTS,
+    HA_NP = $MODEL_PARAMETERS,
+    HA_NY = $MODEL_OUTPUTS,
+    HA_NG = $MODEL_INDICATORS,
     /* Value references: time, states, their derivatives, inputs, parameters, outputs, event indicators. */
     HA_FIRST_STATE = 1,
     HA_FIRST_DERIVATIVE = HA_FIRST_STATE + HA_NX,
@@ -30,12 +30,12 @@ enum { HA_TRIAL_EVALUATIONS = 1000000 };
 
 /* What may be done with a parameter: 0 nothing, 1 set before the start, 2 set at any time. */
 static const unsigned char ha_settable[] = {
-SETTABLE
+$SETTABLE
 };
 
 /* Everything that a run consists of: saved and restored as a whole. */
 typedef struct {
-    MODEL m;
+    $model m;
     int mode;
     /* Whether the start has to be found. */
     int start_due;
@@ -79,9 +79,9 @@ static int ha_failed(ha_fmu *f)
     char text[1024];
     const double time = f->s.m.failure.time;
     if (time == time) {
-        (void)snprintf(text, sizeof text, "at t = %g s: %s", time, MODEL_message(&f->s.m));
+        (void)snprintf(text, sizeof text, "at t = %g s: %s", time, $model_message(&f->s.m));
     } else {
-        (void)snprintf(text, sizeof text, "with these parameters: %s", MODEL_message(&f->s.m));
+        (void)snprintf(text, sizeof text, "with these parameters: %s", $model_message(&f->s.m));
     }
     ha_say(f, text);
     f->s.mode = HA_FAILED;
@@ -97,7 +97,7 @@ static int ha_without_value(ha_fmu *f)
     (void)ha_failed(f);
     if (f->discarded) {
         f->s.mode = mode;
-        f->s.m.failure.code = MODEL_OK;
+        f->s.m.failure.code = $MODEL_OK;
     }
     return 0;
 }
@@ -145,7 +145,7 @@ static int ha_begin(ha_fmu *f)
     f->s.start_time = 0.0;
     memset(f->s.scales, 0, sizeof f->s.scales);
     ha_changed(f);
-    if (MODEL_reset(&f->s.m) != MODEL_OK) {
+    if ($model_reset(&f->s.m) != $MODEL_OK) {
         return 0;
     }
     if (f->exchange) {
@@ -158,7 +158,7 @@ static int ha_begin(ha_fmu *f)
 static int ha_started(ha_fmu *f)
 {
     if (f->s.start_due && f->s.mode <= HA_INITIALISING) {
-        if (MODEL_start(&f->s.m, f->s.start_time) != MODEL_OK) {
+        if ($model_start(&f->s.m, f->s.start_time) != $MODEL_OK) {
             return ha_failed(f);
         }
         f->s.start_due = 0;
@@ -171,7 +171,7 @@ static int ha_started(ha_fmu *f)
 static int ha_rates(ha_fmu *f)
 {
     if (f->s.rates_due) {
-        if (MODEL_rates(&f->s.m, f->s.m.t, f->s.m.x, f->s.dx) != MODEL_OK) {
+        if ($model_rates(&f->s.m, f->s.m.t, f->s.m.x, f->s.dx) != $MODEL_OK) {
             return ha_without_value(f);
         }
         f->s.rates_due = 0;
@@ -182,7 +182,7 @@ static int ha_rates(ha_fmu *f)
 static int ha_outputs(ha_fmu *f)
 {
     if (f->s.outputs_due) {
-        if (MODEL_observe(&f->s.m, f->s.m.t, f->s.m.x, f->s.y) != MODEL_OK) {
+        if ($model_observe(&f->s.m, f->s.m.t, f->s.m.x, f->s.y) != $MODEL_OK) {
             return ha_without_value(f);
         }
         f->s.outputs_due = 0;
@@ -196,7 +196,7 @@ static int ha_indicators(ha_fmu *f, double *values)
 {
 //if switches
     int i;
-    if (MODEL_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != MODEL_OK) {
+    if ($model_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != $MODEL_OK) {
         return ha_without_value(f);
     }
     for (i = 0; i < HA_NG; ++i) {
@@ -216,7 +216,7 @@ static int ha_scale(ha_fmu *f)
 //if switches
     double values[HA_NG];
     int i;
-    if (MODEL_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != MODEL_OK) {
+    if ($model_indicators(&f->s.m, f->s.m.t, f->s.m.x, values) != $MODEL_OK) {
         return ha_failed(f);
     }
     for (i = 0; i < HA_NG; ++i) {
@@ -283,11 +283,11 @@ static int ha_set(ha_fmu *f, unsigned reference, double value)
         if (ha_settable[parameter] < (before ? 1 : 2)) {
             return ha_refuse(f, before ? "this variable cannot be set" : "this parameter is fixed once the run has begun");
         }
-        status = MODEL_set_parameter(&f->s.m, parameter, value);
-        if (status == MODEL_STRUCTURE) {
+        status = $model_set_parameter(&f->s.m, parameter, value);
+        if (status == $MODEL_STRUCTURE) {
             /* Other parameters may be set with it: the start or the next step says whether they all fit. */
-            f->s.m.failure.code = MODEL_OK;
-        } else if (status != MODEL_OK) {
+            f->s.m.failure.code = $MODEL_OK;
+        } else if (status != $MODEL_OK) {
             return ha_failed(f);
         }
     } else {
@@ -315,7 +315,7 @@ static int ha_initialised(ha_fmu *f)
 static int ha_event(ha_fmu *f, double *next)
 {
     if (!f->s.fresh) {
-        if (MODEL_cross(&f->s.m, f->s.m.t, f->s.m.x) != MODEL_OK) {
+        if ($model_cross(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_failed(f);
         }
         f->s.fresh = 1;
@@ -324,7 +324,7 @@ static int ha_event(ha_fmu *f, double *next)
     if (!ha_scale(f)) {
         return 0;
     }
-    *next = MODEL_next_jump(&f->s.m, f->s.m.t);
+    *next = $model_next_jump(&f->s.m, f->s.m.t);
     return 1;
 }
 
@@ -332,11 +332,11 @@ static int ha_event(ha_fmu *f, double *next)
  * every step, the solution is taken anew, as after a jump, and that is said. */
 static int ha_stepped(ha_fmu *f)
 {
-    MODEL *m = &f->s.m;
-    if (MODEL_accept(m, m->t, m->x) != MODEL_OK) {
-        const MODEL_failure failure = m->failure;
-        m->failure.code = MODEL_OK;
-        if (MODEL_cross(m, m->t, m->x) != MODEL_OK) {
+    $model *m = &f->s.m;
+    if ($model_accept(m, m->t, m->x) != $MODEL_OK) {
+        const $model_failure failure = m->failure;
+        m->failure.code = $MODEL_OK;
+        if ($model_cross(m, m->t, m->x) != $MODEL_OK) {
             m->failure = failure;
             return ha_failed(f);
         }
@@ -351,7 +351,7 @@ static int ha_stepped(ha_fmu *f)
  * one. */
 static int ha_advance_to(ha_fmu *f, double from, double length)
 {
-    MODEL *m = &f->s.m;
+    $model *m = &f->s.m;
     const double slack = 1e-9 * m->step;
     const double end = from + length;
     if (!(length >= 0.0 && length - length == 0.0)) {
@@ -366,12 +366,12 @@ static int ha_advance_to(ha_fmu *f, double from, double length)
     while (m->t + slack < end) {
         int status;
         if (end - m->t < m->step - slack) {
-            status = MODEL_step_until(m, end);
-            MODEL_align(m);
+            status = $model_step_until(m, end);
+            $model_align(m);
         } else {
-            status = MODEL_step(m);
+            status = $model_step(m);
         }
-        if (status != MODEL_OK) {
+        if (status != $MODEL_OK) {
             return ha_failed(f);
         }
     }
@@ -403,7 +403,7 @@ static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const 
             return ha_refuse(f, "directional derivatives are taken by states and inputs");
         }
     }
-    if (MODEL_directional(&f->s.m, f->s.m.t, f->s.m.x, v, w, dv, dy) != MODEL_OK) {
+    if ($model_directional(&f->s.m, f->s.m.t, f->s.m.x, v, w, dv, dy) != $MODEL_OK) {
         return ha_without_value(f);
     }
     for (i = 0; i < rows; ++i) {
@@ -471,7 +471,7 @@ static int ha_deserialise(ha_fmu *f, const void *bytes, size_t size, void **save
 static void ha_nominals(double *values)
 {
     static const double nominals[] = {
-NOMINALS
+$NOMINALS
     };
     int i;
     for (i = 0; i < HA_NX; ++i) {
@@ -482,7 +482,7 @@ NOMINALS
 static ha_fmu *ha_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *))
 {
     ha_fmu *f;
-    if (token == NULL || strcmp(token, "TOKEN") != 0) {
+    if (token == NULL || strcmp(token, "$TOKEN") != 0) {
         return NULL;
     }
     f = (ha_fmu *)allocate(1, sizeof *f);

@@ -1,9 +1,9 @@
-/* MODEL_TITLE as a Functional Mock-up Unit 2.0. */
-#include "MODEL.h"
+/* $MODEL_TITLE as a Functional Mock-up Unit 2.0. */
+#include "$model.h"
 
 #include "fmi2Functions.h"
 
-COMMON
+$COMMON
 /* ---- FMI 2.0 ---- */
 
 /* How bad it is what is said. */

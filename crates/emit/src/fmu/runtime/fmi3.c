@@ -1,9 +1,9 @@
-/* MODEL_TITLE as a Functional Mock-up Unit 3.0. */
-#include "MODEL.h"
+/* $MODEL_TITLE as a Functional Mock-up Unit 3.0. */
+#include "$model.h"
 
 #include "fmi3Functions.h"
 
-COMMON
+$COMMON
 /* ---- FMI 3.0 ---- */
 
 /* How bad it is what is said. */

@@ -57,6 +57,7 @@ impl Frame {
         if !self.evaluate(solve, false) {
             return Err(NotConverged { iterations: 0, residual: f64::NAN });
         }
+        self.newton_of(solve).valued = true;
         let most = self.iteration_limit(solve, globalization);
         for iteration in 0..most {
             if self.residual(solve) == 0.0 {

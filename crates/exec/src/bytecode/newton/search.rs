@@ -61,7 +61,7 @@ impl Frame {
     fn find_single_root(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        (newton.evaluations, newton.fresh) = (0, false);
+        (newton.evaluations, newton.fresh, newton.valued) = (0, false, false);
         newton.floating.now.fill(false);
         newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
@@ -163,12 +163,12 @@ impl Frame {
     pub(super) fn search(&mut self, solve: &Solve) -> bool {
         let newton = self.newton_of(solve);
         newton.start.copy_from_slice(&newton.previous);
-        if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
+        if self.search_from(solve) {
             return true;
         }
         for start in std::iter::once(0.0).chain(OTHER_STARTS) {
             self.newton_of(solve).start.fill(start);
-            if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
+            if self.search_from(solve) {
                 return true;
             }
         }
@@ -177,12 +177,42 @@ impl Frame {
         for start in OTHER_STARTS.into_iter().filter(|_| n > 1) {
             let apart = |i: usize| start * ((i + 1) as f64 / n as f64);
             self.newton_of(solve).start.iter_mut().enumerate().for_each(|(i, own)| *own = apart(i));
-            if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
+            if self.search_from(solve) {
                 return true;
             }
         }
+        if n > 1 && !self.newton_of(solve).valued && self.search_in_pairs(solve) {
+            return true;
+        }
         self.newton_of(solve).floating.now.fill(false);
         n == 1 && self.scan(solve)
+    }
+
+    /// A root by an iteration from the start that is set.
+    fn search_from(&mut self, solve: &Solve) -> bool {
+        self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve)
+    }
+
+    /// Where the laws have no value at any of the starts so far, as an exponential that overflows: one or two unknowns
+    /// elsewhere, the others 0, on up to half the evaluations.
+    fn search_in_pairs(&mut self, solve: &Solve) -> bool {
+        let n = solve.right.len();
+        for (one, other) in (0..n).flat_map(|one| (one..n).map(move |other| (one, other))) {
+            let others = if other == one { 1 } else { OTHER_STARTS.len() };
+            for (i, j) in (0..OTHER_STARTS.len()).flat_map(|i| (0..others).map(move |j| (i, j))) {
+                let newton = self.newton_of(solve);
+                if newton.evaluations > newton.limit() / 2 {
+                    return false;
+                }
+                newton.start.fill(0.0);
+                newton.start[other] = OTHER_STARTS[j];
+                newton.start[one] = OTHER_STARTS[i];
+                if self.search_from(solve) {
+                    return true;
+                }
+            }
+        }
+        false
     }
 }
 

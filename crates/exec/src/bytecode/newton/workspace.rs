@@ -56,6 +56,8 @@ pub(crate) struct Newton {
     pub(in crate::bytecode) magnitude: Vec<f64>,
     /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
     pub(super) contracts: bool,
+    /// Whether the laws had a value where an iteration began, since a root is sought.
+    pub(super) valued: bool,
     /// Unknowns that no equation determines.
     pub floating: Floating,
 }
@@ -102,6 +104,7 @@ impl Newton {
             magnitude: line,
             start_jacobian: matrix,
             contracts: false,
+            valued: false,
             floating: Floating::new(size, sparse),
         }
     }

@@ -1,80 +1,88 @@
+//item ha_evaluate
 /* Runs the code at a point; whether residuals and Jacobian are finite. */
-static int ha_evaluate(ha_model *m, ha_newton *w, const double *point)
+static int ha_evaluate(ha_model *m, ha_newton *w, const $real *point)
 {
     ++w->evaluations;
     w->block->code(m, w->present, point, w->right, w->matrix);
-    return ha_all_finite(w->right, w->n) && ha_all_finite(w->matrix, w->entries);
+    return $ha_all_finite(w->right, w->n) && $ha_all_finite(w->matrix, w->entries);
 }
 
+//item ha_evaluate_on_path
 /* Evaluates a point on the line from the start (0) to the root (1). */
-static int ha_evaluate_on_path(ha_model *m, ha_newton *w, double part)
+static int ha_evaluate_on_path(ha_model *m, ha_newton *w, $real part)
 {
     int i;
     for (i = 0; i < w->n; ++i) {
-        const double way = part * (w->x[i] - w->start[i]);
+        const $real way = part * (w->x[i] - w->start[i]);
         w->trial[i] = w->start[i] + way;
     }
-    return ha_evaluate(m, w, w->trial);
+    return $ha_evaluate(m, w, w->trial);
 }
 
+//item ha_residual
 /* Greatest residual at the point evaluated last. */
-static double ha_residual(const ha_newton *w)
+static $real ha_residual(const ha_newton *w)
 {
-    double most = 0.0;
+    $real most = $0.0;
     int i;
     for (i = 0; i < w->n; ++i) {
-        most = ha_max(most, fabs(w->right[i] - w->offset[i]));
+        most = $ha_max(most, $fabs(w->right[i] - w->offset[i]));
     }
     return most;
 }
 
+//item ha_newton_factor
 static int ha_newton_factor(ha_newton *w)
 {
-    return ha_lu_factor(&w->lu, w->matrix);
+    return $ha_lu_factor(&w->lu, w->matrix);
 }
 
+//item ha_newton_correction
 static void ha_newton_correction(ha_newton *w)
 {
     int i;
     for (i = 0; i < w->n; ++i) {
         w->correction[i] = w->offset[i] - w->right[i];
     }
-    ha_lu_solve(&w->lu, w->correction);
+    $ha_lu_solve(&w->lu, w->correction);
 }
 
+//item ha_correction_norm
 /* Scaled maximum norm of the correction. */
-static double ha_correction_norm(const ha_newton *w)
+static $real ha_correction_norm(const ha_newton *w)
 {
-    double most = 0.0;
+    $real most = $0.0;
     int i;
     for (i = 0; i < w->n; ++i) {
-        const double size = fabs(w->correction[i]);
-        if (!ha_finite(size)) {
-            return HUGE_VAL;
+        const $real size = $fabs(w->correction[i]);
+        if (!$ha_finite(size)) {
+            return $HUGE_VAL;
         }
-        most = ha_max(most, size / ha_max(ha_max(w->scale[i], size), DBL_MIN));
+        most = $ha_max(most, size / $ha_max($ha_max(w->scale[i], size), $DBL_MIN));
     }
     return most;
 }
 
+//item ha_simplified_correction_norm
 /* The simplified correction at the point evaluated last, by the Jacobian factored last, and its norm, scaled as that of the
  * correction. */
-static double ha_simplified_correction_norm(ha_newton *w)
+static $real ha_simplified_correction_norm(ha_newton *w)
 {
-    double most = 0.0;
+    $real most = $0.0;
     int i;
     for (i = 0; i < w->n; ++i) {
         w->simplified[i] = w->offset[i] - w->right[i];
     }
-    ha_lu_solve(&w->lu, w->simplified);
+    $ha_lu_solve(&w->lu, w->simplified);
     for (i = 0; i < w->n; ++i) {
-        const double scale = ha_max(ha_max(w->scale[i], fabs(w->correction[i])), DBL_MIN);
-        const double size = fabs(w->simplified[i]) / scale;
-        most = size != size ? HUGE_VAL : ha_max(most, size);
+        const $real scale = $ha_max($ha_max(w->scale[i], $fabs(w->correction[i])), $DBL_MIN);
+        const $real size = $fabs(w->simplified[i]) / scale;
+        most = size != size ? $HUGE_VAL : $ha_max(most, size);
     }
     return most;
 }
 
+//item ha_scale_unknowns_at_rest
 /* Gives an unknown that is 0, and stays so in the first correction, the magnitude at which it would count in one of the
  * equations: small changes of it afterwards are no failure of the step. */
 static void ha_scale_unknowns_at_rest(ha_newton *w)
@@ -84,62 +92,66 @@ static void ha_scale_unknowns_at_rest(ha_newton *w)
     int j;
     int e;
     for (j = 0; j < n; ++j) {
-        double least = HUGE_VAL;
-        if (w->scale[j] != 0.0 || w->correction[j] != 0.0) {
+        $real least = $HUGE_VAL;
+        if (w->scale[j] != $0.0 || w->correction[j] != $0.0) {
             continue;
         }
         for (i = 0; i < n; ++i) {
-            double own = 0.0;
-            double others = 0.0;
+            $real own = $0.0;
+            $real others = $0.0;
             for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
                 const int k = w->columns[e];
                 if (k == j) {
-                    own = fabs(w->matrix[e]);
+                    own = $fabs(w->matrix[e]);
                 } else {
-                    const double term = fabs(w->matrix[e]) * ha_max(w->scale[k], fabs(w->correction[k]));
+                    const $real term = $fabs(w->matrix[e]) * $ha_max(w->scale[k], $fabs(w->correction[k]));
                     others += term;
                 }
             }
-            if (own > 0.0 && others > 0.0) {
+            if (own > $0.0 && others > $0.0) {
                 least = others / own < least ? others / own : least;
             }
         }
-        if (ha_finite(least)) {
+        if ($ha_finite(least)) {
             w->scale[j] = least;
         }
     }
 }
 
+//item ha_perturb
 /* Leaves a point at which the Jacobian is singular. */
 static void ha_perturb(ha_newton *w, int iteration)
 {
     int i;
     w->contracts = 0;
     for (i = 0; i < w->n; ++i) {
-        const double away = 1e-3 * (1.0 + (double)iteration) * ha_max(w->scale[i], 1.0);
-        const double move = i % 2 == iteration % 2 ? away : 0.5 * away;
+        const $real away = $1e-3 * ($1.0 + ($real)iteration) * $ha_max(w->scale[i], $1.0);
+        const $real move = i % 2 == iteration % 2 ? away : $0.5 * away;
         w->x[i] += move;
     }
 }
 
+//item ha_accept_trial
 static void ha_accept_trial(ha_newton *w)
 {
     int i;
-    ha_copy(w->x, w->trial, w->n);
+    $ha_copy(w->x, w->trial, w->n);
     for (i = 0; i < w->n; ++i) {
-        w->scale[i] = ha_max(w->scale[i], fabs(w->x[i]));
+        w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
     }
 }
 
+//item ha_add_simplified_correction
 static void ha_add_simplified_correction(ha_newton *w)
 {
     int i;
     for (i = 0; i < w->n; ++i) {
         w->x[i] += w->simplified[i];
-        w->scale[i] = ha_max(w->scale[i], fabs(w->x[i]));
+        w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
     }
 }
 
+//item ha_is_linear_on_path
 /* Whether the Jacobian is the same all the way from the start to x: what differs is rounding. */
 static int ha_is_linear_on_path(ha_model *m, ha_newton *w)
 {
@@ -149,19 +161,19 @@ static int ha_is_linear_on_path(ha_model *m, ha_newton *w)
     int i;
     int e;
     for (point = 0; point <= 8; ++point) {
-        if (!ha_evaluate_on_path(m, w, (double)point / 8.0)) {
+        if (!$ha_evaluate_on_path(m, w, ($real)point / $8.0)) {
             same = 0;
         }
         if (point == 0) {
-            ha_copy(w->jacobian, w->matrix, w->entries);
+            $ha_copy(w->jacobian, w->matrix, w->entries);
         }
         for (i = 0; i < n; ++i) {
-            double most = 0.0;
+            $real most = $0.0;
             for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
-                most = ha_max(most, fabs(w->jacobian[e]));
+                most = $ha_max(most, $fabs(w->jacobian[e]));
             }
             for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
-                if (!(fabs(w->matrix[e] - w->jacobian[e]) <= CLOSE_TO_ROUNDING * most)) {
+                if (!($fabs(w->matrix[e] - w->jacobian[e]) <= $CLOSE_TO_ROUNDING * most)) {
                     same = 0;
                 }
             }
@@ -170,17 +182,18 @@ static int ha_is_linear_on_path(ha_model *m, ha_newton *w)
     return same;
 }
 
+//item ha_stagnates_at_rounding
 /* Whether the Jacobian is the same at x and a whole correction from there: that it does not help is rounding. */
 static int ha_stagnates_at_rounding(ha_model *m, ha_newton *w)
 {
     int linear;
     int i;
-    ha_copy(w->saved_start, w->start, w->n);
+    $ha_copy(w->saved_start, w->start, w->n);
     for (i = 0; i < w->n; ++i) {
         w->start[i] = w->x[i] + w->correction[i];
     }
-    linear = ha_is_linear_on_path(m, w);
-    ha_copy(w->start, w->saved_start, w->n);
-    return ha_evaluate(m, w, w->x) && linear;
+    linear = $ha_is_linear_on_path(m, w);
+    $ha_copy(w->start, w->saved_start, w->n);
+    return $ha_evaluate(m, w, w->x) && linear;
 }
 

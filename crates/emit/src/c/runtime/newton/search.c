@@ -1,39 +1,43 @@
 //if newton_single
+//item ha_scan_distances
 /* Distances from tiny to huge. */
-static const double ha_scan_distances[] = {
-DISTANCES
+static const $real ha_scan_distances[] = {
+$DISTANCES
 };
 
+//item ha_residual_at
 /* The residual of one equation at a point; whether it is finite. */
-static int ha_residual_at(ha_model *m, ha_newton *w, double at, double *residual)
+static int ha_residual_at(ha_model *m, ha_newton *w, $real at, $real *residual)
 {
     int finite;
     w->trial[0] = at;
-    finite = ha_evaluate(m, w, w->trial);
+    finite = $ha_evaluate(m, w, w->trial);
     *residual = w->right[0];
     return finite;
 }
 
-static int ha_is_below(double a)
+//item ha_is_below
+static int ha_is_below($real a)
 {
-    return a < 0.0 || (a == 0.0 && 1.0 / a < 0.0);
+    return a < $0.0 || (a == $0.0 && $1.0 / a < $0.0);
 }
 
+//item ha_bisect_residual
 /* Bisects an interval at whose ends the residual differs in sign. A pole is no root. */
-static int ha_bisect_residual(ha_model *m, ha_newton *w, double a, double ra, double b, double rb)
+static int ha_bisect_residual(ha_model *m, ha_newton *w, $real a, $real ra, $real b, $real rb)
 {
-    const double jump = fabs(ra) < fabs(rb) ? fabs(ra) : fabs(rb);
+    const $real jump = $fabs(ra) < $fabs(rb) ? $fabs(ra) : $fabs(rb);
     int halving;
     for (halving = 0; halving < 200; ++halving) {
-        const double middle = 0.5 * (a + b);
-        double r;
+        const $real middle = $0.5 * (a + b);
+        $real r;
         if (middle == a || middle == b) {
             break;
         }
-        if (!ha_residual_at(m, w, middle, &r)) {
+        if (!$ha_residual_at(m, w, middle, &r)) {
             return 0;
         }
-        if (ha_is_below(r) == ha_is_below(ra)) {
+        if ($ha_is_below(r) == $ha_is_below(ra)) {
             a = middle;
             ra = r;
         } else {
@@ -41,42 +45,43 @@ static int ha_bisect_residual(ha_model *m, ha_newton *w, double a, double ra, do
             rb = r;
         }
     }
-    if (!(fabs(ra) < fabs(rb))) {
+    if (!($fabs(ra) < $fabs(rb))) {
         a = b;
         ra = rb;
     }
-    if (fabs(ra) > jump) {
+    if ($fabs(ra) > jump) {
         return 0;
     }
     w->start[0] = a;
     w->evaluations = 0;
-    return ha_iterate(m, w, HA_DAMPED);
+    return $ha_iterate(m, w, HA_DAMPED);
 }
 
+//item ha_scan
 /* One equation in one unknown: a root anywhere, those near the previous solution first. */
 static int ha_scan(ha_model *m, ha_newton *w)
 {
-    const int points = (int)(sizeof ha_scan_distances / sizeof ha_scan_distances[0]);
-    const double middle = w->previous[0];
-    double at[2] = {0.0, 0.0};
-    double residual[2] = {0.0, 0.0};
+    const int points = (int)(sizeof $ha_scan_distances / sizeof $ha_scan_distances[0]);
+    const $real middle = w->previous[0];
+    $real at[2] = {$0.0, $0.0};
+    $real residual[2] = {$0.0, $0.0};
     int there[2] = {0, 0};
     int i;
     int side;
-    ha_fill(w->offset, 0.0, w->n);
+    $ha_fill(w->offset, $0.0, w->n);
     for (i = 0; i < points; ++i) {
         for (side = 0; side < 2; ++side) {
-            const double way = side == 0 ? ha_scan_distances[i] : -ha_scan_distances[i];
-            const double here = middle + way;
-            double r;
-            const int finite = ha_residual_at(m, w, here, &r);
+            const $real way = side == 0 ? $ha_scan_distances[i] : -$ha_scan_distances[i];
+            const $real here = middle + way;
+            $real r;
+            const int finite = $ha_residual_at(m, w, here, &r);
             const int before = there[side];
-            const double a = at[side];
-            const double ra = residual[side];
+            const $real a = at[side];
+            const $real ra = residual[side];
             at[side] = here;
             residual[side] = r;
             there[side] = finite;
-            if (finite && before && ha_is_below(r) != ha_is_below(ra) && ha_bisect_residual(m, w, a, ra, here, r)) {
+            if (finite && before && $ha_is_below(r) != $ha_is_below(ra) && $ha_bisect_residual(m, w, a, ra, here, r)) {
                 return 1;
             }
         }
@@ -85,18 +90,55 @@ static int ha_scan(ha_model *m, ha_newton *w)
 }
 
 //end
+//item ha_search_from
+/* A root by an iteration that begins at w->start. */
+static int ha_search_from(ha_model *m, ha_newton *w)
+{
+    return $ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w);
+}
+
+//item ha_search_in_pairs
+/* Where the laws have no value at any of the starts so far, as an exponential that overflows: one or two unknowns elsewhere,
+ * the others 0, on up to half the evaluations. */
+static int ha_search_in_pairs(ha_model *m, ha_newton *w, const $real *starts, int count)
+{
+    int one;
+    int other;
+    int i;
+    int j;
+    for (one = 0; one < w->n; ++one) {
+        for (other = one; other < w->n; ++other) {
+            for (i = 0; i < count; ++i) {
+                for (j = 0; j < (other == one ? 1 : count); ++j) {
+                    if (w->evaluations > w->limit / 2) {
+                        return 0;
+                    }
+                    $ha_fill(w->start, $0.0, w->n);
+                    w->start[other] = starts[j];
+                    w->start[one] = starts[i];
+                    if ($ha_search_from(m, w)) {
+                        return 1;
+                    }
+                }
+            }
+        }
+    }
+    return 0;
+}
+
+//item ha_search
 /* Any root. */
 static int ha_search(ha_model *m, ha_newton *w)
 {
-    static const double starts[] = {0.0, 1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3};
+    static const $real starts[] = {$0.0, $1e-3, -$1e-3, $1.0, -$1.0, $1e3, -$1e3};
     int i;
-    ha_copy(w->start, w->previous, w->n);
-    if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+    $ha_copy(w->start, w->previous, w->n);
+    if ($ha_search_from(m, w)) {
         return 1;
     }
     for (i = 0; i < 7; ++i) {
-        ha_fill(w->start, starts[i], w->n);
-        if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+        $ha_fill(w->start, starts[i], w->n);
+        if ($ha_search_from(m, w)) {
             return 1;
         }
     }
@@ -104,67 +146,72 @@ static int ha_search(ha_model *m, ha_newton *w)
     for (i = 1; i < 7 && w->n > 1; ++i) {
         int j;
         for (j = 0; j < w->n; ++j) {
-            const double part = (double)(j + 1) / (double)w->n;
+            const $real part = ($real)(j + 1) / ($real)w->n;
             w->start[j] = starts[i] * part;
         }
-        if (ha_iterate(m, w, HA_DAMPED) || ha_floats(m, w)) {
+        if ($ha_search_from(m, w)) {
             return 1;
         }
     }
+    if (!w->valued && w->n > 1 && $ha_search_in_pairs(m, w, starts + 1, 6)) {
+        return 1;
+    }
 //if newton_single
-    return w->n == 1 && ha_scan(m, w);
+    return w->n == 1 && $ha_scan(m, w);
 //else
     return 0;
 //end
 }
 
+//item ha_find_root
 /* The root of a block that continues its previous solution, at a start or an event any root; o: what the block reads. */
-static int ha_find_root(ha_model *m, int number, const double *o, double *x)
+static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
 {
-    ha_newton w = ha_newton_of(m, number);
+    ha_newton w = $ha_newton_of(m, number);
     int status;
-    ha_copy(w.outer, o, w.block->reads);
-    ha_copy(w.present, o, w.block->reads);
-    ha_fill(w.floor, 0.0, w.n);
-    status = ha_continue_root(m, &w);
-    if (status != MODEL_OK && w.following) {
+    $ha_copy(w.outer, o, w.block->reads);
+    $ha_copy(w.present, o, w.block->reads);
+    $ha_fill(w.floor, $0.0, w.n);
+    status = $ha_continue_root(m, &w);
+    if (status != $MODEL_OK && w.following) {
 //if newton_single
         /* Is there a solution elsewhere, or none at all? */
-        if (status == MODEL_NO_CONVERGENCE && w.n == 1 && ha_scan(m, &w)) {
-            status = MODEL_BRANCH;
+        if (status == $MODEL_NO_CONVERGENCE && w.n == 1 && $ha_scan(m, &w)) {
+            status = $MODEL_BRANCH;
         }
 //end
         return status;
     }
-    if (status != MODEL_OK && !ha_search(m, &w)) {
+    if (status != $MODEL_OK && !$ha_search(m, &w)) {
         return status;
     }
-    ha_copy(w.jacobian, w.matrix, w.entries);
-    ha_copy(x, w.x, w.n);
-    return MODEL_OK;
+    $ha_copy(w.jacobian, w.matrix, w.entries);
+    $ha_copy(x, w.x, w.n);
+    return $MODEL_OK;
 }
 
 //if newton
+//item ha_root_along
 /* The same with the rates of the unknowns, by the implicit function theorem; e: rates of what the block reads. */
-static int ha_root_along(ha_model *m, int number, const double *o, const double *e, double *x, double *dx)
+static int ha_root_along(ha_model *m, int number, const $real *o, const $real *e, $real *x, $real *dx)
 {
-    const int status = ha_find_root(m, number, o, x);
+    const int status = $ha_find_root(m, number, o, x);
     ha_newton w;
     int i;
-    if (status != MODEL_OK) {
+    if (status != $MODEL_OK) {
         return status;
     }
-    w = ha_newton_of(m, number);
+    w = $ha_newton_of(m, number);
     w.block->code(m, o, x, w.right, w.matrix);
     w.block->along(m, o, e, x, w.right);
-    if (!ha_lu_factor(&w.lu, w.matrix)) {
-        return MODEL_SINGULAR;
+    if (!$ha_lu_factor(&w.lu, w.matrix)) {
+        return $MODEL_SINGULAR;
     }
     for (i = 0; i < w.n; ++i) {
         dx[i] = -w.right[i];
     }
-    ha_lu_solve(&w.lu, dx);
-    return MODEL_OK;
+    $ha_lu_solve(&w.lu, dx);
+    return $MODEL_OK;
 }
 
 //end

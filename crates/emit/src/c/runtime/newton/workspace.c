@@ -1,22 +1,27 @@
 
+//section
 /* ---- nonlinear equations: Newton's method, damped by the restricted natural monotonicity test, and continuation, which
  * keeps a run on one solution. P. Deuflhard, "Newton Methods for Nonlinear Problems", 2004, chapters 3 and 5. ---- */
 
+//always
 typedef struct {
     /* Where the entries of the Jacobian stand, and the number of values read from outside. */
     const ha_pattern *pattern;
     int reads;
     /* First place of its memory in m->memory. */
     int memory;
-    void (*code)(ha_model *m, const double *o, const double *g, double *right, double *matrix);
+    void (*code)(ha_model *m, const $real *o, const $real *g, $real *right, $real *matrix);
     /* Of what the residuals are the sums, in magnitude. */
-    void (*terms)(ha_model *m, const double *o, const double *g, double *terms);
+    void (*terms)(ha_model *m, const $real *o, const $real *g, $real *terms);
 //if newton
-    void (*along)(ha_model *m, const double *o, const double *e, const double *g, double *rates);
+    void (*along)(ha_model *m, const $real *o, const $real *e, const $real *g, $real *rates);
 //end
 } ha_block;
 
-BLOCK_TABLE
+//item ha_blocks
+$BLOCK_TABLE
+
+//always
 /* What a solution is sought with: parts of the memory and of the workspace of the model. */
 typedef struct {
     const ha_block *block;
@@ -30,61 +35,65 @@ typedef struct {
     int evaluations;
     /* Whether the first step, undamped, contracted by 1/4. */
     int contracts;
+    /* Whether the laws had a value where an iteration began. */
+    int valued;
     /* The previous solution, what the block read there, and its Jacobian. */
-    double *previous;
-    double *previous_outer;
-    double *previous_jacobian;
+    $real *previous;
+    $real *previous_outer;
+    $real *previous_jacobian;
     /* The solution found last, what the block read there, and its Jacobian. */
-    double *x;
-    double *outer;
-    double *jacobian;
+    $real *x;
+    $real *outer;
+    $real *jacobian;
     /* Newton correction at x, trial point, and simplified correction there: with the Jacobian at x. */
-    double *correction;
-    double *trial;
-    double *simplified;
+    $real *correction;
+    $real *trial;
+    $real *simplified;
     /* Scale of norms: greatest magnitude of each unknown so far. */
-    double *scale;
+    $real *scale;
     /* What is subtracted from the residuals: the Newton homotopy F(x) = (1 - s) F(previous). */
-    double *offset;
-    double *previous_residual;
+    $real *offset;
+    $real *previous_residual;
     /* Where the iteration starts: the last root on the path; its Jacobian is start_jacobian. */
-    double *start;
-    double *saved_start;
+    $real *start;
+    $real *saved_start;
     /* The first correction, and its right-hand side. */
-    double *first_correction;
-    double *first_right;
+    $real *first_correction;
+    $real *first_right;
     /* Magnitudes of the unknowns. */
-    double *magnitude;
-    double *right;
-    double *present;
-    double *start_jacobian;
-    double *matrix;
+    $real *magnitude;
+    $real *right;
+    $real *present;
+    $real *start_jacobian;
+    $real *matrix;
     /* For unknowns that no equation determines: see ha_floats. */
-    double *terms;
-    double *units;
-    double *loose;
-    double *order;
-    double *rest;
-    double *unseen;
+    $real *terms;
+    $real *units;
+    $real *loose;
+    $real *order;
+    $real *rest;
+    $real *unseen;
     /* Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them. */
-    double *floor;
+    $real *floor;
     ha_lu lu;
 } ha_newton;
 
-static double *ha_take(double **place, int n)
+//item ha_take
+static $real *ha_take($real **place, int n)
 {
-    double *taken = *place;
+    $real *taken = *place;
     *place += n;
     return taken;
 }
 
+//item ha_newton_of
 static ha_newton ha_newton_of(ha_model *m, int number)
 {
-    const ha_block *block = &ha_blocks[number];
+    const ha_block *block = &$ha_blocks[number];
     const int n = block->pattern->n;
-    const int entries = ha_entries(block->pattern);
+    const int entries = $ha_entries(block->pattern);
     const int reads = block->reads;
-    double *place = m->memory + block->memory;
+    $real *place = m->memory + block->memory;
     ha_newton w;
     w.block = block;
     w.n = n;
@@ -95,56 +104,58 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.limit = w.following ? m->most_evaluations : 20000;
     w.evaluations = 0;
     w.contracts = 0;
-    w.previous = ha_take(&place, n);
-    w.previous_outer = ha_take(&place, reads);
-    w.previous_jacobian = ha_take(&place, entries);
-    w.x = ha_take(&place, n);
-    w.outer = ha_take(&place, reads);
-    w.jacobian = ha_take(&place, entries);
+    w.valued = 0;
+    w.previous = $ha_take(&place, n);
+    w.previous_outer = $ha_take(&place, reads);
+    w.previous_jacobian = $ha_take(&place, entries);
+    w.x = $ha_take(&place, n);
+    w.outer = $ha_take(&place, reads);
+    w.jacobian = $ha_take(&place, entries);
     place = m->work;
-    w.correction = ha_take(&place, n);
-    w.trial = ha_take(&place, n);
-    w.simplified = ha_take(&place, n);
-    w.scale = ha_take(&place, n);
-    w.offset = ha_take(&place, n);
-    w.previous_residual = ha_take(&place, n);
-    w.start = ha_take(&place, n);
-    w.saved_start = ha_take(&place, n);
-    w.first_correction = ha_take(&place, n);
-    w.first_right = ha_take(&place, n);
-    w.magnitude = ha_take(&place, n);
-    w.right = ha_take(&place, n);
-    w.present = ha_take(&place, reads);
-    w.start_jacobian = ha_take(&place, entries);
-    w.matrix = ha_take(&place, entries);
-    w.terms = ha_take(&place, n);
-    w.units = ha_take(&place, n);
-    w.order = ha_take(&place, n);
-    w.rest = ha_take(&place, n);
-    w.floor = ha_take(&place, n);
+    w.correction = $ha_take(&place, n);
+    w.trial = $ha_take(&place, n);
+    w.simplified = $ha_take(&place, n);
+    w.scale = $ha_take(&place, n);
+    w.offset = $ha_take(&place, n);
+    w.previous_residual = $ha_take(&place, n);
+    w.start = $ha_take(&place, n);
+    w.saved_start = $ha_take(&place, n);
+    w.first_correction = $ha_take(&place, n);
+    w.first_right = $ha_take(&place, n);
+    w.magnitude = $ha_take(&place, n);
+    w.right = $ha_take(&place, n);
+    w.present = $ha_take(&place, reads);
+    w.start_jacobian = $ha_take(&place, entries);
+    w.matrix = $ha_take(&place, entries);
+    w.terms = $ha_take(&place, n);
+    w.units = $ha_take(&place, n);
+    w.order = $ha_take(&place, n);
+    w.rest = $ha_take(&place, n);
+    w.floor = $ha_take(&place, n);
     w.loose = NULL;
     w.unseen = NULL;
 //if sparse
     /* Large sparse blocks are not searched for unknowns that float. */
-    if (block->pattern->order == NULL || n <= SPARSE_FULL_AT_MOST) {
-        w.loose = ha_take(&place, n * n);
-        w.unseen = ha_take(&place, n * n);
+    if (block->pattern->order == NULL || n <= $SPARSE_FULL_AT_MOST) {
+        w.loose = $ha_take(&place, n * n);
+        w.unseen = $ha_take(&place, n * n);
     }
 //else
-    w.loose = ha_take(&place, n * n);
-    w.unseen = ha_take(&place, n * n);
+    w.loose = $ha_take(&place, n * n);
+    w.unseen = $ha_take(&place, n * n);
 //end
-    w.lu = ha_lu_at(place, m->order, block->pattern);
+    w.lu = $ha_lu_at(place, m->order, block->pattern);
     return w;
 }
 
+//item ha_newton_accept
 /* The solution found last becomes the previous one, and is followed. */
 static void ha_newton_accept(ha_model *m, int number)
 {
-    const ha_newton w = ha_newton_of(m, number);
-    ha_copy(w.previous, w.x, w.n);
-    ha_copy(w.previous_outer, w.outer, w.block->reads);
-    ha_copy(w.previous_jacobian, w.jacobian, w.entries);
+    const ha_newton w = $ha_newton_of(m, number);
+    $ha_copy(w.previous, w.x, w.n);
+    $ha_copy(w.previous_outer, w.outer, w.block->reads);
+    $ha_copy(w.previous_jacobian, w.jacobian, w.entries);
     m->following[number] = 1;
 }
 

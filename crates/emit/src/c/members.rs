@@ -1,0 +1,226 @@
+//! The members of the structure that a model is: how they are declared, and the bytes that they take.
+
+use halfarrow_compiler::program::EventTrigger;
+
+use super::plan::Plan;
+use crate::{Method, Real};
+
+/// What a member is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// A real number.
+    Real,
+    /// A number of double precision.
+    Wide,
+    Int,
+    Byte,
+    /// A structure of the model, by what its name ends with.
+    Failure,
+    Delay,
+    Point,
+    Sample,
+}
+
+impl Kind {
+    fn declared(self, plan: &Plan) -> String {
+        match self {
+            Kind::Real => plan.export.real.kind().into(),
+            Kind::Wide => Real::Double.kind().into(),
+            Kind::Int => "int".into(),
+            Kind::Byte => "unsigned char".into(),
+            Kind::Failure => format!("{}_failure", plan.name),
+            Kind::Delay => format!("{}_delay", plan.name),
+            Kind::Point => format!("{}_point", plan.name),
+            Kind::Sample => format!("{}_sample", plan.name),
+        }
+    }
+
+    /// Its size, on machines of 64 bits.
+    fn bytes(self, real: Real) -> usize {
+        match (self, real) {
+            (Kind::Byte, _) => 1,
+            (Kind::Int, _) | (Kind::Real, Real::Float) => 4,
+            (Kind::Wide, _) | (Kind::Real, Real::Double) => 8,
+            (Kind::Failure, _) => 16,
+            (Kind::Point, Real::Float) => 24,
+            (Kind::Point, Real::Double) | (Kind::Delay | Kind::Sample, _) => 32,
+        }
+    }
+}
+
+/// Members that are declared in one line.
+pub(super) struct Members {
+    kind: Kind,
+    /// Their names; of arrays with how many they hold.
+    names: Vec<(&'static str, Option<usize>)>,
+    about: &'static str,
+}
+
+/// Lines of members.
+#[derive(Default)]
+struct List(Vec<Members>);
+
+impl List {
+    fn put(&mut self, kind: Kind, names: Vec<(&'static str, Option<usize>)>, about: &'static str) {
+        self.0.push(Members { kind, names, about });
+    }
+
+    /// Single ones.
+    fn one(&mut self, kind: Kind, names: &[&'static str], about: &'static str) {
+        self.put(kind, names.iter().map(|&name| (name, None)).collect(), about);
+    }
+
+    /// Arrays of a size; of none one place is left, which C asks for.
+    fn arrays(&mut self, kind: Kind, names: &[&'static str], size: usize, about: &'static str) {
+        self.put(kind, names.iter().map(|&name| (name, Some(size.max(1)))).collect(), about);
+    }
+
+    /// The same, where there are any.
+    fn some(&mut self, kind: Kind, names: &[&'static str], size: usize, about: &'static str) {
+        if size > 0 {
+            self.arrays(kind, names, size, about);
+        }
+    }
+}
+
+/// What users read and set.
+pub(super) fn public(plan: &Plan) -> Vec<Members> {
+    let (p, mut list) = (plan.program, List::default());
+    list.one(Kind::Wide, &["t"], "time, in s");
+    list.one(Kind::Wide, &["step"], "length of a step, in s; may be changed before the start");
+    list.arrays(Kind::Real, &["x"], p.states.len(), "states");
+    list.arrays(Kind::Real, &["u"], p.inputs.len(), "inputs");
+    list.arrays(Kind::Real, &["p"], p.parameters.len(), "parameters");
+    list.arrays(Kind::Real, &["y"], plan.export.recorded.len(), "outputs, as they are at t");
+    list.one(Kind::Failure, &["failure"], "");
+    let about = "evaluations at most each time a Newton block is solved, but for the start and jumps";
+    list.one(Kind::Int, &["most_evaluations"], about);
+    list.0
+}
+
+/// What is nobody's affair.
+pub(super) fn private(plan: &Plan) -> Vec<Members> {
+    let mut list = List::default();
+    of_parameters(&mut list, plan);
+    of_events(&mut list, plan);
+    of_blocks(&mut list, plan);
+    of_steps(&mut list, plan);
+    list.0
+}
+
+fn of_parameters(list: &mut List, plan: &Plan) {
+    let (p, s) = (plan.program, &plan.sizes);
+    let single = plan.export.real == Real::Float;
+    list.arrays(Kind::Real, &["c"], s.derived, "what follows from parameters");
+    if single {
+        list.some(Kind::Wide, &["p_exact"], p.parameters.len(), "parameters in double precision");
+    }
+    list.some(Kind::Wide, &["c_exact"], s.exact, "of what follows from them, what time needs");
+    if single {
+        let about = "of states, what is less than their last digit";
+        list.arrays(Kind::Real, &["rest", "trial_rest"], p.states.len(), about);
+    }
+    list.arrays(Kind::Real, &["k"], p.conserved.len(), "conserved constants");
+    list.arrays(Kind::Real, &["z"], p.held.len(), "held signals");
+    list.arrays(Kind::Byte, &["set"], p.parameters.len(), "which parameters are set");
+    list.one(Kind::Int, &["changed"], "whether any is set");
+    if !p.assumptions.is_empty() {
+        list.one(Kind::Int, &["broken"], "which assumption parameters break, from 1");
+    }
+}
+
+fn of_events(list: &mut List, plan: &Plan) {
+    let (p, s) = (plan.program, &plan.sizes);
+    list.one(Kind::Int, &["begun"], "whether the run has begun");
+    list.one(Kind::Int, &["cross_due"], "whether a parameter or an input has jumped");
+    list.one(Kind::Wide, &["crossed"], "when the last jump was crossed");
+    list.arrays(Kind::Real, &["u_crossed"], p.inputs.len(), "inputs then");
+    list.arrays(Kind::Real, &["u_default"], p.inputs.len(), "inputs that nobody sets");
+    list.one(Kind::Wide, &["tick_from", "tick_next", "tick_index", "tick_rate"], "times of steps");
+    list.some(Kind::Wide, &["held"], p.conditions.len(), "conditions as held");
+    let of_time = |t: EventTrigger| matches!(t, EventTrigger::LinearTime | EventTrigger::CurvedTime);
+    let clocks = p.conditions.values().filter(|c| of_time(c.trigger)).count();
+    if clocks > 0 {
+        list.one(Kind::Int, &["clock_hold"], "what is done with those of time");
+        list.one(Kind::Wide, &["clock_next"], "when they change next");
+        list.arrays(Kind::Wide, &["clock_operand", "clock_rate"], clocks, "");
+    }
+    let switches = plan.switches.len();
+    if switches > 0 {
+        list.one(Kind::Int, &["state_hold"], "what is done with those of the state");
+        list.arrays(Kind::Int, &["sides"], s.indicators, "sides of the indicators");
+        let sizes = [("operands", switches), ("beyond", s.indicators)];
+        list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+    }
+    list.some(Kind::Delay, &["delays"], plan.delays.len(), "");
+    list.some(Kind::Point, &["points"], plan.delays.iter().map(|d| d.1).sum(), "");
+    list.some(Kind::Sample, &["samples"], plan.samples.len(), "");
+    list.some(Kind::Real, &["source", "source_rate"], p.held.len(), "what is delayed or sampled");
+}
+
+fn of_blocks(list: &mut List, plan: &Plan) {
+    let s = &plan.sizes;
+    if !plan.newton.is_empty() {
+        let about = "solutions of Newton blocks, where they were found, their Jacobians";
+        list.arrays(Kind::Real, &["memory"], s.memory, about);
+        list.arrays(Kind::Int, &["following"], plan.newton.len(), "whether they are followed");
+    }
+    if s.factored > 0 {
+        list.arrays(Kind::Real, &["factors"], s.factors, "of matrices of parameters alone");
+        let sizes = [("factors_order", s.factors_order), ("factored", s.factored)];
+        list.put(Kind::Int, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+    }
+}
+
+fn of_steps(list: &mut List, plan: &Plan) {
+    let (nx, s, method) = (plan.program.states.len(), &plan.sizes, plan.export.method);
+    let (shown, single) = (plan.export.recorded.len(), plan.export.real == Real::Float);
+    let sizes = [("stages", nx * method.stages()), ("trial", nx), ("dx", nx)];
+    list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+    list.arrays(Kind::Real, &["beside"], nx, "a state beside another one");
+    list.arrays(Kind::Real, &["w"], s.crossing, "values from one piece of code to the next");
+    list.some(Kind::Wide, &["wide"], s.wide, "the same, where they follow from time alone");
+    let sizes = [("along", s.directions[4]), ("along_out", nx.max(shown))];
+    list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "directions of derivatives");
+    list.arrays(Kind::Real, &["shown"], shown, "");
+    if s.order > 0 {
+        list.arrays(Kind::Real, &["work"], s.work, "for solve blocks");
+        list.arrays(Kind::Int, &["order"], s.order, "");
+    }
+    if method.is_implicit() {
+        let sizes = [("matrix", nx * nx), ("matrix_scale", nx), ("matrix_work", nx)];
+        list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+        if single {
+            list.arrays(Kind::Real, &["matrix_columns"], nx, "");
+        }
+        if single && method == Method::ImplicitMidpoint {
+            list.arrays(Kind::Real, &["half_way"], nx, "from the beginning of a step to its middle");
+        }
+        list.arrays(Kind::Int, &["matrix_order"], nx, "");
+        list.arrays(Kind::Real, &["middle", "sizes", "correction", "direction", "product"], nx, "");
+    }
+}
+
+/// Their declarations, without the last end of a line.
+pub(super) fn lines(members: &[Members], plan: &Plan) -> String {
+    let name = |(name, size): &(&str, Option<usize>)| match size {
+        Some(size) => format!("{name}[{size}]"),
+        None => name.to_string(),
+    };
+    let line = |m: &Members| {
+        let names: Vec<String> = m.names.iter().map(name).collect();
+        let about = if m.about.is_empty() { String::new() } else { format!(" /* {} */", m.about) };
+        format!("    {} {};{about}", m.kind.declared(plan), names.join(", "))
+    };
+    members.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Bytes of the model: its members, each in whole words.
+pub(super) fn bytes(plan: &Plan) -> usize {
+    let all = public(plan).into_iter().chain(private(plan));
+    let of = |m: Members| {
+        let bytes = m.kind.bytes(plan.export.real);
+        m.names.iter().map(|(_, size)| (bytes * size.unwrap_or(1)).next_multiple_of(8)).sum::<usize>()
+    };
+    all.map(of).sum()
+}

@@ -1,0 +1,130 @@
+//! The source: which parts it has, and in which order.
+
+use halfarrow_compiler::algebra::math;
+use halfarrow_compiler::program::{ConditionKind, EventTrigger, LawDomain, Reads};
+
+use super::Plan;
+use crate::c::flags::Flags;
+use crate::c::fragment::{Fragment, assembled};
+use crate::c::header::comment;
+use crate::c::messages;
+use crate::c::template::Filling;
+use crate::c::written::Written;
+use crate::{Method, Real};
+
+/// The search of the solutions of nonlinear blocks.
+const NEWTON: &str = concat!(
+    include_str!("../runtime/newton/workspace.c"),
+    include_str!("../runtime/newton/correction.c"),
+    include_str!("../runtime/newton/floating.c"),
+    include_str!("../runtime/newton/damped.c"),
+    include_str!("../runtime/newton/continuation.c"),
+    include_str!("../runtime/newton/search.c"),
+);
+
+impl Plan<'_> {
+    /// With what templates are filled, and with what those that compute in double precision whatever real numbers are.
+    fn fillings(&self, obligations: String) -> [Filling<'_>; 2] {
+        let mut words = self.words();
+        words.insert("OBLIGATION_LINES", Written::of(obligations));
+        words.insert("MODEL_TITLE", Written::of(comment(&self.program.name)));
+        let filling = |real| Filling { flags: self.flags(), words: words.clone(), model: &self.name, real };
+        [filling(self.export.real), filling(Real::Double)]
+    }
+
+    /// The source file; at its head stands what it keeps to.
+    pub(in crate::c) fn source(&self, obligations: String) -> String {
+        let [filling, wide] = self.fillings(obligations);
+        let mut all = filling.fragments(include_str!("../runtime/top.c"));
+        let mut put = |fragments: Vec<Fragment>| all.extend(fragments);
+        put(wide.fragments(math::C_SOURCE));
+        put(vec![Fragment::section("small things")]);
+        if self.export.real == Real::Float {
+            put(wide.fragments(math::C_SOURCE_SINGLE));
+            put(wide.fragments(include_str!("../runtime/small.c")));
+        }
+        put(filling.fragments(include_str!("../runtime/small.c")));
+        put(filling.fragments(include_str!("../runtime/helpers.c")));
+        if self.sizes.order > 0 {
+            put(filling.fragments(include_str!("../runtime/lu.c")));
+        }
+        if !self.newton.is_empty() {
+            put(filling.fragments(NEWTON));
+        }
+        put(filling.fragments(include_str!("../runtime/tables.c")));
+        put(wide.fragments(include_str!("../runtime/conditions.c")));
+        put(vec![Fragment::section("the equations")]);
+        put(self.functions.iter().cloned().map(Fragment::from).collect());
+        if !self.clocks.is_empty() {
+            put(wide.fragments(include_str!("../runtime/clock.c")));
+        }
+        put(filling.fragments(include_str!("../runtime/held.c")));
+        put(filling.fragments(include_str!("../runtime/system.c")));
+        if self.export.method.is_implicit() {
+            put(filling.fragments(include_str!("../runtime/matrix.c")));
+        }
+        put(filling.fragments(include_str!("../runtime/advance.c")));
+        put(filling.fragments(match self.export.method {
+            Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
+            method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
+            _ => include_str!("../runtime/explicit.c"),
+        }));
+        put(filling.fragments(include_str!("../runtime/step.c")));
+        put(filling.fragments(include_str!("../runtime/start.c")));
+        if self.solves_start() {
+            put(filling.fragments(include_str!("../runtime/start_solve.c")));
+        }
+        put(filling.fragments(include_str!("../runtime/begin.c")));
+        put(messages::messages(self));
+        assembled(&all)
+    }
+
+    pub(super) fn kinds(&self) -> impl Iterator<Item = ConditionKind> + '_ {
+        self.program.conditions.values().map(|c| c.kind)
+    }
+
+    /// What the model has.
+    pub(in crate::c) fn flags(&self) -> Flags {
+        let Plan { export, program: p, .. } = *self;
+        let held = !p.held.is_empty();
+        let time_derivative = export.method.is_linearly_implicit();
+        let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
+        Flags {
+            single: export.real == Real::Float,
+            states: !p.states.is_empty(),
+            inputs: !p.inputs.is_empty(),
+            parameters: !p.parameters.is_empty(),
+            outputs: !export.recorded.is_empty(),
+            conserved: !p.conserved.is_empty(),
+            tables: !p.tables.is_empty(),
+            conditions: !p.conditions.is_empty(),
+            sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),
+            floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
+            piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
+            clocks: !self.clocks.is_empty(),
+            curves: self.clocks.iter().any(|&c| p.conditions[c].trigger == EventTrigger::CurvedTime),
+            switches: !self.switches.is_empty(),
+            held,
+            delays: !self.delays.is_empty(),
+            samples: !self.samples.is_empty(),
+            only_samples: held && self.delays.is_empty(),
+            newton: !self.newton.is_empty(),
+            sparse: self.patterns.any_sparse(),
+            newton_single: self.newton.iter().any(|&b| p.blocks[b].size() == 1),
+            follows: !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty()),
+            rates_newton: !self.rates_blocks.is_empty(),
+            shown_newton: !self.shown_blocks.is_empty(),
+            domains: !p.domains.is_empty(),
+            domains_always: p.domains.iter().any(always),
+            assumptions: !p.assumptions.is_empty(),
+            directional_derivative: self.has_directional_derivative(),
+            derivatives: export.derivatives,
+            time_derivative,
+            time_passes: time_derivative || held,
+            linear_constant: self.sizes.factored > 0,
+            solves_start: self.solves_start(),
+            guesses: !p.guesses.is_empty(),
+            start_groups: self.groups.iter().any(|g| g.together),
+        }
+    }
+}

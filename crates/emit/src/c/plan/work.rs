@@ -1,0 +1,82 @@
+//! What a step costs, and the columns of its matrix.
+
+use halfarrow_compiler::program::{BlockId, EventTrigger};
+
+use super::Plan;
+use crate::Method;
+use crate::c::cost::{Cost, OperationCount};
+
+impl Plan<'_> {
+    /// Rows of the nonzeros of each column of the Jacobian.
+    pub(in crate::c) fn columns(&self) -> Vec<Vec<usize>> {
+        let mut columns = vec![Vec::new(); self.program.states.len()];
+        for (row, reads) in self.program.dependence.iter().enumerate() {
+            reads.iter().for_each(|&column| columns[column as usize].push(row));
+        }
+        columns
+    }
+
+    /// Columns in groups, no two of a group with a nonzero in the same row; as `halfarrow_sim::Sparsity::groups`.
+    pub(super) fn column_groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let mut taken: Vec<Vec<bool>> = Vec::new();
+        for (column, rows) in self.columns().iter().enumerate() {
+            let free = taken.iter().position(|taken| rows.iter().all(|&row| !taken[row]));
+            let group = free.unwrap_or_else(|| {
+                groups.push(Vec::new());
+                taken.push(vec![false; self.program.states.len()]);
+                groups.len() - 1
+            });
+            groups[group].push(column);
+            rows.iter().for_each(|&row| taken[group][row] = true);
+        }
+        groups
+    }
+
+    /// What a step costs at most.
+    pub(in crate::c) fn cost(&self) -> Cost {
+        let w = &self.works;
+        let method = self.export.method;
+        let n = self.program.states.len() as u64;
+        let mut step = match method {
+            Method::ImplicitMidpoint => {
+                let groups = self.column_groups().len() as u64;
+                let mut one = w.rates.clone() + w.directional.clone() * groups;
+                one.operations += n * n * n + 4 * n * n;
+                one * 20
+            }
+            Method::LinearlyImplicitEuler | Method::Rosenbrock => {
+                let (groups, stages) = (self.column_groups().len() as u64, method.stages() as u64);
+                let mut all = w.rates.clone() * stages + w.directional.clone() * (groups + 1);
+                all.operations += n * n * n + 4 * n * n + stages * (2 * n * n + (2 * stages + 4) * n);
+                all
+            }
+            _ => {
+                let stages = method.stages() as u64;
+                let mut all = w.rates.clone() * stages;
+                all.operations += stages * (stages + 3) * n;
+                all
+            }
+        };
+        step = step + w.switching.clone() + w.observe.clone();
+        let follows = |blocks: &[BlockId], work: &OperationCount| {
+            if blocks.is_empty() { OperationCount::default() } else { work.clone() }
+        };
+        let followed = follows(&self.rates_blocks, &w.rates) + follows(&self.shown_blocks, &w.observe);
+        let sources = if self.delays.is_empty() {
+            OperationCount::default()
+        } else {
+            w.rates.clone() + w.sources.clone().along()
+        };
+        step = step + followed.clone() + sources.clone();
+        let held = self.program.held.len() as u64;
+        let curves =
+            self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()
+                as u64;
+        let looks = 2 + curves * (2 * 4000 + 4 * 2200);
+        let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
+        let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
+        let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
+        Cost::new(step, jump, self)
+    }
+}

@@ -1,0 +1,60 @@
+//item ha_start_values
+/* The state at the start: as exported, or solved for other parameters, inputs or times. */
+static int ha_start_values(ha_model *m, double t)
+{
+    int exported = (t == 0.0) && !m->changed;
+    int i;
+    for (i = 0; i < HA_NU; ++i) {
+        if (m->u[i] != m->u_default[i]) {
+            exported = 0;
+        }
+    }
+    if (exported) {
+        $ha_copy(m->x, $ha_start_states, HA_NX);
+//if conserved
+        $ha_copy(m->k, $ha_start_conserved, HA_NK);
+//end
+        return $MODEL_OK;
+    }
+//if solves_start
+    return $ha_solve_start(m, t);
+//else
+    $ha_fill(m->x, $0.0, HA_NX);
+    return $MODEL_OK;
+//end
+}
+
+//always
+int $model_start_from($model *m, double t, const $real *x)
+{
+    int status;
+    $ha_restart(m);
+    m->failure.code = $MODEL_OK;
+    m->t = t;
+    if (x != m->x) {
+        $ha_copy(m->x, x, HA_NX);
+    }
+    $ha_ticks_from(m, t);
+//if single
+    $ha_fill(m->rest, $0.0, HA_NX);
+//end
+    status = $model_cross(m, t, m->x);
+    if (status == $MODEL_OK) {
+        status = $model_accept(m, t, m->x);
+    }
+    return status == $MODEL_OK ? $model_observe(m, t, m->x, m->y) : status;
+}
+
+int $model_start($model *m, double t)
+{
+    int status;
+    m->failure.code = $MODEL_OK;
+    $ha_restart(m);
+//if assumptions
+    if (m->broken) {
+        return $ha_fail(m, $MODEL_STRUCTURE, m->broken - 1, ((double)NAN));
+    }
+//end
+    status = $ha_start_values(m, t);
+    return status == $MODEL_OK ? $model_start_from(m, t, m->x) : status;
+}

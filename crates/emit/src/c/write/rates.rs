@@ -1,0 +1,92 @@
+//! What moves, and its derivatives.
+
+use halfarrow_compiler::program::{Arg, Code, ConditionId, EventTrigger, Op, Step};
+
+use super::{Body, Moving, Reading, Shape, Writer};
+use crate::c::derivatives::Expressions;
+use crate::c::written::{Series, Variable, Written, written};
+
+impl Writer<'_> {
+    /// Which locals have derivatives that somebody asks for.
+    pub(super) fn moves(&self, code: &Code, shape: Shape, rates: bool) -> Vec<bool> {
+        let mut moves = vec![false; code.values.len()];
+        let Some(moving) = shape.along else { return moves };
+        for step in &code.steps {
+            let mut one = false;
+            step.for_each_read(|a| {
+                one |= match a {
+                    Arg::Given(value) => self.givens.rate(value, moving).is_some(),
+                    Arg::Local(i) => moves[i.0 as usize],
+                    Arg::Outer(_) => moving.outer,
+                    Arg::Guess(_) => false,
+                }
+            });
+            let can = match step {
+                Step::Op { op, .. } => op.moves(),
+                Step::Solve(_) => true,
+                Step::Parameter { .. } | Step::Guard { .. } => false,
+            };
+            step.defines().iter().for_each(|out| moves[out.0 as usize] = one && can);
+        }
+        let mut asked = vec![false; moves.len()];
+        let ask = |asked: &mut Vec<bool>, a: Arg| {
+            if let Arg::Local(i) = a {
+                asked[i.0 as usize] = true;
+            }
+        };
+        code.outputs.iter().filter(|_| rates).for_each(|&a| ask(&mut asked, a));
+        for step in code.steps.iter().rev() {
+            let wanted = step.defines().iter().any(|out| moves[out.0 as usize] && asked[out.0 as usize]);
+            let condition = if let Step::Op { op, .. } = step { op.condition() } else { None };
+            let timed = condition.is_some_and(|c| self.takes_rate(c, moving));
+            if wanted || timed {
+                match step {
+                    Step::Op { op: Op::Select(_, a, b), .. } => [*a, *b].into_iter().for_each(|a| ask(&mut asked, a)),
+                    _ => step.for_each_read(|a| ask(&mut asked, a)),
+                }
+            }
+        }
+        moves.iter().zip(&asked).map(|(moves, asked)| *moves && *asked).collect()
+    }
+
+    /// Whether a condition is taken with the rate of its operand: only what time alone moves is.
+    pub(super) fn takes_rate(&self, condition: ConditionId, moving: Moving) -> bool {
+        moving.time.is_some() && self.program.conditions[condition].trigger != EventTrigger::State
+    }
+
+    /// The derivative, if it moves.
+    pub(super) fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<Written> {
+        let moving = f.shape.along?;
+        let (rate, is_wide) = match a {
+            Arg::Given(value) => (self.givens.rate(value, moving)?, false),
+            Arg::Local(local) if !f.moves[local.0 as usize] => return None,
+            Arg::Local(local) => {
+                let i = local.0 as usize;
+                let (place, is_wide) = (f.rate_place[i], f.wide[i]);
+                match f.home[i] == f.chunk {
+                    true => (written!("{}", Variable::Number(Series::Rate(local.0))), is_wide),
+                    false => (written!("m->{}[{}]", if is_wide { "wide" } else { "w" }, place), is_wide),
+                }
+            }
+            Arg::Outer(i) => (moving.outer.then(|| written!("e[{}]", i))?, false),
+            Arg::Guess(_) => return None,
+        };
+        Some(self.cast(rate, is_wide, wide))
+    }
+
+    /// The derivative of an operation by the rules of the table, if it moves.
+    pub(super) fn derivative(&self, f: &mut Body, out: u32, op: Op<Arg>, reads: &Reading) -> Option<Written> {
+        if !f.moves[out as usize] {
+            return None;
+        }
+        let real = self.precision_of(f.wide[out as usize]);
+        let mut k = Expressions::new(&mut f.lines, Series::Rate(out), real);
+        let value = k.push(written!("{}", Variable::Number(Series::Value(out))));
+        let mut operands = reads.values.iter().zip(&reads.rates);
+        let slope = op.derivative(&mut k, value, |k, _| {
+            let (value, rate) = operands.next().expect("as many as operands");
+            (k.push(value.clone()), rate.as_ref().map(|rate| k.push(rate.clone())))
+        });
+        slope.map(|slope| k.written(slope))
+    }
+}
