@@ -172,7 +172,7 @@ fn row(assembled: &mut Assembled, ports: &Ports, state: &Chosen) -> Option<Row> 
     }
     let port = ports.port_of(state);
     let rate = ports.rate_of(state)?;
-    let combination = assembled.rows.of(&mut assembled.d.x, rate)?.clone();
+    let combination = assembled.rows.alone(&mut assembled.d.x, rate)?;
     let mut sum = Sum { assembled, ports, row: Row { quantity: Vec::new(), by: BTreeMap::new() } };
     sum.row.quantity.extend(port.and_then(|p| stored(causal, p)).map(|stored| (ONE, stored)));
     sum.add(&combination, ONE);

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::algebra::{Exprs, ONE, Residue, Symbol};
+use crate::algebra::{Expr, Exprs, ONE, Residue, Symbol};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Ports, Role};
 use crate::ids::Map;
 
@@ -69,6 +69,36 @@ impl<'a> Rows<'a> {
             self.ports?.resolve_into(x, symbol, &mut self.known);
         }
         self.known.get(&symbol)
+    }
+
+    /// The same as [`of`](Rows::of) for one variable alone, without the rows of those that it reads: factors are taken
+    /// from it to what elements give, so that a chain takes as many products as it is long.
+    pub fn alone(&self, x: &mut Exprs, symbol: Symbol) -> Option<Combination> {
+        let ports = self.ports?;
+        if !ports.definitions.contains_key(&symbol) {
+            return self.known.get(&symbol).cloned();
+        }
+        let (mut order, mut open, mut done) = (Vec::new(), vec![symbol], BTreeSet::new());
+        while let Some((next, _)) = ports.next_to_resolve(&mut open, |s| done.contains(s)) {
+            done.insert(next);
+            order.push(next);
+        }
+        let mut factors: BTreeMap<Symbol, Vec<Expr>> = BTreeMap::from([(symbol, vec![ONE])]);
+        for next in order.into_iter().rev() {
+            let Some(terms) = factors.remove(&next) else { continue };
+            let factor = x.add(&terms);
+            let factor = x.simplify(factor);
+            for &(s, c) in ports.definitions[&next].0.iter().filter(|t| !self.zero.contains(&t.0)) {
+                factors.entry(s).or_default().push(x.mul(&[factor, c]));
+            }
+        }
+        let sum = |(s, terms): (Symbol, Vec<Expr>)| {
+            let factor = x.add(&terms);
+            let factor = x.simplify(factor);
+            let vanishes = if ports.undetermined.contains(&s) { x.is_zero_given(factor) } else { x.is_zero(factor) };
+            (!vanishes).then_some((s, factor))
+        };
+        Some(Combination(factors.into_iter().filter_map(sum).collect()))
     }
 
     /// A variable over what elements give, and over variables whose own rows have long coefficients.
