@@ -27,10 +27,11 @@ impl Cost {
 }
 
 impl Exprs {
-    /// Whether a number in the expression is a long one: exact products of numbers that are put into each other grow
-    /// without bound, though they are printed and computed with the digits of one.
-    pub fn has_long_number(&self, e: Expr) -> bool {
-        self.below(&[e], &|_| true).into_iter().any(|part| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER))
+    /// Whether an expression is written longer than this, or holds a long number: exact products of numbers that are put
+    /// into each other grow without bound, though they are printed and computed with the digits of one.
+    pub fn is_longer(&self, e: Expr, length: u64) -> bool {
+        let is_long = |part: Expr| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER);
+        self.written_length(e) > length || self.below(&[e], &|_| true).into_iter().any(is_long)
     }
 
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1

@@ -233,10 +233,15 @@ impl Combination {
                 *e = x.simplify(*e);
             }
         }
-        // A coefficient that vanishes only at the given parameters is kept, except that of an undetermined variable.
-        sum.retain(|s, e| if undetermined.contains(s) { !x.is_zero_given(*e) } else { !x.is_zero(*e) });
+        sum.retain(|&s, e| stays(x, (s, *e), undetermined));
         Combination(sum.into_iter().collect())
     }
+}
+
+/// Whether a term of a combination stays: its coefficient does not vanish. One that vanishes only at the given parameters
+/// is kept, except that of an undetermined variable.
+pub(crate) fn stays(x: &mut Exprs, (symbol, coefficient): (Symbol, Expr), undetermined: &[Symbol]) -> bool {
+    if undetermined.contains(&symbol) { !x.is_zero_given(coefficient) } else { !x.is_zero(coefficient) }
 }
 
 /// The size of an expression at the given parameters, every other symbol taken as 1.

@@ -8,8 +8,8 @@ use super::rows::without_own;
 use crate::algebra::{Expr, SparseRow, Symbol};
 use crate::causal_graph::{Combination, Role, circuits};
 
-/// What changes a stored quantity: `quantity' = row`.
-struct Balance {
+/// A balance, written out: `quantity' = row`.
+struct BalanceRow {
     /// The state that stands for it.
     state: Symbol,
     quantity: Expr,
@@ -32,20 +32,20 @@ pub fn eliminate(assembled: &mut Assembled) -> Vec<Conserved> {
 }
 
 /// The balances that may share all that changes them.
-fn entangled(assembled: &mut Assembled) -> Vec<Balance> {
+fn entangled(assembled: &mut Assembled) -> Vec<BalanceRow> {
     let balances = std::mem::take(&mut assembled.balances);
     let rates: Vec<[Symbol; 1]> = balances.iter().map(|balance| [balance.rate]).collect();
     let entangled = assembled.rows.entangled(&rates, |input| input.role != Role::Dependent);
     let open = balances.into_iter().zip(entangled).filter(|b| b.1);
     let open = open.filter_map(|(balance, _)| {
         let (quantity, row) = assembled.written_out(&balance)?;
-        Some(Balance { state: balance.state, quantity, row })
+        Some(BalanceRow { state: balance.state, quantity, row })
     });
     open.collect()
 }
 
 /// Rows over columns that are an input times its non-constant factor, with constant coefficients.
-fn constant_rows(assembled: &mut Assembled, balances: &[Balance]) -> Vec<Vec<(usize, Expr)>> {
+fn constant_rows(assembled: &mut Assembled, balances: &[BalanceRow]) -> Vec<Vec<(usize, Expr)>> {
     let mut columns: BTreeMap<(Symbol, Option<Expr>), usize> = BTreeMap::new();
     let one = assembled.d.x.int(1);
     let mut rows = Vec::with_capacity(balances.len());
@@ -99,7 +99,7 @@ fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[
 /// Replaces one state of a conserved combination by the constant. `None` if no state can be solved for.
 fn replace(
     assembled: &mut Assembled,
-    balances: &[Balance],
+    balances: &[BalanceRow],
     vector: &[(usize, Expr)],
     number: usize,
 ) -> Option<Conserved> {

@@ -69,12 +69,12 @@ impl LinearForms {
     fn with_names(&mut self, x: &mut Exprs, symbol: Symbol, unknowns: &[Symbol], mut form: LinearForm) -> LinearForm {
         let longest = if unknowns.len() < MANY { NAMED } else { NAMED_OF_MANY };
         for (&k, coefficient) in &mut form.coefficients {
-            if x.written_length(*coefficient) > longest || x.has_long_number(*coefficient) {
+            if x.is_longer(*coefficient, longest) {
                 let gain = x.gain(symbol, unknowns[k]);
                 *coefficient = self.name(x, gain, *coefficient);
             }
         }
-        if x.written_length(form.rest) > longest || x.has_long_number(form.rest) {
+        if x.is_longer(form.rest, longest) {
             let bias = x.bias(symbol);
             form.rest = self.name(x, bias, form.rest);
         }

@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::algebra::{Expr, Exprs, ONE, Residue, Symbol};
-use crate::causal_graph::{CausalGraph, Combination, PortState, Ports, Role};
+use crate::causal_graph::{CausalGraph, Combination, PortState, Ports, Role, stays};
 use crate::ids::Map;
 
 /// Terms that may be formed in the search for terms that cancel.
@@ -95,8 +95,7 @@ impl<'a> Rows<'a> {
         let sum = |(s, terms): (Symbol, Vec<Expr>)| {
             let factor = x.add(&terms);
             let factor = x.simplify(factor);
-            let vanishes = if ports.undetermined.contains(&s) { x.is_zero_given(factor) } else { x.is_zero(factor) };
-            (!vanishes).then_some((s, factor))
+            stays(x, (s, factor), &ports.undetermined).then_some((s, factor))
         };
         Some(Combination(factors.into_iter().filter_map(sum).collect()))
     }
@@ -241,7 +240,7 @@ struct WrittenOut {
 
 /// Whether all coefficients are written shortly.
 fn is_short(x: &mut Exprs, row: &Combination) -> bool {
-    row.0.iter().all(|t| x.written_length(t.1) <= SHORT && !x.has_long_number(t.1))
+    row.0.iter().all(|t| !x.is_longer(t.1, SHORT))
 }
 
 /// What of the definitions is written out, as far as a bound of work goes.
