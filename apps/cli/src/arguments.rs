@@ -26,7 +26,7 @@ pub enum Command {
     New(New),
     /// Report everything that is wrong with a model, and what is odd
     #[command(after_help = "Example:\n  halfarrow check car.bond")]
-    Check(FileArguments),
+    Check(ModelArguments),
     /// Print a model in the canonical layout
     #[command(after_help = "\
 Examples:
@@ -132,6 +132,9 @@ pub struct ModelArguments {
     /// Set a parameter, as in `k=3` or `k=18 kN/m`; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = pair)]
     pub set: Vec<(String, String)>,
+    /// Say on stderr what each stage took, and the memory in use after it
+    #[arg(long)]
+    pub timings: bool,
 }
 
 /// How wide what is printed may be.
@@ -324,9 +327,6 @@ pub struct Simulate {
     /// What to record instead of states and outputs: names with commas between them, or `all`
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub record: Vec<String>,
-    /// Say what took how long, and of each state what scale and which error in a step it was given
-    #[arg(long)]
-    pub timings: bool,
     /// Where to write the trajectory: a .csv or .parquet file, or `-` for CSV on stdout; may be repeated
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,

@@ -23,20 +23,41 @@ pub use report::report;
 pub use run::simulate;
 pub use sweep::sweep;
 
-use halfarrow::{Error, FixedMethod, Form, Model, Override, Problem, Source, Start};
+use std::time::Instant;
+
+use halfarrow::{Error, FixedMethod, Form, Model, Override, Problem, Source, StageTime, Start};
 
 use crate::arguments::{FileArguments, ModelArguments};
+use crate::page::Page;
 use crate::screen;
 
 /// Loads a model, shows what was noticed, and goes on; on an error gives its exit status.
 fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u8, Error>) -> u8 {
+    let begun = Instant::now();
     let set = overrides(arguments);
     let loaded = source(&arguments.model).map_err(Error::from).and_then(|source| Model::new(source, &set));
     let outcome = loaded.and_then(|model| {
         screen::warn(model.warnings());
-        go_on(&model)
+        let status = go_on(&model);
+        if arguments.timings {
+            note_timings(&model.timings(), begun);
+        }
+        status
     });
     outcome.unwrap_or_else(|error| screen::fail(&error, arguments.model.json))
+}
+
+/// Says what each stage took, what the rest of the command, and how much memory was in use after each.
+fn note_timings(stages: &[StageTime], begun: Instant) {
+    let whole = begun.elapsed().as_secs_f64();
+    let rest = whole - stages.iter().map(|stage| stage.seconds).sum::<f64>();
+    let megabytes = |bytes: usize| format!("{:.1}", bytes as f64 / 1e6);
+    let row =
+        |s: &StageTime| [s.stage.to_string(), screen::milliseconds(s.seconds), s.memory.map_or("-".into(), megabytes)];
+    let last =
+        [("else", rest), ("in all", whole)].map(|(name, s)| [name.to_string(), screen::milliseconds(s), String::new()]);
+    let rows = stages.iter().map(row).chain(last);
+    screen::note(Page::usual().table(["stage", "time (ms)", "memory after it (MB)"], rows).trim_end());
 }
 
 /// The model that is asked for, and what it may read.

@@ -27,6 +27,11 @@ impl Page {
         Page { width: arguments.width.or_else(columns).or_else(terminal).unwrap_or(USUAL).max(LEAST) }
     }
 
+    /// As wide as pages are where nobody says.
+    pub fn usual() -> Page {
+        Page { width: USUAL }
+    }
+
     /// Lines, each folded where it is too long.
     pub fn lines(self, text: &str) -> String {
         text.lines().map(|line| self.line(line)).collect()

@@ -79,6 +79,11 @@ pub fn short(x: f64) -> String {
     }
 }
 
+/// A time in ms, to a microsecond.
+pub fn milliseconds(seconds: f64) -> String {
+    format!("{:.3}", seconds * 1e3)
+}
+
 /// Time between two lines of progress where stderr is no terminal.
 const SPELL: Duration = Duration::from_secs(5);
 

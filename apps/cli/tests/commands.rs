@@ -139,6 +139,30 @@ fn loops_tell_class_gain_and_breaks() {
 }
 
 #[test]
+fn timings_tell_time_and_memory_of_every_stage() {
+    let at = folder("timings");
+    let car = model("quarter_car");
+    for (command, stages) in [
+        (&["check", &car][..], &["ast", "bond_graph", "causal_graph", "equations"][..]),
+        (&["loops", &car], &["causal_paths"]),
+        (&["simulate", &car, "--to", "0.1", "--out", "t.csv"], &["program", "code", "start", "run", "write", "in all"]),
+        (&["draw", &car, "--out", "t.svg"], &["causal_paths", "draw"]),
+    ] {
+        let output = halfarrow(&at, &[command, &["--timings"]].concat());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        for stage in stages {
+            let told = stderr(&output);
+            let line =
+                told.lines().find(|line| line.starts_with(&format!("│ {stage} "))).unwrap_or_else(|| panic!("{told}"));
+            let numbers: Vec<f64> = line.split(['│', '┆']).filter_map(|cell| cell.trim().parse().ok()).collect();
+            let memory = usize::from(cfg!(target_os = "linux") && *stage != "in all");
+            assert_eq!(numbers.len(), 1 + memory, "{line}");
+            assert!(numbers.iter().all(|n| *n >= 0.0), "{line}");
+        }
+    }
+}
+
+#[test]
 fn equations_read_as_in_a_textbook() {
     let text = halfarrow(Path::new("."), &["equations", &model("pendulum")]);
     assert_eq!(stdout(&text), "(J + M a²) ω' = -M g a cos φ\nφ' = ω\n");

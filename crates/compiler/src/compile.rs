@@ -1,6 +1,6 @@
 //! The chain of stages.
 
-use crate::ast::parse;
+use crate::ast::{Parsed, parse};
 use std::sync::Arc;
 
 use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate};
@@ -62,9 +62,29 @@ pub fn compile(text: Text<'_>, form: Form) -> Result<Reached<Program>, Found> {
 /// # Errors
 /// All faults of the text and of the names, units and bonds in it.
 pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
+    bond_graph_of(read(text), text)
+}
+
+/// A text that was read, with its faults.
+#[derive(Debug)]
+pub struct Read {
+    parsed: Parsed,
+    sources: Sources,
+}
+
+/// Reads the text alone, without what it imports.
+pub fn read(text: Text<'_>) -> Read {
     let mut sources = Sources::new();
     let file = sources.add(text.name, text.text);
-    let parsed = parse(text.text, file);
+    Read { parsed: parse(text.text, file), sources }
+}
+
+/// The bond graph of a text that was [`read`].
+///
+/// # Errors
+/// As [`to_bond_graph`].
+pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
+    let Read { parsed, sources } = read;
     let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
     diagnostics.0.extend(elaborated.diagnostics.0);

@@ -1,6 +1,5 @@
 //! The picture of a model.
 
-use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_draw::{DrawOptions, DrawnPaths, path_count};
 use halfarrow_trace::{PlotOptions, Trace, plot, plot_runs, png};
@@ -61,7 +60,7 @@ impl Model {
     /// The model has errors, or a path is asked for that it does not have.
     pub fn draw(&self, options: &DrawOptions) -> Result<Picture, Error> {
         let causal = self.causal_graph()?;
-        let paths = find_paths(&causal);
+        let paths = self.paths_of(&causal);
         let count = path_count(&paths);
         if let DrawnPaths::Numbers(numbers) = &options.paths
             && let Some(none) = numbers.iter().find(|n| !(1..=count).contains(*n))
@@ -72,6 +71,6 @@ impl Model {
             };
             return Err(Problem::BadOption { reason: format!("there is no path {none}: {known}") }.into());
         }
-        Ok(Picture { svg: halfarrow_draw::draw(&causal, &paths, options) })
+        Ok(Picture { svg: self.watch.time("draw", || halfarrow_draw::draw(&causal, &paths, options)) })
     }
 }

@@ -53,6 +53,7 @@ mod table_file;
 mod verdict;
 #[cfg(feature = "real_time")]
 mod wall_clock;
+mod watch;
 
 pub use audited::{AuditReport, Deviation};
 pub use check::CheckReport;
@@ -91,3 +92,4 @@ pub use stepper::{Snapshot, Stepper};
 pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
 pub use table_file::read_trace;
 pub use verdict::Verdict;
+pub use watch::StageTime;

@@ -7,8 +7,8 @@ use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind};
 use halfarrow_compiler::causal_graph::{
     CausalGraph, Combination, PortState, Role, Stroke, by_hand, kept_junctions, state_rank,
 };
-use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts, find_paths};
-use halfarrow_compiler::equations::{EquationStep, Equations, Form, StateKind, derive_equations};
+use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, StateKind};
 use halfarrow_compiler::ids::{Id, Map};
 use halfarrow_compiler::textbook::{Style, print_expr, show};
 use serde::Serialize;
@@ -149,12 +149,13 @@ impl Model {
     /// The model has errors.
     pub fn loops(&self) -> Result<LoopsReport, Error> {
         let causal = self.causal_graph()?;
-        let counted = counts(&causal, &find_paths(&causal));
+        let counted = counts(&causal, &self.paths_of(&causal));
         let drawn = CausalGraph { strokes: by_hand(&causal), ..causal.clone() };
-        let paths = find_paths(&drawn);
-        let equations = derive_equations(&causal, Form::Minimal).map_err(|errors| self.fault(errors))?;
+        let paths = self.paths_of(&drawn);
+        let equations = self.equations_of(&causal, Form::Minimal)?;
         let start = self.values_at_start(&equations);
-        let report = |path| loop_report(&causal.graph, &paths, path, &equations, &start);
+        let blocks = Blocks::of(&causal.graph, &equations);
+        let report = |path| loop_report(&causal.graph, &paths, path, (&equations, &blocks), &start);
         Ok(LoopsReport {
             model: self.graph.name.clone(),
             kept: kept_variables(&causal),
@@ -199,7 +200,7 @@ fn loop_report(
     graph: &BondGraph,
     paths: &CausalPaths,
     path: &Path,
-    equations: &Equations,
+    (equations, blocks): (&Equations, &Blocks),
     start: &BTreeMap<String, f64>,
 ) -> LoopReport {
     let x = &paths.exprs;
@@ -213,7 +214,7 @@ fn loop_report(
         gain: ascii(x, path.gain, &PlainNames(x)),
         gain_value: value.is_finite().then_some(value),
         breaks: path.breaks.iter().map(|&s| x.name(s).to_string()).collect(),
-        resolution: resolution(graph, path, equations),
+        resolution: resolution(path, equations, blocks),
     }
 }
 
@@ -225,30 +226,46 @@ fn value_of(x: &Exprs, symbol: Symbol, start: &BTreeMap<String, f64>) -> f64 {
     }
 }
 
-fn resolution(graph: &BondGraph, path: &Path, equations: &Equations) -> String {
+/// The solve blocks that elements take part in: of each kind the first, as its place among the steps and its size.
+struct Blocks {
+    newton: BTreeMap<ElementId, (usize, usize)>,
+    linear: BTreeMap<ElementId, (usize, usize)>,
+}
+
+impl Blocks {
+    fn of(graph: &BondGraph, equations: &Equations) -> Blocks {
+        let mut blocks = Blocks { newton: BTreeMap::new(), linear: BTreeMap::new() };
+        for (place, step) in equations.steps.iter().enumerate() {
+            let (kind, unknowns, elements) = match step {
+                EquationStep::Newton { unknowns, elements, .. } => (&mut blocks.newton, unknowns, elements),
+                EquationStep::Linear { unknowns, elements, .. } => (&mut blocks.linear, unknowns, elements),
+                _ => continue,
+            };
+            for &element in elements.iter().filter(|e| !graph.elements[**e].kind.is_inner()) {
+                kind.entry(element).or_insert((place, unknowns.len()));
+            }
+        }
+        blocks
+    }
+
+    /// What solves the equations of these elements.
+    fn resolution(&self, met: &BTreeSet<ElementId>) -> String {
+        let size =
+            |kind: &BTreeMap<ElementId, (usize, usize)>| met.iter().filter_map(|e| kind.get(e)).min().map(|b| b.1);
+        match (size(&self.newton), size(&self.linear)) {
+            (Some(size), _) => format!("Newton iteration for {size} unknown{}", plural(size)),
+            (None, Some(size)) => format!("solved in a block of {size} linear equation{}", plural(size)),
+            (None, None) => "solved in closed form".to_string(),
+        }
+    }
+}
+
+fn resolution(path: &Path, equations: &Equations, blocks: &Blocks) -> String {
     if path.class == 1 {
         let dependent: Vec<&str> = path.breaks.iter().map(|&s| equations.graph.exprs.name(s)).collect();
         return format!("velocity transformation: {} is eliminated with its storage", dependent.join(", "));
     }
-    let met: BTreeSet<ElementId> = path.route.iter().chain(&path.elements).copied().collect();
-    let meets =
-        |elements: &[ElementId]| elements.iter().any(|e| met.contains(e) && !graph.elements[*e].kind.is_inner());
-    let mut linear = None;
-    for step in &equations.steps {
-        match step {
-            EquationStep::Newton { unknowns, elements, .. } if meets(elements) => {
-                return format!("Newton iteration for {} unknown{}", unknowns.len(), plural(unknowns.len()));
-            }
-            EquationStep::Linear { unknowns, elements, .. } if meets(elements) => {
-                linear = linear.or(Some(unknowns.len()))
-            }
-            _ => {}
-        }
-    }
-    match linear {
-        Some(size) => format!("solved in a block of {size} linear equation{}", plural(size)),
-        None => "solved in closed form".to_string(),
-    }
+    blocks.resolution(&path.route.iter().chain(&path.elements).copied().collect())
 }
 
 fn plural(n: usize) -> &'static str {

@@ -6,18 +6,22 @@ use std::sync::Arc;
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{BondGraph, Override};
 use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
-use halfarrow_compiler::compile::{Found, Reached, Text, to_bond_graph};
+use halfarrow_compiler::causal_paths::{CausalPaths, find_paths};
+use halfarrow_compiler::compile::{self, Found, Reached, Text};
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Equations, Form, derive_equations};
+use halfarrow_compiler::program::{Program, schedule};
 
 use crate::error::{Error, Problem};
 use crate::source::{Remembered, Source};
+use crate::watch::{StageTime, Watch};
 
 /// A model without errors in its text, its names, its units and its bonds, and what was noticed in it.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) graph: BondGraph,
     pub(crate) found: Found,
+    pub(crate) watch: Watch,
     origin: Arc<Origin>,
 }
 
@@ -63,8 +67,10 @@ impl Model {
 
     fn read(source: Source, files: Arc<Remembered>, overrides: Vec<Override>) -> Result<Model, Error> {
         let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides: &overrides };
-        let Reached { ir: graph, found } = to_bond_graph(text)?;
-        Ok(Model { graph, found, origin: Arc::new(Origin { source, files, overrides }) })
+        let watch = Watch::default();
+        let read = watch.time("ast", || compile::read(text));
+        let Reached { ir: graph, found } = watch.time("bond_graph", || compile::bond_graph_of(read, text))?;
+        Ok(Model { graph, found, watch, origin: Arc::new(Origin { source, files, overrides }) })
     }
 
     /// The same model with other values of parameters in the place of those that it has. Files are not read again.
@@ -102,7 +108,7 @@ impl Model {
         let causal = self.causal_graph()?;
         let mut found = self.found.clone();
         found.diagnostics.0.extend(causal_graph::warnings(&causal));
-        let equations = derive_equations(&causal, Form::Minimal);
+        let equations = self.watch.time("equations", || derive_equations(&causal, Form::Minimal));
         let equations = equations.map_err(|errors| {
             let mut all = found.clone();
             all.diagnostics.0.extend(errors.0);
@@ -118,11 +124,33 @@ impl Model {
     }
 
     pub(crate) fn causal_graph(&self) -> Result<CausalGraph, Error> {
-        assign_causality(&self.graph).map_err(|errors| self.fault(errors))
+        self.watch.time("causal_graph", || assign_causality(&self.graph)).map_err(|errors| self.fault(errors))
     }
 
     pub(crate) fn equations_in(&self, form: Form) -> Result<Equations, Error> {
-        derive_equations(&self.causal_graph()?, form).map_err(|errors| self.fault(errors))
+        self.equations_of(&self.causal_graph()?, form)
+    }
+
+    pub(crate) fn equations_of(&self, causal: &CausalGraph, form: Form) -> Result<Equations, Error> {
+        self.watch.time("equations", || derive_equations(causal, form)).map_err(|errors| self.fault(errors))
+    }
+
+    pub(crate) fn paths_of(&self, causal: &CausalGraph) -> CausalPaths {
+        self.watch.time("causal_paths", || find_paths(causal))
+    }
+
+    pub(crate) fn program_of(&self, equations: &Equations) -> Program {
+        self.watch.time("program", || schedule(equations))
+    }
+
+    /// What the stages took so far that this model, or a copy of it, went through.
+    pub fn timings(&self) -> Vec<StageTime> {
+        self.watch.noted()
+    }
+
+    /// Does something with the model, and notes under a name what it took.
+    pub fn timed<T>(&self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+        self.watch.time(stage, work)
     }
 
     /// Errors of a later stage, with the warnings before them.

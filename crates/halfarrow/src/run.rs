@@ -8,7 +8,7 @@ use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{Element, Kind, ParameterKind, PortRef, Storage};
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
-use halfarrow_compiler::program::{Program, schedule};
+use halfarrow_compiler::program::Program;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, StartError};
 use halfarrow_sim::{
@@ -263,6 +263,8 @@ impl Model {
             Ready::Form { system, explicit } => self.run_form((*system, explicit), run, &mut timings, progress),
         };
         timings.run = begun.elapsed().as_secs_f64() - timings.start;
+        self.watch.note("start", timings.start);
+        self.watch.note("run", timings.run);
         match &mut done {
             Ok(done) => done.report.timings = timings,
             Err(Error::Run(stopped)) => stopped.report.timings = timings,
@@ -395,7 +397,8 @@ impl Model {
     /// A form beside the minimal one.
     pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
         let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
-        exec::ImplicitModel::new(schedule(equations), minimal).map_err(|failure| self.stopped(failure))
+        let program = self.program_of(equations);
+        self.watch.time("code", || exec::ImplicitModel::new(program, minimal)).map_err(|failure| self.stopped(failure))
     }
 
     fn run_report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
@@ -418,7 +421,8 @@ impl Model {
     }
 
     pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
-        exec::Model::new(schedule(equations)).map_err(|failure| self.stopped(failure))
+        let program = self.program_of(equations);
+        self.watch.time("code", || exec::Model::new(program)).map_err(|failure| self.stopped(failure))
     }
 
     /// Says of a value that is not finite at the start which stored quantity it comes from, if that starts at 0 since nothing

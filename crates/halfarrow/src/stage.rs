@@ -1,11 +1,9 @@
 //! The stages as text.
 
 use halfarrow_compiler::ast;
-use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::compile::Found;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::Form;
-use halfarrow_compiler::program::schedule;
 use halfarrow_compiler::textbook::show;
 
 use crate::Override;
@@ -81,10 +79,10 @@ impl Stage {
             Stage::CausalGraph => model.causal_graph()?.to_string(),
             Stage::CausalPaths => {
                 let causal = model.causal_graph()?;
-                find_paths(&causal).text(&causal)
+                model.paths_of(&causal).text(&causal)
             }
             Stage::Equations => show(model.equations_in(Form::Minimal)?).to_string(),
-            Stage::Program => schedule(&model.equations_in(Form::Minimal)?).to_string(),
+            Stage::Program => model.program_of(&model.equations_in(Form::Minimal)?).to_string(),
         })
     }
 }

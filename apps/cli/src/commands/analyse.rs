@@ -1,29 +1,36 @@
 //! `check`, `show`, `loops`, `equations`.
 
+use std::time::Instant;
+
 use halfarrow::{CheckReport, EquationsReport, Error, Form, LoopsReport, Model, Stage};
 use serde_json::json;
 
-use super::{overrides, source, with_model};
-use crate::arguments::{self, FileArguments, Format};
+use super::{note_timings, overrides, source, with_model};
+use crate::arguments::{self, Format, ModelArguments};
 use crate::page::Page;
 use crate::screen;
 
 /// All diagnostics.
-pub fn check(arguments: &FileArguments) -> u8 {
-    let report = match source(arguments).map_err(Error::from).and_then(CheckReport::of) {
+pub fn check(arguments: &ModelArguments) -> u8 {
+    let begun = Instant::now();
+    let source = source(&arguments.model).map_err(Error::from);
+    let report = match source.and_then(|source| CheckReport::of(source, &overrides(arguments))) {
         Ok(report) => report,
-        Err(error) => return screen::fail(&error, arguments.json),
+        Err(error) => return screen::fail(&error, arguments.model.json),
     };
+    if arguments.timings {
+        note_timings(&report.timings, begun);
+    }
     screen::warn(&report.found);
-    let printed = if arguments.json {
+    let printed = if arguments.model.json {
         screen::print_json(&report.to_json())
     } else if report.errors == 0 {
         let odd = if report.warnings == 0 { "nothing to say".to_string() } else { counted(report.warnings, "warning") };
-        screen::print(&format!("{}: {odd}\n", arguments.file.display()))
+        screen::print(&format!("{}: {odd}\n", arguments.model.file.display()))
     } else {
         let errors = counted(report.errors, "error");
         let warnings = counted(report.warnings, "warning");
-        screen::note(&format!("{}: {errors}, {warnings}", arguments.file.display()));
+        screen::note(&format!("{}: {errors}, {warnings}", arguments.model.file.display()));
         Ok(())
     };
     screen::printed(printed, u8::from(report.errors > 0))

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, Error, FixedMethod, Method, Model, Problem, Record, Run, RunReport, Simulated,
-    Start, Stopped, Timings, Trace, csv_text, write_csv, write_parquet,
+    Start, Stopped, Trace, csv_text, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -131,18 +131,18 @@ fn finish(
     (told, error): (&[String], Option<&str>),
 ) -> Result<(), Error> {
     if done.trace.samples() > 0 || error.is_none() {
-        write_files(arguments, &done.trace)?;
-        write_plots(arguments, model, &run(arguments), done)?;
+        model.timed("write", || write_files(arguments, &done.trace))?;
+        model.timed("draw", || write_plots(arguments, model, &run(arguments), done))?;
     }
     let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
     let untold = done.report.notes.iter().filter(|note| !told.contains(note));
     untold.for_each(|note| screen::note(&format!("warning: {note}")));
-    if arguments.timings && !arguments.model.model.json {
-        screen::note(timings(&done.report, Page::of(&arguments.page)).trim_end());
+    if arguments.model.timings && !arguments.model.model.json {
+        screen::note(tolerances(&done.report, Page::of(&arguments.page)).trim_end());
     }
     if arguments.model.model.json {
         if !to_stdout {
-            screen::print_json(&json_of(arguments, done, error))?;
+            screen::print_json(&json_of(arguments, model, done, error))?;
         }
     } else if to_stdout {
         screen::note(summary(&done.report).trim_end());
@@ -165,7 +165,7 @@ fn write_files(arguments: &Simulate, trace: &Trace) -> Result<(), Error> {
 }
 
 /// The report, the columns and, if they are written nowhere else, the values.
-fn json_of(arguments: &Simulate, done: &Simulated, error: Option<&str>) -> Value {
+fn json_of(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&str>) -> Value {
     let mut object = json!(done.report);
     if let Some(error) = error {
         object["error"] = json!(error);
@@ -178,24 +178,19 @@ fn json_of(arguments: &Simulate, done: &Simulated, error: Option<&str>) -> Value
         object["values"] = columns.map(|c| (c.name.clone(), json!(c.values))).collect::<serde_json::Map<_, _>>().into();
     }
     object["complete"] = json!(done.report.reached >= arguments.to);
-    if arguments.timings {
+    if arguments.model.timings {
         object["timings"] = json!(done.report.timings);
+        object["timings"]["stages"] = json!(model.timings());
         object["tolerances"] = json!(done.report.tolerances);
     }
     object
 }
 
-/// What took how long, and how exact each state was kept.
-fn timings(report: &RunReport, page: Page) -> String {
-    let Timings { equations, start, run } = report.timings;
-    let [equations, start, run] = [equations, start, run].map(screen::short);
-    let mut text = format!("equations {equations} s, start {start} s, run {run} s\n");
-    if !report.tolerances.is_empty() {
-        let rows = report.tolerances.iter();
-        let rows = rows.map(|kept| [kept.name.clone(), screen::short(kept.scale), format!("{:.1e}", kept.absolute)]);
-        text += &page.table(["state", "scale (SI)", "error allowed in a step"], rows);
-    }
-    text
+/// How exact each state was kept.
+fn tolerances(report: &RunReport, page: Page) -> String {
+    let rows = report.tolerances.iter();
+    let rows = rows.map(|kept| [kept.name.clone(), screen::short(kept.scale), format!("{:.1e}", kept.absolute)]);
+    page.table(["state", "scale (SI)", "error allowed in a step"], rows)
 }
 
 /// Start, end, least and greatest value of every column.

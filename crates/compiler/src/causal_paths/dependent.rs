@@ -6,7 +6,6 @@ use super::cycles::{Cycles, cycles_through};
 use super::trace::nodes;
 use crate::bond_graph::{BondGraph, BondId, Kind, PortRef, Storage, StorageLaw};
 use crate::causal_graph::Stroke;
-use crate::causal_graph::break_set::shortest_cycle;
 use crate::causal_graph::signals::{EdgeKind, NodeId, SignalEdge, SignalGraph};
 use crate::ids::{Id, Table};
 
@@ -54,12 +53,29 @@ pub(super) fn cycles_of(signals: &SignalGraph, edge: &SignalEdge, limit: usize) 
     found
 }
 
-/// A shortest such cycle.
+/// A shortest such cycle: breadth first, edges in the order of the graph.
 pub(super) fn shortest_of(signals: &SignalGraph, edge: &SignalEdge) -> Option<Vec<NodeId>> {
-    let layers = Layers::new(signals, edge);
-    let cycle = shortest_cycle(&layers.successors(), 0, |_| false)?;
-    let cycle: Vec<usize> = cycle.into_iter().map(|v| layers.places[v].0.index()).collect();
-    is_simple(&cycle).then(|| nodes(&cycle))
+    const NEW: usize = usize::MAX;
+    let slot = |(node, passed): Place| 2 * node.index() + usize::from(passed);
+    let start = (edge.to, false);
+    let mut from = vec![NEW; 2 * signals.node_count()];
+    from[slot(start)] = slot(start);
+    let mut queue = VecDeque::from([start]);
+    while let Some(place) = queue.pop_front() {
+        for next in after(signals, edge, place) {
+            if next == start {
+                let back = std::iter::successors(Some(slot(place)), |&at| (at != slot(start)).then(|| from[at]));
+                let mut cycle: Vec<usize> = back.map(|at| at / 2).collect();
+                cycle.reverse();
+                return is_simple(&cycle).then(|| nodes(&cycle));
+            }
+            if from[slot(next)] == NEW {
+                from[slot(next)] = slot(place);
+                queue.push_back(next);
+            }
+        }
+    }
+    None
 }
 
 fn is_simple(cycle: &[usize]) -> bool {
@@ -68,13 +84,28 @@ fn is_simple(cycle: &[usize]) -> bool {
     sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
+/// A signal, and whether an integral edge has been passed on the way to it.
+type Place = (NodeId, bool);
+
+/// Where one can go on to from a place on a way from a derivative edge: once through an integral edge.
+fn after<'a>(signals: &'a SignalGraph, edge: &SignalEdge, (node, passed): Place) -> impl Iterator<Item = Place> + 'a {
+    let back = (passed && node == edge.from).then_some((edge.to, false));
+    let edges = if back.is_some() { &[][..] } else { signals.edges_from(node) };
+    let allowed = edges.iter().filter(move |edge| match edge.kind {
+        EdgeKind::Integral => !passed,
+        EdgeKind::Derivative => false,
+        _ => true,
+    });
+    back.into_iter().chain(allowed.map(move |edge| (edge.to, passed || edge.kind == EdgeKind::Integral)))
+}
+
 /// The signals that a derivative edge reaches: before an integral edge, and after it.
 struct Layers<'a> {
     signals: &'a SignalGraph,
     edge: &'a SignalEdge,
-    /// Signal, and whether an integral edge has been passed; the first is what the derivative edge sets.
-    places: Vec<(NodeId, bool)>,
-    index: BTreeMap<(NodeId, bool), usize>,
+    /// The first is what the derivative edge sets.
+    places: Vec<Place>,
+    index: BTreeMap<Place, usize>,
 }
 
 impl<'a> Layers<'a> {
@@ -83,7 +114,7 @@ impl<'a> Layers<'a> {
         let mut layers = Layers { signals, edge, places: vec![start], index: BTreeMap::from([(start, 0)]) };
         let mut queue = VecDeque::from([start]);
         while let Some(place) = queue.pop_front() {
-            for next in layers.after(place) {
+            for next in after(signals, edge, place) {
                 if !layers.index.contains_key(&next) {
                     layers.index.insert(next, layers.places.len());
                     layers.places.push(next);
@@ -94,22 +125,8 @@ impl<'a> Layers<'a> {
         layers
     }
 
-    /// Where one can go on to from a place.
-    fn after(&self, (node, passed): (NodeId, bool)) -> Vec<(NodeId, bool)> {
-        if passed && node == self.edge.from {
-            return vec![(self.edge.to, false)];
-        }
-        let edges = self.signals.edges_from(node).iter();
-        let allowed = edges.filter(|edge| match edge.kind {
-            EdgeKind::Integral => !passed,
-            EdgeKind::Derivative => false,
-            _ => true,
-        });
-        allowed.map(|edge| (edge.to, passed || edge.kind == EdgeKind::Integral)).collect()
-    }
-
     fn successors(&self) -> Vec<Vec<u32>> {
-        let heads = |&place: &(NodeId, bool)| self.after(place).iter().map(|next| self.index[next] as u32).collect();
-        self.places.iter().map(heads).collect()
+        let heads = |&place: &Place| after(self.signals, self.edge, place).map(|next| self.index[&next] as u32);
+        self.places.iter().map(|place| heads(place).collect()).collect()
     }
 }

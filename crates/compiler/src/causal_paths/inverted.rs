@@ -13,8 +13,9 @@ use crate::causal_graph::signals::{EdgeKind, NodeId, SignalGraph, signal_graph};
 use crate::causal_graph::{CausalGraph, Stroke, in_order, kept_junctions};
 use crate::ids::{Id, Table};
 
-/// Work allowed: bonds looked at in all tries together.
-const BUDGET: usize = 2_000_000;
+/// Work allowed: bonds looked at in all tries together, once for the turning of strokes and once for every storage in
+/// derivative causality whose paths are looked for.
+const BUDGET: usize = 10_000_000;
 /// Distances from the paths at which storages are tried.
 const RINGS: usize = 6;
 
@@ -139,7 +140,8 @@ impl Tries<'_> {
                 turner.turn(place, open);
             }
         }
-        let ports = wanted.iter().copied().filter(|&place| !turner.is_integral(place)).collect();
+        let ports: Vec<PortRef> = wanted.iter().copied().filter(|&place| !turner.is_integral(place)).collect();
+        self.spend(ports.len())?;
         let mut found = Inverted { strokes: turner.strokes, ports };
         let mut score = score_of(self.graph, &found);
         self.turn_resistors(&mut found, &mut score);
@@ -158,8 +160,11 @@ impl Tries<'_> {
             improved = false;
             for place in self.resistors_on_paths(&found.strokes) {
                 for end in self.resistors_on_paths(&found.strokes) {
-                    if place == end || self.spend(1).is_none() {
+                    if place == end {
                         continue;
+                    }
+                    if self.spend(1 + found.ports.len()).is_none() {
+                        return;
                     }
                     let mut turner = Turner { graph: self.graph, kept: self.kept, strokes: found.strokes.clone() };
                     if !turner.turn(place, |other, _| other == end) {
@@ -288,16 +293,19 @@ impl Turner<'_> {
         if bonds.len() < way.len() {
             return false;
         }
-        let before = self.strokes.clone();
-        for &bond in &bonds {
-            self.strokes[bond] = turned(self.strokes[bond]);
-        }
+        self.turn_over(&bonds);
         let met: BTreeSet<ElementId> = way.iter().map(|step| step.1.element).collect();
         let in_order = met.into_iter().all(|element| self.in_order(element));
         if !in_order {
-            self.strokes = before;
+            self.turn_over(&bonds);
         }
         in_order
+    }
+
+    fn turn_over(&mut self, bonds: &BTreeSet<BondId>) {
+        for &bond in bonds {
+            self.strokes[bond] = turned(self.strokes[bond]);
+        }
     }
 
     fn in_order(&self, element: ElementId) -> bool {
