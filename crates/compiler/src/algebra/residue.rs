@@ -11,6 +11,9 @@ use super::node::Expr;
 pub struct Residue(u64);
 
 impl Residue {
+    /// The value of 0.
+    pub const ZERO: Residue = Residue(0);
+
     /// Whether it is 0.
     pub fn vanishes(self) -> bool {
         self.0 == 0

@@ -85,8 +85,11 @@ impl ConnectedPart<'_> {
         let before = self.x.assumed();
         let solved = self.assign_with_fewest_breaks(strokes)?;
         let (graph, members) = (self.graph, self.members);
+        if members.len() > TURNED_AT_MOST || contradiction::is_forced(graph, members) {
+            return Ok(solved);
+        }
         let cost = digits::cost(self.x, graph, &solved, point);
-        if cost < digits::COSTLY || members.len() > TURNED_AT_MOST || contradiction::is_forced(graph, members) {
+        if cost < digits::COSTLY {
             return Ok(solved);
         }
         self.laws.clear();
@@ -492,7 +495,8 @@ impl ConnectedPart<'_> {
         }
         let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
         if !speeds.is_empty() {
-            preferences.virtual_speeds = speeds.into_iter().filter(|v| spanned(self.x, graph, &first, v)).collect();
+            let mut span = Span::of(graph, &first);
+            preferences.virtual_speeds = speeds.into_iter().filter(|v| span.holds(self.x, v)).collect();
             if !preferences.virtual_speeds.is_empty() {
                 self.x.suppose(before);
                 return (solve_part(self.x, graph, members, &preferences), preferences);
@@ -636,20 +640,35 @@ fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
     done == definitions.len()
 }
 
-/// Whether the common variable of a junction is a combination of co-energy variables and imposed variables.
-fn spanned(x: &mut Exprs, graph: &BondGraph, solved: &Solved, speed: &Virtual) -> bool {
-    let ports = Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() };
-    let bond = &graph.bonds[graph.elements[speed.junction].ports[0].bond];
-    let common = if matches!(graph.elements[speed.junction].kind, Kind::One) { bond.flow } else { bond.effort };
-    let row = ports.resolve(x, common, &mut Map::new());
-    let allowed = |s: Symbol| {
-        solved
-            .ports
-            .iter()
-            .any(|p| p.input == s && matches!(p.role, Role::Independent | Role::Source | Role::Redundant))
-    };
-    row.0.iter().all(|t| allowed(t.0))
-        && row.0.iter().any(|t| solved.ports.iter().any(|p| p.input == t.0 && p.role == Role::Independent))
+/// What co-energy variables and imposed variables span.
+struct Span<'a> {
+    graph: &'a BondGraph,
+    ports: Ports,
+    /// Roles of ports by the variables that they are given.
+    roles: BTreeMap<Symbol, Role>,
+    known: Map<Symbol, Combination>,
+}
+
+impl<'a> Span<'a> {
+    fn of(graph: &'a BondGraph, solved: &Solved) -> Span<'a> {
+        Span {
+            graph,
+            ports: Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() },
+            roles: solved.ports.iter().map(|p| (p.input, p.role)).collect(),
+            known: Map::new(),
+        }
+    }
+
+    /// Whether the common variable of a junction is a combination of them, not of imposed variables alone.
+    fn holds(&mut self, x: &mut Exprs, speed: &Virtual) -> bool {
+        let junction = &self.graph.elements[speed.junction];
+        let bond = &self.graph.bonds[junction.ports[0].bond];
+        let common = if matches!(junction.kind, Kind::One) { bond.flow } else { bond.effort };
+        let row = self.ports.resolve(x, common, &mut self.known);
+        let roles: Option<Vec<Role>> = row.0.iter().map(|t| self.roles.get(&t.0).copied()).collect();
+        let spanning = |role: &Role| matches!(role, Role::Independent | Role::Source | Role::Redundant);
+        roles.is_some_and(|roles| roles.iter().all(spanning) && roles.contains(&Role::Independent))
+    }
 }
 
 /// Strokes from the exact causality of the ports; bonds that it leaves open are completed by a matching.
@@ -697,7 +716,6 @@ fn erase(graph: &BondGraph, strokes: &mut Table<BondId, Stroke>, undetermined: &
 fn merge(ports: &mut Ports, solved: Solved) {
     ports.ports.extend(solved.ports);
     ports.definitions.extend(solved.definitions);
-    ports.definitions.extend(solved.short.into_iter().flatten());
     ports.watched.extend(solved.watched);
     ports.degenerate.extend(solved.degenerate);
     ports.undetermined.extend(solved.undetermined);

@@ -72,7 +72,7 @@ fn express(
             classes.iter().for_each(|class| _ = work.eliminate(x, class));
             let done = work.finish();
             let all = columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c));
-            all.then(|| net.solved(x, done, &outputs, preferences))
+            all.then(|| net.solved(x, done, &outputs, preferences, true))
         });
         if expressed.is_some() {
             return expressed;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::ports::Solved;
 use super::strokes::{Strokes, sits_here};
 use super::{CausalGraph, Combination, Role};
-use crate::algebra::{Expr, Exprs, PlainNames, Symbol, ascii};
+use crate::algebra::{Expr, Exprs, PlainNames, Residue, Symbol, ascii};
 use crate::bond_graph::{Bond, BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -234,7 +234,11 @@ fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnos
     let mut x = graph.exprs.clone();
     let mut known = Map::new();
     let inputs: BTreeMap<Symbol, &super::PortState> = causal.ports.ports.iter().map(|p| (p.input, p)).collect();
+    let mut moves = Moves { causal, inputs: &inputs, known: Map::new() };
     for state in causal.ports.ports.iter().filter(|p| p.role == Role::Dependent) {
+        if moves.certainly(&mut x, state.output) {
+            continue;
+        }
         let row = causal.ports.resolve(&mut x, state.output, &mut known);
         let imposed = |t: &(Symbol, Expr)| inputs.get(&t.0).is_some_and(|p| p.role == Role::Source);
         if !row.0.iter().all(imposed) {
@@ -258,6 +262,37 @@ fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnos
             .note("it has no freedom of its own, and its reaction needs the time derivative of what fixes it")
             .hint("if that is not meant, put an R between them"),
         );
+    }
+}
+
+/// Whether variables follow from anything but sources, found without writing them out: in a prime field, with sources 0
+/// and random values of all else.
+struct Moves<'a> {
+    causal: &'a CausalGraph,
+    inputs: &'a BTreeMap<Symbol, &'a super::PortState>,
+    known: Map<Symbol, Option<Residue>>,
+}
+
+impl Moves<'_> {
+    fn certainly(&mut self, x: &mut Exprs, symbol: Symbol) -> bool {
+        let mut open = vec![symbol];
+        while let Some((next, row)) = self.causal.ports.next_to_resolve(&mut open, |s| self.known.contains_key(s)) {
+            let mut sum = Some(Residue::ZERO);
+            for &(read, coefficient) in &row.0 {
+                let value = match self.known.get(&read) {
+                    Some(known) => *known,
+                    None if self.inputs.get(&read).is_some_and(|p| p.role == Role::Source) => Some(Residue::ZERO),
+                    None => {
+                        let read = x.sym(read);
+                        x.residue(read)
+                    }
+                };
+                let term = x.residue(coefficient).zip(value).map(|(c, v)| c * v);
+                sum = sum.zip(term).map(|(sum, term)| sum + term);
+            }
+            self.known.insert(next, sum);
+        }
+        self.known.get(&symbol).is_some_and(|sum| sum.is_some_and(|sum| !sum.vanishes()))
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::assign::{preferred, sequential};
-use super::ports::{CausalityPreferences, Virtual, imposes_effort, solve_part};
+use super::ports::{CausalityPreferences, Virtual, imposes_effort, solve_part_at_length};
 use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
 use super::strokes::{Strokes, parts};
@@ -94,7 +94,7 @@ pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     x.forget_unwatched(&Assumptions::default());
     let mut ports = Ports::default();
     for members in parts(graph) {
-        let solved = solve_part(&mut x, graph, &members, &preferences(causal, &members));
+        let solved = solve_part_at_length(&mut x, graph, &members, &preferences(causal, &members));
         ports.ports.extend(solved.ports);
         ports.definitions.extend(solved.definitions);
         ports.watched.extend(solved.watched);

@@ -44,10 +44,8 @@ pub struct Solved {
     pub ports: Vec<PortState>,
     /// The virtual speeds that turned out independent.
     pub virtual_speeds: Vec<Virtual>,
-    /// Triangular definitions.
+    /// Triangular definitions, as short as the elements write them where that can be.
     pub definitions: Vec<(Symbol, Combination)>,
-    /// The same as short as the elements write them, where that can be.
-    pub short: Option<Vec<(Symbol, Combination)>>,
     /// Relations among source variables alone that the structure implies: each `Σ = 0` with minimal support.
     pub demands: Vec<Combination>,
     /// Divisors to be guarded during a run.
@@ -107,13 +105,36 @@ pub(super) struct Net {
     pub inner: Vec<usize>,
 }
 
-/// Solves the junction structure of one connected part.
+/// Solves the junction structure of one connected part. Definitions are as short as the elements write them where that
+/// can be.
 pub fn solve_part(
     x: &mut Exprs,
     graph: &BondGraph,
     members: &[ElementId],
     preferences: &CausalityPreferences,
 ) -> Solved {
+    let (net, done, outputs) = eliminated(x, graph, members, preferences);
+    net.solved(x, done, &outputs, preferences, true)
+}
+
+/// The same, with definitions as elimination leaves them: by fewer variables, and longer.
+pub fn solve_part_at_length(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    preferences: &CausalityPreferences,
+) -> Solved {
+    let (net, done, outputs) = eliminated(x, graph, members, preferences);
+    net.solved(x, done, &outputs, preferences, false)
+}
+
+/// The rows of a part with one variable of every port eliminated; the roles of ports, by their numbers.
+fn eliminated(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    preferences: &CausalityPreferences,
+) -> (Net, Elimination, BTreeMap<usize, Role>) {
     let net = Net::new(x, graph, members, preferences);
     let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len());
     work.eliminate(x, &net.inner);
@@ -140,7 +161,7 @@ pub fn solve_part(
         let dependent = work.eliminate(x, &[net.ports[p].given()]) == 1;
         outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
     }
-    net.solved(x, work.finish(), &outputs, preferences)
+    (net, work.finish(), outputs)
 }
 
 impl NetPort {
@@ -326,18 +347,19 @@ impl Net {
         Combination(terms)
     }
 
-    /// The result of an elimination as roles, definitions and relations.
+    /// The result of an elimination as roles, definitions, `short` where that can be, and relations.
     pub fn solved(
         &self,
         x: &mut Exprs,
         done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         preferences: &CausalityPreferences,
+        short: bool,
     ) -> Solved {
         let demands = circuits(x, done.rest.clone());
         let demands = demands.into_iter().map(|(_, row)| self.combination(&row.0)).collect();
         let mut solved = Solved { demands, ..Solved::default() };
-        self.report(done, outputs, preferences, &mut solved, x);
+        self.report(done, outputs, preferences, (&mut solved, short), x);
         solved
     }
 
@@ -346,7 +368,7 @@ impl Net {
         done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         preferences: &CausalityPreferences,
-        solved: &mut Solved,
+        (solved, short): (&mut Solved, bool),
         x: &mut Exprs,
     ) {
         for (&p, &role) in outputs {
@@ -372,11 +394,12 @@ impl Net {
         let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
         let regular = x.if_found(|x| regular_rows(x, &done));
         let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
-        if all && regular.is_none() && done.degenerate.is_empty() {
-            solved.short =
-                x.if_found(|x| matched_rows(x, &self.rows, &done)).map(|rows| rows.into_iter().map(named).collect());
-        }
-        solved.definitions.extend(reduced_rows(x, &done, regular.as_ref()).into_iter().map(named));
+        let short = match short && all && regular.is_none() && done.degenerate.is_empty() {
+            true => x.if_found(|x| matched_rows(x, &self.rows, &done)),
+            false => None,
+        };
+        let rows = short.unwrap_or_else(|| reduced_rows(x, &done, regular.as_ref()));
+        solved.definitions.extend(rows.into_iter().map(named));
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
         for (&p, &role) in outputs {

@@ -172,7 +172,9 @@ impl Sharing {
                 continue;
             }
             let new = self.unit(Unit::Pair(pair.0, pair.1, pair.2));
-            let mut at = where_.get(&pair.0).cloned().unwrap_or_default();
+            let found_at = |unit: UnitId| where_.get(&unit).map_or(&[][..], |bags| bags);
+            let (first, second) = (found_at(pair.0), found_at(pair.1));
+            let mut at = if first.len() <= second.len() { first.to_vec() } else { second.to_vec() };
             at.dedup();
             let mut risen = FxHashSet::default();
             for i in at {
