@@ -7,7 +7,7 @@ use super::node::Expr;
 
 /// The value of an expression in a prime field, where every symbol has a random value. Sums and products of values are
 /// the values of sums and products; one that vanishes stands for an expression that is 0 (up to a probability of 2^-60).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Residue(u64);
 
 impl Residue {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::Role;
 use super::digits::slope;
-use super::ports::{CausalityPreferences, Net, Offer, Solved};
+use super::ports::{CausalityPreferences, Net, Offer, Solved, Way};
 use crate::algebra::{Eliminator, Exprs, NumericPoint};
 use crate::bond_graph::{BondGraph, ElementId, PortCausality};
 
@@ -72,7 +72,7 @@ fn express(
             classes.iter().for_each(|class| _ = work.eliminate(x, class));
             let done = work.finish();
             let all = columns.iter().all(|c| done.pivots.iter().any(|pivot| pivot.column == *c));
-            all.then(|| net.solved(x, done, &outputs, preferences, true))
+            all.then(|| net.solved(x, done, &outputs, preferences, Way::BySize))
         });
         if expressed.is_some() {
             return expressed;

@@ -5,13 +5,13 @@
 //! occurs in it, and defines it as it stands. Where such definitions depend on each other cyclically (a ring of junctions),
 //! elimination is confined to the rows of that cycle. The blocks are those of the block triangular form (Duff and Reid, ACM Transactions on Mathematical Software 4, 1978).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
 
-use super::ports::settled;
-use crate::algebra::{Elimination, Expr, Exprs, ONE, SparseRow, eliminate};
+use super::ports::{regular_rows, settled};
+use crate::algebra::{Elimination, Expr, Exprs, ONE, Residue, SparseRow, eliminate};
 use crate::sparse::Matching;
 
 /// A column as a linear combination of others.
@@ -21,16 +21,9 @@ pub(super) type Row = (usize, Vec<(usize, Expr)>);
 /// divisor that is neither known to be nonzero nor a divisor of the elimination.
 pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination) -> Option<Vec<Row>> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
-    let row_of = matching(x, &rows, done)?;
-    let mut graph = DiGraph::<usize, ()>::new();
-    let nodes: BTreeMap<usize, _> = row_of.keys().map(|&column| (column, graph.add_node(column))).collect();
-    for (column, &row) in &row_of {
-        let read = rows[row].0.iter().filter(|e| e.0 != *column).filter_map(|e| nodes.get(&e.0));
-        read.for_each(|&read| _ = graph.add_edge(nodes[column], read, ()));
-    }
+    let row_of = matching(x, &rows, done, false)?;
     let mut definitions = Vec::with_capacity(row_of.len());
-    for circle in tarjan_scc(&graph) {
-        let columns: Vec<usize> = circle.into_iter().map(|node| graph[node]).collect();
+    for columns in blocks(&rows, &row_of) {
         match columns[..] {
             [column] => definitions.push((column, solved_for(x, rows[row_of[&column]], column))),
             _ => {
@@ -40,6 +33,69 @@ pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination
         }
     }
     Some(definitions)
+}
+
+/// Definitions block by block.
+pub(super) struct BlockRows {
+    pub rows: Vec<Row>,
+    /// What the blocks are divided by; none of them may vanish.
+    pub divisors: Vec<Expr>,
+    /// The values of the divisors, of either sign.
+    residues: BTreeSet<Residue>,
+}
+
+impl BlockRows {
+    /// Adds a divisor, unless it is one of them up to its sign: the loops of efforts and of flows have one in common.
+    fn add(&mut self, x: &mut Exprs, divisor: Expr) {
+        let opposite = x.neg(divisor);
+        let residue = x.residue(divisor);
+        if residue.is_none_or(|residue| !self.residues.contains(&residue)) {
+            self.residues.extend(residue.into_iter().chain(x.residue(opposite)));
+            self.divisors.push(divisor);
+        }
+    }
+}
+
+/// Each pivot column of an elimination as a combination of columns of its block, of blocks before it and of columns that are
+/// no pivots. The determinant of the whole is the product of those of the blocks, so that what they are divided by is what
+/// has to be watched: each loop of a chain has a divisor of its own.
+pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination) -> Option<BlockRows> {
+    let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
+    let row_of = matching(x, &rows, done, true)?;
+    let mut found =
+        BlockRows { rows: Vec::with_capacity(row_of.len()), divisors: Vec::new(), residues: BTreeSet::new() };
+    for mut columns in blocks(&rows, &row_of) {
+        columns.sort_unstable();
+        let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
+        let own = eliminate(x, own, &[columns.clone()]);
+        if own.pivots.len() < columns.len() || !own.degenerate.is_empty() {
+            return None;
+        }
+        match x.if_found(|x| regular_rows(x, &own)) {
+            Some(regular) => {
+                found.add(x, regular.determinant);
+                found.rows.extend(own.pivots.iter().zip(regular.rows).map(|(pivot, row)| (pivot.column, row.0)));
+            }
+            None => {
+                own.watched.iter().for_each(|&divisor| found.add(x, divisor));
+                let solved = own.pivots.iter().map(|pivot| (pivot.column, solved_for(x, &pivot.row, pivot.column)));
+                found.rows.extend(solved.collect::<Vec<_>>());
+            }
+        }
+    }
+    Some(found)
+}
+
+/// The columns of every cycle of matched rows, those first that others read.
+fn blocks(rows: &[&SparseRow], row_of: &BTreeMap<usize, usize>) -> Vec<Vec<usize>> {
+    let mut graph = DiGraph::<usize, ()>::new();
+    let nodes: BTreeMap<usize, _> = row_of.keys().map(|&column| (column, graph.add_node(column))).collect();
+    for (column, &row) in row_of {
+        let read = rows[row].0.iter().filter(|e| e.0 != *column).filter_map(|e| nodes.get(&e.0));
+        read.for_each(|&read| _ = graph.add_edge(nodes[column], read, ()));
+    }
+    let columns = |circle: Vec<_>| circle.into_iter().map(|node| graph[node]).collect();
+    tarjan_scc(&graph).into_iter().map(columns).collect()
 }
 
 /// The columns of a cycle, each as a combination of later ones and of columns outside.
@@ -72,18 +128,20 @@ struct Edge {
 }
 
 /// A matching of rows to pivot columns in which each coefficient is a number, or else the divisor of the elimination, or else
-/// a nonzero parameter. `None` if there is no complete matching.
-fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination) -> Option<BTreeMap<usize, usize>> {
+/// a nonzero parameter, or else, if `any` may be matched, one that is not always zero. `None` if there is no complete
+/// matching.
+fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination, any: bool) -> Option<BTreeMap<usize, usize>> {
     let place: BTreeMap<usize, usize> = done.pivots.iter().enumerate().map(|(i, p)| (p.column, i)).collect();
     let constant = |e: Expr| !x.depends_on_any(e, &|s| x.facts(s).given.is_none());
-    let levels: [&dyn Fn(&Edge) -> bool; 3] = [
+    let levels: [&dyn Fn(&Edge) -> bool; 4] = [
         &|edge| x.is_number(edge.coefficient).is_some(),
         &|edge| edge.row == edge.column && edge.coefficient == done.pivots[edge.row].divisor,
         &|edge| constant(edge.coefficient) && x.nonzero(edge.coefficient),
+        &|edge| !x.is_zero(edge.coefficient),
     ];
     let mut allowed: Vec<Vec<usize>> = vec![Vec::new(); rows.len()];
     let mut found = Matching::new(rows.len());
-    for level in levels {
+    for level in &levels[..if any { 4 } else { 3 }] {
         for (row, entries) in rows.iter().enumerate() {
             for &(column, coefficient) in &entries.0 {
                 let Some(&column) = place.get(&column) else { continue };

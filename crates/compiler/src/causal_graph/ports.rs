@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::matched::matched_rows;
+use super::matched::{BlockRows, block_rows, matched_rows};
 use super::{Combination, PortState, Role};
-use crate::algebra::{Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate};
+use crate::algebra::{
+    Assumptions, Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate,
+};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
 /// Preferences and conditions for the elimination, beyond the graph itself.
@@ -95,6 +97,17 @@ pub(super) struct NetPort {
     pub offer: Offer,
 }
 
+/// How definitions are written.
+pub(super) enum Way {
+    /// As short as the elements write them where that can be, else loop by loop where that is shorter; with what was assumed
+    /// before the elimination.
+    Short(Assumptions),
+    /// As short as the elements write them where that can be.
+    BySize,
+    /// As elimination leaves them.
+    Eliminated,
+}
+
 /// The rows of a junction structure.
 pub(super) struct Net {
     pub symbols: Vec<Symbol>,
@@ -113,8 +126,9 @@ pub fn solve_part(
     members: &[ElementId],
     preferences: &CausalityPreferences,
 ) -> Solved {
+    let before = x.assumed();
     let (net, done, outputs) = eliminated(x, graph, members, preferences);
-    net.solved(x, done, &outputs, preferences, true)
+    net.solved(x, done, &outputs, preferences, Way::Short(before))
 }
 
 /// The same, with definitions as elimination leaves them: by fewer variables, and longer.
@@ -125,7 +139,7 @@ pub fn solve_part_at_length(
     preferences: &CausalityPreferences,
 ) -> Solved {
     let (net, done, outputs) = eliminated(x, graph, members, preferences);
-    net.solved(x, done, &outputs, preferences, false)
+    net.solved(x, done, &outputs, preferences, Way::Eliminated)
 }
 
 /// The rows of a part with one variable of every port eliminated; the roles of ports, by their numbers.
@@ -347,19 +361,19 @@ impl Net {
         Combination(terms)
     }
 
-    /// The result of an elimination as roles, definitions, `short` where that can be, and relations.
+    /// The result of an elimination as roles, definitions and relations.
     pub fn solved(
         &self,
         x: &mut Exprs,
         done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         preferences: &CausalityPreferences,
-        short: bool,
+        way: Way,
     ) -> Solved {
         let demands = circuits(x, done.rest.clone());
         let demands = demands.into_iter().map(|(_, row)| self.combination(&row.0)).collect();
         let mut solved = Solved { demands, ..Solved::default() };
-        self.report(done, outputs, preferences, (&mut solved, short), x);
+        self.report(done, outputs, preferences, (&mut solved, way), x);
         solved
     }
 
@@ -368,7 +382,7 @@ impl Net {
         done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         preferences: &CausalityPreferences,
-        (solved, short): (&mut Solved, bool),
+        (solved, way): (&mut Solved, Way),
         x: &mut Exprs,
     ) {
         for (&p, &role) in outputs {
@@ -392,13 +406,24 @@ impl Net {
         let mut defined = vec![false; self.symbols.len()];
         done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
         let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
+        let exact = all && done.degenerate.is_empty();
         let regular = x.if_found(|x| regular_rows(x, &done));
-        let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
-        let short = match short && all && regular.is_none() && done.degenerate.is_empty() {
+        let (short, before) = match way {
+            Way::Short(before) => (true, Some(before)),
+            Way::BySize => (true, None),
+            Way::Eliminated => (false, None),
+        };
+        let matched = match short && exact && regular.is_none() {
             true => x.if_found(|x| matched_rows(x, &self.rows, &done)),
             false => None,
         };
-        let rows = short.unwrap_or_else(|| reduced_rows(x, &done, regular.as_ref()));
+        let parts = exact && matched.is_none() && done.watched.iter().any(|&e| is_divided(x, e));
+        let whole = matched.unwrap_or_else(|| reduced_rows(x, &done, regular.as_ref()));
+        let (rows, watched) = match before.filter(|_| parts).and_then(|before| self.parted(x, &done, before, &whole)) {
+            Some(BlockRows { rows, divisors, .. }) => (rows, divisors),
+            None => (whole, regular.map_or(done.watched, |regular| vec![regular.determinant])),
+        };
+        let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
         solved.definitions.extend(rows.into_iter().map(named));
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
@@ -407,8 +432,29 @@ impl Net {
                 solved.undetermined.push(self.symbols[self.ports[p].conjugate()]);
             }
         }
-        solved.watched = regular.map_or(done.watched, |regular| vec![regular.determinant]);
+        solved.watched = watched;
         solved.degenerate = done.degenerate;
+    }
+}
+
+impl Net {
+    /// The rows block by block, if several blocks have divisors of their own and that is less than half as long. What is
+    /// assumed is then what was assumed `before` the elimination, and these divisors.
+    fn parted(
+        &self,
+        x: &mut Exprs,
+        done: &Elimination,
+        before: Assumptions,
+        whole: &[(usize, Vec<(usize, Expr)>)],
+    ) -> Option<BlockRows> {
+        let eliminated = x.assumed();
+        x.suppose(before);
+        let parted = block_rows(x, &self.rows, done);
+        let parted = parted.filter(|p| p.divisors.len() > 1 && 2 * length(x, &p.rows) < length(x, whole));
+        if parted.is_none() {
+            x.suppose(eliminated);
+        }
+        parted
     }
 }
 
@@ -464,20 +510,29 @@ fn reduced_rows(x: &mut Exprs, done: &Elimination, regular: Option<&RegularRows>
     rows
 }
 
+/// How long rows are in print.
+fn length(x: &Exprs, rows: &[(usize, Vec<(usize, Expr)>)]) -> u64 {
+    rows.iter().flat_map(|row| &row.1).map(|entry| x.printed_length(entry.1)).sum()
+}
+
+/// Whether an expression is a fraction.
+fn is_divided(x: &mut Exprs, e: Expr) -> bool {
+    x.lowest_terms(e).is_some_and(|l| !l.below.is_empty())
+}
+
 /// Pivot columns as combinations of the columns without a pivot.
-struct RegularRows {
+pub(super) struct RegularRows {
     /// A row for each pivot.
-    rows: Vec<SparseRow>,
+    pub rows: Vec<SparseRow>,
     /// The junction structure is regular where this is not zero.
-    determinant: Expr,
+    pub determinant: Expr,
 }
 
 /// The rows of an elimination without divisors that only the order of elimination introduced: where one pivot is divided by
 /// another, not each of them has to be nonzero but their product, the determinant. `None` if no divisor can be dropped, or
 /// if the search would take too long.
-fn regular_rows(x: &mut Exprs, done: &Elimination) -> Option<RegularRows> {
-    let divided = |x: &mut Exprs, e: Expr| x.lowest_terms(e).is_some_and(|l| !l.below.is_empty());
-    if !done.watched.iter().any(|&e| divided(x, e)) {
+pub(super) fn regular_rows(x: &mut Exprs, done: &Elimination) -> Option<RegularRows> {
+    if !done.watched.iter().any(|&e| is_divided(x, e)) {
         return None;
     }
     let product = x.mul(&done.watched);
