@@ -55,6 +55,20 @@ impl Sparsity {
         self.starts[column]..self.starts[column + 1]
     }
 
+    /// The number of the nonzero in a row and column.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn place(&self, row: usize, column: usize) -> usize {
+        let found = self.column(column).binary_search(&row).expect("a nonzero of the pattern");
+        self.places(column).start + found
+    }
+
+    /// The pattern with the whole diagonal.
+    pub fn with_diagonal(&self) -> Sparsity {
+        Sparsity::from_columns((0..self.states()).map(|column| [self.column(column), &[column]].concat()))
+    }
+
     /// Columns in groups, no two of a group with a nonzero in the same row: one directional derivative gives all columns
     /// of a group. Greedy, in order; at most as many groups as columns.
     pub fn groups(&self) -> Vec<Vec<usize>> {

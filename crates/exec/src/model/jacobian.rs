@@ -16,11 +16,7 @@ pub(super) struct JacobianCode {
 impl JacobianCode {
     pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[JacobianEntry]) -> JacobianCode {
         let values: Vec<Value> = entries.iter().map(|e| e.value).collect();
-        let place = |e: &JacobianEntry| {
-            let (row, column) = (e.row as usize, e.column as usize);
-            let found = sparsity.column(column).binary_search(&row);
-            sparsity.places(column).start + found.expect("what moves stands in the pattern")
-        };
+        let place = |e: &JacobianEntry| sparsity.place(e.row as usize, e.column as usize);
         JacobianCode { routine: layout.guarded_routine(program, &values), places: entries.iter().map(place).collect() }
     }
 }
