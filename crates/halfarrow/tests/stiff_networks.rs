@@ -29,6 +29,9 @@ fn pipes_with_implicit_friction_come_to_their_end() {
     for (volume, pressure) in volumes.iter().zip([0.1111268591478108e6, 0.1111270045592387e6]) {
         assert!((volume / capacity - pressure).abs() < 1e-2, "{} Pa, not {pressure}", volume / capacity);
     }
+    // At rest at first, so that the sign of each flow is rounding: a method that solves for its steps comes through that too.
+    let radau = run(&fault("tubes"), Run { to: 3600.0 * hours, method: Method::Radau, ..Run::default() });
+    assert!((last(&radau, "buffer5.q") - volumes[0]).abs() < 1e-4, "{}", last(&radau, "buffer5.q"));
     // What has flowed in and not out is in the buffers.
     let inflow = |h: f64| {
         let near = 1.0 - f64::cos(f64::exp(-h) - 1.0);
