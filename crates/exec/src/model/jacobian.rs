@@ -21,8 +21,9 @@ impl JacobianCode {
     }
 }
 
-/// Directions along which all derivatives may be taken without a look at what they would take at once.
-const FEW_DIRECTIONS: usize = 16;
+/// Directions along which all derivatives may be taken without a look at what they would take at once: with fewer states
+/// than that, implicit steps have the bits of exported C, which takes directions.
+const FEW_DIRECTIONS: usize = 24;
 
 /// Operations of a derivative along a direction for each one of the value.
 const ALONG: usize = 2;
