@@ -1,4 +1,5 @@
 //! Published networks with implicit laws, and large stiff ones: values, balances, work.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::path::Path;
 

@@ -11,11 +11,11 @@ pub(crate) use dense::Lu;
 pub(crate) use sparse::SparseLu;
 
 use faer::c64;
-use std::ops::{Add, Mul, Sub};
+use std::ops::{AddAssign, Mul, Sub, SubAssign};
 
 /// What matrices are made of: real or complex numbers.
 pub(crate) trait Number:
-    faer::traits::ComplexField + Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    faer::traits::ComplexField + Copy + Default + AddAssign + SubAssign + Sub<Output = Self> + Mul<Output = Self>
 {
     /// One over it.
     fn reciprocal(self) -> Self;

@@ -50,6 +50,11 @@ impl<T: Number> SparseLu<T> {
         }
     }
 
+    /// Where the matrix may have entries.
+    pub(crate) fn pattern(&self) -> &Sparsity {
+        &self.pattern
+    }
+
     /// The entries of the matrix, in the order of the pattern: what the next factorisation takes.
     pub(crate) fn values(&mut self) -> &mut [T] {
         &mut self.values
@@ -87,7 +92,7 @@ impl<T: Number> SparseLu<T> {
         self.rest.fill(T::default());
         self.sizes.fill(0.0);
         for ((row, _), &value) in self.pattern.entries().zip(&self.values) {
-            self.rest[row] = self.rest[row] + value;
+            self.rest[row] += value;
             self.sizes[row] += value.magnitude();
         }
         let mut trial = std::mem::take(&mut self.trial);
@@ -95,7 +100,7 @@ impl<T: Number> SparseLu<T> {
         self.solve(&mut trial);
         for ((row, column), &value) in self.pattern.entries().zip(&self.values) {
             let term = value * trial[column];
-            self.rest[row] = self.rest[row] - term;
+            self.rest[row] -= term;
             self.sizes[row] += term.magnitude();
         }
         self.trial = trial;

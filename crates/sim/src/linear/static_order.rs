@@ -63,7 +63,7 @@ impl<T: Number> StaticLu<T> {
             *own = factor;
             let line = symbolic.upper.row(k as usize);
             for (u, &j) in upper[line.clone()].iter().zip(&symbolic.upper.columns()[line]) {
-                row[j as usize] = row[j as usize] - factor * *u;
+                row[j as usize] -= factor * *u;
             }
         }
         let pivot = row[place];

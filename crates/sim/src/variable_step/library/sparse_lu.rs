@@ -1,6 +1,7 @@
 //! Sparse linear equations that say when they have no solution, where the library's own solver panics.
 
 use std::cell::RefCell;
+use std::rc::Rc;
 
 use diffsol_la::error::{LaError, LinearSolverError};
 use diffsol_la::linear_solver::LinearSolver;
@@ -8,13 +9,23 @@ use diffsol_la::{FaerContext, FaerSparseMat, FaerVec, LinearOp, Matrix, MatrixCo
 
 use crate::{Sparsity, linear};
 
+/// Factors that solvers hand on to those that come after a restart: the order of elimination is found once a run.
+pub(crate) type KeptFactors = Rc<RefCell<Option<linear::SparseLu<f64>>>>;
+
 /// A sparse matrix and its triangular factors. A singular matrix leaves none; Newton is told so when it asks for a
 /// solution, and the integrator tries a shorter step.
 #[derive(Default)]
 pub(super) struct SparseLu {
     matrix: Option<FaerSparseMat<f64>>,
-    factors: Option<RefCell<linear::SparseLu<f64>>>,
+    kept: KeptFactors,
     factored: bool,
+}
+
+impl SparseLu {
+    /// With factors that others have had, none of whom asks for them again.
+    pub(super) fn after(kept: &KeptFactors) -> SparseLu {
+        SparseLu { kept: Rc::clone(kept), ..SparseLu::default() }
+    }
 }
 
 impl LinearSolver<FaerSparseMat<f64>> for SparseLu {
@@ -25,7 +36,11 @@ impl LinearSolver<FaerSparseMat<f64>> for SparseLu {
         let matrix = FaerSparseMat::new_from_sparsity(op.nrows(), op.ncols(), op.sparsity(), *op.context());
         let structure = matrix.inner()[0].symbolic();
         let columns = (0..op.ncols()).map(|column| structure.row_idx_of_col(column).collect());
-        self.factors = Some(RefCell::new(linear::SparseLu::new(&Sparsity::from_columns(columns))));
+        let pattern = Sparsity::from_columns(columns);
+        let kept = &mut *self.kept.borrow_mut();
+        if kept.as_ref().is_none_or(|kept| *kept.pattern() != pattern) {
+            *kept = Some(linear::SparseLu::new(&pattern));
+        }
         self.matrix = Some(matrix);
         self.factored = false;
     }
@@ -35,19 +50,19 @@ impl LinearSolver<FaerSparseMat<f64>> for SparseLu {
         C: LinearOp<T = f64, V = FaerVec<f64>, M = FaerSparseMat<f64>, C = FaerContext>,
     {
         self.factored = false;
-        if let (Some(matrix), Some(factors)) = (&mut self.matrix, &mut self.factors) {
+        if let (Some(matrix), Some(factors)) = (&mut self.matrix, &mut *self.kept.borrow_mut()) {
             op.matrix_inplace(matrix);
-            let factors = factors.get_mut();
             factors.values().copy_from_slice(matrix.inner()[0].val());
             self.factored = factors.factor();
         }
     }
 
     fn solve_in_place(&self, b: &mut FaerVec<f64>) -> Result<(), LaError> {
-        let factors = self.factors.as_ref().filter(|_| self.factored).ok_or(LinearSolverError::LuSolveFailed)?;
+        let kept = &mut *self.kept.borrow_mut();
+        let factors = kept.as_mut().filter(|_| self.factored).ok_or(LinearSolverError::LuSolveFailed)?;
         let mut finite = true;
         b.for_each_batch_host([], |b, [], _| {
-            factors.borrow_mut().solve(b);
+            factors.solve(b);
             finite &= b.iter().all(|value| value.is_finite());
         });
         if finite { Ok(()) } else { Err(LinearSolverError::LuSolveFailed.into()) }
