@@ -23,7 +23,7 @@ def in_environment():
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
     subprocess.run([python, "-m", "pip", "install", "-q", "-r", HERE / "requirements.txt"], check=True)
-    raise SystemExit(subprocess.run([python, __file__, *sys.argv[1:]]).returncode)
+    raise SystemExit(subprocess.run([python, *sys.argv]).returncode)
 
 
 def built():

@@ -14,6 +14,7 @@ pub mod equations;
 pub mod ids;
 pub mod program;
 pub mod span;
-pub mod sparse;
 pub mod textbook;
 pub mod unit;
+
+pub use halfarrow_sparse as sparse;

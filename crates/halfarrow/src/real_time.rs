@@ -155,6 +155,9 @@ impl Model {
     ) -> Result<RealTimeReport, Error> {
         let pace = pace(run)?;
         let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
+        if run.method.is_implicit() {
+            system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
+        }
         connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
         choose(&mut system, &run.record)?;
         cost::held(&system, TICKS / run.rate)?;

@@ -281,6 +281,9 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let begun = Moment::now();
+        if run.method.asks_for_derivatives() {
+            system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
+        }
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
         let mut notes = choose(&mut system, &run.record)?;
         let start = self.start(&mut system, run.start)?;

@@ -34,5 +34,7 @@ mod linearize;
 mod names;
 #[path = "report.rs"]
 mod report;
+#[path = "stiff_networks.rs"]
+mod stiff_networks;
 #[path = "sweep.rs"]
 mod sweep;

@@ -2,10 +2,14 @@
 
 use crate::{Failure, Sparsity, System};
 
-/// Computes the nonzeros of `∂f/∂x`; all memory is taken in [`new`](Jacobian::new).
+/// Rows up to this long have their columns grouped beforehand: that takes the square of their length, and what has longer
+/// ones mostly has its Jacobian at once.
+const LONG: usize = 256;
+
+/// Computes the nonzeros of `∂f/∂x`; all memory is taken in [`new`](Jacobian::new), unless a long row asks for groups.
 pub(crate) struct Jacobian {
     sparsity: Sparsity,
-    groups: Vec<Vec<usize>>,
+    groups: Option<Vec<Vec<usize>>>,
     direction: Vec<f64>,
     product: Vec<f64>,
     values: Vec<f64>,
@@ -16,7 +20,7 @@ impl Jacobian {
         let states = sparsity.states();
         Jacobian {
             sparsity: sparsity.clone(),
-            groups: sparsity.groups(),
+            groups: (sparsity.longest_row() <= LONG).then(|| sparsity.groups()),
             direction: vec![0.0; states],
             product: vec![0.0; states],
             values: vec![0.0; sparsity.nonzeros()],
@@ -40,7 +44,8 @@ impl Jacobian {
             }
             return Ok(());
         }
-        for group in &self.groups {
+        let sparsity = &self.sparsity;
+        for group in &*self.groups.get_or_insert_with(|| sparsity.groups()) {
             self.direction.fill(0.0);
             group.iter().for_each(|&column| self.direction[column] = 1.0);
             system.directional_derivative(t, x, &self.direction, &mut self.product)?;

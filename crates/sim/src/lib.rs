@@ -10,7 +10,7 @@ pub mod fixed_step;
 mod implicit;
 mod implicit_system;
 mod jacobian;
-mod lu;
+mod linear;
 mod options;
 mod radau;
 pub mod real_time;

@@ -21,6 +21,17 @@ pub enum Method {
     Auto,
 }
 
+impl Method {
+    /// Whether it asks for derivatives of the rates by the states, or may come to.
+    pub fn asks_for_derivatives(self) -> bool {
+        match self {
+            Method::Fixed(method) => method.is_implicit(),
+            Method::Explicit => false,
+            Method::Bdf | Method::Radau | Method::Auto => true,
+        }
+    }
+}
+
 /// Absolute error allowed in a step of a variable-step method, on top of the relative one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AbsoluteTolerance {

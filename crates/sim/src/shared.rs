@@ -3,6 +3,7 @@
 use std::cell::{RefCell, RefMut};
 
 use crate::events::Events;
+use crate::variable_step::KeptFactors;
 use crate::{Failure, HybridSystem, Sparsity, System};
 
 /// A system that the run and the integrator's library both call, and the failure that the library cannot pass on.
@@ -11,11 +12,17 @@ pub(crate) struct Shared<'a> {
     failure: RefCell<Option<Failure>>,
     /// Which states have a rate, if some have none: their rates are to be 0.
     differential: Option<Vec<bool>>,
+    kept_factors: KeptFactors,
 }
 
 impl<'a> Shared<'a> {
     pub(crate) fn new(system: &'a mut dyn HybridSystem) -> Shared<'a> {
-        Shared { system: RefCell::new(Counted::new(system)), failure: RefCell::new(None), differential: None }
+        Shared {
+            system: RefCell::new(Counted::new(system)),
+            failure: RefCell::new(None),
+            differential: None,
+            kept_factors: KeptFactors::default(),
+        }
     }
 
     /// A system of which only the states marked have rates; those of the others have to be 0.
@@ -26,6 +33,11 @@ impl<'a> Shared<'a> {
     /// Which states have a rate, if some have none.
     pub(crate) fn differential(&self) -> Option<&[bool]> {
         self.differential.as_deref()
+    }
+
+    /// Sparse factors of the steps so far, for those after a restart.
+    pub(crate) fn kept_factors(&self) -> &KeptFactors {
+        &self.kept_factors
     }
 
     /// The system, to be given back before anybody else asks for it.

@@ -55,27 +55,74 @@ impl Sparsity {
         self.starts[column]..self.starts[column + 1]
     }
 
+    /// The number of the nonzero in a row and column.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn place(&self, row: usize, column: usize) -> usize {
+        let found = self.column(column).binary_search(&row).expect("a nonzero of the pattern");
+        self.places(column).start + found
+    }
+
+    /// The pattern with the whole diagonal.
+    pub fn with_diagonal(&self) -> Sparsity {
+        Sparsity::from_columns((0..self.states()).map(|column| [self.column(column), &[column]].concat()))
+    }
+
     /// Columns in groups, no two of a group with a nonzero in the same row: one directional derivative gives all columns
-    /// of a group. Greedy, in order; at most as many groups as columns.
+    /// of a group. Greedy, in order; at least as many groups as the [longest row](Sparsity::longest_row) has nonzeros, at
+    /// most as many as columns.
     pub fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
-        let mut taken: Vec<Vec<bool>> = Vec::new();
+        let mut in_row: Vec<Vec<usize>> = vec![Vec::new(); self.states()];
+        // For each group the last column that does not fit in it.
+        let mut barred: Vec<usize> = Vec::new();
         for column in 0..self.states() {
             let rows = self.column(column);
-            let free = taken.iter().position(|taken| rows.iter().all(|&row| !taken[row]));
-            let group = free.unwrap_or_else(|| {
+            rows.iter().flat_map(|&row| &in_row[row]).for_each(|&group| barred[group] = column);
+            let group = barred.iter().position(|&last| last != column).unwrap_or_else(|| {
                 groups.push(Vec::new());
-                taken.push(vec![false; self.states()]);
+                barred.push(usize::MAX);
                 groups.len() - 1
             });
             groups[group].push(column);
-            rows.iter().for_each(|&row| taken[group][row] = true);
+            rows.iter().for_each(|&row| in_row[row].push(group));
         }
         groups
+    }
+
+    /// Number of nonzeros in the row that has most.
+    pub fn longest_row(&self) -> usize {
+        let mut lengths = vec![0; self.states()];
+        self.rows.iter().for_each(|&row| lengths[row] += 1);
+        lengths.into_iter().max().unwrap_or(0)
     }
 
     /// All nonzeros as (row, column), column by column.
     pub fn entries(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.states()).flat_map(|column| self.column(column).iter().map(move |&row| (row, column)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_of_a_group_share_no_row() {
+        let chain = Sparsity::from_columns((0..100).map(|i: usize| (i.saturating_sub(1)..(i + 2).min(100)).collect()));
+        assert_eq!((chain.groups().len(), chain.longest_row()), (3, 3));
+        let star = Sparsity::from_columns((0..50).map(|i| vec![0, i]));
+        assert_eq!((star.groups().len(), star.longest_row()), (50, 50));
+        let comb = Sparsity::from_columns((0..60).map(|i: usize| vec![i, (7 * i) % 60, (i * i) % 60]));
+        let groups = comb.groups();
+        assert_eq!(groups.iter().map(Vec::len).sum::<usize>(), 60);
+        for group in groups {
+            let mut rows: Vec<usize> = group.iter().flat_map(|&column| comb.column(column)).copied().collect();
+            let all = rows.len();
+            rows.sort_unstable();
+            rows.dedup();
+            assert_eq!(rows.len(), all);
+        }
     }
 }

@@ -8,5 +8,7 @@ mod fixed_step;
 mod implicit;
 #[path = "real_time.rs"]
 mod real_time;
+#[path = "sparse.rs"]
+mod sparse;
 #[path = "variable_step.rs"]
 mod variable_step;

@@ -1,7 +1,7 @@
 //! All derivatives of the rates by the states at once.
 
-use super::Model;
 use super::system::What;
+use super::{Model, Operations};
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{JacobianEntry, Program, Value};
 use halfarrow_sim::{Affected, Failure, Sparsity, System};
@@ -16,16 +16,38 @@ pub(super) struct JacobianCode {
 impl JacobianCode {
     pub fn new(program: &Program, layout: &Layout, sparsity: &Sparsity, entries: &[JacobianEntry]) -> JacobianCode {
         let values: Vec<Value> = entries.iter().map(|e| e.value).collect();
-        let place = |e: &JacobianEntry| {
-            let (row, column) = (e.row as usize, e.column as usize);
-            let found = sparsity.column(column).binary_search(&row);
-            sparsity.places(column).start + found.expect("what moves stands in the pattern")
-        };
+        let place = |e: &JacobianEntry| sparsity.place(e.row as usize, e.column as usize);
         JacobianCode { routine: layout.guarded_routine(program, &values), places: entries.iter().map(place).collect() }
     }
 }
 
+/// Directions along which all derivatives may be taken without a look at what they would take at once: with fewer states
+/// than that, implicit steps have the bits of exported C, which takes directions.
+const FEW_DIRECTIONS: usize = 24;
+
+/// Operations of a derivative along a direction for each one of the value.
+const ALONG: usize = 2;
+
 impl Model {
+    /// Prepares for methods that ask for derivatives of the rates: has them all at once from now on where that takes fewer
+    /// operations than along directions, as where many states meet in one sum.
+    ///
+    /// # Errors
+    /// As [`set_up`](Model::set_up).
+    pub fn prepare_derivatives(&mut self) -> Result<(), Failure> {
+        let directions = self.code.sparsity.longest_row();
+        if self.code.jacobian.is_some() || directions <= FEW_DIRECTIONS {
+            return Ok(());
+        }
+        let mut other = Model::with_jacobian(self.code.program.clone())?;
+        let along = ALONG * directions * self.operations().total();
+        if other.code.jacobian.as_ref().is_some_and(|at_once| Operations::of(&at_once.routine).total() < along) {
+            other.set_up(&self.setup)?;
+            *self = other;
+        }
+        Ok(())
+    }
+
     /// Writes the nonzeros in the order of the pattern; false if the model was made without them.
     pub(super) fn jacobian_at(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
         if self.code.jacobian.is_none() {

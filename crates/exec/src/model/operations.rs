@@ -29,7 +29,7 @@ impl Operations {
         self.additions + self.multiplications + self.divisions + self.calls
     }
 
-    fn of(routine: &Routine) -> Operations {
+    pub(super) fn of(routine: &Routine) -> Operations {
         let mut counted = Operations::default();
         // What is handed through or guarded is not counted, blocks are below.
         let operations = routine.code.iter().filter_map(|i| if let Instruction::Op(o) = i { Some(o) } else { None });

@@ -2,7 +2,7 @@
 
 use super::{Run, Stepper};
 use crate::Failure;
-use crate::events::{Events, first_crossing};
+use crate::events::{Events, FINEST, first_crossing};
 
 /// Parts of a step by which it is made to go beyond a zero crossing.
 const MARGINS: [f64; 2] = [1e-3, 1e-6];
@@ -46,10 +46,11 @@ impl Run<'_> {
         mut end: f64,
     ) -> Result<(f64, Option<(f64, usize)>), Failure> {
         let mut crossing = self.crossing(stepper, end)?;
+        let finest = 2.0 * FINEST * (end - self.time);
         for margin in MARGINS {
             let Some((time, _)) = crossing else { break };
             let beyond = time + margin * (time - self.time);
-            if beyond >= end || !stepper.shorten(beyond) {
+            if time - self.time <= finest || beyond >= end || !stepper.shorten(beyond) {
                 break;
             }
             end = beyond;

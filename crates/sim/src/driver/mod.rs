@@ -42,7 +42,9 @@ pub(crate) struct Run<'a> {
     pub(crate) to: f64,
     pub(crate) counts: Summary,
     signs: Signs,
+    /// Of zero crossings, and of time events.
     chatter: Chatter,
+    ticking: Chatter,
     sink: &'a mut dyn Sink,
     /// Whether the sink wants to see every step.
     watched: bool,
@@ -64,6 +66,7 @@ impl<'a> Run<'a> {
             counts: Summary::default(),
             signs: Signs::new(events.indicators()),
             chatter: Chatter::new(options.to - options.from),
+            ticking: Chatter::of_times(),
             watched: sink.watches(),
             seen: None,
             sink,
@@ -76,10 +79,11 @@ impl<'a> Run<'a> {
     /// A run of which nobody takes samples, from where it stands.
     pub(crate) fn unsampled(options: &'a Options, sink: &'a mut dyn Sink, position: Position) -> Run<'a> {
         let Position { time, signs, counts } = position;
-        let chatter = Chatter::new(options.to - options.from);
+        let (chatter, ticking) = (Chatter::new(options.to - options.from), Chatter::of_times());
         let (values, inside) = (Vec::new(), Vec::new());
         let (samples, watched, seen) = (Samples::Nowhere, false, None);
-        Run { options, time, to: options.to, counts, signs, chatter, sink, watched, seen, samples, values, inside }
+        let to = options.to;
+        Run { options, time, to, counts, signs, chatter, ticking, sink, watched, seen, samples, values, inside }
     }
 
     /// Where it stands.
@@ -175,6 +179,9 @@ impl<'a> Run<'a> {
         self.counts.crossings += usize::from(crossed);
         self.counts.corners += usize::from(corner);
         self.counts.jumps += usize::from(at_event && !corner);
+        if at_event && self.ticking.is_one(end) {
+            return Err(Failure::Chattering { time: end, what: "a condition on time".into() });
+        }
         Ok(match (crossed, at_event) {
             (true, _) => StopReason::ZeroCrossing,
             (false, true) => StopReason::TimeEvent { corner },

@@ -1,4 +1,4 @@
-//! Zero crossings without end.
+//! Events without end.
 
 /// Crossings in a row that may lie within [`SHORT`] of the run.
 const MOST_CROSSINGS: usize = 200;
@@ -6,22 +6,32 @@ const MOST_CROSSINGS: usize = 200;
 /// Part of the run in which so many crossings have no physical meaning.
 const SHORT: f64 = 1e-9;
 
-/// Notices crossings that follow each other without time going on.
+/// Part of the time that has passed in which so many time events have none: that of a few thousand rounding errors.
+const STILL: f64 = 1e-12;
+
+/// Notices events that follow each other without time going on.
 pub(crate) struct Chatter {
     short: f64,
+    /// The same as part of the time.
+    relative: f64,
     since: f64,
     crossings: usize,
 }
 
 impl Chatter {
-    /// For a run of this length in s.
+    /// Of zero crossings, for a run of this length in s.
     pub(crate) fn new(length: f64) -> Chatter {
-        Chatter { short: SHORT * length, since: f64::NEG_INFINITY, crossings: 0 }
+        Chatter { short: SHORT * length, relative: 0.0, since: f64::NEG_INFINITY, crossings: 0 }
     }
 
-    /// Takes notice of a crossing. `true` if it is one too many.
+    /// Of time events.
+    pub(crate) fn of_times() -> Chatter {
+        Chatter { short: 0.0, relative: STILL, since: f64::NEG_INFINITY, crossings: 0 }
+    }
+
+    /// Takes notice of an event. `true` if it is one too many.
     pub(crate) fn is_one(&mut self, time: f64) -> bool {
-        if time - self.since > self.short {
+        if time - self.since > self.short + self.relative * time.abs() {
             (self.since, self.crossings) = (time, 0);
         }
         self.crossings += 1;
@@ -38,5 +48,16 @@ mod tests {
         let mut chatter = Chatter::new(1.0);
         assert!((0..1000).all(|i| !chatter.is_one(i as f64 * 1e-10)));
         assert!((0..1000).any(|i| chatter.is_one(0.5 + i as f64 * 1e-15)));
+    }
+
+    #[test]
+    fn frequent_time_events_are_no_chatter() {
+        let mut chatter = Chatter::of_times();
+        assert!((0..1000).all(|i| !chatter.is_one(f64::from(i) * 1e-10)));
+        let mut time = 1e-13_f64;
+        assert!((0..1000).any(|_| {
+            time = time.next_up();
+            chatter.is_one(time)
+        }));
     }
 }

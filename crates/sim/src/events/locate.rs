@@ -9,6 +9,10 @@ const PARTS: usize = 4;
 /// Halvings of the bracket of a crossing at most.
 const MOST_BISECTIONS: usize = 80;
 
+/// Part of a step within which crossings are not told apart, 2 to the power -62: what has passed since a start at time 0 can
+/// be as small as you like, but what a state would be then is rounding of the step.
+pub(crate) const FINEST: f64 = 2.168404344971009e-19;
+
 /// The first time in `(start, end]` at which an event indicator has another sign than that held, and which it is.
 /// `crossed` says for a time inside the step what [`Signs::crossed`] says of the state there. The time returned is just
 /// past the crossing, by a rounding error.
@@ -30,14 +34,14 @@ pub(crate) fn first_crossing(
         let found = crossed(signs, time(part))?;
         seen.push(signs.values().to_vec());
         if found.is_some() {
-            return bisect(signs, time(part - 1), time(part), found, &mut crossed);
+            return bisect(signs, (time(part - 1), time(part)), FINEST * (end - start), found, &mut crossed);
         }
         for turn in extrema(&seen) {
             let extremum = start + (end - start) * turn / PARTS as f64;
             let found = crossed(signs, extremum)?;
             if found.is_some() {
                 let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
-                return bisect(signs, before, extremum, found, &mut crossed);
+                return bisect(signs, (before, extremum), FINEST * (end - start), found, &mut crossed);
             }
         }
     }
@@ -55,17 +59,17 @@ fn extrema(seen: &[Vec<f64>]) -> Vec<f64> {
     a.iter().zip(b).zip(c).filter_map(turn).collect()
 }
 
-/// Halves the bracket until it is as short as times can be told apart.
+/// Halves the bracket until it is as short as times can be told apart, or as `finest`.
 fn bisect(
     signs: &mut Signs,
-    mut before: f64,
-    mut after: f64,
+    (mut before, mut after): (f64, f64),
+    finest: f64,
     mut found: Option<usize>,
     crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
 ) -> Result<Option<(f64, usize)>, Failure> {
     for _ in 0..MOST_BISECTIONS {
         let middle = before + 0.5 * (after - before);
-        if middle <= before || middle >= after {
+        if middle <= before || middle >= after || after - before <= finest {
             break;
         }
         match crossed(signs, middle)? {

@@ -5,7 +5,7 @@ mod locate;
 mod signs;
 
 pub(crate) use chatter::Chatter;
-pub(crate) use locate::first_crossing;
+pub(crate) use locate::{FINEST, first_crossing};
 pub(crate) use signs::Signs;
 
 use crate::Failure;

@@ -1,7 +1,6 @@
 //! The implicit midpoint rule.
 
-use crate::jacobian::Jacobian;
-use crate::lu::Lu;
+use super::matrix::StepMatrix;
 use crate::{Failure, Sparsity, System};
 
 /// Newton iterations at most in a step.
@@ -12,8 +11,7 @@ const SMALL: f64 = 1e-9;
 
 /// Solves `X = x + h/2 · f(t + h/2, X)` for the midpoint `X`; the step ends at `2X - x`.
 pub(super) struct ImplicitMidpoint {
-    jacobian: Jacobian,
-    matrix: Lu,
+    matrix: StepMatrix,
     middle: Vec<f64>,
     rates: Vec<f64>,
     /// Magnitude of what each equation adds up.
@@ -26,8 +24,7 @@ impl ImplicitMidpoint {
     pub(super) fn new(sparsity: &Sparsity) -> ImplicitMidpoint {
         let states = sparsity.states();
         ImplicitMidpoint {
-            jacobian: Jacobian::new(sparsity),
-            matrix: Lu::new(states),
+            matrix: StepMatrix::new(sparsity),
             middle: vec![0.0; states],
             rates: vec![0.0; states],
             sizes: vec![0.0; states],
@@ -61,16 +58,10 @@ impl ImplicitMidpoint {
     /// One Newton iteration on the midpoint.
     fn correct(&mut self, system: &mut dyn System, t: f64, half: f64, x: &[f64]) -> Result<(), Failure> {
         system.rates(t, &self.middle, &mut self.rates)?;
-        self.matrix.set_unit();
         self.sizes.iter_mut().zip(x).for_each(|(size, x)| *size = x.abs());
-        let (matrix, sizes, middle) = (&mut self.matrix, &mut self.sizes, &self.middle);
-        self.jacobian.visit(system, t, middle, |row, column, _, value| {
-            matrix.add(row, column, -half * value);
+        let (sizes, middle) = (&mut self.sizes, &self.middle);
+        self.matrix.factor(system, t, middle, half, |row, column, value| {
             sizes[row] += (half * value * middle[column]).abs();
-        })?;
-        self.matrix.factor().map_err(|column| Failure::Singular {
-            time: t,
-            what: format!("the step of {}", system.state_name(column)),
         })?;
         for (i, correction) in self.correction.iter_mut().enumerate() {
             *correction = x[i] + half * self.rates[i] - self.middle[i];

@@ -82,7 +82,7 @@ impl LinearlyImplicit {
         let (method, n) = (self.method, x.len());
         let scale = h * method.gamma;
         system.time_derivative(t, x, &mut self.time_derivative)?;
-        self.matrix.factor(system, t, x, scale)?;
+        self.matrix.factor(system, t, x, scale, |_, _, _| {})?;
         for stage in 0..method.nodes.len() {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
             let own = &mut rest[..n];

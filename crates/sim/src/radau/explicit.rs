@@ -23,16 +23,11 @@ impl<'s> Explicit<'s> {
     pub(crate) fn new(shared: &'s Shared<'s>) -> Explicit<'s> {
         let system = shared.system();
         let own = system.sparsity();
-        let with_diagonal = |column: usize| own.column(column).iter().copied().chain([column]).collect();
-        let sparsity = Sparsity::from_columns((0..system.states()).map(with_diagonal));
-        let place = |(row, column): (usize, usize)| {
-            let rows = sparsity.column(column);
-            sparsity.places(column).start + rows.partition_point(|&other| other < row)
-        };
+        let sparsity = own.with_diagonal();
         Explicit {
             jacobian: Jacobian::new(own),
-            places: own.entries().map(place).collect(),
-            diagonal: (0..system.states()).map(|i| place((i, i))).collect(),
+            places: own.entries().map(|(row, column)| sparsity.place(row, column)).collect(),
+            diagonal: (0..system.states()).map(|i| sparsity.place(i, i)).collect(),
             scales: system.scales().to_vec(),
             differential: vec![true; system.states()],
             sparsity,

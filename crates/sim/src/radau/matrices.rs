@@ -1,14 +1,9 @@
 //! The linear equations of a step: one real and one complex matrix of the size of the system.
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::prelude::Reborrow as _;
-use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, MatMut, Par, c64};
+use faer::c64;
 
-use super::complex_lu::ComplexLu;
 use crate::Sparsity;
-use crate::lu::Lu;
+use crate::linear::{ComplexLu, Lu, SparseLu};
 
 /// Unknowns up to which dense matrices are faster, whatever the pattern.
 const LARGEST_DENSE: usize = 32;
@@ -36,6 +31,13 @@ enum Factors {
     Sparse(Box<Sparse>),
 }
 
+/// Sparse matrices and their factors.
+struct Sparse {
+    real: SparseLu<f64>,
+    complex: SparseLu<c64>,
+    work: Vec<c64>,
+}
+
 /// Why there is no factorisation.
 pub(super) struct NoPivot {
     /// The unknown for which no pivot is left, where that is known.
@@ -46,14 +48,15 @@ impl Matrices {
     pub(super) fn new(pattern: &Sparsity) -> Matrices {
         let size = pattern.states();
         let is_full = pattern.nonzeros() as f64 > FULL * (size * size) as f64;
-        let sparse = (size > LARGEST_DENSE && !is_full).then(|| Sparse::new(pattern)).flatten();
-        let dense = || Factors::Dense { real: Lu::new(size), complex: ComplexLu::new(size) };
-        Matrices {
-            pattern: pattern.clone(),
-            columns: vec![1.0; size],
-            rows: vec![1.0; size],
-            factors: sparse.map_or_else(dense, |sparse| Factors::Sparse(Box::new(sparse))),
-        }
+        let factors = match size > LARGEST_DENSE && !is_full {
+            true => Factors::Sparse(Box::new(Sparse {
+                real: SparseLu::new(pattern),
+                complex: SparseLu::new(pattern),
+                work: vec![c64::default(); size],
+            })),
+            false => Factors::Dense { real: Lu::new(size), complex: ComplexLu::new(size) },
+        };
+        Matrices { pattern: pattern.clone(), columns: vec![1.0; size], rows: vec![1.0; size], factors }
     }
 
     /// Factors both matrices, for unknowns of these scales.
@@ -89,12 +92,13 @@ impl Matrices {
                 factored.map_err(|unknown| NoPivot { unknown: Some(unknown) })
             }
             Factors::Sparse(sparse) => {
-                let (values, complex_values) = (sparse.real.val_mut(), sparse.complex.val_mut());
+                let (values, complex_values) = (sparse.real.values(), sparse.complex.values());
                 for (place, _, _, dy, dyp) in entries {
                     values[place] = real * dyp + dy;
                     complex_values[place] = complex * dyp + dy;
                 }
-                sparse.factor().ok_or(NoPivot { unknown: None })
+                let factored = sparse.real.factor() && sparse.complex.factor();
+                factored.then_some(()).ok_or(NoPivot { unknown: None })
             }
         }
     }
@@ -109,7 +113,7 @@ impl Matrices {
         b.iter_mut().zip(&self.rows).for_each(|(b, row)| *b *= row);
         match &mut self.factors {
             Factors::Dense { real, .. } => real.solve(b),
-            Factors::Sparse(sparse) => sparse.solve_real(b),
+            Factors::Sparse(sparse) => sparse.real.solve(b),
         }
         b.iter_mut().zip(&self.columns).for_each(|(b, column)| *b *= column);
     }
@@ -167,69 +171,10 @@ impl Matrices {
     }
 }
 
-/// Sparse matrices and their factors; the choice of an order is made once.
-struct Sparse {
-    symbolic: SymbolicLu<usize>,
-    real: SparseColMat<usize, f64>,
-    complex: SparseColMat<usize, c64>,
-    real_factors: NumericLu<usize, f64>,
-    complex_factors: NumericLu<usize, c64>,
-    work: Vec<c64>,
-    memory: MemBuffer,
-}
-
 impl Sparse {
-    /// `None` if there is no memory for it.
-    fn new(pattern: &Sparsity) -> Option<Sparse> {
-        let size = pattern.states();
-        let (mut starts, mut rows) = (vec![0], vec![]);
-        for column in 0..size {
-            rows.extend_from_slice(pattern.column(column));
-            starts.push(rows.len());
-        }
-        let structure = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
-        let symbolic = factorize_symbolic_lu(structure.rb(), Default::default()).ok()?;
-        let need = StackReq::any_of(&[
-            symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default()),
-            symbolic.factorize_numeric_lu_scratch::<c64>(Par::Seq, Default::default()),
-            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-            symbolic.solve_in_place_scratch::<c64>(1, Par::Seq),
-        ]);
-        Some(Sparse {
-            symbolic,
-            real: SparseColMat::new(structure.clone(), vec![0.0; pattern.nonzeros()]),
-            complex: SparseColMat::new(structure, vec![c64::new(0.0, 0.0); pattern.nonzeros()]),
-            real_factors: NumericLu::new(),
-            complex_factors: NumericLu::new(),
-            work: vec![c64::new(0.0, 0.0); size],
-            memory: MemBuffer::try_new(need).ok()?,
-        })
-    }
-
-    /// `None` if a matrix is singular.
-    fn factor(&mut self) -> Option<()> {
-        let stack = MemStack::new(&mut self.memory);
-        let parameters = Default::default();
-        self.symbolic.factorize_numeric_lu(&mut self.real_factors, self.real.rb(), Par::Seq, stack, parameters).ok()?;
-        let parameters = Default::default();
-        self.symbolic
-            .factorize_numeric_lu(&mut self.complex_factors, self.complex.rb(), Par::Seq, stack, parameters)
-            .ok()?;
-        Some(())
-    }
-
-    fn solve_real(&mut self, b: &mut [f64]) {
-        let factors = LuRef::new_unchecked(&self.symbolic, &self.real_factors);
-        let rows = b.len();
-        let b = MatMut::from_column_major_slice_mut(b, rows, 1);
-        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.memory));
-    }
-
     fn solve_complex(&mut self, re: &mut [f64], im: &mut [f64]) {
         self.work.iter_mut().zip(re.iter().zip(im.iter())).for_each(|(b, (re, im))| *b = c64::new(*re, *im));
-        let factors = LuRef::new_unchecked(&self.symbolic, &self.complex_factors);
-        let b = MatMut::from_column_major_slice_mut(&mut self.work, re.len(), 1);
-        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.memory));
+        self.complex.solve(&mut self.work);
         self.work.iter().zip(re.iter_mut().zip(im)).for_each(|(b, (re, im))| (*re, *im) = (b.re, b.im));
     }
 }

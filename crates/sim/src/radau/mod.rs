@@ -6,7 +6,6 @@
 //! three times as large. One formulation serves explicit, semi-explicit and fully implicit systems.
 
 mod collocation;
-mod complex_lu;
 mod control;
 mod explicit;
 mod matrices;

@@ -15,6 +15,7 @@ use crate::driver::{Flow, Run};
 use crate::shared::Shared;
 use crate::{Failure, Method, Summary};
 use controlled::{Controlled, HandOver};
+pub(crate) use library::KeptFactors;
 use stiffness::Stiffness;
 use tolerances::Tolerances;
 

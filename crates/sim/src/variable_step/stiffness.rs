@@ -6,6 +6,13 @@ use crate::System;
 /// Accepted steps between two checks.
 const EVERY: usize = 10;
 
+/// The same where there are many states: a sparse implicit step costs little more than an explicit one, and a large network
+/// that is not stiff is rare.
+const EVERY_OF_LARGE: usize = 3;
+
+/// States from which on they are many.
+const LARGE: usize = 200;
+
 /// Step times spectral radius beyond which only stability can limit the step: on oscillations that accuracy limits it
 /// stays below 1.
 const STABILITY_LIMIT: f64 = 2.0;
@@ -44,7 +51,8 @@ impl Stiffness {
         remaining: f64,
     ) -> bool {
         self.steps += 1;
-        if !self.steps.is_multiple_of(EVERY) {
+        let every = if self.vector.len() < LARGE { EVERY } else { EVERY_OF_LARGE };
+        if !self.steps.is_multiple_of(every) {
             return false;
         }
         let radius = self.radius(system, tolerances, t, x).unwrap_or(0.0);

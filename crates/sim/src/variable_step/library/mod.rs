@@ -6,7 +6,7 @@ mod sparse_lu;
 use diffsol::error::DiffsolError;
 use diffsol::ode_solver::state::StateCommon;
 use diffsol::{
-    BdfState, DefaultDenseMatrix, FaerSparseMat, InitialConditionSolverOptions, Matrix, NalgebraLU, NalgebraMat,
+    Bdf, BdfState, DefaultDenseMatrix, FaerSparseMat, InitialConditionSolverOptions, Matrix, NalgebraLU, NalgebraMat,
     OdeSolverMethod, OdeSolverOptions, OdeSolverProblem, OdeSolverState, RkState, Tableau, Vector,
 };
 
@@ -15,6 +15,7 @@ use super::tolerances::Tolerances;
 use crate::shared::Shared;
 use crate::{Affected, Failure, Summary, System};
 use equations::Equations;
+pub(crate) use sparse_lu::KeptFactors;
 use sparse_lu::SparseLu;
 
 /// States up to which dense matrices are faster.
@@ -59,7 +60,10 @@ pub(super) fn with_bdf<'s, R>(
         work(&mut Driven::new(&problem, |state: BdfState<_>| problem.bdf_solver::<NalgebraLU<f64>>(state), false))
     } else {
         let problem = problem::<FaerSparseMat<f64>>(shared, tolerances, Some(BDF_SHARE));
-        work(&mut Driven::new(&problem, |state: BdfState<_>| problem.bdf_solver::<SparseLu>(state), false))
+        let make = |state: BdfState<_>| -> Result<Bdf<'_, Equations<'s, FaerSparseMat<f64>>, SparseLu>, DiffsolError> {
+            Bdf::new(&problem, state, SparseLu::after(shared.kept_factors()))
+        };
+        work(&mut Driven::new(&problem, make, false))
     }
 }
 

@@ -1,35 +1,30 @@
 //! Sparse linear equations that say when they have no solution, where the library's own solver panics.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use diffsol_la::error::{LaError, LinearSolverError};
 use diffsol_la::linear_solver::LinearSolver;
-use diffsol_la::{FaerContext, FaerSparseMat, FaerVec, IndexType, LinearOp, Matrix, MatrixCommon, Vector};
-use faer::Mat;
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+use diffsol_la::{FaerContext, FaerSparseMat, FaerVec, LinearOp, Matrix, MatrixCommon, Vector};
+
+use crate::{Sparsity, linear};
+
+/// Factors that solvers hand on to those that come after a restart: the order of elimination is found once a run.
+pub(crate) type KeptFactors = Rc<RefCell<Option<linear::SparseLu<f64>>>>;
 
 /// A sparse matrix and its triangular factors. A singular matrix leaves none; Newton is told so when it asks for a
 /// solution, and the integrator tries a shorter step.
 #[derive(Default)]
 pub(super) struct SparseLu {
     matrix: Option<FaerSparseMat<f64>>,
-    symbolic: Option<SymbolicLu<IndexType>>,
-    factors: Option<Lu<IndexType, f64>>,
+    kept: KeptFactors,
+    factored: bool,
 }
 
 impl SparseLu {
-    /// Replaces `b` by what `solve` makes of it.
-    fn apply(
-        &self,
-        b: &mut FaerVec<f64>,
-        solve: impl FnOnce(&Lu<IndexType, f64>, &Mat<f64>) -> Mat<f64>,
-    ) -> Result<(), LaError> {
-        let factors = self.factors.as_ref().ok_or(LinearSolverError::LuSolveFailed)?;
-        let x = solve(factors, &Mat::from_fn(b.len(), 1, |i, _| b.get_index(i)));
-        (0..b.len()).for_each(|i| b.set_index(i, x[(i, 0)]));
-        match (0..b.len()).all(|i| x[(i, 0)].is_finite()) {
-            true => Ok(()),
-            false => Err(LinearSolverError::LuSolveFailed.into()),
-        }
+    /// With factors that others have had, none of whom asks for them again.
+    pub(super) fn after(kept: &KeptFactors) -> SparseLu {
+        SparseLu { kept: Rc::clone(kept), ..SparseLu::default() }
     }
 }
 
@@ -39,36 +34,51 @@ impl LinearSolver<FaerSparseMat<f64>> for SparseLu {
         C: LinearOp<T = f64, V = FaerVec<f64>, M = FaerSparseMat<f64>, C = FaerContext>,
     {
         let matrix = FaerSparseMat::new_from_sparsity(op.nrows(), op.ncols(), op.sparsity(), *op.context());
-        self.symbolic = SymbolicLu::try_new(matrix.inner()[0].symbolic()).ok();
+        let structure = matrix.inner()[0].symbolic();
+        let columns = (0..op.ncols()).map(|column| structure.row_idx_of_col(column).collect());
+        let pattern = Sparsity::from_columns(columns);
+        let kept = &mut *self.kept.borrow_mut();
+        if kept.as_ref().is_none_or(|kept| *kept.pattern() != pattern) {
+            *kept = Some(linear::SparseLu::new(&pattern));
+        }
         self.matrix = Some(matrix);
-        self.factors = None;
+        self.factored = false;
     }
 
     fn set_linearisation<C>(&mut self, op: &C)
     where
         C: LinearOp<T = f64, V = FaerVec<f64>, M = FaerSparseMat<f64>, C = FaerContext>,
     {
-        self.factors = None;
-        if let (Some(matrix), Some(symbolic)) = (&mut self.matrix, &self.symbolic) {
+        self.factored = false;
+        if let (Some(matrix), Some(factors)) = (&mut self.matrix, &mut *self.kept.borrow_mut()) {
             op.matrix_inplace(matrix);
-            self.factors = Lu::try_new_with_symbolic(symbolic.clone(), matrix.inner()[0].as_ref()).ok();
+            factors.values().copy_from_slice(matrix.inner()[0].val());
+            self.factored = factors.factor();
         }
     }
 
     fn solve_in_place(&self, b: &mut FaerVec<f64>) -> Result<(), LaError> {
-        self.apply(b, |factors, b| factors.solve(b))
+        let kept = &mut *self.kept.borrow_mut();
+        let factors = kept.as_mut().filter(|_| self.factored).ok_or(LinearSolverError::LuSolveFailed)?;
+        let mut finite = true;
+        b.for_each_batch_host([], |b, [], _| {
+            factors.solve(b);
+            finite &= b.iter().all(|value| value.is_finite());
+        });
+        if finite { Ok(()) } else { Err(LinearSolverError::LuSolveFailed.into()) }
     }
 
-    fn solve_transpose_in_place(&self, b: &mut FaerVec<f64>) -> Result<(), LaError> {
-        self.apply(b, |factors, b| factors.solve_transpose(b))
+    /// Integration forward in time does not ask for it.
+    fn solve_transpose_in_place(&self, _: &mut FaerVec<f64>) -> Result<(), LaError> {
+        Err(LinearSolverError::LuSolveFailed.into())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use diffsol_la::VectorIndex;
     use diffsol_la::matrix::sparsity::MatrixSparsity;
+    use diffsol_la::{IndexType, VectorIndex};
 
     /// A matrix of three diagonals.
     struct Tridiagonal {

@@ -3,9 +3,8 @@
 mod matching;
 mod symbolic;
 
-pub(crate) use matching::Matching;
-pub use symbolic::SymbolicFactors;
-pub(crate) use symbolic::full_operations;
+pub use matching::Matching;
+pub use symbolic::{SymbolicFactors, full_operations};
 
 use std::ops::Range;
 use std::sync::Arc;

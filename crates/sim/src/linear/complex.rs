@@ -7,7 +7,7 @@ const THRESHOLD: f64 = 0.1;
 
 /// A dense square matrix, whose rows should be of like size, and its triangular factors in the same place; all memory is
 /// taken in [`new`](ComplexLu::new).
-pub(super) struct ComplexLu {
+pub(crate) struct ComplexLu {
     size: usize,
     /// Row by row; the factors hold the reciprocals of the pivots.
     entries: Vec<c64>,
@@ -17,22 +17,22 @@ pub(super) struct ComplexLu {
 }
 
 impl ComplexLu {
-    pub(super) fn new(size: usize) -> ComplexLu {
+    pub(crate) fn new(size: usize) -> ComplexLu {
         let zero = c64::new(0.0, 0.0);
         ComplexLu { size, entries: vec![zero; size * size], order: vec![0; size], work: vec![zero; size] }
     }
 
     /// Makes all entries 0.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.entries.fill(c64::new(0.0, 0.0));
     }
 
-    pub(super) fn set(&mut self, row: usize, column: usize, value: c64) {
+    pub(crate) fn set(&mut self, row: usize, column: usize, value: c64) {
         self.entries[row * self.size + column] = value;
     }
 
     /// Factors in place; `Err(column)` if no pivot is left for it.
-    pub(super) fn factor(&mut self) -> Result<(), usize> {
+    pub(crate) fn factor(&mut self) -> Result<(), usize> {
         let n = self.size;
         (0..n).for_each(|row| self.order[row] = row);
         for k in 0..n {
@@ -52,7 +52,7 @@ impl ComplexLu {
     }
 
     /// Replaces `re + i im` by the solution. The matrix must have been factored.
-    pub(super) fn solve(&mut self, re: &mut [f64], im: &mut [f64]) {
+    pub(crate) fn solve(&mut self, re: &mut [f64], im: &mut [f64]) {
         let n = self.size;
         for row in 0..n {
             let from = self.order[row];

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 /// Rows and columns, joined in pairs.
-pub(crate) struct Matching {
+#[derive(Debug)]
+pub struct Matching {
     /// The row of each column.
     pub row_of: Vec<Option<usize>>,
     /// The column of each row.
