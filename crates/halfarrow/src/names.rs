@@ -10,7 +10,8 @@ use serde::{Serialize, Serializer};
 
 use crate::model::Model;
 
-/// A name of a model. Names within components stand with those of their instances before them: `motor.coil`.
+/// A name of a model. Names within components stand with those of their instances before them: `motor.coil`. Elements
+/// with indices have one name together: `spring` for `spring[1]` to `spring[9]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Name {
     /// The name.
@@ -171,7 +172,27 @@ fn readers(graph: &BondGraph) -> Vec<Reader<'_>> {
     );
     let bonds = graph.bonds.values().filter(|b| !b.name.is_empty());
     all.extend(bonds.map(|b| reader(&b.name, NameKind::Bond, b.span, &[b.effort, b.flow], &[])));
-    all
+    together(all)
+}
+
+/// Elements with indices have one name together: what one of them reads or gives, the name does.
+fn together(all: Vec<Reader<'_>>) -> Vec<Reader<'_>> {
+    let mut at: BTreeMap<(bool, &str), usize> = BTreeMap::new();
+    let mut merged: Vec<Reader> = Vec::with_capacity(all.len());
+    for reader in all {
+        let name = reader.name.strip_suffix(']').and_then(|n| n.rsplit_once('[')).map_or(reader.name, |(name, _)| name);
+        match at.get(&(reader.kind.is_value(), name)).filter(|_| name != reader.name) {
+            Some(&first) => {
+                merged[first].symbols.extend(reader.symbols);
+                merged[first].reads.extend(reader.reads);
+            }
+            None => {
+                at.insert((reader.kind.is_value(), name), merged.len());
+                merged.push(Reader { name, ..reader });
+            }
+        }
+    }
+    merged
 }
 
 fn kind_of(element: &Element) -> NameKind {

@@ -6,6 +6,7 @@
 //! held signals, and the effort, flow and stored quantity of bonds and ports. What the modeller wrote as `R1.f` is the
 //! flow of the bond at `R1`; `w.f` of a 1-junction is the flow of any of its bonds.
 
+mod arrays;
 mod assemble;
 mod blocks;
 mod builder;
@@ -17,6 +18,8 @@ mod dimension;
 mod elaborate;
 mod elements;
 mod expressions;
+mod families;
+mod faults;
 mod files;
 mod flatten;
 mod guesses;
@@ -28,6 +31,7 @@ mod names;
 mod overrides;
 mod print;
 mod recognise;
+mod repeat;
 mod scope;
 mod structure;
 mod symbols;
@@ -71,6 +75,10 @@ id!(
 id!(
     /// An integrated signal (`state x' = …`, and the states of `pid` and `tf`).
     SignalId
+);
+id!(
+    /// A turn of a repetition.
+    CellId
 );
 id!(
     /// A signal held from earlier times (`delay`, `sample`).
@@ -122,6 +130,21 @@ pub struct BondGraph {
     pub constraints: Vec<Constraint>,
     /// Time, as a symbol.
     pub time: Symbol,
+    /// The turns of all repetitions (`for`), in the order in which they are made.
+    pub cells: Table<CellId, Cell>,
+}
+
+/// One turn of a repetition: what is made in it is like what is made in other turns of the same, but for the numbers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cell {
+    /// The loop variable.
+    pub variable: String,
+    /// Its value.
+    pub value: i64,
+    /// Where the variable is declared: turns of one repetition have one place.
+    pub span: Span,
+    /// The turn of the repetition around it.
+    pub outer: Option<CellId>,
 }
 
 /// A symbol's meaning, unit and place.
@@ -178,6 +201,8 @@ pub struct Element {
     pub span: Span,
     /// The law or value as the modeller wrote it, for drawings: `k = ks`, `e = b*f^3`; empty for junctions.
     pub label: String,
+    /// The turn of a repetition that it is made in, if it is.
+    pub cell: Option<CellId>,
 }
 
 /// A port and its bond.
@@ -328,8 +353,11 @@ pub struct Parameter {
     pub symbol: Symbol,
     /// Its value, a number or an expression of other parameters, in SI.
     pub value: Expr,
-    /// Whether it is a `const`.
+    /// Whether it stays as it is while the model runs: it is a `const`, or shapes the model.
     pub constant: bool,
+    /// Whether it shapes the model, as the number of turns of a repetition does: only a model that is compiled anew has
+    /// another value of it.
+    pub shapes: bool,
     /// What it is.
     pub kind: ParameterKind,
     /// Unit as written.
@@ -528,6 +556,7 @@ impl BondGraph {
             guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
             time: self.time,
+            cells: self.cells.clone(),
         }
     }
     /// The bond at a port.

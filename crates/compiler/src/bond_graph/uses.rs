@@ -1,6 +1,7 @@
 //! Where the text uses names, recorded where they are resolved.
 
-use super::scope::{ComponentId, DeclId, Node};
+use super::families::FamilyId;
+use super::scope::{ComponentId, DeclId, Node, Valued};
 use crate::span::Span;
 
 /// What a place in the text uses.
@@ -8,10 +9,22 @@ use crate::span::Span;
 pub(super) enum Used {
     /// A value or function.
     Value(DeclId),
+    /// Values with indices.
+    Values(FamilyId),
     /// An element, instance, port, bond or constraint.
     Node(Node),
     /// A component.
     Component(ComponentId),
+}
+
+impl Used {
+    /// What a name of values stands for.
+    pub fn of(value: Valued) -> Used {
+        match value {
+            Valued::One(decl) => Used::Value(decl),
+            Valued::Family(family) => Used::Values(family),
+        }
+    }
 }
 
 /// The places that use names.
