@@ -103,6 +103,20 @@ impl Model {
     }
 }
 
+/// The parts of a list with commas between them, as options take it. Commas in brackets belong to a part: `node[1,2].q`.
+///
+/// ```
+/// assert_eq!(halfarrow::listed("t, node[1,2].q,final(x)"), ["t", "node[1,2].q", "final(x)"]);
+/// ```
+pub fn listed(text: &str) -> Vec<&str> {
+    let mut open = 0i32;
+    let parts = text.split(|c| {
+        open += i32::from(matches!(c, '[' | '(')) - i32::from(matches!(c, ']' | ')'));
+        c == ',' && open <= 0
+    });
+    parts.map(str::trim).collect()
+}
+
 /// The place that stands for a whole file.
 fn beginning_of(file: &str) -> Place {
     Place { file: file.to_string(), line: 1, column: 1, start: 0, end: 0 }

@@ -33,11 +33,21 @@ pub(super) struct Uses {
     pub places: Vec<(Used, Span)>,
     /// Tables by the paths under which they were found.
     pub tables: Vec<(String, Span)>,
+    /// What was recorded last, by place: what is repeated uses mostly the same names in each turn.
+    last: Vec<Option<(Used, Span)>>,
 }
+
+/// How many places are kept in mind.
+const LAST: usize = 256;
 
 impl Uses {
     /// A name is used at this place.
     pub fn add(&mut self, used: Used, at: Span) {
-        self.places.push((used, at));
+        self.last.resize(LAST, None);
+        let last = &mut self.last[at.start as usize % LAST];
+        if *last != Some((used, at)) {
+            *last = Some((used, at));
+            self.places.push((used, at));
+        }
     }
 }
