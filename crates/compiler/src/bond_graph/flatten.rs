@@ -223,7 +223,9 @@ pub(super) fn flatten<'a>(files: &'a [ast::Ast], given: &'a [Given]) -> Flat<'a>
         }
         flat.fill(Here::of(0), &file.statements, false, i > 0);
     }
-    flat.draw_bonds();
+    if !flat.lost {
+        flat.draw_bonds();
+    }
     flat
 }
 
