@@ -540,7 +540,15 @@ impl<'a> Flat<'a> {
         let mut decl = Decl { name: full, reads, item, array, alone, kind, unit, replaced_unit, doc, span: name.span };
         self.override_value(&mut decl, here.scope, name, indices);
         match self.names.declare(here.scope, name, indices, decl) {
-            Ok(decl) => Some(decl),
+            Ok(decl) => {
+                if let Some(&value @ Valued::Family(family)) =
+                    self.names.scopes[here.scope].values.get(name.text.as_str())
+                    && self.names.value_families[family].span != name.span
+                {
+                    self.uses.add(Used::of(value), name.span);
+                }
+                Some(decl)
+            }
             Err(fault) => {
                 self.faults.push(*fault);
                 None
@@ -567,7 +575,14 @@ impl<'a> Flat<'a> {
     /// Gives a node its name; false if the name is taken, which is said.
     fn place(&mut self, scope: ScopeId, name: &'a ast::Name, indices: &[i64], node: Node) -> bool {
         match self.names.place(scope, name, indices, node) {
-            Ok(()) => true,
+            Ok(()) => {
+                if let Some(&(Node::Family(family), first)) = self.names.scopes[scope].nodes.get(name.text.as_str())
+                    && first != name.span
+                {
+                    self.uses.add(Used::Node(Node::Family(family)), name.span);
+                }
+                true
+            }
             Err(fault) => {
                 self.faults.push(*fault);
                 false

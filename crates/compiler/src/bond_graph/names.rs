@@ -92,7 +92,7 @@ pub struct Name {
     /// Where the name is declared. What a component declares stands there for each of its instances. `None` for tables,
     /// which are no model text; a file that is imported is declared by its beginning.
     pub declared: Option<Span>,
-    /// Where it is used: its name alone, without what stands before or behind the dots. In the order of the files and of
+    /// Where it is used, and where further elements of it are declared: its name alone, without what stands before or behind the dots. In the order of the files and of
     /// their text, each place once. A place inside a component counts for each instance that names something else by it.
     pub uses: Vec<Span>,
 }
