@@ -93,6 +93,8 @@ fn elements_with_indices_have_one_name_together() {
     let v = one("v");
     let places: Vec<(usize, usize)> = v.uses.iter().map(|p| (p.line, p.column)).collect();
     assert_eq!((v.kind, v.declared.line, places), (NameKind::Junction, 3, vec![(4, 16), (6, 5), (7, 15)]));
+    let n: Vec<(usize, usize)> = one("n").uses.iter().map(|p| (p.line, p.column)).collect();
+    assert_eq!(n, [(2, 23), (2, 47), (2, 61), (5, 13), (9, 20), (10, 27), (10, 41)]);
     assert_eq!(one("heat").read_by, ["last", "mean"]);
     assert_eq!((one("r").kind, one("n").kind), (NameKind::Parameter, NameKind::Parameter));
 }

@@ -117,8 +117,10 @@ fn build(
     }
     b.forgive_unwritten_units();
     if faulty || b.incomplete || !b.faults.is_empty() {
+        b.repeats.add_uses(&flat.names, &mut b.uses);
         return Built { graph: None, faults: b.faults.into_list(), uses: b.uses };
     }
+    b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
     let faults = faults.into_list();
     Built { graph: finished(b, title, kinds, asked, &relations, &rates), faults, uses }

@@ -537,7 +537,9 @@ impl<'a> Flat<'a> {
         let prefix = &self.names.scopes[here.scope].prefix;
         let full = full_name(prefix, &name.text, indices);
         let (item, array, replaced_unit, alone) = (Indices::default(), None, None, false);
-        let mut decl = Decl { name: full, reads, item, array, alone, kind, unit, replaced_unit, doc, span: name.span };
+        let (own, scope) = (name.text.as_str(), here.scope);
+        let mut decl =
+            Decl { name: full, own, scope, reads, item, array, alone, kind, unit, replaced_unit, doc, span: name.span };
         self.override_value(&mut decl, here.scope, name, indices);
         match self.names.declare(here.scope, name, indices, decl) {
             Ok(decl) => {

@@ -92,8 +92,9 @@ pub struct Name {
     /// Where the name is declared. What a component declares stands there for each of its instances. `None` for tables,
     /// which are no model text; a file that is imported is declared by its beginning.
     pub declared: Option<Span>,
-    /// Where it is used, and where further elements of it are declared: its name alone, without what stands before or behind the dots. In the order of the files and of
-    /// their text, each place once. A place inside a component counts for each instance that names something else by it.
+    /// Where it is used, and where further elements of it are declared: its name alone, without what stands before or behind
+    /// the dots. In the order of the files and of their text, each place once. A place inside a component counts for each
+    /// instance that names something else by it.
     pub uses: Vec<Span>,
 }
 
@@ -106,6 +107,7 @@ pub(super) fn table(
     sources: &Sources,
 ) -> Vec<Name> {
     uses.places.extend(&flat.uses.places);
+    flat.repeats.add_uses(&flat.names, &mut uses);
     uses.places.sort_unstable();
     uses.places.dedup();
     let mut places: FxHashMap<Used, Vec<Span>> = FxHashMap::default();

@@ -4,6 +4,7 @@ use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::scope::{DeclId, DeclKind, Here, Names, Node, ScopeId, TurnId, Valued};
+use super::uses::{Used, Uses};
 use crate::algebra::Rational;
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
 use crate::diagnostic::{Diagnostic, codes};
@@ -93,6 +94,10 @@ pub(super) struct Repeats<'a> {
     shaping: FxHashSet<Key<'a>>,
     /// The named numbers that the expression reads.
     read: Vec<Key<'a>>,
+    /// Where names are used in what shapes the model.
+    uses: FxHashSet<(Key<'a>, Span)>,
+    /// Whether a name is only looked up, which is no use of it.
+    looking: bool,
     depth: usize,
     /// How many turns have been made, those that are forgotten with them.
     made: usize,
@@ -101,7 +106,8 @@ pub(super) struct Repeats<'a> {
 impl Default for Repeats<'_> {
     fn default() -> Self {
         let (known, shaping) = (FxHashMap::default(), FxHashSet::default());
-        Repeats { turns: vec![None], known, shaping, read: Vec::new(), depth: 0, made: 0 }
+        let (uses, looking) = (FxHashSet::default(), false);
+        Repeats { turns: vec![None], known, shaping, read: Vec::new(), uses, looking, depth: 0, made: 0 }
     }
 }
 
@@ -203,7 +209,10 @@ impl<'a> Repeats<'a> {
         if let Some(value) = self.variable(here.turn, &name.text) {
             return Some(value);
         }
-        self.bare(names, here, name, &[]).ok()?.as_integer()
+        self.looking = true;
+        let value = self.bare(names, here, name, &[]);
+        self.looking = false;
+        value.ok()?.as_integer()
     }
 
     /// A bare name as an index.
@@ -228,6 +237,17 @@ impl<'a> Repeats<'a> {
                 _ => None,
             },
         })
+    }
+
+    /// Adds where names are used in what shapes the model.
+    pub fn add_uses(&self, names: &Names<'a>, uses: &mut Uses) {
+        for &(key, span) in &self.uses {
+            let used = match key {
+                Key::Declared(decl) => names.used(decl),
+                Key::Ahead(scope, name) => names.scopes[scope].values.get(name).map(|value| Used::of(*value)),
+            };
+            used.into_iter().for_each(|used| uses.add(used, span));
+        }
     }
 
     /// What is read for this shapes the model.
@@ -491,6 +511,9 @@ impl<'a> Repeats<'a> {
         what: &str,
         span: Span,
     ) -> Result<Rational, Unknown> {
+        if !self.looking {
+            self.uses.insert((key, span));
+        }
         match self.known.get(&key) {
             Some(Known::Number(number, _)) => {
                 self.read.push(key);

@@ -4,6 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::families::{Families, FamilyId, Indices, spelled};
 use super::repeat::Repeats;
+use super::uses::Used;
 use super::value::Reading;
 use crate::ast;
 use crate::diagnostic::nearest;
@@ -120,6 +121,9 @@ pub(super) enum Node {
 pub(super) struct Decl<'a> {
     /// Its full name.
     pub name: String,
+    /// Its name as it is written, and the scope that it belongs to.
+    pub own: &'a str,
+    pub scope: ScopeId,
     /// Where its expression reads.
     pub reads: Here,
     /// Which element it is, if its expression is for all elements of an array.
@@ -300,6 +304,12 @@ impl<'a> Names<'a> {
                 self.value_families.get(family, &part.name, &indices).copied()
             }
         }
+    }
+
+    /// What a use of a declaration is one of: of its own name, or of that of an array.
+    pub fn used(&self, decl: DeclId) -> Option<Used> {
+        let d = &self.decls[decl];
+        self.scopes[d.scope].values.get(d.own).map(|value| Used::of(*value))
     }
 
     /// Where a value is declared, or the first of several.
