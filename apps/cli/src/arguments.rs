@@ -572,6 +572,9 @@ pub struct Draw {
     /// Leave out laws and values of the elements
     #[arg(long)]
     pub no_laws: bool,
+    /// Of the cells of a `for` that are made alike draw the first alone
+    #[arg(long)]
+    pub first_cells: bool,
     /// An earlier drawing, as .svg: elements that are in it stay where they are there, as seen from each other
     #[arg(long, value_name = "FILE")]
     pub keep: Option<PathBuf>,

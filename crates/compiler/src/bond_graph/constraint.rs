@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use super::assemble::cell_of;
 use super::builder::{Builder, Pair, Role};
 use super::flatten::Held;
 use super::structure::Structure;
@@ -167,8 +168,9 @@ impl Builder<'_, '_> {
     }
 
     fn build(&mut self, structure: &mut Structure, r: &Relation) -> Constraint {
-        let Held { name, ast: c, .. } = &self.flat.constraints[r.at];
+        let Held { name, ast: c, here, .. } = &self.flat.constraints[r.at];
         let name = name.clone();
+        let first = structure.elements.len();
         let minus_rest = self.exprs.neg(r.rest);
         let label = self.sources.slice(c.left.span.to(c.right.span)).to_string();
         let node = structure.add(format!("{name}.0"), Kind::Zero, r.span, String::new());
@@ -190,6 +192,8 @@ impl Builder<'_, '_> {
         let bond = structure.join((zc, ""), (node, ""), (effort, flow), r.span);
         self.mean(effort, Meaning::Effort(bond), effort_in);
         self.mean(flow, Meaning::Flow(bond), flow_in);
+        let cell = cell_of(self.flat.names.turn_around(*here));
+        (first..structure.elements.len()).for_each(|at| structure.elements[ElementId::new(at)].cell = cell);
         let multiplier = self.exprs.sym(effort);
         Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span }
     }
