@@ -243,7 +243,24 @@ fn cells_tell_where_elements_come_from() {
     assert_eq!((g.cells.len(), cell("t")), (6, None));
     let inner = &g.cells[cell("r[2,4]").expect("a cell")];
     let outer = &g.cells[inner.outer.expect("an outer cell")];
-    assert_eq!([(inner.variable.as_str(), inner.value), (outer.variable.as_str(), outer.value)], [("j", 4), ("i", 2)]);
+    let told = [inner, outer].map(|c| (g.repetitions[c.repetition].variable.as_str(), c.value));
+    assert_eq!(told, [("j", 4), ("i", 2)]);
+    let text = "component X(param n; port p) { p -> 1:w\nfor i in 1..n { w -> R:r[i](1) } }";
+    let g = graph(
+        &format!("model M\n{text}\nfor k in 1..2 {{ Se:s[k](1) -> X:x[k](n = k) }}\nSe:t(1) -> X:y(n = 2)\n"),
+        &[],
+    );
+    let around = |name: &str| {
+        let mut cell = g.elements.values().find(|e| e.name == name).and_then(|e| e.cell);
+        let mut all = Vec::new();
+        while let Some(id) = cell {
+            let of = &g.repetitions[g.cells[id].repetition];
+            all.push(format!("{}{}={}", of.within, of.variable, g.cells[id].value));
+            cell = g.cells[id].outer;
+        }
+        all.join(" ")
+    };
+    assert_eq!(["x[2].r[2]", "x[1].w", "y.r[1]", "t"].map(around), ["x[2]i=2 k=2", "k=1", "yi=1", ""]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use halfarrow_compiler::bond_graph::{BondGraph, CellId};
+use halfarrow_compiler::bond_graph::{BondGraph, CellId, Repetition, RepetitionId};
 use halfarrow_compiler::span::Span;
 
 use crate::figure::{Figure, Form, Glyph, Line, Loop};
@@ -43,10 +43,10 @@ fn stands_for(graph: &BondGraph) -> BTreeMap<CellId, Vec<i64>> {
             cell = graph.cells[id].outer;
         }
     }
-    let mut first: BTreeMap<(Span, Option<CellId>, &Make), CellId> = BTreeMap::new();
+    let mut first: BTreeMap<(RepetitionId, Option<CellId>, &Make), CellId> = BTreeMap::new();
     let mut found: BTreeMap<CellId, Vec<i64>> = BTreeMap::new();
     for (id, cell) in graph.cells.iter() {
-        let alike = *first.entry((cell.span, cell.outer, &makes[id.0 as usize])).or_insert(id);
+        let alike = *first.entry((cell.repetition, cell.outer, &makes[id.0 as usize])).or_insert(id);
         let others = found.entry(alike).or_default();
         if alike != id {
             others.push(cell.value);
@@ -57,8 +57,8 @@ fn stands_for(graph: &BondGraph) -> BTreeMap<CellId, Vec<i64>> {
 
 /// `i = 2, as for i = 3..9`, with the variables around it.
 fn words(graph: &BondGraph, id: CellId, others: &[i64]) -> String {
-    let cell = &graph.cells[id];
-    let variable = &cell.variable;
+    let cell = graph.cells[id];
+    let Repetition { variable, within, .. } = &graph.repetitions[cell.repetition];
     let together = others.windows(2).all(|pair| pair[1] == pair[0] + 1);
     let others = match others {
         [one] => one.to_string(),
@@ -69,11 +69,13 @@ fn words(graph: &BondGraph, id: CellId, others: &[i64]) -> String {
     let mut around = Vec::new();
     let mut outer = cell.outer;
     while let Some(id) = outer {
-        around.push(format!("{} = {}", graph.cells[id].variable, graph.cells[id].value));
-        outer = graph.cells[id].outer;
+        let cell = graph.cells[id];
+        around.push(format!("{} = {}", graph.repetitions[cell.repetition].variable, cell.value));
+        outer = cell.outer;
     }
     let around: String = around.iter().rev().map(|a| format!("{a}, ")).collect();
-    format!("{around}{variable} = {}: drawn for {variable} = {others} too", cell.value)
+    let within = if within.is_empty() { String::new() } else { format!("{within}: ") };
+    format!("{within}{around}{variable} = {}: drawn for {variable} = {others} too", cell.value)
 }
 
 /// The figure of what is drawn, with an ellipsis for each element at the other end of a bond.

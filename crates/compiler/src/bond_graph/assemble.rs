@@ -2,18 +2,22 @@
 
 use std::collections::BTreeMap;
 
+use rustc_hash::FxHashMap;
+
 use super::builder::{Builder, NamedDraft, Role};
 use super::dimension::Quantity;
 use super::flatten::Word;
-use super::scope::{DeclId, TurnId};
+use super::repeat::Turn;
+use super::scope::{DeclId, Here, ScopeId, TurnId};
 use super::structure::Structure;
 use super::{
     BondGraph, Cell, CellId, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input, InputId,
-    IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, SignalId, Variable,
+    IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, SignalId, Variable,
 };
 use crate::algebra::{Expr, Node, Symbol};
 use crate::ast::Header;
 use crate::ids::{Id, Map, Table};
+use crate::span::Span;
 use crate::unit::{Dimension, Unit};
 
 /// The cell of a turn of a repetition.
@@ -92,7 +96,7 @@ impl Builder<'_, '_> {
         let inputs = self.whole_inputs()?;
         self.fix_parameters();
         let parameters = std::mem::take(&mut self.parameters);
-        let cells = self.cells();
+        let (repetitions, cells) = self.cells();
         let variables = self.variables(&Tables { parameters: &parameters, inputs: &inputs, signals: &laws.signals });
         self.replace_symbols(&mut laws, &mut asked.guesses, rates);
         self.replace_symbols(&mut laws, &mut asked.guesses, repeated);
@@ -116,6 +120,7 @@ impl Builder<'_, '_> {
             guesses: asked.guesses,
             constraints: laws.constraints,
             time: self.time,
+            repetitions,
             cells,
         })
     }
@@ -134,17 +139,22 @@ impl Builder<'_, '_> {
         }
     }
 
-    /// The turns of all repetitions.
-    fn cells(&self) -> Table<CellId, Cell> {
-        let flat = &self.flat.repeats;
-        flat.all()
-            .map(|t| Cell {
-                variable: t.variable.text.clone(),
-                value: t.value,
-                span: t.variable.span,
-                outer: cell_of(t.outer),
-            })
-            .collect()
+    /// All repetitions and their turns, those of sums left out.
+    fn cells(&self) -> (Table<RepetitionId, Repetition>, Table<CellId, Cell>) {
+        let names = &self.flat.names;
+        let mut repetitions: Table<RepetitionId, Repetition> = Table::new();
+        let mut known: FxHashMap<(Span, ScopeId), RepetitionId> = FxHashMap::default();
+        let mut cell = |turn: &Turn<'_>| {
+            let span = turn.variable.span;
+            let repetition = *known.entry((span, turn.scope)).or_insert_with(|| {
+                let within = names.scopes[turn.scope].prefix.trim_end_matches('.').to_string();
+                repetitions.push(Repetition { variable: turn.variable.text.clone(), within, span })
+            });
+            let outer = cell_of(names.turn_around(Here { scope: turn.scope, turn: turn.outer }));
+            Cell { repetition, value: turn.value, outer }
+        };
+        let cells = self.flat.repeats.all().map(&mut cell).collect();
+        (repetitions, cells)
     }
 
     fn whole_inputs(&mut self) -> Option<Table<InputId, Input>> {

@@ -210,7 +210,7 @@ impl<'a> Builder<'a, '_> {
         own: (&[&str], &[i64]),
         found: &mut Vec<(DeclId, Span)>,
     ) {
-        let turn = self.repeats.turn(&repeated.variable, value, here.turn);
+        let turn = self.repeats.turn(&repeated.variable, value, here);
         self.collect(Here { turn, ..here }, &repeated.value, own, found);
         self.repeats.forget(turn);
     }

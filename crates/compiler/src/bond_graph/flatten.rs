@@ -377,7 +377,7 @@ impl<'a> Flat<'a> {
             return;
         };
         for value in values {
-            let turn = self.repeats.turn(&l.variable, value, here.turn);
+            let turn = self.repeats.turn(&l.variable, value, here);
             let before = self.faults.len();
             self.fill(Here { turn, ..here }, &l.body, pseudo, imported);
             self.faults.in_turn(before, || self.repeats.words(turn));

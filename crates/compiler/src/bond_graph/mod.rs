@@ -77,6 +77,10 @@ id!(
     SignalId
 );
 id!(
+    /// A repetition of statements.
+    RepetitionId
+);
+id!(
     /// A turn of a repetition.
     CellId
 );
@@ -130,20 +134,31 @@ pub struct BondGraph {
     pub constraints: Vec<Constraint>,
     /// Time, as a symbol.
     pub time: Symbol,
-    /// The turns of all repetitions (`for`), in the order in which they are made.
+    /// The repetitions of statements (`for`).
+    pub repetitions: Table<RepetitionId, Repetition>,
+    /// Their turns, in the order in which they are made.
     pub cells: Table<CellId, Cell>,
 }
 
-/// One turn of a repetition: what is made in it is like what is made in other turns of the same, but for the numbers.
+/// A `for` around statements, of the model or of one instance of a component.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Cell {
-    /// The loop variable.
+pub struct Repetition {
+    /// Its variable.
     pub variable: String,
-    /// Its value.
-    pub value: i64,
-    /// Where the variable is declared: turns of one repetition have one place.
+    /// The instance that it stands in; empty for the model itself.
+    pub within: String,
+    /// Where the variable is declared.
     pub span: Span,
-    /// The turn of the repetition around it.
+}
+
+/// One turn of a repetition: what is made in it is made of the same text as what other turns of it make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell {
+    /// The repetition.
+    pub repetition: RepetitionId,
+    /// The value of its variable.
+    pub value: i64,
+    /// The turn of the repetition around it, or around the instance that it stands in.
     pub outer: Option<CellId>,
 }
 
@@ -556,6 +571,7 @@ impl BondGraph {
             guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
             time: self.time,
+            repetitions: self.repetitions.clone(),
             cells: self.cells.clone(),
         }
     }

@@ -29,7 +29,9 @@ pub(super) struct Turn<'a> {
     pub variable: &'a ast::Name,
     /// Its value.
     pub value: i64,
-    /// The turn of the repetition around it.
+    /// The scope that it stands in.
+    pub scope: ScopeId,
+    /// The turn of the repetition around it, in that scope.
     pub outer: TurnId,
 }
 
@@ -114,8 +116,8 @@ impl Default for Repeats<'_> {
 /// Turns.
 impl<'a> Repeats<'a> {
     /// A new turn.
-    pub fn turn(&mut self, variable: &'a ast::Name, value: i64, outer: TurnId) -> TurnId {
-        self.turns.push(Some(Turn { variable, value, outer }));
+    pub fn turn(&mut self, variable: &'a ast::Name, value: i64, here: Here) -> TurnId {
+        self.turns.push(Some(Turn { variable, value, scope: here.scope, outer: here.turn }));
         self.made += 1;
         self.turns.len() - 1
     }
@@ -328,7 +330,7 @@ impl<'a> Repeats<'a> {
             ExprKind::Repeated(list) => match item.split_first() {
                 Some((first, rest)) => {
                     let from = self.range_end(names, here, &list.from)?;
-                    let turn = self.turn(&list.variable, from + first - 1, here.turn);
+                    let turn = self.turn(&list.variable, from + first - 1, here);
                     self.fixed(names, Here { turn, ..here }, &list.value, rest)
                 }
                 None => other("this is a list"),
@@ -409,7 +411,7 @@ impl<'a> Repeats<'a> {
         let mut total = Rational::zero();
         let turns = self.turns.len();
         for value in self.terms_of(from, to).ok_or_else(|| too_many(sum.to.span))? {
-            let turn = self.turn(&sum.variable, value, here.turn);
+            let turn = self.turn(&sum.variable, value, here);
             total = &total + &self.number(names, Here { turn, ..here }, &sum.value, item)?;
             self.turns.truncate(turns);
         }

@@ -100,7 +100,7 @@ impl<'a> Builder<'a, '_> {
     fn entry(&mut self, cx: &Reading<'_>, list: &'a ast::Repeated) -> Option<Value> {
         let (first, rest) = cx.item.split_first()?;
         let from = self.whole(cx, &list.from, "where a list begins")?;
-        let turn = self.repeats.turn(&list.variable, from + first - 1, cx.here.turn);
+        let turn = self.repeats.turn(&list.variable, from + first - 1, cx.here);
         self.read(&Reading { item: rest, here: Here { turn, ..cx.here }, ..*cx }, &list.value)
     }
 
@@ -116,7 +116,7 @@ impl<'a> Builder<'a, '_> {
         let mut quantity = Quantity::Any;
         for value in values {
             let before = self.faults.len();
-            let turn = self.repeats.turn(&sum.variable, value, cx.here.turn);
+            let turn = self.repeats.turn(&sum.variable, value, cx.here);
             let term = self.number(&Reading { here: Here { turn, ..cx.here }, ..*cx }, &sum.value);
             self.met_in(Here { turn, ..cx.here }, before);
             let term = term?;

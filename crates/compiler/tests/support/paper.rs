@@ -74,6 +74,7 @@ pub fn empty(name: &str) -> BondGraph {
         guesses: Vec::new(),
         constraints: Vec::new(),
         time,
+        repetitions: Table::new(),
         cells: Table::new(),
     }
 }

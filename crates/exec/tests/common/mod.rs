@@ -180,6 +180,7 @@ impl Sketch {
             guesses: Vec::new(),
             constraints: Vec::new(),
             time: self.time,
+            repetitions: Table::new(),
             cells: Table::new(),
         };
         Equations {
