@@ -257,5 +257,5 @@ fn of_cells_alike_the_first_alone_is_drawn_where_that_is_asked_for() {
     assert!(few.contains("x[3]") && few.contains("v[9]"), "where the graph goes on");
     assert!(few.contains("i = 2: drawn for i = 3..9 too"), "{few}");
     // Numbers of bonds are those of the graph.
-    assert!(few.contains("data-bond=\"34\""), "{few}");
+    assert!(few.contains("data-bond=\"35\""), "{few}");
 }
