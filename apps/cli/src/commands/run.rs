@@ -5,8 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, Error, FixedMethod, Method, Model, Problem, Record, Run, RunReport, Simulated,
-    Start, Stopped, Trace, csv_text, write_csv, write_parquet,
-    Start, Stopped, Timings, Trace, csv_text, listed, write_csv, write_parquet,
+    Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
