@@ -24,7 +24,7 @@ pub struct Name {
     pub declared: Place,
     /// Where the text uses it, in the order of the files and of their text: the places of the name alone, without what
     /// stands before and behind the dots. A place inside a component is one of each instance's name that it means there.
-    /// Components that nothing instantiates use nothing; the arguments of functions are no names of the model.
+    /// Components that nothing instantiates use nothing; the arguments of functions and the variables of repetitions are no names of the model.
     pub uses: Vec<Place>,
     /// Whose values or laws read it, by name: of a parameter or signal itself, of an element one of its variables. A `let` is
     /// written out where it stands: what it reads is read there. A parameter of an instance that is given another one whole

@@ -157,7 +157,7 @@ impl<'a> Flat<'a> {
         match self.repeats.whole(&self.names, here, e, what) {
             Ok(value) => Some(value),
             Err(fault) => {
-                self.faults.maybe(fault);
+                self.faults.maybe(fault.map(|f| *f));
                 self.lost = true;
                 None
             }

@@ -306,7 +306,7 @@ impl<'a> Flat<'a> {
             match &statement.kind {
                 StatementKind::Param(list) => self.parameters(here, list, false),
                 StatementKind::Const(list) => self.parameters(here, list, true),
-                StatementKind::Let(list) => self.lets(here, list, |value| DeclKind::Let(value)),
+                StatementKind::Let(list) => self.lets(here, list, DeclKind::Let),
                 StatementKind::Function(f) => {
                     let unit = f.unit.as_ref();
                     self.declare(here, here, (&f.name, &[]), DeclKind::Function(f), unit, f.doc.as_ref());
@@ -323,10 +323,8 @@ impl<'a> Flat<'a> {
                     list.iter().for_each(|d| self.declare_whole(here, here, d, DeclKind::Input(d.value.as_ref())));
                 }
                 // Outputs of the model are outputs; those inside an instance are named values.
-                StatementKind::Output(list) if here.scope == 0 => {
-                    self.lets(here, list, |value| DeclKind::Output(value))
-                }
-                StatementKind::Output(list) => self.lets(here, list, |value| DeclKind::Let(value)),
+                StatementKind::Output(list) if here.scope == 0 => self.lets(here, list, DeclKind::Output),
+                StatementKind::Output(list) => self.lets(here, list, DeclKind::Let),
                 StatementKind::State(s) => {
                     if let Some(indices) = self.indices(here, &s.indices) {
                         let (unit, doc) = (s.unit.as_ref(), s.doc.as_ref());

@@ -161,7 +161,7 @@ impl<'a> Repeats<'a> {
         for e in list {
             match self.whole(names, here, e, "an index") {
                 Ok(index) => indices.push(index),
-                Err(Some(fault)) => return Err(Box::new(fault)),
+                Err(Some(fault)) => return Err(fault),
                 // Brackets that are at fault, which the parser has said: the same words are said once.
                 Err(None) => {
                     let fault = Diagnostic::error(codes::N021, "an index cannot be read", e.span, "here");
@@ -179,12 +179,12 @@ impl<'a> Repeats<'a> {
         here: Here,
         e: &'a ast::Expr,
         what: &str,
-    ) -> Result<i64, Option<Diagnostic>> {
-        let number = self.shaped(|r| r.number(names, here, e, &[])).map_err(|why| why.fault(what))?;
+    ) -> Result<i64, Option<Box<Diagnostic>>> {
+        let number = self.shaped(|r| r.number(names, here, e, &[])).map_err(|why| why.fault(what).map(Box::new))?;
         number.as_integer().ok_or_else(|| {
             let title = format!("{what} must be a whole number");
             let d = Diagnostic::error(codes::N021, title, e.span, format!("this is {number}"));
-            Some(d.hint("`floor` gives the whole number below"))
+            Some(Box::new(d.hint("`floor` gives the whole number below")))
         })
     }
 

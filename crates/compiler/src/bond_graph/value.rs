@@ -136,7 +136,7 @@ impl<'a> Builder<'a, '_> {
             Ok(value) => Some(value),
             Err(fault) => {
                 self.incomplete |= fault.is_none();
-                self.faults.maybe(fault);
+                self.faults.maybe(fault.map(|f| *f));
                 None
             }
         }
