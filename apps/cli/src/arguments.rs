@@ -325,7 +325,7 @@ pub struct Simulate {
     #[arg(long, default_value = "given")]
     pub start: Start,
     /// What to record instead of states and outputs: names with commas between them, or `all`
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES")]
     pub record: Vec<String>,
     /// Where to write the trajectory: a .csv or .parquet file, or `-` for CSV on stdout; may be repeated
     #[arg(long, value_name = "FILE")]
@@ -337,7 +337,7 @@ pub struct Simulate {
     #[arg(long, value_name = "FILE")]
     pub plot: Vec<PathBuf>,
     /// What to plot instead of all that is recorded: names with commas between them
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "plot")]
+    #[arg(long, value_name = "NAMES", requires = "plot")]
     pub plot_vars: Vec<String>,
     /// What goes to the right in the plot instead of the time: a name
     #[arg(long, value_name = "NAME", requires = "plot")]
@@ -407,10 +407,10 @@ pub struct Linearize {
     pub at: Point,
     /// Inputs: declared ones, and sources by their names, to whose value the input is added [default: the declared ones, else
     /// all sources]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES")]
     pub inputs: Vec<String>,
     /// Outputs: anything that can be recorded [default: the declared ones, else the states]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES")]
     pub outputs: Vec<String>,
     /// Tell matrices and transfer functions as expressions too
     #[arg(long)]
@@ -475,7 +475,7 @@ pub struct Sweep {
     #[arg(long, value_name = "FILE")]
     pub samples: Option<PathBuf>,
     /// What to keep of each run, as in `max(body.f),final(spring.q)` [default: the last value of states and outputs]
-    #[arg(long, value_name = "REDUCTIONS", value_delimiter = ',')]
+    #[arg(long, value_name = "REDUCTIONS")]
     pub reduce: Vec<String>,
     /// End of each run, in s
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
@@ -539,7 +539,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "TARGET")]
     pub output: Option<String>,
     /// What to send instead of states and outputs: names with commas between them, or `all`
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES")]
     pub record: Vec<String>,
     /// The method, one with fixed step
     #[arg(long, default_value = "heun")]
@@ -572,6 +572,9 @@ pub struct Draw {
     /// Leave out laws and values of the elements
     #[arg(long)]
     pub no_laws: bool,
+    /// Of the cells of a `for` that are made alike draw the first alone
+    #[arg(long)]
+    pub first_cells: bool,
     /// An earlier drawing, as .svg: elements that are in it stay where they are there, as seen from each other
     #[arg(long, value_name = "FILE")]
     pub keep: Option<PathBuf>,

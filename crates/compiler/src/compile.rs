@@ -1,13 +1,15 @@
 //! The chain of stages.
 
 use crate::ast::{Parsed, parse};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate};
 use crate::causal_graph::{self, CausalGraph, assign_causality};
-use crate::diagnostic::{Diagnostics, Sources, render};
+use crate::diagnostic::{Diagnostic, DiagnosticCode, Diagnostics, Sources, render};
 use crate::equations::{Equations, Form, derive_equations};
 use crate::program::{Program, schedule};
+use crate::span::Span;
 
 /// The text of a model, and where the rest of it comes from.
 #[derive(Clone, Copy)]
@@ -92,7 +94,7 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
     let mut found = Found { diagnostics, sources: elaborated.sources, names };
     match elaborated.graph {
         Some(ir) if !found.diagnostics.has_errors() => {
-            found.diagnostics.0.extend(bond_graph::warnings(&ir));
+            found.diagnostics.0.extend(told_once(bond_graph::warnings(&ir), &ir));
             Ok(Reached { ir, found })
         }
         _ => Err(found),
@@ -105,8 +107,31 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
 /// As [`to_bond_graph`], and sources, constraints or forced strokes that cannot hold together.
 pub fn to_causal_graph(text: Text<'_>) -> Result<Reached<CausalGraph>, Found> {
     let mut causal = to_bond_graph(text)?.and_then(|bonds| assign_causality(&bonds))?;
-    causal.found.diagnostics.0.extend(causal_graph::warnings(&causal.ir));
+    let warnings = told_once(causal_graph::warnings(&causal.ir), &causal.ir.graph);
+    causal.found.diagnostics.0.extend(warnings);
     Ok(causal)
+}
+
+/// What is told of one place for many turns of a repetition is told once, and how many more there are.
+fn told_once(all: Vec<Diagnostic>, graph: &BondGraph) -> Vec<Diagnostic> {
+    if graph.cells.is_empty() {
+        return all;
+    }
+    let mut at: BTreeMap<(Span, DiagnosticCode), (usize, usize)> = BTreeMap::new();
+    let mut once: Vec<Diagnostic> = Vec::new();
+    for told in all {
+        match at.get_mut(&(told.primary.span, told.code)) {
+            Some((_, more)) => *more += 1,
+            None => {
+                at.insert((told.primary.span, told.code), (once.len(), 0));
+                once.push(told);
+            }
+        }
+    }
+    for (first, more) in at.into_values().filter(|(_, more)| *more > 0) {
+        once[first].notes.push(format!("and so {more} more time{} here", if more == 1 { "" } else { "s" }));
+    }
+    once
 }
 
 /// The equations in one form.

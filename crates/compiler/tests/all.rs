@@ -18,5 +18,7 @@ mod faulty;
 mod forms;
 #[path = "math.rs"]
 mod math;
+#[path = "repeated.rs"]
+mod repeated;
 #[path = "shown.rs"]
 mod shown;

@@ -304,6 +304,13 @@ const PIECES: &[&str] = &[
     "%",
     "²",
     "reset ",
+    "for i in 1..n {\n",
+    "if i == 1 {",
+    "} else ",
+    "[i]",
+    "[i, j + 1]",
+    "sum(i in 1..3, ",
+    " for i in ",
     "(a = 1)",
     "(x)",
     "e = ",
@@ -333,6 +340,9 @@ fn expr() -> impl Strategy<Value = String> {
             "x'",
             "table(\"f.csv\", x, column = 2)",
             "[1, [a, b]]",
+            "m[i].f",
+            "x[i, j - 1]",
+            "[2*i for i in 1..n]",
         ][..],
     );
     leaf.prop_map(str::to_owned).prop_recursive(5, 40, 3, |inner| {
@@ -344,6 +354,8 @@ fn expr() -> impl Strategy<Value = String> {
             (inner.clone(), gap()).prop_map(|(a, g)| format!("(-{g}{a})")),
             inner.clone().prop_map(|a| format!("(not {a})")),
             (inner.clone(), inner.clone(), inner.clone()).prop_map(|(a, b, c)| format!("(if {a} then {b} else\n{c})")),
+            (inner.clone(), gap(), inner.clone()).prop_map(|(a, g, b)| format!("sum(i{g} in 1{g}..{g}{a},{g}{b})")),
+            (inner.clone(), gap(), inner.clone()).prop_map(|(a, g, b)| format!("[{g}{a} for i in {b}..\n3]")),
             (inner.clone(), inner).prop_map(|(a, b)| format!("f({a},\n\n\n k={b})")),
         ]
     })
@@ -360,6 +372,9 @@ fn statement() -> impl Strategy<Value = String> {
         expr().prop_map(|e| format!("constraint h:{e}=0 // why")),
         expr().prop_map(|e| format!("component X(param a={e};port p){{\n\n\na->b{g}\n}}", g = " // c")),
         gap().prop_map(|g| format!("domain d pseudo{{{g}x->y{g}}}")),
+        (expr(), gap()).prop_map(|(e, g)| format!("for i in 1..n{g}{{\n\n1:m[i]->x[{e}]{g}as b[i]\n}}")),
+        (expr(), gap()).prop_map(|(e, g)| format!("if {e}==1{g}{{a->b}}{g}else{g}{{\n// c\nstate x[1,{e}]'=1}}")),
+        (expr(), expr()).prop_map(|(e, f)| format!("if {e} {{a->b\n}}\nelse if {f}{{param k[2]=[1,2]}}")),
         Just("stroke a->b at b\n\n\n".to_owned()),
         Just("  // alone".to_owned()),
     ]

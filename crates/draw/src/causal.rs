@@ -100,6 +100,7 @@ fn line(causal: &CausalGraph, id: halfarrow_compiler::bond_graph::BondId) -> Lin
         if field { element.ports[p.port as usize].name.clone() } else { String::new() }
     };
     Line {
+        number: id.index() + 1,
         ends: [bond.from.element.index(), bond.to.element.index()],
         ports: [port(bond.from), port(bond.to)],
         stroke: match causal.strokes[id] {

@@ -74,6 +74,8 @@ pub enum Form {
 /// A bond.
 #[derive(Debug, Clone)]
 pub struct Line {
+    /// Its number for people, from 1.
+    pub number: usize,
     /// Indices of the glyphs, from and to (where the half arrow is).
     pub ends: [usize; 2],
     /// Names of the ports of fields, else empty.

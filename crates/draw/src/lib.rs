@@ -5,6 +5,7 @@
 
 mod alike;
 mod causal;
+mod cells;
 mod detour;
 pub mod figure;
 mod geometry;
@@ -22,6 +23,7 @@ use std::collections::BTreeMap;
 
 use causal::figure;
 pub use causal::path_count;
+use cells::first_cells;
 pub use kept::positions;
 pub use svg::render;
 
@@ -35,6 +37,8 @@ pub struct DrawOptions {
     pub paths: DrawnPaths,
     /// Whether laws and values stand at the elements.
     pub laws: bool,
+    /// Whether of the cells of a repetition that are made alike the first alone is drawn.
+    pub first_cells: bool,
     /// Where elements stand already, in px by their names: they stay there, as seen from each other. From
     /// [`positions`] of an earlier drawing, or from an editor.
     pub keep: BTreeMap<String, [f64; 2]>,
@@ -50,9 +54,9 @@ pub enum DrawnPaths {
 }
 
 impl Default for DrawOptions {
-    /// 12 causal paths, laws, nothing kept.
+    /// 12 causal paths, laws, all cells, nothing kept.
     fn default() -> Self {
-        DrawOptions { paths: DrawnPaths::First(12), laws: true, keep: BTreeMap::new() }
+        DrawOptions { paths: DrawnPaths::First(12), laws: true, first_cells: false, keep: BTreeMap::new() }
     }
 }
 
@@ -63,5 +67,7 @@ impl Default for DrawOptions {
 /// ring, bonds whose stroke is undetermined are dotted. Equal graphs
 /// give equal texts.
 pub fn draw(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> String {
-    render(&figure(causal, paths, options), &options.keep)
+    let all = figure(causal, paths, options);
+    let drawn = if options.first_cells { first_cells(all, &causal.graph) } else { all };
+    render(&drawn, &options.keep)
 }

@@ -193,11 +193,11 @@ impl Svg {
 
     fn bonds(&mut self, figure: &Figure, routes: &[Route]) {
         self.open("bonds", &format!("fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.4\" stroke-linecap=\"round\""));
-        for (i, (bond, route)) in figure.bonds.iter().zip(routes).enumerate() {
+        for (bond, route) in figure.bonds.iter().zip(routes) {
             let [from, to] = bond.ends.map(|v| &figure.glyphs[v]);
             let name = if bond.name.is_empty() { String::new() } else { format!(" {}", bond.name) };
-            let tip = escape(&format!("bond {}{name}: {} → {}", i + 1, called(from), called(to)));
-            _ = write!(self.out, "<g class=\"bond\" data-bond=\"{}\"><title>{tip}</title>", i + 1);
+            let tip = escape(&format!("bond {}{name}: {} → {}", bond.number, called(from), called(to)));
+            _ = write!(self.out, "<g class=\"bond\" data-bond=\"{}\"><title>{tip}</title>", bond.number);
             self.shaft(route, bond.stroke.is_some());
             if let Some(end) = bond.stroke {
                 self.stroke(route, end);

@@ -234,3 +234,28 @@ fn paths_and_laws_can_be_chosen() {
     let none = draw(&causal, &paths, &DrawOptions { paths: DrawnPaths::Numbers(vec![]), ..DrawOptions::default() });
     assert!(numbers(&none).is_empty() && !none.contains("more causal paths"));
 }
+
+#[test]
+fn of_cells_alike_the_first_alone_is_drawn_where_that_is_asked_for() {
+    let text = "model Row
+        Se:push(1) -> 1:v[1]
+        for i in 1..9 {
+            if i > 1 { v[i - 1] -> 0:x[i] -> 1:v[i]
+                x[i] -> C:spring[i](1) }
+            v[i] -> I:body[i](1)
+        }
+        v[9] -> R:drag(1)
+    ";
+    let all = drawn(text, &DrawOptions::default());
+    let few = drawn(text, &DrawOptions { first_cells: true, ..DrawOptions::default() });
+    let named = |svg: &str, name: &str| svg.contains(&format!(">{name}<")) || svg.contains(&format!(": {name}<"));
+    assert!(named(&all, "body[9]") && named(&all, "spring[5]"));
+    for name in ["push", "v[1]", "body[1]", "x[2]", "body[2]", "drag"] {
+        assert!(few.contains(name), "{name}");
+    }
+    assert!(!few.contains("body[3]") && !few.contains("spring[9]"));
+    assert!(few.contains("x[3]") && few.contains("v[9]"), "where the graph goes on");
+    assert!(few.contains("i = 2: drawn for i = 3..9 too"), "{few}");
+    // Numbers of bonds are those of the graph.
+    assert!(few.contains("data-bond=\"35\""), "{few}");
+}

@@ -10,7 +10,8 @@ use serde::{Serialize, Serializer};
 
 use crate::model::Model;
 
-/// A name of a model. Names within components stand with those of their instances before them: `motor.coil`.
+/// A name of a model. Names within components stand with those of their instances before them: `motor.coil`. Elements
+/// with indices have one name together: `spring` for `spring[1]` to `spring[9]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Name {
     /// The name.
@@ -23,7 +24,7 @@ pub struct Name {
     pub declared: Place,
     /// Where the text uses it, in the order of the files and of their text: the places of the name alone, without what
     /// stands before and behind the dots. A place inside a component is one of each instance's name that it means there.
-    /// Components that nothing instantiates use nothing; the arguments of functions are no names of the model.
+    /// Components that nothing instantiates use nothing; the arguments of functions and the variables of repetitions are no names of the model.
     pub uses: Vec<Place>,
     /// Whose values or laws read it, by name: of a parameter or signal itself, of an element one of its variables. A `let` is
     /// written out where it stands: what it reads is read there. A parameter of an instance that is given another one whole
@@ -102,6 +103,20 @@ impl Model {
     }
 }
 
+/// The parts of a list with commas between them, as options take it. Commas in brackets belong to a part: `node[1,2].q`.
+///
+/// ```
+/// assert_eq!(halfarrow::listed("t, node[1,2].q,final(x)"), ["t", "node[1,2].q", "final(x)"]);
+/// ```
+pub fn listed(text: &str) -> Vec<&str> {
+    let mut open = 0i32;
+    let parts = text.split(|c| {
+        open += i32::from(matches!(c, '[' | '(')) - i32::from(matches!(c, ']' | ')'));
+        c == ',' && open <= 0
+    });
+    parts.map(str::trim).collect()
+}
+
 /// The place that stands for a whole file.
 fn beginning_of(file: &str) -> Place {
     Place { file: file.to_string(), line: 1, column: 1, start: 0, end: 0 }
@@ -171,7 +186,27 @@ fn readers(graph: &BondGraph) -> Vec<Reader<'_>> {
     );
     let bonds = graph.bonds.values().filter(|b| !b.name.is_empty());
     all.extend(bonds.map(|b| reader(&b.name, NameKind::Bond, b.span, &[b.effort, b.flow], &[])));
-    all
+    together(all)
+}
+
+/// Elements with indices have one name together: what one of them reads or gives, the name does.
+fn together(all: Vec<Reader<'_>>) -> Vec<Reader<'_>> {
+    let mut at: BTreeMap<(bool, &str), usize> = BTreeMap::new();
+    let mut merged: Vec<Reader> = Vec::with_capacity(all.len());
+    for reader in all {
+        let name = reader.name.strip_suffix(']').and_then(|n| n.rsplit_once('[')).map_or(reader.name, |(name, _)| name);
+        match at.get(&(reader.kind.is_value(), name)).filter(|_| name != reader.name) {
+            Some(&first) => {
+                merged[first].symbols.extend(reader.symbols);
+                merged[first].reads.extend(reader.reads);
+            }
+            None => {
+                at.insert((reader.kind.is_value(), name), merged.len());
+                merged.push(Reader { name, ..reader });
+            }
+        }
+    }
+    merged
 }
 
 fn kind_of(element: &Element) -> NameKind {

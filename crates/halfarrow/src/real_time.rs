@@ -21,6 +21,7 @@ use crate::cost;
 use crate::error::{Error, Problem};
 use crate::input::{Input, connect};
 use crate::model::Model;
+use crate::names::listed;
 use crate::run::{Record, Run, Start, choose, units};
 use crate::verdict::Made;
 use crate::wall_clock::WallClock;
@@ -435,7 +436,7 @@ impl Lines {
 /// Reads values in order, or by name, with commas between; tells whether all of it could be read. Nothing is put if not.
 fn parse(text: &str, names: &[String], put: &mut dyn FnMut(usize, f64)) -> bool {
     let read = |put: &mut dyn FnMut(usize, f64)| {
-        text.trim().split(',').enumerate().all(|(place, field)| {
+        listed(text.trim()).into_iter().enumerate().all(|(place, field)| {
             let (index, number) = match field.split_once('=') {
                 Some((name, number)) => (names.iter().position(|known| known == name.trim()), number),
                 None => (Some(place).filter(|&place| place < names.len()), field),

@@ -510,12 +510,12 @@ impl Kind {
 pub(crate) fn known_parameter(system: &exec::Model, name: &str) -> Result<(), Problem> {
     let parameters = &system.program().parameters;
     match parameters.iter().find(|p| p.name == name) {
-        Some(parameter) if parameter.constant => {
+        Some(parameter) if parameter.constant && !parameter.shapes => {
             Err(Problem::BadOption { reason: format!("`{name}` is a constant: declare it as a param to vary it") })
         }
         Some(_) => Ok(()),
         None => {
-            let known = parameters.iter().filter(|p| !p.constant).map(|p| p.name.as_str());
+            let known = parameters.iter().filter(|p| !p.constant || p.shapes).map(|p| p.name.as_str());
             let hint = nearest(name, known).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
             Err(Problem::BadOption { reason: format!("the model has no parameter `{name}`{hint}") })
         }

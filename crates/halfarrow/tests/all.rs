@@ -32,6 +32,8 @@ mod forms;
 mod linearize;
 #[path = "names.rs"]
 mod names;
+#[path = "repeated.rs"]
+mod repeated;
 #[path = "report.rs"]
 mod report;
 #[path = "stiff_networks.rs"]

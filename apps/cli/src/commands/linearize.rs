@@ -4,6 +4,7 @@ use halfarrow::{Linearize, LinearizeReport, Point, ReachReport, Stability, Symbo
 use serde_json::json;
 
 use super::picture::{check_names, write_picture};
+use super::run::all_listed;
 use super::with_model;
 use crate::arguments;
 use crate::page::Page;
@@ -33,7 +34,7 @@ pub fn linearize(arguments: &arguments::Linearize) -> u8 {
 }
 
 fn wanted(arguments: &arguments::Linearize) -> Linearize {
-    let given = |names: &[String]| (!names.is_empty()).then(|| names.iter().map(|n| n.trim().to_string()).collect());
+    let given = |names: &[String]| (!names.is_empty()).then(|| all_listed(names));
     Linearize {
         at: match arguments.at {
             arguments::Point::Start => Point::Start,

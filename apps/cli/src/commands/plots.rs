@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use halfarrow::{Error, Model, Override, PlotOptions, Problem, Record, Run, Simulated, Trace, read_trace};
+use halfarrow::{Error, Model, Override, PlotOptions, Problem, Record, Run, Simulated, Trace, listed, read_trace};
 
 use super::picture::write_picture;
+use super::run::all_listed;
 use crate::arguments::{PlotLog, Simulate};
 
 /// The variables that a plot needs beside what is recorded anyway.
@@ -23,7 +24,7 @@ pub fn recorded(arguments: &Simulate, record: Record) -> Record {
 fn options(arguments: &Simulate) -> PlotOptions {
     let log = arguments.plot_log;
     PlotOptions {
-        vars: arguments.plot_vars.iter().map(|name| name.trim().to_string()).collect(),
+        vars: all_listed(&arguments.plot_vars),
         x: arguments.plot_x.clone(),
         log: [matches!(log, Some(PlotLog::X | PlotLog::Xy)), matches!(log, Some(PlotLog::Y | PlotLog::Xy))],
     }
@@ -61,6 +62,6 @@ fn other(model: &Model, run: &Run, own: &Trace, what: &str) -> Result<Trace, Err
         })?;
         Ok(Override { name, value })
     };
-    let set = what.split(',').map(pair).collect::<Result<Vec<Override>, Error>>()?;
+    let set = listed(what).into_iter().map(pair).collect::<Result<Vec<Override>, Error>>()?;
     Ok(model.with(&set)?.simulate(run, &mut |_| true)?.trace)
 }

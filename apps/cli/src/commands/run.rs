@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, Error, FixedMethod, Method, Model, Problem, Record, Run, RunReport, Simulated,
-    Start, Stopped, Trace, csv_text, write_csv, write_parquet,
+    Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -88,11 +88,16 @@ pub(super) fn method(solver: Solver) -> Method {
 
 /// What an option asks to record.
 pub(super) fn record(names: &[String]) -> Record {
-    match names {
-        [] => Record::Default,
-        [all] if all == "all" => Record::All,
-        names => Record::Names(names.iter().map(|name| name.trim().to_string()).collect()),
+    match all_listed(names) {
+        names if names.is_empty() => Record::Default,
+        names if names == ["all"] => Record::All,
+        names => Record::Names(names),
     }
+}
+
+/// The parts of lists, in order.
+pub(super) fn all_listed(lists: &[String]) -> Vec<String> {
+    lists.iter().flat_map(|list| listed(list)).map(str::to_string).collect()
 }
 
 /// Where an option says to start.

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use halfarrow::{Error, Method, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
 use serde_json::json;
 
-use super::run::{method, misses, start};
+use super::run::{all_listed, method, misses, start};
 use super::{warn_of_step, with_model};
 use crate::arguments;
 use crate::screen::{self, Progress};
@@ -78,7 +78,7 @@ fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
         run,
         vary: arguments.vary.iter().map(|text| Vary::parse(text)).collect::<Result<_, Problem>>()?,
         samples: arguments.samples.as_deref().map(Samples::read).transpose()?,
-        reduce: arguments.reduce.iter().map(|text| Reduce::parse(text)).collect::<Result<_, Problem>>()?,
+        reduce: all_listed(&arguments.reduce).iter().map(|text| Reduce::parse(text)).collect::<Result<_, Problem>>()?,
         restart: arguments.restart,
         units: arguments.units,
     })

@@ -56,7 +56,9 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
         StatementKind::Stroke(s) => write_stroke(out, s),
         StatementKind::Guess(list) => write_guesses(out, list),
         StatementKind::Constraint(c) => {
-            *out += &format!("constraint {}: {} = {}", c.name.text, shown(&c.left), shown(&c.right));
+            *out += &format!("constraint {}", c.name.text);
+            write_indices(out, &c.indices);
+            *out += &format!(": {} = {}", shown(&c.left), shown(&c.right));
             write_doc(out, &c.doc);
         }
         StatementKind::Domain(d) => {
@@ -69,6 +71,14 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
         StatementKind::For(l) => {
             *out += &format!("for {} in {}..{}", l.variable.text, shown(&l.from), shown(&l.to));
             write_block(out, &l.body, level);
+        }
+        StatementKind::Choice(c) => {
+            *out += &format!("if {}", shown(&c.cond));
+            write_block(out, &c.yes, level);
+            if !c.no.is_empty() {
+                *out += " else";
+                write_block(out, &c.no, level);
+            }
         }
     }
 }
@@ -103,6 +113,7 @@ fn write_declarations(out: &mut String, word: &str, list: &[Declaration]) {
     *out += word;
     separated(out, " ", list, |out, d| {
         *out += &d.name.text;
+        write_indices(out, &d.indices);
         write_unit(out, &d.unit);
         if let Some(value) = &d.value {
             *out += &format!(" = {}", shown(value));
@@ -130,7 +141,9 @@ fn write_function(out: &mut String, f: &Function) {
 }
 
 fn write_state(out: &mut String, s: &State) {
-    *out += &format!("state {}' = {}", s.name.text, shown(&s.rate));
+    *out += &format!("state {}", s.name.text);
+    write_indices(out, &s.indices);
+    *out += &format!("' = {}", shown(&s.rate));
     if let Some(start) = &s.start {
         *out += &format!(" from {}", shown(start));
     }
@@ -159,7 +172,7 @@ fn write_stroke(out: &mut String, s: &ForcedStroke) {
             *out += " -> ";
             write_path(out, to);
         }
-        StrokeBond::Named(name) => *out += &name.text,
+        StrokeBond::Named(name) => write_part(out, name),
     }
     *out += " at ";
     write_path(out, &s.at);
@@ -171,7 +184,8 @@ fn write_chain(out: &mut String, c: &Chain) {
         *out += " -> ";
         write_node(out, &bond.to);
         if let Some(name) = &bond.name {
-            *out += &format!(" as {}", name.text);
+            *out += " as ";
+            write_part(out, name);
         }
         write_doc(out, &bond.doc);
     }
@@ -191,13 +205,11 @@ fn write_element(out: &mut String, e: &Element) {
         *out += &format!("[{}]", shown(width));
     }
     *out += &format!(":{}", e.name.text);
+    write_indices(out, &e.indices);
     if !e.ports.is_empty() {
         out.push('[');
         separated(out, "", &e.ports, |out, p| *out += &p.text);
         out.push(']');
-    }
-    if let Some(index) = &e.index {
-        *out += &format!("[<{}>]", shown(index));
     }
     if !e.args.is_empty() {
         write_args(out, &e.args);
@@ -223,10 +235,20 @@ fn write_args(out: &mut String, args: &[Arg]) {
 fn write_path(out: &mut String, path: &Path) {
     for (i, part) in path.parts.iter().enumerate() {
         *out += if i == 0 { "" } else { "." };
-        *out += &part.name.text;
-        if let Some(index) = &part.index {
-            *out += &format!("[{}]", shown(index));
-        }
+        write_part(out, part);
+    }
+}
+
+fn write_part(out: &mut String, part: &PathPart) {
+    *out += &part.name.text;
+    write_indices(out, &part.indices);
+}
+
+fn write_indices(out: &mut String, indices: &[Expr]) {
+    if !indices.is_empty() {
+        out.push('[');
+        separated(out, "", indices, write_expr);
+        out.push(']');
     }
 }
 
@@ -268,6 +290,14 @@ fn write_expr(out: &mut String, expr: &Expr) {
             out.push('[');
             separated(out, "", items, write_expr);
             out.push(']');
+        }
+        ExprKind::Repeated(r) => {
+            *out += &format!("[{} for {} in {}..{}]", shown(&r.value), r.variable.text, shown(&r.from), shown(&r.to));
+        }
+        ExprKind::Sum(r) => {
+            *out += &format!("sum({} in {}..{}, ", r.variable.text, shown(&r.from), shown(&r.to));
+            write_expr(out, &r.value);
+            out.push(')');
         }
         ExprKind::Unary(unary) => {
             *out += if unary.op == UnaryOp::Neg { "(-" } else { "(not " };

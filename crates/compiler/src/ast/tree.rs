@@ -101,8 +101,10 @@ pub enum StatementKind {
     Chain(Chain),
     /// `when cond { ... }`: reserved; an error of the parser says so.
     When(Box<When>),
-    /// `for i in 1..n { ... }`: reserved; an error of the parser says so.
+    /// `for i in 1..n { ... }`: statements repeated.
     For(Box<For>),
+    /// `if i == 1 { ... } else { ... }`: statements that are there or not.
+    Choice(Box<Choice>),
 }
 
 /// A named value: `name : unit = value "doc"` (or the unit after the value).
@@ -110,6 +112,8 @@ pub enum StatementKind {
 pub struct Declaration {
     /// What is declared.
     pub name: Name,
+    /// What stands in brackets behind the name: indices, or how many elements there are.
+    pub indices: Vec<Expr>,
     /// The unit after `:`.
     pub unit: Option<UnitText>,
     /// The expression after `=`.
@@ -156,6 +160,8 @@ pub struct Function {
 pub struct State {
     /// The signal that is integrated, without the prime.
     pub name: Name,
+    /// Its indices.
+    pub indices: Vec<Expr>,
     /// Its derivative in time.
     pub rate: Expr,
     /// Its value at the start.
@@ -231,7 +237,7 @@ pub enum StrokeBond {
     /// By its two ends, in the order of the half arrow.
     Between(Path, Path),
     /// By its own name.
-    Named(Name),
+    Named(PathPart),
 }
 
 /// `constraint name: left = right "doc"`.
@@ -239,6 +245,8 @@ pub enum StrokeBond {
 pub struct Constraint {
     /// Its name; `name.e` is the multiplier.
     pub name: Name,
+    /// Its indices.
+    pub indices: Vec<Expr>,
     /// Left of the equals sign.
     pub left: Expr,
     /// Right of it, mostly 0.
@@ -277,7 +285,7 @@ pub struct Bond {
     /// The node that the half arrow points at.
     pub to: Node,
     /// The bond's name.
-    pub name: Option<Name>,
+    pub name: Option<PathPart>,
     /// What it is.
     pub doc: Option<Doc>,
 }
@@ -293,7 +301,7 @@ pub enum Node {
     Missing(Span),
 }
 
-/// `Kind:name[ports](args) "doc"`.
+/// `Kind:name[indices][ports](args) "doc"`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
     /// `0`, `1`, `Se`, ..., or the name of a component.
@@ -302,10 +310,11 @@ pub struct Element {
     pub width: Option<Expr>,
     /// Its name.
     pub name: Name,
-    /// The ports of a field, empty when none are listed. (An index that is a name, `cell[i]`, reads as a port.)
+    /// The indices in `C:cell[i + 1](...)`, also `C:cell[i][x, y](...)`.
+    pub indices: Vec<Expr>,
+    /// The ports of a field, empty when none are listed. Where every index is a name, as in `C:cell[i](...)`, the indices
+    /// stand here: which of the two they are, the names in reach decide.
     pub ports: Vec<Name>,
-    /// The index in `C:cell[i + 1](...)`: reserved; an error of the parser says so.
-    pub index: Option<Expr>,
     /// What stands in the parentheses.
     pub args: Vec<Arg>,
     /// What it is.
@@ -347,13 +356,13 @@ pub struct Path {
     pub span: Span,
 }
 
-/// One part of a path: `cell` or `cell[i]`.
+/// One part of a path, or a name with indices: `cell`, `cell[i]`, `node[i, j + 1]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPart {
     /// The name.
     pub name: Name,
-    /// The index: reserved; an error of the parser says so.
-    pub index: Option<Box<Expr>>,
+    /// Its indices, mostly none.
+    pub indices: Vec<Expr>,
 }
 
 /// An expression and its place.
@@ -380,6 +389,10 @@ pub enum ExprKind {
     Call(Call),
     /// `[a, b]`; a matrix is a list of lists.
     List(Vec<Expr>),
+    /// `[10*i for i in 1..n]`.
+    Repeated(Repeated),
+    /// `sum(i in 1..n, m[i].f)`.
+    Sum(Repeated),
     /// `-x`, `not x`.
     Unary(Unary),
     /// `a + b`.
@@ -406,6 +419,19 @@ pub struct Call {
     pub function: Name,
     /// Its arguments.
     pub args: Vec<Arg>,
+}
+
+/// An expression for each value of a variable: `expr for i in from..to`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeated {
+    /// The expression.
+    pub value: Box<Expr>,
+    /// The variable.
+    pub variable: Name,
+    /// First value.
+    pub from: Box<Expr>,
+    /// Last value.
+    pub to: Box<Expr>,
 }
 
 /// `-x` or `not x`.
@@ -501,7 +527,7 @@ pub struct Reset {
     pub value: Expr,
 }
 
-/// `for i in from..to { ... }`: reserved.
+/// `for i in from..to { ... }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct For {
     /// The loop variable.
@@ -512,4 +538,15 @@ pub struct For {
     pub to: Expr,
     /// What stands between the braces.
     pub body: Vec<Statement>,
+}
+
+/// `if cond { ... } else { ... }` around statements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The condition.
+    pub cond: Expr,
+    /// The statements that are there where it holds.
+    pub yes: Vec<Statement>,
+    /// Those that are there elsewhere; of `else if` the one choice that follows.
+    pub no: Vec<Statement>,
 }

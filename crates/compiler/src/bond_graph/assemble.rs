@@ -2,18 +2,28 @@
 
 use std::collections::BTreeMap;
 
+use rustc_hash::FxHashMap;
+
 use super::builder::{Builder, NamedDraft, Role};
 use super::dimension::Quantity;
 use super::flatten::Word;
+use super::repeat::Turn;
+use super::scope::{DeclId, Here, ScopeId, TurnId};
 use super::structure::Structure;
 use super::{
-    BondGraph, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input, InputId, IntegratedSignal,
-    Meaning, Named, Parameter, ParameterId, Preference, SignalId, Variable,
+    BondGraph, Cell, CellId, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input, InputId,
+    IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, SignalId, Variable,
 };
-use crate::algebra::{Expr, Symbol};
+use crate::algebra::{Expr, Node, Symbol};
 use crate::ast::Header;
 use crate::ids::{Id, Map, Table};
+use crate::span::Span;
 use crate::unit::{Dimension, Unit};
+
+/// The cell of a turn of a repetition.
+pub(super) fn cell_of(turn: TurnId) -> Option<CellId> {
+    turn.checked_sub(1).map(CellId::new)
+}
 
 /// What a model is called.
 #[derive(Default)]
@@ -84,7 +94,9 @@ impl Builder<'_, '_> {
         [rates, repeated]: [&BTreeMap<Symbol, Expr>; 2],
     ) -> Option<BondGraph> {
         let inputs = self.whole_inputs()?;
+        self.fix_parameters();
         let parameters = std::mem::take(&mut self.parameters);
+        let (repetitions, cells) = self.cells();
         let variables = self.variables(&Tables { parameters: &parameters, inputs: &inputs, signals: &laws.signals });
         self.replace_symbols(&mut laws, &mut asked.guesses, rates);
         self.replace_symbols(&mut laws, &mut asked.guesses, repeated);
@@ -108,7 +120,41 @@ impl Builder<'_, '_> {
             guesses: asked.guesses,
             constraints: laws.constraints,
             time: self.time,
+            repetitions,
+            cells,
         })
+    }
+
+    /// Parameters that shape the model cannot change when it is compiled.
+    fn fix_parameters(&mut self) {
+        let shaping: Vec<DeclId> = self.repeats.shaping(&self.flat.names).collect();
+        for decl in shaping {
+            let Some(value) = &self.values[decl] else { continue };
+            let Node::Symbol(symbol) = *self.exprs.node(value.expr) else { continue };
+            if let Some(Meaning::Parameter(id)) = self.meaning(symbol) {
+                let value = self.exprs.float(self.numbers[id.index()]);
+                let parameter = &mut self.parameters[id];
+                (parameter.value, parameter.constant, parameter.shapes) = (value, true, true);
+            }
+        }
+    }
+
+    /// All repetitions and their turns, those of sums left out.
+    fn cells(&self) -> (Table<RepetitionId, Repetition>, Table<CellId, Cell>) {
+        let names = &self.flat.names;
+        let mut repetitions: Table<RepetitionId, Repetition> = Table::new();
+        let mut known: FxHashMap<(Span, ScopeId), RepetitionId> = FxHashMap::default();
+        let mut cell = |turn: &Turn<'_>| {
+            let span = turn.variable.span;
+            let repetition = *known.entry((span, turn.scope)).or_insert_with(|| {
+                let within = names.scopes[turn.scope].prefix.trim_end_matches('.').to_string();
+                repetitions.push(Repetition { variable: turn.variable.text.clone(), within, span })
+            });
+            let outer = cell_of(names.turn_around(Here { scope: turn.scope, turn: turn.outer }));
+            Cell { repetition, value: turn.value, outer }
+        };
+        let cells = self.flat.repeats.all().map(&mut cell).collect();
+        (repetitions, cells)
     }
 
     fn whole_inputs(&mut self) -> Option<Table<InputId, Input>> {
@@ -132,10 +178,10 @@ impl Builder<'_, '_> {
 
     /// Named expressions in the order of the text, each with the unit that is written or follows from its value.
     pub fn whole_named(&self, mut drafts: Vec<NamedDraft>) -> Vec<Named> {
-        drafts.sort_by_key(|d| d.span);
+        drafts.sort_by_key(|d| d.place);
         let unit = |quantity: &Quantity| self.dims.value(quantity).filter(|_| self.units_written).map(Unit::si);
         let whole = drafts.into_iter().map(|d| {
-            let NamedDraft { name, value, unit: written, unit_is_written, quantity, doc, span } = d;
+            let NamedDraft { name, value, unit: written, unit_is_written, quantity, doc, place: (span, _) } = d;
             Named { name, value, unit: written.or_else(|| unit(&quantity)), unit_is_written, doc, span }
         });
         whole.collect()

@@ -94,7 +94,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn open(&mut self, cx: &Reading<'_>, input: &'a ast::Expr, goes: BlockInput) {
-        let block = OpenBlock { input, scope: cx.scope, own: cx.own, law: cx.law, owner: cx.owner.to_string(), goes };
+        let block = OpenBlock { input, here: cx.here, own: cx.own, law: cx.law, owner: cx.owner.to_string(), goes };
         self.open_blocks.push(block);
     }
 
@@ -283,7 +283,7 @@ impl<'a> Builder<'a, '_> {
     pub fn finish_blocks(&mut self) {
         while let Some(block) = self.open_blocks.pop() {
             let owner = block.owner.clone();
-            let cx = Reading { own: block.own, law: block.law, ..Reading::of(block.scope, &owner) };
+            let cx = Reading { own: block.own, law: block.law, ..Reading::of(block.here, &owner) };
             let Some(value) = self.number(&cx, block.input) else { continue };
             match block.goes {
                 BlockInput::Held(id) => self.held[id].source = Some(value.expr),

@@ -7,9 +7,11 @@ use rustc_hash::FxHashMap;
 
 use super::common::representatives;
 use super::dimension::{Clash, Dimensions, Quantity, Reason};
+use super::faults::Faults;
 use super::files::Files;
 use super::flatten::{Flat, Part};
-use super::scope::DeclId;
+use super::repeat::Repeats;
+use super::scope::{DeclId, Here};
 use super::uses::Uses;
 use super::wire::Wiring;
 use super::{BondId, ElementId, HeldId, HeldKind, InputId, Meaning, Parameter, ParameterId, PortRef, SignalId};
@@ -85,7 +87,8 @@ pub(super) struct NamedDraft {
     pub unit_is_written: bool,
     pub quantity: Quantity,
     pub doc: String,
-    pub span: Span,
+    /// Where it is declared, and its number among the declarations, of which several may stand there.
+    pub place: (Span, usize),
 }
 
 /// A signal whose rate is lowered when all names are known.
@@ -103,7 +106,7 @@ pub(super) struct OpenBlock<'a> {
     /// The input as written.
     pub input: &'a ast::Expr,
     /// Where names are looked up.
-    pub scope: usize,
+    pub here: Here,
     /// The part whose argument it is in, if it is in one.
     pub own: Option<usize>,
     /// Whether the part's own variables come first.
@@ -121,6 +124,17 @@ pub(super) enum BlockInput {
     Held(HeldId),
     /// It is added, divided by an expression, to the rate of a signal.
     Rate(SignalId, Expr),
+}
+
+/// An equality of dimensions that is put off.
+pub(super) struct PutOff {
+    left: Quantity,
+    right: Quantity,
+    span: Span,
+    /// What the two are, in words.
+    what: String,
+    /// Where it is asked for.
+    here: Here,
 }
 
 /// Effort and flow of a bond, with their dimensions.
@@ -147,8 +161,12 @@ pub(super) struct Builder<'a, 'f> {
     /// Whether the model writes any unit: without one, nothing is said about units.
     pub units_written: bool,
     /// Equalities of dimensions that are put off.
-    pub later: Option<Vec<(Quantity, Quantity, Span, String)>>,
-    pub faults: Vec<Diagnostic>,
+    pub later: Option<Vec<PutOff>>,
+    /// Where what is read stands.
+    pub now: Here,
+    pub faults: Faults,
+    /// The turns of repetitions, those of sums with them, and what shapes the model.
+    pub repeats: Repeats<'a>,
     /// Whether something in the tree is missing, which the parser has said.
     pub incomplete: bool,
     /// Role and dimension of every symbol, by its number.
@@ -205,7 +223,9 @@ impl<'a, 'f> Builder<'a, 'f> {
             dims: Dimensions::default(),
             units_written: false,
             later: None,
-            faults: Vec::new(),
+            now: Here::of(0),
+            faults: Faults::default(),
+            repeats: flat.repeats.clone(),
             incomplete: wiring.broken,
             roles: Vec::new(),
             pairs: Vec::with_capacity(wiring.wires.len()),
@@ -238,6 +258,14 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// Reports a fault.
     pub fn fault(&mut self, fault: Diagnostic) {
         self.faults.push(fault);
+    }
+
+    /// Says of the faults since `before` in which turn of a repetition they were found.
+    pub fn met_in(&mut self, here: Here, before: usize) {
+        let turn = self.flat.names.turn_around(here);
+        if turn != 0 {
+            self.faults.in_turn(before, || self.repeats.words(turn));
+        }
     }
 
     /// Says what a symbol means.
@@ -296,7 +324,8 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// this is put off until the laws of the elements have spoken, so that a wrong output is not blamed on the elements.
     pub fn equal(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str) {
         if let Some(later) = &mut self.later {
-            later.push((left.clone(), right.clone(), span, what.to_string()));
+            let (left, right, what) = (left.clone(), right.clone(), what.to_string());
+            later.push(PutOff { left, right, span, what, here: self.now });
             return;
         }
         let reason = Reason { span, part: None };
@@ -314,8 +343,10 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// Requires what was put off.
     pub fn settle_units(&mut self) {
-        for (left, right, span, what) in self.later.take().unwrap_or_default() {
+        for PutOff { left, right, span, what, here } in self.later.take().unwrap_or_default() {
+            let before = self.faults.len();
             self.equal(&left, &right, span, &what);
+            self.met_in(here, before);
         }
     }
 

@@ -6,7 +6,9 @@
 
 use std::collections::BTreeMap;
 
+use super::assemble::cell_of;
 use super::builder::{Builder, Pair, Role};
+use super::flatten::Held;
 use super::structure::Structure;
 use super::value::Reading;
 use super::{BondId, Constraint, ElementId, Kind, Meaning};
@@ -48,20 +50,28 @@ impl Builder<'_, '_> {
     pub fn constraint_sides(&mut self) -> Vec<Sides> {
         let flat = self.flat;
         let mut all = Vec::new();
-        for (at, (scope, c, span)) in flat.constraints.iter().enumerate() {
-            let cx = Reading::of(*scope, &c.name.text);
+        for (at, Held { name, here, ast: c, span }) in flat.constraints.iter().enumerate() {
+            let before = self.faults.len();
+            let cx = Reading::of(*here, name);
             let (left, right) = (self.number(&cx, &c.left), self.number(&cx, &c.right));
             if let (Some(left), Some(right)) = (left, right) {
                 self.equal(&left.quantity, &right.quantity, *span, "the two sides");
                 all.push(Sides { at, expr: self.exprs.sub(left.expr, right.expr), span: *span });
             }
+            self.met_in(*here, before);
         }
         all
     }
 
     /// The relations between flows that constraints ask for, with the rates of signals put in.
     pub fn relations(&mut self, sides: &[Sides], rates: &BTreeMap<Symbol, Expr>) -> Vec<Relation> {
-        sides.iter().filter_map(|s| self.relation(s, rates)).collect()
+        let relation = |s: &Sides| {
+            let before = self.faults.len();
+            let relation = self.relation(s, rates);
+            self.met_in(self.flat.constraints[s.at].here, before);
+            relation
+        };
+        sides.iter().filter_map(relation).collect()
     }
 
     fn relation(&mut self, sides: &Sides, rates: &BTreeMap<Symbol, Expr>) -> Option<Relation> {
@@ -158,8 +168,9 @@ impl Builder<'_, '_> {
     }
 
     fn build(&mut self, structure: &mut Structure, r: &Relation) -> Constraint {
-        let (scope, c, _) = &self.flat.constraints[r.at];
-        let name = format!("{}{}", self.flat.names.scopes[*scope].prefix, c.name.text);
+        let Held { name, ast: c, here, .. } = &self.flat.constraints[r.at];
+        let name = name.clone();
+        let first = structure.elements.len();
         let minus_rest = self.exprs.neg(r.rest);
         let label = self.sources.slice(c.left.span.to(c.right.span)).to_string();
         let node = structure.add(format!("{name}.0"), Kind::Zero, r.span, String::new());
@@ -181,6 +192,8 @@ impl Builder<'_, '_> {
         let bond = structure.join((zc, ""), (node, ""), (effort, flow), r.span);
         self.mean(effort, Meaning::Effort(bond), effort_in);
         self.mean(flow, Meaning::Flow(bond), flow_in);
+        let cell = cell_of(self.flat.names.turn_around(*here));
+        (first..structure.elements.len()).for_each(|at| structure.elements[ElementId::new(at)].cell = cell);
         let multiplier = self.exprs.sym(effort);
         Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::builder::{Builder, InputDraft, NamedDraft, OpenSignal, Role, SignalDraft, Value};
 use super::dimension::Quantity;
-use super::scope::{self, DeclId, DeclKind, ScopeId};
+use super::scope::{self, DeclId, DeclKind, Here, Valued};
 use super::value::Reading;
 use super::{InputId, Meaning, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts, Node};
@@ -20,15 +20,6 @@ enum Stage {
     Waiting,
     Open,
     Done,
-}
-
-/// The dimension of a number that is written with its unit.
-fn dimension_of_number(e: &ast::Expr) -> Option<Dim> {
-    match &e.kind {
-        ExprKind::Number(number) => Unit::parse(&number.unit.as_ref()?.text).ok().map(|unit| unit.dimension),
-        ExprKind::Unary(unary) => dimension_of_number(&unary.operand),
-        _ => None,
-    }
 }
 
 impl<'a> Builder<'a, '_> {
@@ -51,7 +42,9 @@ impl<'a> Builder<'a, '_> {
         let (meaning, quantity) = match d.kind {
             DeclKind::Input(default) => {
                 let declared = d.unit.and_then(|u| self.unit(u)).map(|u| u.dim);
-                let dimension = declared.or_else(|| default.and_then(dimension_of_number));
+                let written = default.and_then(|e| unit_of_literal(e, &d.item));
+                let of_number = || Some(Unit::parse(&written?.text).ok()?.dimension);
+                let dimension = declared.or_else(of_number);
                 let quantity = dimension.map_or(Quantity::Any, Quantity::of);
                 (Meaning::Input(InputId::new(self.inputs.len())), quantity)
             }
@@ -138,18 +131,18 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The declarations that must be known before this one, and where it reads them.
-    fn reads(&self, decl: DeclId) -> Vec<(DeclId, Span)> {
+    fn reads(&mut self, decl: DeclId) -> Vec<(DeclId, Span)> {
         let d = &self.flat.names.decls[decl];
         let mut found = Vec::new();
         match d.kind {
             DeclKind::Function(f) => {
                 let formals: Vec<&str> = f.params.iter().map(|p| p.text.as_str()).collect();
-                self.collect(d.reads, &f.body, &formals, &mut found);
+                self.collect(d.reads, &f.body, (&formals, &[]), &mut found);
             }
             DeclKind::State(_) => {}
             _ => {
-                if let Some(value) = d.value() {
-                    self.collect(d.reads, value, &[], &mut found);
+                if let Some(value) = d.kind.value() {
+                    self.collect(d.reads, value, (&[], &d.item), &mut found);
                 }
             }
         }
@@ -157,56 +150,106 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The declarations that an expression reads at once: not through a state, a delay, a sample or a transfer function
-    /// without direct path.
-    fn collect(&self, scope: ScopeId, e: &ast::Expr, formals: &[&str], found: &mut Vec<(DeclId, Span)>) {
+    /// without direct path. Given are the formal arguments of a function, and which element of an array is asked for.
+    fn collect(&mut self, here: Here, e: &'a ast::Expr, own: (&[&str], &[i64]), found: &mut Vec<(DeclId, Span)>) {
         match &e.kind {
             ExprKind::Path(path) => {
-                if let Some(decl) = self.decl_of(scope, path, formals)
+                if let Some(decl) = self.decl_of(here, path, own)
                     && !matches!(self.flat.names.decls[decl].kind, DeclKind::State(_) | DeclKind::Input(_))
                 {
                     found.push((decl, path.span));
                 }
             }
             ExprKind::Call(call) => {
-                if let Some(decl) = self.flat.names.value(scope, &call.function.text) {
+                if let Some(Valued::One(decl)) = self.flat.names.value(here.scope, &call.function.text) {
                     found.push((decl, call.function.span));
                 }
                 let skip = usize::from(super::blocks::is_lagging(call));
                 for arg in call.args.iter().skip(skip) {
-                    self.collect(scope, &arg.value, formals, found);
+                    self.collect(here, &arg.value, own, found);
                 }
             }
-            ExprKind::Rate(inner) => self.collect(scope, inner, formals, found),
-            ExprKind::List(list) => list.iter().for_each(|e| self.collect(scope, e, formals, found)),
-            ExprKind::Unary(u) => self.collect(scope, &u.operand, formals, found),
+            ExprKind::Rate(inner) => self.collect(here, inner, own, found),
+            ExprKind::List(list) => match own.1.split_first() {
+                Some((first, rest)) => {
+                    let entry = usize::try_from(first - 1).ok().and_then(|at| list.get(at));
+                    entry.into_iter().for_each(|e| self.collect(here, e, (own.0, rest), found));
+                }
+                None => list.iter().for_each(|e| self.collect(here, e, own, found)),
+            },
+            ExprKind::Repeated(list) => {
+                if let (Some((first, rest)), Some(from)) = (own.1.split_first(), self.known_whole(here, &list.from)) {
+                    self.collect_turn(here, list, from + first - 1, (own.0, rest), found);
+                }
+            }
+            ExprKind::Sum(sum) => {
+                let ends = self.known_whole(here, &sum.from).zip(self.known_whole(here, &sum.to));
+                let values = ends.and_then(|(from, to)| self.repeats.terms_of(from, to));
+                values.into_iter().flatten().for_each(|value| self.collect_turn(here, sum, value, own, found));
+            }
+            ExprKind::Unary(u) => self.collect(here, &u.operand, own, found),
             ExprKind::Binary(b) => {
-                self.collect(scope, &b.left, formals, found);
-                self.collect(scope, &b.right, formals, found);
+                self.collect(here, &b.left, own, found);
+                self.collect(here, &b.right, own, found);
             }
             ExprKind::If(i) => {
                 for part in [&i.cond, &i.yes, &i.no] {
-                    self.collect(scope, part, formals, found);
+                    self.collect(here, part, own, found);
                 }
             }
             ExprKind::Number(_) | ExprKind::Text(_) | ExprKind::Missing => {}
         }
     }
 
+    /// The same of what is repeated, for one value of its variable.
+    fn collect_turn(
+        &mut self,
+        here: Here,
+        repeated: &'a ast::Repeated,
+        value: i64,
+        own: (&[&str], &[i64]),
+        found: &mut Vec<(DeclId, Span)>,
+    ) {
+        let turn = self.repeats.turn(&repeated.variable, value, here);
+        self.collect(Here { turn, ..here }, &repeated.value, own, found);
+        self.repeats.forget(turn);
+    }
+
+    /// A whole number, if it is known; what is wrong with it is said where its expression is read.
+    fn known_whole(&mut self, here: Here, e: &'a ast::Expr) -> Option<i64> {
+        self.repeats.whole(&self.flat.names, here, e, "").ok()
+    }
+
     /// The declaration that a path names, if it names one.
-    fn decl_of(&self, scope: ScopeId, path: &ast::Path, formals: &[&str]) -> Option<DeclId> {
-        let first = path.parts[0].name.text.as_str();
-        if path.parts.len() == 1 {
-            return (!formals.contains(&first)).then(|| self.flat.names.value(scope, first)).flatten();
-        }
-        match self.flat.names.node(scope, path) {
-            Ok((scope::Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
-                self.flat.names.scopes[inner].values.get(path.parts[used].name.text.as_str()).copied()
-            }
-            _ => None,
-        }
+    fn decl_of(&mut self, here: Here, path: &'a ast::Path, (formals, item): (&[&str], &[i64])) -> Option<DeclId> {
+        let names = &self.flat.names;
+        let (value, part) = match path.parts.as_slice() {
+            [one] if one.indices.is_empty() && self.is_bound(here, formals, &one.name.text) => return None,
+            [one] => (names.value(here.scope, &one.name.text)?, one),
+            [.., last] => match names.node(&mut self.repeats, here, path) {
+                Ok((scope::Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
+                    (*names.scopes[inner].values.get(last.name.text.as_str())?, last)
+                }
+                _ => return None,
+            },
+            [] => return None,
+        };
+        names.decl_of(&mut self.repeats, here, value, part, item).ok()
+    }
+
+    /// Whether a name is a formal argument or the variable of a repetition.
+    fn is_bound(&self, here: Here, formals: &[&str], name: &str) -> bool {
+        formals.contains(&name) || self.repeats.variable(here.turn, name).is_some()
     }
 
     fn evaluate(&mut self, decl: DeclId) {
+        let before = self.faults.len();
+        self.now = self.flat.names.decls[decl].reads;
+        self.evaluate_one(decl);
+        self.met_in(self.flat.names.decls[decl].reads, before);
+    }
+
+    fn evaluate_one(&mut self, decl: DeclId) {
         let d = &self.flat.names.decls[decl];
         match d.kind {
             DeclKind::Parameter { value, constant } => self.parameter(decl, value, constant),
@@ -220,7 +263,7 @@ impl<'a> Builder<'a, '_> {
 
     fn missing_value(&mut self, decl: DeclId) {
         let d = &self.flat.names.decls[decl];
-        let in_component = self.flat.names.scopes[d.reads].instance.is_some();
+        let in_component = self.flat.names.scopes[d.reads.scope].instance.is_some();
         if !in_component {
             let fault = Diagnostic::error(codes::N009, format!("`{}` has no value", d.name), d.span, "declared here")
                 .hint(format!("write `{} = …`", d.name));
@@ -231,7 +274,7 @@ impl<'a> Builder<'a, '_> {
     fn parameter(&mut self, decl: DeclId, value: Option<&'a ast::Expr>, constant: bool) {
         let Some(e) = value else { return self.missing_value(decl) };
         let d = &self.flat.names.decls[decl];
-        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        let Some(value) = self.number(&d.reading(), e) else { return };
         if !self.only_parameters(value.expr, e.span, "a parameter") {
             return;
         }
@@ -249,7 +292,7 @@ impl<'a> Builder<'a, '_> {
         }
         let facts = Facts { nonzero: number != 0.0, positive: number > 0.0, given: Some(value.expr) };
         let symbol = self.fresh(&d.name, facts);
-        let written = d.unit.or(d.replaced_unit).or(unit_of_literal(e));
+        let written = d.unit.or(d.replaced_unit).or(unit_of_literal(e, &d.item));
         let unit = written.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
         let parameter = Parameter {
@@ -257,6 +300,7 @@ impl<'a> Builder<'a, '_> {
             symbol,
             value: value.expr,
             constant,
+            shapes: false,
             kind: ParameterKind::Declared,
             unit,
             doc,
@@ -321,7 +365,7 @@ impl<'a> Builder<'a, '_> {
             return;
         };
         let d = &self.flat.names.decls[decl];
-        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        let Some(value) = self.number(&d.reading(), e) else { return };
         if !self.only_parameters(value.expr, e.span, "the default of an input") {
             return;
         }
@@ -339,13 +383,14 @@ impl<'a> Builder<'a, '_> {
     fn named(&mut self, decl: DeclId, value: Option<&'a ast::Expr>, output: bool) {
         let Some(e) = value else { return self.missing_value(decl) };
         let d = &self.flat.names.decls[decl];
-        let Some(value) = self.number(&Reading::of(d.reads, &d.name), e) else { return };
+        let Some(value) = self.number(&d.reading(), e) else { return };
         let value = self.with_unit(value, d.unit, e.span);
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (d.name.clone(), d.doc.to_string());
         let unit_is_written = unit.is_some();
         let quantity = value.quantity.clone();
-        let named = NamedDraft { name, value: value.expr, unit, unit_is_written, quantity, doc, span: d.span };
+        let place = (d.span, decl);
+        let named = NamedDraft { name, value: value.expr, unit, unit_is_written, quantity, doc, place };
         if output {
             self.outputs.push(named)
         } else {
@@ -378,22 +423,28 @@ impl<'a> Builder<'a, '_> {
     /// Rates and start values of states, when all names are known.
     fn make_rates(&mut self) {
         for open in std::mem::take(&mut self.open_signals) {
-            let d = &self.flat.names.decls[open.decl];
-            let cx = Reading::of(d.reads, &d.name);
-            let own = self.quantity(self.signals[open.id].symbol);
-            if let Some(rate) = self.number(&cx, &open.state.rate) {
-                let per_second = own.over(&Quantity::of(Dim::SECOND));
-                self.equal(&rate.quantity, &per_second, open.state.rate.span, "the rate and the signal over time");
-                self.signals[open.id].rate = Some(rate.expr);
-            }
-            let Some(start) = &open.state.start else { continue };
-            if let Some(value) = self.number(&cx, start)
-                && self.only_parameters(value.expr, start.span, "a start value")
-            {
-                let value = self.with_unit(value, open.state.unit.as_ref(), start.span);
-                self.equal(&value.quantity, &own, start.span, "the start value and the signal");
-                self.signals[open.id].initial = Some(value.expr);
-            }
+            let before = self.faults.len();
+            self.now = self.flat.names.decls[open.decl].reads;
+            self.make_rate(&open);
+            self.met_in(self.flat.names.decls[open.decl].reads, before);
+        }
+    }
+
+    fn make_rate(&mut self, open: &OpenSignal<'a>) {
+        let cx = self.flat.names.decls[open.decl].reading();
+        let own = self.quantity(self.signals[open.id].symbol);
+        if let Some(rate) = self.number(&cx, &open.state.rate) {
+            let per_second = own.over(&Quantity::of(Dim::SECOND));
+            self.equal(&rate.quantity, &per_second, open.state.rate.span, "the rate and the signal over time");
+            self.signals[open.id].rate = Some(rate.expr);
+        }
+        let Some(start) = &open.state.start else { return };
+        if let Some(value) = self.number(&cx, start)
+            && self.only_parameters(value.expr, start.span, "a start value")
+        {
+            let value = self.with_unit(value, open.state.unit.as_ref(), start.span);
+            self.equal(&value.quantity, &own, start.span, "the start value and the signal");
+            self.signals[open.id].initial = Some(value.expr);
         }
     }
 
@@ -442,11 +493,14 @@ impl<'a> Builder<'a, '_> {
     }
 }
 
-/// The unit that stands at a value which is one number.
-pub(super) fn unit_of_literal(e: &ast::Expr) -> Option<&ast::UnitText> {
-    match &e.kind {
-        ExprKind::Number(n) => n.unit.as_ref(),
-        ExprKind::Unary(u) => unit_of_literal(&u.operand),
+/// The unit that stands at a value which is one number; that of its element `item` in a list.
+pub(super) fn unit_of_literal<'a>(e: &'a ast::Expr, item: &[i64]) -> Option<&'a ast::UnitText> {
+    match (&e.kind, item) {
+        (ExprKind::Number(n), _) => n.unit.as_ref(),
+        (ExprKind::Unary(u), _) => unit_of_literal(&u.operand, item),
+        (ExprKind::List(list), [first, rest @ ..]) => {
+            unit_of_literal(list.get(usize::try_from(first - 1).ok()?)?, rest)
+        }
         _ => None,
     }
 }

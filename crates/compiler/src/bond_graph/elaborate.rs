@@ -49,13 +49,13 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     let Loaded { files: trees, imports, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
     let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
-    let mut flat = flatten::flatten(&trees);
-    faults.append(&mut flat.faults);
-    overrides::apply(&given, &mut flat, &mut faults);
-    let mut wiring = wire(&flat);
-    faults.append(&mut wiring.faults);
-    let Built { graph, faults: more, uses } =
-        build(&flat, &wiring, &sources, files, faults.iter().any(Diagnostic::is_error), &title, &BTreeSet::new());
+    let mut flat = flatten::flatten(&trees, &given);
+    faults.extend(std::mem::take(&mut flat.faults).into_list());
+    overrides::refuse_idle(&given, &flat, &mut faults);
+    let Built { graph, faults: more, uses } = match flat.lost {
+        true => Built::default(),
+        false => wired(&flat, &sources, files, &mut faults, &title),
+    };
     faults.extend(more);
     faults.extend(graph.iter().flat_map(super::guesses::idle));
     in_order(&mut faults);
@@ -65,6 +65,14 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     }
     let names = names::table(&trees[0], &flat, uses, &imports, &sources);
     Elaborated { graph, names, diagnostics: Diagnostics(faults), sources }
+}
+
+/// Connects the bonds of a flat model and builds its graph, as far as its faults allow.
+fn wired(flat: &Flat<'_>, sources: &Sources, files: &dyn Files, faults: &mut Vec<Diagnostic>, title: &Title) -> Built {
+    let mut wiring = wire(flat);
+    faults.extend(std::mem::take(&mut wiring.faults).into_list());
+    let faulty = faults.iter().any(Diagnostic::is_error);
+    build(flat, &wiring, sources, files, faulty, title, &BTreeSet::new())
 }
 
 /// Brings faults into the order of the text, each once.
@@ -109,9 +117,12 @@ fn build(
     }
     b.forgive_unwritten_units();
     if faulty || b.incomplete || !b.faults.is_empty() {
-        return Built { graph: None, faults: b.faults, uses: b.uses };
+        b.repeats.add_uses(&flat.names, &mut b.uses);
+        return Built { graph: None, faults: b.faults.into_list(), uses: b.uses };
     }
+    b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
+    let faults = faults.into_list();
     Built { graph: finished(b, title, kinds, asked, &relations, &rates), faults, uses }
 }
 
@@ -135,6 +146,7 @@ fn finished(
 }
 
 /// What building has given.
+#[derive(Default)]
 struct Built {
     graph: Option<BondGraph>,
     faults: Vec<Diagnostic>,

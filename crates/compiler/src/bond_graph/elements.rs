@@ -41,6 +41,14 @@ struct PortLaw {
 impl<'a> Builder<'a, '_> {
     /// The kind and law of a part; `None` if it is at fault, which has been said.
     pub fn kind(&mut self, part: usize) -> Option<Kind> {
+        let before = self.faults.len();
+        self.now = self.part(part).here;
+        let kind = self.kind_of(part);
+        self.met_in(self.part(part).here, before);
+        kind
+    }
+
+    fn kind_of(&mut self, part: usize) -> Option<Kind> {
         let p = self.part(part);
         match p.word {
             Word::Zero | Word::One | Word::De | Word::Df => self.plain(part),
@@ -81,7 +89,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn refuse_ports(&mut self, p: &Part<'_>) {
-        if let Some(port) = p.ast.ports.first() {
+        if let Some(port) = p.ports.first() {
             let title = format!("only I, C and R have a list of ports, not {}", p.word.text());
             self.fault(Diagnostic::error(codes::N007, title, port.span, "no list here"));
         }
@@ -90,7 +98,7 @@ impl<'a> Builder<'a, '_> {
     /// Reads an argument of a part.
     fn arg(&mut self, part: usize, e: &'a ast::Expr, law: bool) -> Option<Value> {
         let p = self.part(part);
-        let cx = Reading { own: Some(part), law, ..Reading::of(p.scope, &p.name) };
+        let cx = Reading { own: Some(part), law, ..Reading::of(p.here, &p.name) };
         self.number(&cx, e)
     }
 
@@ -197,7 +205,7 @@ impl<'a> Builder<'a, '_> {
     /// Sorts the arguments of an `I`, `C` or `R`.
     fn law_args(&mut self, part: usize) -> Option<LawArgs<'a>> {
         let p = self.part(part);
-        let ports = p.ast.ports.len().max(1);
+        let ports = p.ports.len().max(1);
         let mut args = LawArgs { laws: vec![Vec::new(); ports], coefficient: None, energy: None, starts: Vec::new() };
         let mut fine = self.ports_are_distinct(p);
         for arg in &p.ast.args {
@@ -208,7 +216,7 @@ impl<'a> Builder<'a, '_> {
 
     /// Says which name is given to two ports.
     fn ports_are_distinct(&mut self, p: &Part<'_>) -> bool {
-        let ports = &p.ast.ports;
+        let ports = &p.ports;
         let twice = (1..ports.len()).find_map(|i| Some((i, ports[..i].iter().position(|q| q.text == ports[i].text)?)));
         let Some((again, first)) = twice else { return true };
         let title = format!("two ports of `{}` have the name `{}`", p.name, ports[again].text);
@@ -298,12 +306,12 @@ impl<'a> Builder<'a, '_> {
 
     /// The port that a label speaks of.
     fn slot(&mut self, p: &Part<'_>, label: &ArgLabel, free: bool, args: &LawArgs<'_>) -> Option<usize> {
-        let list = || p.ast.ports.iter().map(|n| n.text.as_str()).collect::<Vec<_>>().join(", ");
-        match (&label.port, p.ast.ports.len()) {
+        let list = || p.ports.iter().map(|n| n.text.as_str()).collect::<Vec<_>>().join(", ");
+        match (&label.port, p.ports.len()) {
             (None, 0 | 1) => Some(0),
             (None, _) if free => args.laws.iter().position(Vec::is_empty).or(Some(0)),
             (None, _) => {
-                let (name, first) = (&label.name.text, &p.ast.ports[0].text);
+                let (name, first) = (&label.name.text, &p.ports[0].text);
                 let d = Diagnostic::error(
                     codes::B009,
                     format!("`{name}` of which port?"),
@@ -314,11 +322,11 @@ impl<'a> Builder<'a, '_> {
                 None
             }
             (Some(port), _) => {
-                let found = p.ast.ports.iter().position(|n| n.text == port.text);
+                let found = p.ports.iter().position(|n| n.text == port.text);
                 if found.is_none() {
                     let title = format!("`{}` has no port `{}`", p.name, port.text);
                     let d = Diagnostic::error(codes::N001, title, port.span, "not known");
-                    let hint = if p.ast.ports.is_empty() {
+                    let hint = if p.ports.is_empty() {
                         format!("list its ports: `{}:{}[{}, …]`", p.word.text(), p.ast.name.text, port.text)
                     } else {
                         format!("its ports are {}", list())
@@ -548,11 +556,11 @@ impl<'a> Builder<'a, '_> {
     fn no_law<T>(&mut self, part: usize, slot: usize) -> Option<T> {
         let p = self.part(part);
         let name = &p.ast.name.text;
-        let (title, span) = match p.ast.ports.get(slot) {
-            Some(port) if p.ast.ports.len() > 1 => (format!("port `{}.{}` has no law", p.name, port.text), port.span),
+        let (title, span) = match p.ports.get(slot) {
+            Some(port) if p.ports.len() > 1 => (format!("port `{}.{}` has no law", p.name, port.text), port.span),
             _ => (format!("{} has no law", what(p)), p.ast.span),
         };
-        let hint = match (p.word, p.ast.ports.len()) {
+        let hint = match (p.word, p.ports.len()) {
             (Word::I, 0 | 1) => format!("write `I:{name}( … )` with its inertance, or a law `f = …` of p"),
             (Word::C, 0 | 1) => format!("write `C:{name}( … )` with its compliance, `k = …`, or a law `e = …` of q"),
             (Word::R, 0 | 1) => format!("write `R:{name}( … )` with its resistance, `g = …`, or a law `e = …` of f"),
@@ -570,7 +578,7 @@ impl<'a> Builder<'a, '_> {
         for (letter, slot, arg) in starts {
             let own = self.port_variable(part, *slot, letter.encode_utf8(&mut [0; 4]));
             let p = self.part(part);
-            let value = self.number(&Reading::of(p.scope, &p.name), &arg.value);
+            let value = self.number(&Reading::of(p.here, &p.name), &arg.value);
             let (Some(own), Some(value)) = (own, value) else {
                 fine = false;
                 continue;

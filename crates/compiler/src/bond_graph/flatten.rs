@@ -2,15 +2,16 @@
 
 use rustc_hash::FxHashMap;
 
-use super::scope::{Decl, DeclKind, Names, Node, Scope, ScopeId};
-use super::uses::{Used, Uses};
+use super::families::{Indices, spell};
+use super::faults::Faults;
+use super::overrides::Given;
+use super::repeat::{MAX_TURNS, Repeats};
+use super::scope::{DeclKind, Here, Names, Node, Scope, ScopeId};
+use super::uses::Uses;
 use crate::ast::{self, StatementKind};
-use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 
-/// The greatest number of components inside one another.
-const MAX_DEPTH: usize = 64;
 /// The greatest number of elements and junctions of a model.
 const MAX_PARTS: usize = 2_000_000;
 /// The greatest number of instances of components.
@@ -98,9 +99,11 @@ pub(super) struct Part<'a> {
     /// Its full name.
     pub name: String,
     /// Where it belongs.
-    pub scope: ScopeId,
+    pub here: Here,
     /// Its kind.
     pub word: Word,
+    /// The ports of a field, empty when none are listed.
+    pub ports: &'a [ast::Name],
     /// As written.
     pub ast: &'a ast::Element,
     /// Whether it stands in a `domain … pseudo`.
@@ -108,11 +111,25 @@ pub(super) struct Part<'a> {
 }
 
 /// A port of an instance: where a bond from outside and one from inside become one.
-pub(super) struct Joint<'a> {
+pub(super) struct Joint {
     /// The scope of the instance.
     pub instance: ScopeId,
     /// Its name.
-    pub name: &'a ast::Name,
+    pub name: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A `constraint`.
+pub(super) struct Held<'a> {
+    /// Its full name.
+    pub name: String,
+    /// Where it belongs.
+    pub here: Here,
+    /// As written.
+    pub ast: &'a ast::Constraint,
+    /// The whole statement.
+    pub span: Span,
 }
 
 /// A bond as drawn, perhaps ending at ports of components.
@@ -123,6 +140,8 @@ pub(super) struct Drawn {
     pub to: End,
     /// Its name, else empty.
     pub name: String,
+    /// Where it belongs.
+    pub here: Here,
     /// Whether it stands in a `domain … pseudo`.
     pub pseudo: bool,
     /// Where it is written.
@@ -156,28 +175,33 @@ pub(super) enum At {
 pub(super) struct Flat<'a> {
     pub names: Names<'a>,
     pub parts: Vec<Part<'a>>,
-    pub joints: Vec<Joint<'a>>,
+    pub joints: Vec<Joint>,
     pub drawn: Vec<Drawn>,
-    pub prefer: Vec<(ScopeId, &'a ast::Path)>,
-    pub causality: Vec<(ScopeId, &'a ast::ForcedCausality)>,
-    pub strokes: Vec<(ScopeId, &'a ast::ForcedStroke, Span)>,
-    pub guesses: Vec<(ScopeId, &'a ast::Guess)>,
-    pub constraints: Vec<(ScopeId, &'a ast::Constraint, Span)>,
-    pub faults: Vec<Diagnostic>,
+    pub prefer: Vec<(Here, &'a ast::Path)>,
+    pub causality: Vec<(Here, &'a ast::ForcedCausality)>,
+    pub strokes: Vec<(Here, &'a ast::ForcedStroke, Span)>,
+    pub guesses: Vec<(Here, &'a ast::Guess)>,
+    pub constraints: Vec<Held<'a>>,
+    pub faults: Faults,
     /// Where names are used that say what there is and how it is joined.
     pub uses: Uses,
-    chains: Vec<(ScopeId, &'a ast::Chain, bool)>,
-    full: bool,
+    /// The turns of repetitions, and what shapes the model.
+    pub repeats: Repeats<'a>,
+    /// Whether it is not known what there is: the rest of the model cannot be judged.
+    pub lost: bool,
+    pub chains: Vec<(Here, &'a ast::Chain, bool)>,
+    pub full: bool,
 }
 
-/// Flattens the files of a model, the main one first.
-pub(super) fn flatten<'a>(files: &'a [ast::Ast]) -> Flat<'a> {
+/// Flattens the files of a model, the main one first, with new values of parameters.
+pub(super) fn flatten<'a>(files: &'a [ast::Ast], given: &'a [Given]) -> Flat<'a> {
     let mut flat = Flat::default();
+    flat.names.overrides = given.iter().map(|g| (g.name.as_str(), &g.value)).collect();
     flat.names.scopes.push(Scope {
         prefix: String::new(),
         parent: None,
         instance: None,
-        user: 0,
+        user: Here::of(0),
         depth: 0,
         values: FxHashMap::default(),
         nodes: FxHashMap::default(),
@@ -190,25 +214,31 @@ pub(super) fn flatten<'a>(files: &'a [ast::Ast]) -> Flat<'a> {
         if i > 0 {
             flat.refuse_in_import(&file.statements);
         }
-        flat.fill(0, &file.statements, false, i > 0);
+        flat.fill(Here::of(0), &file.statements, false, i > 0);
     }
-    flat.draw_bonds();
+    if !flat.lost {
+        flat.draw_bonds();
+    }
     flat
 }
 
-/// Parts of a full name.
-fn full_name(prefix: &str, name: &str) -> String {
-    let mut full = String::with_capacity(prefix.len() + name.len());
+/// A full name: `motor.spring[3]`.
+pub(super) fn full_name(prefix: &str, name: &str, indices: &[i64]) -> String {
+    let mut full = String::with_capacity(prefix.len() + name.len() + 8 * indices.len());
     full.push_str(prefix);
-    full.push_str(name);
+    spell(&mut full, name, indices);
     full
 }
 
 impl<'a> Flat<'a> {
-    /// Registers the components that are written in a scope, before anything uses them.
-    fn components(&mut self, scope: ScopeId, statements: &'a [ast::Statement]) {
+    /// Registers the components that are written in a scope, and its values that may shape it, before anything uses them.
+    pub fn components(&mut self, scope: ScopeId, statements: &'a [ast::Statement]) {
         for statement in statements {
             match &statement.kind {
+                StatementKind::Param(list) | StatementKind::Const(list) | StatementKind::Let(list) => {
+                    let plain = list.iter().filter(|d| d.indices.is_empty());
+                    self.names.ahead.extend(plain.map(|d| ((scope, d.name.text.as_str()), d)));
+                }
                 StatementKind::Component(c) => self.component(scope, c),
                 StatementKind::Domain(d) => self.components(scope, &d.body),
                 _ => {}
@@ -250,6 +280,15 @@ impl<'a> Flat<'a> {
                     self.refuse_in_import(&d.body);
                     continue;
                 }
+                StatementKind::For(l) => {
+                    self.refuse_in_import(&l.body);
+                    continue;
+                }
+                StatementKind::Choice(c) => {
+                    self.refuse_in_import(&c.yes);
+                    self.refuse_in_import(&c.no);
+                    continue;
+                }
                 _ => continue,
             };
             let title = format!("{what} cannot be imported");
@@ -262,492 +301,117 @@ impl<'a> Flat<'a> {
     }
 
     /// Declares what the statements of a scope declare, instances and what is in them included.
-    fn fill(&mut self, scope: ScopeId, statements: &'a [ast::Statement], pseudo: bool, imported: bool) {
+    pub fn fill(&mut self, here: Here, statements: &'a [ast::Statement], pseudo: bool, imported: bool) {
         for statement in statements {
             match &statement.kind {
-                StatementKind::Param(list) => {
-                    self.declare_all(scope, list, |d| DeclKind::Parameter { value: d.value.as_ref(), constant: false })
-                }
-                StatementKind::Const(list) => {
-                    self.declare_all(scope, list, |d| DeclKind::Parameter { value: d.value.as_ref(), constant: true })
-                }
-                StatementKind::Let(list) => self.declare_all(scope, list, |d| DeclKind::Let(d.value.as_ref())),
+                StatementKind::Param(list) => self.parameters(here, list, false),
+                StatementKind::Const(list) => self.parameters(here, list, true),
+                StatementKind::Let(list) => self.lets(here, list, DeclKind::Let),
                 StatementKind::Function(f) => {
                     let unit = f.unit.as_ref();
-                    self.declare(scope, &f.name, DeclKind::Function(f), unit, f.doc.as_ref());
+                    self.declare(here, here, (&f.name, &[]), DeclKind::Function(f), unit, f.doc.as_ref());
                 }
-                StatementKind::Domain(d) => self.fill(scope, &d.body, pseudo || d.pseudo.is_some(), imported),
-                StatementKind::Import(i) if self.names.scopes[scope].instance.is_some() => self.faults.push(
+                StatementKind::Domain(d) => self.fill(here, &d.body, pseudo || d.pseudo.is_some(), imported),
+                StatementKind::For(l) => self.repeat(here, l, pseudo, imported),
+                StatementKind::Choice(c) => self.choose(here, c, pseudo, imported),
+                StatementKind::Import(i) if self.names.scopes[here.scope].instance.is_some() => self.faults.push(
                     Diagnostic::error(codes::N014, "a component cannot import", i.path.span, "here")
                         .hint("import at the top of the file"),
                 ),
                 _ if imported => {}
-                StatementKind::Input(list) => self.declare_all(scope, list, |d| DeclKind::Input(d.value.as_ref())),
-                StatementKind::Output(list) => self.outputs(scope, list),
+                StatementKind::Input(list) => {
+                    list.iter().for_each(|d| self.declare_whole(here, here, d, DeclKind::Input(d.value.as_ref())));
+                }
+                // Outputs of the model are outputs; those inside an instance are named values.
+                StatementKind::Output(list) if here.scope == 0 => self.lets(here, list, DeclKind::Output),
+                StatementKind::Output(list) => self.lets(here, list, DeclKind::Let),
                 StatementKind::State(s) => {
-                    self.declare(scope, &s.name, DeclKind::State(s), s.unit.as_ref(), s.doc.as_ref());
+                    if let Some(indices) = self.indices(here, &s.indices) {
+                        let (unit, doc) = (s.unit.as_ref(), s.doc.as_ref());
+                        self.declare(here, here, (&s.name, &indices), DeclKind::State(s), unit, doc);
+                    }
                 }
-                StatementKind::Prefer(paths) => self.prefer.extend(paths.iter().map(|p| (scope, p))),
-                StatementKind::Causality(list) => self.causality.extend(list.iter().map(|c| (scope, c))),
-                StatementKind::Stroke(s) => self.strokes.push((scope, s, statement.span)),
-                StatementKind::Guess(list) => self.guesses.extend(list.iter().map(|g| (scope, g))),
-                StatementKind::Constraint(c) => {
-                    let node = Node::Constraint(self.constraints.len());
-                    self.place(scope, &c.name, node);
-                    self.constraints.push((scope, c, statement.span));
-                }
-                StatementKind::Chain(chain) => self.chain(scope, chain, pseudo),
+                StatementKind::Prefer(paths) => self.prefer.extend(paths.iter().map(|p| (here, p))),
+                StatementKind::Causality(list) => self.causality.extend(list.iter().map(|c| (here, c))),
+                StatementKind::Stroke(s) => self.strokes.push((here, s, statement.span)),
+                StatementKind::Guess(list) => self.guesses.extend(list.iter().map(|g| (here, g))),
+                StatementKind::Constraint(c) => self.constraint(here, c, statement.span),
+                StatementKind::Chain(chain) => self.chain(here, chain, pseudo),
                 StatementKind::Import(_) | StatementKind::Component(_) => {}
-                StatementKind::When(_) | StatementKind::For(_) => {}
+                StatementKind::When(_) => {}
             }
         }
     }
 
-    fn declare_all(
-        &mut self,
-        scope: ScopeId,
-        list: &'a [ast::Declaration],
-        kind: impl Fn(&'a ast::Declaration) -> DeclKind<'a>,
-    ) {
-        for d in list {
-            self.declare(scope, &d.name, kind(d), d.unit.as_ref(), d.doc.as_ref());
-        }
-    }
-
-    /// Outputs of the model are outputs; those inside an instance are named values.
-    fn outputs(&mut self, scope: ScopeId, list: &'a [ast::Declaration]) {
-        if scope == 0 {
-            self.declare_all(scope, list, |d| DeclKind::Output(d.value.as_ref()));
-        } else {
-            self.declare_all(scope, list, |d| DeclKind::Let(d.value.as_ref()));
-        }
-    }
-
-    fn declare(
-        &mut self,
-        scope: ScopeId,
-        name: &'a ast::Name,
-        kind: DeclKind<'a>,
-        unit: Option<&'a ast::UnitText>,
-        doc: Option<&'a ast::Doc>,
-    ) {
-        self.declare_reading(scope, scope, name, kind, unit, doc);
-    }
-
-    fn declare_reading(
-        &mut self,
-        scope: ScopeId,
-        reads: ScopeId,
-        name: &'a ast::Name,
-        kind: DeclKind<'a>,
-        unit: Option<&'a ast::UnitText>,
-        doc: Option<&'a ast::Doc>,
-    ) {
-        let decl = Decl {
-            name: full_name(&self.names.scopes[scope].prefix, &name.text),
-            reads,
-            kind,
-            unit,
-            replaced_unit: None,
-            doc: doc.map_or("", |d| &d.text),
-            span: name.span,
-        };
-        if let Err(fault) = self.names.declare(scope, name, decl) {
-            self.faults.push(*fault);
-        }
-    }
-
-    /// Gives a node its name; false if the name is taken, which is said.
-    fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> bool {
-        match self.names.place(scope, name, node) {
-            Ok(()) => true,
-            Err(fault) => {
-                self.faults.push(*fault);
-                false
-            }
-        }
+    fn constraint(&mut self, here: Here, c: &'a ast::Constraint, span: Span) {
+        let Some(indices) = self.indices(here, &c.indices) else { return };
+        let name = full_name(&self.names.scopes[here.scope].prefix, &c.name.text, &indices);
+        self.place(here.scope, &c.name, &indices, Node::Constraint(self.constraints.len()));
+        self.constraints.push(Held { name, here, ast: c, span });
     }
 
     /// Declares the nodes of a chain and keeps its bonds for later, when all nodes are known.
-    fn chain(&mut self, scope: ScopeId, chain: &'a ast::Chain, pseudo: bool) {
+    fn chain(&mut self, here: Here, chain: &'a ast::Chain, pseudo: bool) {
         let nodes = std::iter::once(&chain.first).chain(chain.bonds.iter().map(|b| &b.to));
         for node in nodes {
             if let ast::Node::Declared(element) = node {
-                self.element(scope, element, pseudo);
+                self.element(here, element, pseudo);
             }
         }
-        self.chains.push((scope, chain, pseudo));
+        self.chains.push((here, chain, pseudo));
     }
 
-    fn element(&mut self, scope: ScopeId, element: &'a ast::Element, pseudo: bool) {
+    fn element(&mut self, here: Here, element: &'a ast::Element, pseudo: bool) {
         if self.parts.len() >= MAX_PARTS || self.names.scopes.len() >= MAX_INSTANCES {
             self.too_large(element.span);
             return;
         }
+        let Some((indices, ports)) = self.indices_and_ports(here, element) else { return };
         let Some(word) = Word::of(&element.kind.text) else {
-            return self.instance(scope, element, pseudo);
+            return self.instance(here, element, &indices, ports, pseudo);
         };
         let node = Node::Part(self.parts.len());
-        let name = full_name(&self.names.scopes[scope].prefix, &element.name.text);
-        if self.place(scope, &element.name, node) {
-            self.parts.push(Part { name, scope, word, ast: element, pseudo });
+        let name = full_name(&self.names.scopes[here.scope].prefix, &element.name.text, &indices);
+        if self.place(here.scope, &element.name, &indices, node) {
+            self.parts.push(Part { name, here, word, ports, ast: element, pseudo });
         }
     }
 
-    fn too_large(&mut self, span: Span) {
+    /// What stands in brackets behind the name of an element: its indices and its ports. Names alone are indices if they
+    /// are numbers known here, else ports. `None` if they are at fault, which is said.
+    pub fn indices_and_ports(&mut self, here: Here, element: &'a ast::Element) -> Option<(Indices, &'a [ast::Name])> {
+        if element.ports.is_empty() || !element.indices.is_empty() {
+            return Some((self.indices(here, &element.indices)?, &element.ports));
+        }
+        let known = |r: &mut Repeats<'a>, names: &Names<'a>, name| r.peek(names, here, name).is_some();
+        let number: Vec<bool> = element.ports.iter().map(|p| known(&mut self.repeats, &self.names, p)).collect();
+        if number.iter().all(|known| *known) {
+            let index = |name| self.repeats.name_as_index(&self.names, here, name);
+            return Some((element.ports.iter().map(index).collect::<Option<_>>()?, &[]));
+        }
+        let variable = |p: &ast::Name| self.repeats.variable(here.turn, &p.text).is_some();
+        if !element.ports.iter().any(variable) {
+            return Some((Indices::default(), &element.ports));
+        }
+        let port = element.ports.iter().zip(&number).find(|(_, known)| !**known).map(|(p, _)| p)?;
+        let (name, title) =
+            (&element.name.text, format!("`{}` is no number known when the model is compiled", port.text));
+        let d = Diagnostic::error(codes::N022, title, port.span, "beside an index");
+        let hint = format!("ports stand in brackets of their own: `{name}[i][{}]`", port.text);
+        self.faults.push(d.hint(hint));
+        self.lost = true;
+        None
+    }
+
+    pub fn too_large(&mut self, span: Span) {
+        self.lost = true;
         if !self.full {
             self.full = true;
+            let limits = format!("at most {MAX_PARTS} elements, {MAX_INSTANCES} instances of components");
             self.faults.push(
                 Diagnostic::error(codes::N013, "the model is too large", span, "one more does not fit")
-                    .note(format!("at most {MAX_PARTS} elements and {MAX_INSTANCES} instances of components")),
+                    .note(format!("{limits} and {MAX_TURNS} turns of repetitions")),
             );
         }
     }
-
-    /// Makes a scope for an instance of a component and fills it.
-    fn instance(&mut self, scope: ScopeId, element: &'a ast::Element, pseudo: bool) {
-        let Some(used) = self.names.component(scope, &element.kind.text) else {
-            return self.unknown_kind(scope, element);
-        };
-        self.uses.add(Used::Component(used), element.kind.span);
-        let (written, component) = self.names.components[used];
-        if let Some(fault) = self.endless(scope, component, element) {
-            self.faults.push(fault);
-            self.place(scope, &element.name, Node::Broken);
-            return;
-        }
-        let id = self.names.scopes.len();
-        if !self.place(scope, &element.name, Node::Instance(id)) {
-            return;
-        }
-        self.names.scopes.push(Scope {
-            prefix: format!("{}{}.", self.names.scopes[scope].prefix, element.name.text),
-            parent: Some(written),
-            instance: Some((component, element.span)),
-            user: scope,
-            depth: self.names.scopes[scope].depth + 1,
-            values: FxHashMap::default(),
-            nodes: FxHashMap::default(),
-            components: FxHashMap::default(),
-        });
-        self.refuse_odd_arguments(component, element);
-        self.interface(id, scope, component, element);
-        self.components(id, &component.body);
-        self.fill(id, &component.body, pseudo, false);
-        self.check_outs(id, component);
-    }
-
-    fn unknown_kind(&mut self, scope: ScopeId, element: &'a ast::Element) {
-        let kind = &element.kind;
-        let known = WORDS.iter().map(|w| w.0).chain(self.names.visible_components(scope));
-        let title = format!("there is no kind of element `{}`", kind.text);
-        let d = Diagnostic::error(codes::N005, title, kind.span, "neither a kind nor a component");
-        let d = match nearest(&kind.text, known) {
-            _ if usual_name(&kind.text).is_some() => {
-                let (word, what) = usual_name(&kind.text).unwrap_or_default();
-                d.hint(format!("write `{word}:{}(…)`: {what}", element.name.text))
-            }
-            Some(near) => d.hint(format!("did you mean `{near}`?")),
-            None => {
-                d.hint("kinds are 0 1 Se Sf I C R TF GY ZC rSe rSf De Df, and components that are declared or imported")
-            }
-        };
-        self.faults.push(d);
-        self.place(scope, &element.name, Node::Broken);
-    }
-
-    /// Whether a component contains itself, or components are nested too deeply.
-    fn endless(&self, scope: ScopeId, component: &ast::Component, element: &ast::Element) -> Option<Diagnostic> {
-        let mut around = Vec::new();
-        let mut s = scope;
-        while let Some((outer, span)) = self.names.scopes[s].instance {
-            around.push((outer, span));
-            if std::ptr::eq(outer, component) {
-                let path: Vec<&str> = around.iter().rev().map(|(c, _)| c.name.text.as_str()).collect();
-                let title = format!("component `{}` contains itself", component.name.text);
-                let d = Diagnostic::error(codes::N012, title, element.span, "here it is used in itself");
-                let d = if path.len() > 1 {
-                    d.note(format!("{} -> {}", path.join(" -> "), component.name.text))
-                } else {
-                    d
-                };
-                return Some(d.also(component.name.span, "declared here").hint("take the use out of the component"));
-            }
-            s = self.names.scopes[s].user;
-        }
-        (self.names.scopes[scope].depth >= MAX_DEPTH).then(|| {
-            Diagnostic::error(codes::N013, "components are nested too deeply", element.span, "this one is too deep")
-                .note(format!("at most {MAX_DEPTH} inside one another"))
-        })
-    }
-
-    /// Says which arguments of an instance belong to nothing.
-    fn refuse_odd_arguments(&mut self, component: &'a ast::Component, element: &'a ast::Element) {
-        let known: Vec<&str> = component.params.iter().chain(&component.ins).map(|d| d.name.text.as_str()).collect();
-        let mut given: FxHashMap<&str, Span> = FxHashMap::default();
-        for arg in &element.args {
-            let Some(label) = &arg.label else {
-                let example = known.first().copied().unwrap_or("a");
-                self.faults.push(
-                    Diagnostic::error(codes::N007, "an argument of a component needs its name", arg.span, "which one?")
-                        .hint(format!("write `{example} = …`")),
-                );
-                continue;
-            };
-            let name = label.name.text.as_str();
-            if !known.contains(&name) || label.port.is_some() {
-                let title = format!("component `{}` has no parameter or input `{name}`", component.name.text);
-                let d = Diagnostic::error(codes::N008, title, label.span, "not known");
-                let d = d.also(component.name.span, "declared here");
-                self.faults.push(match nearest(name, known.iter().copied()) {
-                    Some(near) => d.hint(format!("did you mean `{near}`?")),
-                    None => d.hint(format!("it takes: {}", known.join(", "))),
-                });
-            } else if let Some(first) = given.insert(name, label.span) {
-                let title = format!("`{name}` is given twice");
-                self.faults.push(Diagnostic::error(codes::N002, title, label.span, "again").also(first, "given first"));
-            }
-        }
-        for port in &element.ports {
-            let title = format!("the ports of component `{}` are those of its declaration", component.name.text);
-            self.faults.push(Diagnostic::error(codes::N007, title, port.span, "no list here"));
-        }
-    }
-
-    /// Declares the parameters, inputs, outputs and ports of an instance, with the values that it is given.
-    fn interface(&mut self, id: ScopeId, scope: ScopeId, component: &'a ast::Component, element: &'a ast::Element) {
-        let given = |name: &str| {
-            let labelled = element.args.iter().filter(|a| a.label.as_ref().is_some_and(|l| l.name.text == name));
-            labelled.map(|a| &a.value).next()
-        };
-        for d in component.params.iter().chain(&component.ins) {
-            let (value, reads) = match given(&d.name.text) {
-                Some(value) => (Some(value), scope),
-                None => (d.value.as_ref(), id),
-            };
-            if value.is_none() {
-                self.missing_argument(component, element, d);
-            }
-            let is_param = component.params.iter().any(|p| std::ptr::eq(p, d));
-            let kind = match is_param {
-                true => DeclKind::Parameter { value, constant: false },
-                false => DeclKind::Let(value),
-            };
-            self.declare_reading(id, reads, &d.name, kind, d.unit.as_ref(), d.doc.as_ref());
-        }
-        self.labels_use(id, element);
-        for d in component.outs.iter().filter(|d| d.value.is_some()) {
-            self.declare(id, &d.name, DeclKind::Let(d.value.as_ref()), d.unit.as_ref(), d.doc.as_ref());
-        }
-        for d in &component.ports {
-            let joint = self.joints.len();
-            self.joints.push(Joint { instance: id, name: &d.name });
-            self.place(id, &d.name, Node::Joint(joint));
-        }
-    }
-
-    /// The label of an argument names what the instance declares.
-    fn labels_use(&mut self, id: ScopeId, element: &ast::Element) {
-        for label in element.args.iter().filter_map(|a| a.label.as_ref()) {
-            if let Some(&decl) = self.names.scopes[id].values.get(label.name.text.as_str()) {
-                self.uses.add(Used::Value(decl), label.name.span);
-            }
-        }
-    }
-
-    fn missing_argument(&mut self, component: &ast::Component, element: &ast::Element, d: &ast::Declaration) {
-        let title = format!("`{}` needs a value for `{}`", element.name.text, d.name.text);
-        self.faults.push(
-            Diagnostic::error(codes::N009, title, element.span, "not given here")
-                .also(d.name.span, format!("`{}` has no default in component `{}`", d.name.text, component.name.text))
-                .hint(format!("write `{}:{}({} = …)`", component.name.text, element.name.text, d.name.text)),
-        );
-    }
-
-    /// Says which outputs of a component have no value.
-    fn check_outs(&mut self, id: ScopeId, component: &'a ast::Component) {
-        for d in component.outs.iter().filter(|d| d.value.is_none()) {
-            if let Some(&decl) = self.names.scopes[id].values.get(d.name.text.as_str()) {
-                self.uses.add(Used::Value(decl), d.name.span);
-            } else {
-                let title =
-                    format!("component `{}` gives no value to its output `{}`", component.name.text, d.name.text);
-                let fault = Diagnostic::error(codes::N009, title, d.name.span, "declared here")
-                    .hint(format!("write `let {} = …` in the component", d.name.text));
-                if !self.faults.contains(&fault) {
-                    self.faults.push(fault);
-                }
-            }
-        }
-    }
-
-    /// Makes the bonds of all chains, those of the model before those inside its instances.
-    fn draw_bonds(&mut self) {
-        let mut chains = std::mem::take(&mut self.chains);
-        chains.sort_by_key(|(scope, _, _)| *scope);
-        for (scope, chain, pseudo) in chains {
-            if chain.bonds.is_empty() {
-                self.lone_node(&chain.first);
-                continue;
-            }
-            let mut from = self.end(scope, &chain.first);
-            for bond in &chain.bonds {
-                let to = self.end(scope, &bond.to);
-                self.drawn_bond(scope, from, to, bond, pseudo);
-                from = to;
-            }
-        }
-    }
-
-    /// A chain without bonds has to declare something.
-    fn lone_node(&mut self, node: &ast::Node) {
-        if let ast::Node::Named(path) = node {
-            self.faults.push(
-                Diagnostic::error(codes::B008, "a name alone says nothing", path.span, "no bond starts here")
-                    .hint("write `a -> b`, or `Kind:name` to declare an element"),
-            );
-        }
-    }
-
-    fn drawn_bond(&mut self, scope: ScopeId, from: End, to: End, bond: &'a ast::Bond, pseudo: bool) {
-        let name = match &bond.name {
-            Some(name) => {
-                self.place(scope, name, Node::Bond(self.drawn.len()));
-                full_name(&self.names.scopes[scope].prefix, &name.text)
-            }
-            None => String::new(),
-        };
-        self.drawn.push(Drawn { from, to, name, pseudo, span: from.span.to(to.span) });
-    }
-
-    /// What a node of a chain stands for as the end of a bond.
-    fn end(&mut self, scope: ScopeId, node: &'a ast::Node) -> End {
-        match node {
-            ast::Node::Missing(span) => End { at: At::Broken, span: *span },
-            ast::Node::Declared(element) => {
-                let known = self.names.scopes[scope].nodes.get(element.name.text.as_str()).copied();
-                let at = match known {
-                    Some((node, span)) if span == element.name.span && element.port.is_some() => {
-                        element.port.as_ref().map_or(At::Broken, |port| self.port_of(node, port))
-                    }
-                    Some((Node::Part(part), span)) if span == element.name.span => At::Part(part, None),
-                    Some((Node::Instance(inner), span)) if span == element.name.span => {
-                        self.only_port(inner, element.span)
-                    }
-                    _ => At::Broken,
-                };
-                End { at, span: element.span }
-            }
-            ast::Node::Named(path) => End { at: self.named_end(scope, path), span: path.span },
-        }
-    }
-
-    /// A port of an element or of an instance, where the parser has told all that is wrong.
-    fn port_of(&mut self, node: Node, port: &'a ast::Name) -> At {
-        match node {
-            Node::Part(part) => self.named_port(part, port),
-            Node::Instance(inner) => match self.names.scopes[inner].nodes.get(port.text.as_str()) {
-                Some(&(Node::Joint(joint), _)) => {
-                    self.uses.add(Used::Node(Node::Joint(joint)), port.span);
-                    At::Outside(joint)
-                }
-                _ => At::Broken,
-            },
-            _ => At::Broken,
-        }
-    }
-
-    /// A component with one port can be written as a node; otherwise the port must be named.
-    fn only_port(&mut self, inner: ScopeId, span: Span) -> At {
-        let Some((component, _)) = self.names.scopes[inner].instance else { return At::Broken };
-        match component.ports.as_slice() {
-            [port] => match self.names.scopes[inner].nodes.get(port.name.text.as_str()) {
-                Some(&(Node::Joint(joint), _)) => At::Outside(joint),
-                _ => At::Broken,
-            },
-            ports => {
-                let list: Vec<&str> = ports.iter().map(|p| p.name.text.as_str()).collect();
-                let title = format!("which port of `{}`?", component.name.text);
-                let name = self.names.scopes[inner].prefix.clone();
-                let d = Diagnostic::error(codes::B009, title, span, "a bond ends at a port");
-                self.faults.push(match list.first() {
-                    Some(first) => d
-                        .note(format!("its ports are {}", list.join(", ")))
-                        .hint(format!("declare it on a line of its own and write `{name}{first}` here")),
-                    None => d.note("it has no ports"),
-                });
-                At::Broken
-            }
-        }
-    }
-
-    /// What a path stands for as the end of a bond.
-    fn named_end(&mut self, scope: ScopeId, path: &'a ast::Path) -> At {
-        let (node, used) = match self.names.walk(scope, path, &mut |node, span| self.uses.add(Used::Node(node), span)) {
-            Ok(found) => found,
-            Err(fault) => {
-                self.faults.push(*fault);
-                return At::Broken;
-            }
-        };
-        let rest = &path.parts[used..];
-        match (node, rest) {
-            (Node::Part(part), []) => At::Part(part, None),
-            (Node::Part(part), [port]) => self.named_port(part, &port.name),
-            (Node::Instance(inner), []) => self.only_port(inner, path.span),
-            (Node::Joint(joint), []) if used == 1 => At::Inside(joint),
-            (Node::Joint(joint), []) => At::Outside(joint),
-            (Node::Broken, _) => At::Broken,
-            _ => {
-                let what = match node {
-                    Node::Bond(_) => "a bond",
-                    Node::Constraint(_) => "a constraint",
-                    Node::Instance(_) => "a signal",
-                    _ => "a variable",
-                };
-                let title = format!("a bond cannot end at {what}");
-                self.faults
-                    .push(Diagnostic::error(codes::B008, title, path.span, "here").hint("name an element or a port"));
-                At::Broken
-            }
-        }
-    }
-
-    /// The port of an element by its name.
-    fn named_port(&mut self, part: usize, port: &ast::Name) -> At {
-        let p = &self.parts[part];
-        let list: Vec<&str> = match p.word.is_two_port() {
-            true => vec!["in", "out"],
-            false => p.ast.ports.iter().map(|n| n.text.as_str()).collect(),
-        };
-        if let Some(at) = list.iter().position(|name| *name == port.text) {
-            return At::Part(part, Some(at));
-        }
-        let title = format!("`{}` has no port `{}`", p.name, port.text);
-        let d = Diagnostic::error(codes::N001, title, port.span, "not known").also(p.ast.span, "declared here");
-        self.faults.push(match (nearest(&port.text, list.iter().copied()), list.is_empty()) {
-            (Some(near), _) => d.hint(format!("did you mean `{near}`?")),
-            (None, true) => d.hint(format!("write `{}`", p.ast.name.text)),
-            (None, false) => d.hint(format!("its ports are {}", list.join(", "))),
-        });
-        At::Broken
-    }
-}
-
-/// The kind that a word of one domain stands for, and what it is in a bond graph.
-fn usual_name(word: &str) -> Option<(&'static str, &'static str)> {
-    Some(match word {
-        "L" | "Inductor" | "Coil" => ("I", "an inductance is an inertance"),
-        "M" | "m" | "J" | "Mass" | "Inertia" => ("I", "a mass is an inertance"),
-        "K" | "k" | "Spring" => ("C", "a spring is a compliance; `k = …` gives its stiffness"),
-        "Capacitor" => ("C", "a capacitor is a compliance"),
-        "B" | "b" | "D" | "Damper" | "Resistor" | "Friction" => ("R", "a damper is a resistor"),
-        "G" => ("R", "a conductance is a resistor; `g = …` gives it"),
-        "V" | "U" | "F" | "P" | "E" => ("Se", "a voltage, force or pressure is a source of effort"),
-        "Q" => ("Sf", "a flow that is given is a source of flow"),
-        "SE" | "se" => ("Se", "kinds are written like this"),
-        "SF" | "sf" => ("Sf", "kinds are written like this"),
-        "Gear" | "Lever" => ("TF", "its ratio is the modulus of a transformer"),
-        _ => return None,
-    })
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::builder::Builder;
-use super::scope::ScopeId;
+use super::scope::Here;
 use super::value::Reading;
 use super::{BondGraph, Guess, Kind, Meaning, StorageLaw};
 use crate::algebra::{Expr, Node, Symbol};
@@ -17,8 +17,11 @@ impl<'a> Builder<'a, '_> {
         let flat = self.flat;
         let mut first: BTreeMap<Symbol, Span> = BTreeMap::new();
         let mut guesses = Vec::new();
-        for &(scope, guess) in &flat.guesses {
-            let Some((symbol, entry)) = self.guess(scope, guess) else { continue };
+        for &(here, guess) in &flat.guesses {
+            let before = self.faults.len();
+            let found = self.guess(here, guess);
+            self.met_in(here, before);
+            let Some((symbol, entry)) = found else { continue };
             match first.get(&symbol) {
                 Some(&before) => self.guessed_twice(symbol, before, guess.span),
                 None => {
@@ -30,9 +33,9 @@ impl<'a> Builder<'a, '_> {
         guesses
     }
 
-    fn guess(&mut self, scope: ScopeId, guess: &'a ast::Guess) -> Option<(Symbol, Guess)> {
+    fn guess(&mut self, here: Here, guess: &'a ast::Guess) -> Option<(Symbol, Guess)> {
         let flat = self.flat;
-        let cx = Reading::of(scope, flat.names.scopes[scope].prefix.trim_end_matches('.'));
+        let cx = Reading::of(here, flat.names.scopes[here.scope].prefix.trim_end_matches('.'));
         let own = self.path(&cx, &guess.what)?;
         let symbol = self.searched(own.expr, guess.what.span)?;
         let value = self.number(&cx, &guess.value)?;

@@ -1,8 +1,11 @@
 //! What the modeller asks of causality: `prefer`, `causality`, `stroke`.
 
+use std::collections::BTreeMap;
+
 use super::builder::Builder;
+use super::families::spelled;
 use super::flatten::Word;
-use super::scope::{Node, ScopeId};
+use super::scope::{Here, Node, no_indices};
 use super::uses::Used;
 use super::{ForcedCausality, ForcedStroke, PortCausality, PortRef, Preference};
 use crate::algebra::Symbol;
@@ -14,24 +17,41 @@ impl<'a> Builder<'a, '_> {
     /// The entries of all `prefer` statements.
     pub fn preferences(&mut self) -> Vec<Preference> {
         let flat = self.flat;
-        let entries = flat.prefer.iter();
-        let written = |scope: ScopeId, path: &ast::Path| {
-            let parts: Vec<&str> = path.parts.iter().map(|p| p.name.text.as_str()).collect();
-            format!("{}{}", flat.names.scopes[scope].prefix, parts.join("."))
-        };
         let mut found = Vec::new();
-        for (scope, path) in entries {
-            if let Some(symbol) = self.preferred(*scope, path) {
-                found.push(Preference { name: written(*scope, path), symbol, span: path.span });
+        for &(here, path) in &flat.prefer {
+            let before = self.faults.len();
+            if let Some(symbol) = self.preferred(here, path) {
+                let name = format!("{}{}", flat.names.scopes[here.scope].prefix, self.written(here, path));
+                found.push(Preference { name, symbol, span: path.span });
             }
+            self.met_in(here, before);
         }
         found
     }
 
+    /// A dotted name as it stands in results.
+    fn written(&mut self, here: Here, path: &'a ast::Path) -> String {
+        let mut parts: Vec<String> = Vec::with_capacity(path.parts.len());
+        for part in &path.parts {
+            let indices = self.repeats.indices(&self.flat.names, here, &part.indices).unwrap_or_default();
+            parts.push(spelled(&part.name.text, &indices));
+        }
+        parts.join(".")
+    }
+
     /// A dotted name as a node and the names that follow it.
-    fn node_of(&mut self, scope: ScopeId, path: &'a ast::Path) -> Option<(Node, Vec<&'a ast::Name>)> {
-        match self.flat.names.walk(scope, path, &mut |node, span| self.uses.add(Used::Node(node), span)) {
-            Ok((node, used)) => Some((node, path.parts[used..].iter().map(|p| &p.name).collect())),
+    fn node_of(&mut self, here: Here, path: &'a ast::Path) -> Option<(Node, Vec<&'a ast::Name>)> {
+        let uses = &mut self.uses;
+        let visit = &mut |node, span| uses.add(Used::Node(node), span);
+        match self.flat.names.walk(&mut self.repeats, here, path, visit) {
+            Ok((node, used)) => {
+                let rest = &path.parts[used..];
+                if let Some((part, index)) = rest.iter().find_map(|p| Some((p, p.indices.first()?))) {
+                    self.fault(no_indices(&part.name, index.span));
+                    return None;
+                }
+                Some((node, rest.iter().map(|p| &p.name).collect()))
+            }
             Err(fault) => {
                 self.fault(*fault);
                 None
@@ -39,8 +59,8 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn preferred(&mut self, scope: ScopeId, path: &'a ast::Path) -> Option<Symbol> {
-        let (node, rest) = self.node_of(scope, path)?;
+    fn preferred(&mut self, here: Here, path: &'a ast::Path) -> Option<Symbol> {
+        let (node, rest) = self.node_of(here, path)?;
         let rest: Vec<&str> = rest.iter().map(|n| n.text.as_str()).collect();
         let wire = match (node, rest.as_slice()) {
             (Node::Broken, _) => return None,
@@ -73,7 +93,7 @@ impl<'a> Builder<'a, '_> {
             _ => return None,
         };
         let slot = port.unwrap_or(0);
-        let several = p.word.is_law() && p.ast.ports.len() > 1 || p.word.is_two_port();
+        let several = p.word.is_law() && p.ports.len() > 1 || p.word.is_two_port();
         if several && port.is_none() {
             self.not_preferable(span, "which port?");
             return None;
@@ -99,7 +119,7 @@ impl<'a> Builder<'a, '_> {
         match name {
             "in" if p.word.is_two_port() => Some(0),
             "out" if p.word.is_two_port() => Some(1),
-            _ => p.ast.ports.iter().position(|n| n.text == name),
+            _ => p.ports.iter().position(|n| n.text == name),
         }
     }
 
@@ -107,8 +127,10 @@ impl<'a> Builder<'a, '_> {
     pub fn forced_causality(&mut self) -> Vec<ForcedCausality> {
         let flat = self.flat;
         let mut forced: Vec<ForcedCausality> = Vec::new();
-        for (scope, entry) in &flat.causality {
-            for port in self.forced_ports(*scope, entry) {
+        let mut first: BTreeMap<PortRef, usize> = BTreeMap::new();
+        for &(here, entry) in &flat.causality {
+            let before = self.faults.len();
+            for port in self.forced_ports(here, entry) {
                 let span = entry.element.span.to(entry.span);
                 let causality = match entry.causality {
                     Causality::Integral => PortCausality::Integral,
@@ -116,7 +138,8 @@ impl<'a> Builder<'a, '_> {
                     Causality::Resistive => PortCausality::Resistive,
                     Causality::Conductive => PortCausality::Conductive,
                 };
-                match forced.iter().find(|f| f.port == port) {
+                let at = *first.entry(port).or_insert(forced.len());
+                match forced.get(at) {
                     Some(first) if first.causality == causality => {}
                     Some(first) => {
                         let d = Diagnostic::error(codes::B010, "one element is forced two ways", span, "forced again")
@@ -126,12 +149,13 @@ impl<'a> Builder<'a, '_> {
                     None => forced.push(ForcedCausality { port, causality, span }),
                 }
             }
+            self.met_in(here, before);
         }
         forced
     }
 
-    fn forced_ports(&mut self, scope: ScopeId, entry: &'a ast::ForcedCausality) -> Vec<PortRef> {
-        let Some((node, rest)) = self.node_of(scope, &entry.element) else { return Vec::new() };
+    fn forced_ports(&mut self, here: Here, entry: &'a ast::ForcedCausality) -> Vec<PortRef> {
+        let Some((node, rest)) = self.node_of(here, &entry.element) else { return Vec::new() };
         let Node::Part(part) = node else {
             if node != Node::Broken {
                 self.not_forcible(entry, "not an element");
@@ -177,28 +201,32 @@ impl<'a> Builder<'a, '_> {
     pub fn forced_strokes(&mut self) -> Vec<ForcedStroke> {
         let flat = self.flat;
         let mut forced: Vec<ForcedStroke> = Vec::new();
-        for (scope, stroke, span) in &flat.strokes {
-            let Some((wire, at_to)) = self.stroke(*scope, stroke) else { continue };
-            let bond = Self::bond_id(wire);
-            match forced.iter().find(|f| f.bond == bond && f.at_to != at_to) {
-                Some(first) => {
-                    let d = Diagnostic::error(codes::B010, "one bond has a stroke at both ends", *span, "here")
-                        .also(first.span, "and here");
-                    self.fault(d.hint("remove one of them"));
+        let mut sides: BTreeMap<(usize, bool), Span> = BTreeMap::new();
+        for &(here, stroke, span) in &flat.strokes {
+            let before = self.faults.len();
+            if let Some((wire, at_to)) = self.stroke(here, stroke) {
+                sides.entry((wire, at_to)).or_insert(span);
+                match sides.get(&(wire, !at_to)) {
+                    Some(first) => {
+                        let d = Diagnostic::error(codes::B010, "one bond has a stroke at both ends", span, "here")
+                            .also(*first, "and here");
+                        self.fault(d.hint("remove one of them"));
+                    }
+                    None => forced.push(ForcedStroke { bond: Self::bond_id(wire), at_to, span }),
                 }
-                None => forced.push(ForcedStroke { bond, at_to, span: *span }),
             }
+            self.met_in(here, before);
         }
         forced
     }
 
     /// The bond of a stroke, and whether the stroke is where the half arrow is.
-    fn stroke(&mut self, scope: ScopeId, stroke: &'a ast::ForcedStroke) -> Option<(usize, bool)> {
+    fn stroke(&mut self, here: Here, stroke: &'a ast::ForcedStroke) -> Option<(usize, bool)> {
         let wire = match &stroke.bond {
-            StrokeBond::Between(from, to) => self.bond_between(scope, from, to)?,
-            StrokeBond::Named(name) => self.bond_named(scope, name)?,
+            StrokeBond::Between(from, to) => self.bond_between(here, from, to)?,
+            StrokeBond::Named(name) => self.bond_named(here, name)?,
         };
-        let (at, slot) = self.stroke_end(scope, &stroke.at)?;
+        let (at, slot) = self.stroke_end(here, &stroke.at)?;
         let w = &self.wiring.wires[wire];
         let is = |end: (usize, usize)| end.0 == at && slot.is_none_or(|s| s == end.1);
         if is(w.to) {
@@ -219,8 +247,8 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// A part, and a port of it if one is named.
-    fn stroke_end(&mut self, scope: ScopeId, path: &'a ast::Path) -> Option<(usize, Option<usize>)> {
-        let (node, rest) = self.node_of(scope, path)?;
+    fn stroke_end(&mut self, here: Here, path: &'a ast::Path) -> Option<(usize, Option<usize>)> {
+        let (node, rest) = self.node_of(here, path)?;
         match (node, rest.as_slice()) {
             (Node::Part(part), []) => Some((part, None)),
             (Node::Part(part), [port]) if self.port_named(part, &port.text).is_some() => {
@@ -242,10 +270,17 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn bond_named(&mut self, scope: ScopeId, name: &'a ast::Name) -> Option<usize> {
-        match self.flat.names.scopes[scope].nodes.get(name.text.as_str()) {
-            Some(&(node @ Node::Bond(drawn), _)) => {
-                self.uses.add(Used::Node(node), name.span);
+    fn bond_named(&mut self, here: Here, part: &'a ast::PathPart) -> Option<usize> {
+        let name = &part.name;
+        let named = self.flat.names.scopes[here.scope].nodes.get(name.text.as_str()).map(|(node, _)| *node);
+        let node = named.map(|node| self.flat.names.with_indices(&mut self.repeats, here, node, part));
+        match node {
+            Some(Err(fault)) => {
+                self.fault(*fault);
+                None
+            }
+            Some(Ok(Node::Bond(drawn))) => {
+                named.into_iter().for_each(|node| self.uses.add(Used::Node(node), name.span));
                 self.wiring.of_drawn[drawn]
             }
             _ => {
@@ -262,8 +297,8 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The bond from one element to another.
-    fn bond_between(&mut self, scope: ScopeId, from: &'a ast::Path, to: &'a ast::Path) -> Option<usize> {
-        let (a, b) = (self.stroke_end(scope, from), self.stroke_end(scope, to));
+    fn bond_between(&mut self, here: Here, from: &'a ast::Path, to: &'a ast::Path) -> Option<usize> {
+        let (a, b) = (self.stroke_end(here, from), self.stroke_end(here, to));
         let ((a, a_slot), (b, b_slot)) = (a?, b?);
         let fits =
             |end: (usize, usize), part: usize, slot: Option<usize>| end.0 == part && slot.is_none_or(|s| s == end.1);

@@ -4,7 +4,7 @@ use super::Meaning;
 use super::builder::{Builder, Role, Value};
 use super::dimension::Quantity;
 use super::flatten::Word;
-use super::scope::{DeclId, DeclKind, Node, ScopeId};
+use super::scope::{DeclId, DeclKind, Node, ScopeId, Valued, no_indices};
 use super::uses::Used;
 use super::value::Reading;
 use crate::algebra::{Expr, Symbol, SymbolKind};
@@ -16,37 +16,66 @@ use crate::unit::Dimension as Dim;
 
 impl<'a> Builder<'a, '_> {
     /// The value of a name, bare or dotted.
-    pub fn path(&mut self, cx: &Reading<'_>, path: &ast::Path) -> Option<Value> {
-        if path.parts.iter().any(|p| p.index.is_some()) {
-            self.incomplete = true;
-            return None;
+    pub fn path(&mut self, cx: &Reading<'_>, path: &'a ast::Path) -> Option<Value> {
+        match path.parts.as_slice() {
+            [one] => self.bare(cx, one),
+            _ => self.dotted(cx, path),
         }
-        if path.parts.len() == 1 { self.bare(cx, &path.parts[0].name) } else { self.dotted(cx, path) }
     }
 
-    fn bare(&mut self, cx: &Reading<'_>, name: &ast::Name) -> Option<Value> {
-        let text = name.text.as_str();
-        if let Some((_, symbol)) = cx.formals.iter().find(|(n, _)| *n == text) {
+    fn bare(&mut self, cx: &Reading<'_>, part: &'a ast::PathPart) -> Option<Value> {
+        let (name, text) = (&part.name, part.name.text.as_str());
+        let plain = part.indices.is_empty();
+        if let Some((_, symbol)) = cx.formals.iter().find(|(n, _)| *n == text && plain) {
             return Some(Value::number(self.exprs.sym(*symbol), Quantity::Any));
         }
         if cx.law
+            && plain
             && let Some(found) = self.own(cx, text, None, name.span)
         {
             return found;
         }
         match text {
-            "t" => return Some(self.symbol_value(self.time)),
-            "pi" => return Some(Value::number(self.exprs.pi(), Quantity::NONE)),
+            "t" if plain => return Some(self.symbol_value(self.time)),
+            "pi" if plain => return Some(Value::number(self.exprs.pi(), Quantity::NONE)),
             _ => {}
         }
-        if let Some(decl) = self.flat.names.value(cx.scope, text) {
-            self.uses.add(Used::Value(decl), name.span);
-            return self.declared(decl, name.span);
+        if let Some(value) = self.repeats.variable(cx.here.turn, text).filter(|_| plain) {
+            return Some(Value::number(self.exprs.int(value), Quantity::Any));
         }
-        if let Some(found) = self.own(cx, text, None, name.span) {
+        if let Some(value) = self.flat.names.value(cx.here.scope, text) {
+            return self.valued(cx, value, part);
+        }
+        if let Some(found) = self.own(cx, text, None, name.span).filter(|_| plain) {
             return found;
         }
         self.unknown(cx, name);
+        None
+    }
+
+    /// The value of a name with its indices.
+    fn valued(&mut self, cx: &Reading<'_>, value: Valued, part: &'a ast::PathPart) -> Option<Value> {
+        self.uses.add(Used::of(value), part.name.span);
+        let names = &self.flat.names;
+        if let (Valued::Family(family), Some(array), true) = (value, cx.array, part.indices.is_empty())
+            && !cx.item.is_empty()
+            && !names.value_families[family].is_like(&names.value_families[array])
+        {
+            return self.unlike(part, names.value_families[family].words(&part.name.text));
+        }
+        match names.decl_of(&mut self.repeats, cx.here, value, part, cx.item) {
+            Ok(decl) => self.declared(decl, part.name.span),
+            Err(fault) => {
+                self.fault(*fault);
+                None
+            }
+        }
+    }
+
+    fn unlike(&mut self, part: &ast::PathPart, words: String) -> Option<Value> {
+        let title = format!("`{}` has not the indices of this array", part.name.text);
+        let d = Diagnostic::error(codes::N021, title, part.name.span, "an array of another shape");
+        self.fault(d.note(words).hint("read single elements in a list: `[a[i] for i in 1..n]`"));
         None
     }
 
@@ -80,18 +109,18 @@ impl<'a> Builder<'a, '_> {
         if !has || p.word.is_two_port() {
             return None;
         }
-        let slot = match (port, p.ast.ports.len()) {
+        let slot = match (port, p.ports.len()) {
             (None, 0 | 1) => 0,
             (None, _) if !cx.law => return None,
             (None, _) => {
-                let first = &p.ast.ports[0].text;
+                let first = &p.ports[0].text;
                 self.fault(
                     Diagnostic::error(codes::B009, format!("`{name}` of which port?"), span, "the element has several")
                         .hint(format!("write `{name}.{first}`")),
                 );
                 return Some(None);
             }
-            (Some(port), _) => p.ast.ports.iter().position(|n| n.text == port.text)?,
+            (Some(port), _) => p.ports.iter().position(|n| n.text == port.text)?,
         };
         Some(self.port_variable(part, slot, name))
     }
@@ -114,7 +143,7 @@ impl<'a> Builder<'a, '_> {
             name.span,
             "no such parameter or signal",
         );
-        if let Some((node, span)) = self.flat.names.scopes[cx.scope].nodes.get(text).copied() {
+        if let Some((node, span)) = self.flat.names.scopes[cx.here.scope].nodes.get(text).copied() {
             let variable = self.example_variable(node);
             return self.fault(
                 d.also(span, "there is an element of that name")
@@ -129,7 +158,7 @@ impl<'a> Builder<'a, '_> {
                     .hint("an I has e, f, p; a C has e, f, q; an R has e, f"),
             );
         }
-        let near = nearest(text, self.flat.names.visible_values(cx.scope));
+        let near = nearest(text, self.flat.names.visible_values(cx.here.scope));
         self.fault(match near {
             Some(near) => d.hint(format!("did you mean `{near}`?")),
             None => d.hint(format!("declare it: `param {text} = …`")),
@@ -149,7 +178,7 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn dotted(&mut self, cx: &Reading<'_>, path: &ast::Path) -> Option<Value> {
+    fn dotted(&mut self, cx: &Reading<'_>, path: &'a ast::Path) -> Option<Value> {
         let first = &path.parts[0].name;
         if path.parts.len() == 2
             && matches!(first.text.as_str(), "e" | "f" | "q" | "p")
@@ -157,21 +186,29 @@ impl<'a> Builder<'a, '_> {
         {
             return found;
         }
-        let visit = &mut |node, span| self.uses.add(Used::Node(node), span);
-        let (node, used) = match self.flat.names.walk(cx.scope, path, visit) {
+        let uses = &mut self.uses;
+        let visit = &mut |node, span| uses.add(Used::Node(node), span);
+        let (node, used) = match self.flat.names.walk(&mut self.repeats, cx.here, path, visit) {
             Ok(found) => found,
             Err(fault) => {
                 self.fault(*fault);
                 return None;
             }
         };
-        let rest: Vec<&ast::Name> = path.parts[used..].iter().map(|p| &p.name).collect();
+        let rest = &path.parts[used..];
+        if let (Node::Instance(inner), [part]) = (node, rest) {
+            return self.inner_value(cx, inner, part);
+        }
+        if let Some((part, index)) = rest.iter().find_map(|p| Some((p, p.indices.first()?))) {
+            self.fault(no_indices(&part.name, index.span));
+            return None;
+        }
+        let rest: Vec<&ast::Name> = rest.iter().map(|p| &p.name).collect();
         match (node, rest.as_slice()) {
             (Node::Broken, _) => None,
             (Node::Part(part), [port]) if self.is_port(part, &port.text) => self.incomplete_port(port, path),
             (Node::Part(part), [variable]) => self.element_variable(part, variable),
             (Node::Part(part), [port, variable]) => self.named_port_variable(part, port, variable),
-            (Node::Instance(inner), [name]) => self.inner_value(inner, name),
             (Node::Joint(joint), [variable]) => self.pair_variable(self.wiring.of_joint[joint], variable),
             (Node::Bond(drawn), [variable]) => self.pair_variable(self.wiring.of_drawn[drawn], variable),
             (Node::Constraint(c), [variable]) => self.reaction_variable(c, variable),
@@ -194,7 +231,7 @@ impl<'a> Builder<'a, '_> {
     fn is_port(&self, part: usize, name: &str) -> bool {
         let p = self.part(part);
         p.word.is_two_port() && matches!(name, "in" | "out")
-            || p.ast.ports.iter().any(|n| n.text == name) && !matches!(name, "e" | "f" | "q" | "p")
+            || p.ports.iter().any(|n| n.text == name) && !matches!(name, "e" | "f" | "q" | "p")
     }
 
     fn incomplete_port(&mut self, port: &ast::Name, path: &ast::Path) -> Option<Value> {
@@ -216,12 +253,10 @@ impl<'a> Builder<'a, '_> {
         None
     }
 
-    fn inner_value(&mut self, inner: ScopeId, name: &ast::Name) -> Option<Value> {
+    fn inner_value(&mut self, cx: &Reading<'_>, inner: ScopeId, part: &'a ast::PathPart) -> Option<Value> {
+        let name = &part.name;
         match self.flat.names.scopes[inner].values.get(name.text.as_str()) {
-            Some(&decl) => {
-                self.uses.add(Used::Value(decl), name.span);
-                self.declared(decl, name.span)
-            }
+            Some(&value) => self.valued(cx, value, part),
             None => {
                 let names = &self.flat.names;
                 let owner = names.scopes[inner].prefix.trim_end_matches('.');
@@ -247,7 +282,7 @@ impl<'a> Builder<'a, '_> {
                 return Some(self.symbol_value(symbol));
             }
             (w, "e" | "f") if w.is_junction() || w.is_two_port() => None,
-            (_, "e" | "f") | (Word::C, "q") | (Word::I, "p") => (p.ast.ports.len() < 2).then_some(0),
+            (_, "e" | "f") | (Word::C, "q") | (Word::I, "p") => (p.ports.len() < 2).then_some(0),
             _ => {
                 self.no_such_variable(part, variable);
                 return None;
@@ -280,7 +315,7 @@ impl<'a> Builder<'a, '_> {
                 format!("write `{short}.in.{name}` or `{short}.out.{name}`"),
             ),
             _ => {
-                let first = &p.ast.ports[0].text;
+                let first = &p.ports[0].text;
                 (format!("`{name}` of which port of `{}`?", p.name), format!("write `{short}.{first}.{name}`"))
             }
         };
@@ -312,10 +347,10 @@ impl<'a> Builder<'a, '_> {
         let slot = match (p.word.is_two_port(), port.text.as_str()) {
             (true, "in") => Some(0),
             (true, "out") => Some(1),
-            _ => p.ast.ports.iter().position(|n| n.text == port.text),
+            _ => p.ports.iter().position(|n| n.text == port.text),
         };
         let Some(slot) = slot else {
-            let list: Vec<&str> = p.ast.ports.iter().map(|n| n.text.as_str()).collect();
+            let list: Vec<&str> = p.ports.iter().map(|n| n.text.as_str()).collect();
             let title = format!("`{}` has no port `{}`", p.name, port.text);
             let d = Diagnostic::error(codes::N001, title, port.span, "not known").also(p.ast.span, "declared here");
             self.fault(if list.is_empty() { d } else { d.hint(format!("its ports are {}", list.join(", "))) });

@@ -45,10 +45,10 @@ impl Builder<'_, '_> {
     /// Reads the unit of a number; where there is no such unit but a declared name, a product is meant.
     pub fn unit_of_number(&mut self, cx: &Reading<'_>, n: &ast::Number, unit: &ast::UnitText) -> Option<Scale> {
         let names = [unit.text.as_str(), Unit::first_symbol(&unit.text)];
-        let declared = |name: &str| Some((name.to_string(), self.flat.names.value(cx.scope, name)?));
+        let declared = |name: &str| Some((name.to_string(), self.flat.names.value(cx.here.scope, name)?));
         match (Unit::parse(&unit.text), names.into_iter().find_map(declared)) {
             (Err(why), Some((symbol, decl))) => {
-                let declared = self.flat.names.decls[decl].span;
+                let declared = self.flat.names.span_of(decl);
                 let hint = format!("write `{}*{symbol}` for the product", n.text);
                 self.fault(why.at(unit.span).also(declared, format!("`{symbol}` is declared here")).hint(hint));
                 None

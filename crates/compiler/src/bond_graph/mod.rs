@@ -6,20 +6,27 @@
 //! held signals, and the effort, flow and stored quantity of bonds and ports. What the modeller wrote as `R1.f` is the
 //! flow of the bond at `R1`; `w.f` of a 1-junction is the flow of any of its bonds.
 
+mod arrays;
 mod assemble;
 mod blocks;
 mod builder;
 mod common;
 mod constraint;
 mod csv;
+mod declare;
 mod decls;
 mod dimension;
 mod elaborate;
 mod elements;
+mod ends;
 mod expressions;
+mod families;
+mod faults;
 mod files;
+mod fixed;
 mod flatten;
 mod guesses;
+mod instances;
 mod intent;
 mod load;
 mod lookup;
@@ -28,9 +35,11 @@ mod names;
 mod overrides;
 mod print;
 mod recognise;
+mod repeat;
 mod scope;
 mod structure;
 mod symbols;
+mod turns;
 mod two_ports;
 mod uses;
 mod value;
@@ -71,6 +80,14 @@ id!(
 id!(
     /// An integrated signal (`state x' = …`, and the states of `pid` and `tf`).
     SignalId
+);
+id!(
+    /// A repetition of statements.
+    RepetitionId
+);
+id!(
+    /// A turn of a repetition.
+    CellId
 );
 id!(
     /// A signal held from earlier times (`delay`, `sample`).
@@ -122,6 +139,32 @@ pub struct BondGraph {
     pub constraints: Vec<Constraint>,
     /// Time, as a symbol.
     pub time: Symbol,
+    /// The repetitions of statements (`for`).
+    pub repetitions: Table<RepetitionId, Repetition>,
+    /// Their turns, in the order in which they are made.
+    pub cells: Table<CellId, Cell>,
+}
+
+/// A `for` around statements, of the model or of one instance of a component.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Repetition {
+    /// Its variable.
+    pub variable: String,
+    /// The instance that it stands in; empty for the model itself.
+    pub within: String,
+    /// Where the variable is declared.
+    pub span: Span,
+}
+
+/// One turn of a repetition: what is made in it is made of the same text as what other turns of it make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell {
+    /// The repetition.
+    pub repetition: RepetitionId,
+    /// The value of its variable.
+    pub value: i64,
+    /// The turn of the repetition around it, or around the instance that it stands in.
+    pub outer: Option<CellId>,
 }
 
 /// A symbol's meaning, unit and place.
@@ -178,6 +221,8 @@ pub struct Element {
     pub span: Span,
     /// The law or value as the modeller wrote it, for drawings: `k = ks`, `e = b*f^3`; empty for junctions.
     pub label: String,
+    /// The turn of a repetition that it is made in, if it is.
+    pub cell: Option<CellId>,
 }
 
 /// A port and its bond.
@@ -328,8 +373,11 @@ pub struct Parameter {
     pub symbol: Symbol,
     /// Its value, a number or an expression of other parameters, in SI.
     pub value: Expr,
-    /// Whether it is a `const`.
+    /// Whether it stays as it is while the model runs: it is a `const`, or shapes the model.
     pub constant: bool,
+    /// Whether it shapes the model, as the number of turns of a repetition does: only a model that is compiled anew has
+    /// another value of it.
+    pub shapes: bool,
     /// What it is.
     pub kind: ParameterKind,
     /// Unit as written.
@@ -528,6 +576,8 @@ impl BondGraph {
             guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
             time: self.time,
+            repetitions: self.repetitions.clone(),
+            cells: self.cells.clone(),
         }
     }
     /// The bond at a port.

@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
 use super::flatten::Flat;
-use super::scope::{ComponentId, DeclId, DeclKind, Node};
+use super::scope::{ComponentId, Decl, DeclKind, Node, Scope, Valued};
 use super::uses::{Used, Uses};
 use crate::ast::Ast;
 use crate::diagnostic::Sources;
@@ -84,15 +84,17 @@ impl NameKind {
 /// A name that the text of a model declares, and the places at which the text uses it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Name {
-    /// The name, within instances with theirs before it: `crane.motor.r`. Of files the path.
+    /// The name, within instances with theirs before it: `crane.motor.r`. Of files the path. Elements with indices have
+    /// one name together: `spring` for `spring[1]` to `spring[9]`.
     pub name: String,
     /// What it stands for.
     pub kind: NameKind,
     /// Where the name is declared. What a component declares stands there for each of its instances. `None` for tables,
     /// which are no model text; a file that is imported is declared by its beginning.
     pub declared: Option<Span>,
-    /// Where it is used: its name alone, without what stands before or behind the dots. In the order of the files and of
-    /// their text, each place once. A place inside a component counts for each instance that names something else by it.
+    /// Where it is used, and where further elements of it are declared: its name alone, without what stands before or behind
+    /// the dots. In the order of the files and of their text, each place once. A place inside a component counts for each
+    /// instance that names something else by it.
     pub uses: Vec<Span>,
 }
 
@@ -105,6 +107,7 @@ pub(super) fn table(
     sources: &Sources,
 ) -> Vec<Name> {
     uses.places.extend(&flat.uses.places);
+    flat.repeats.add_uses(&flat.names, &mut uses);
     uses.places.sort_unstable();
     uses.places.dedup();
     let mut places: FxHashMap<Used, Vec<Span>> = FxHashMap::default();
@@ -151,37 +154,57 @@ fn in_order(mut places: Vec<Span>) -> Vec<Span> {
 }
 
 fn values(flat: &Flat<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
-    let name = |(id, d): (DeclId, &super::scope::Decl<'_>)| {
-        let kind = match d.kind {
-            DeclKind::Parameter { constant: false, .. } => NameKind::Parameter,
-            DeclKind::Parameter { constant: true, .. } => NameKind::Constant,
-            DeclKind::Input(_) => NameKind::Input,
-            DeclKind::Let(_) => NameKind::Let,
-            DeclKind::Output(_) => NameKind::Output,
-            DeclKind::State(_) => NameKind::State,
-            DeclKind::Function(_) => NameKind::Function,
-        };
-        Name { name: d.name.clone(), kind, declared: Some(d.span), uses: uses(Used::Value(id)) }
-    };
-    flat.names.decls.iter().enumerate().map(name).collect()
+    let names = &flat.names;
+    let mut all = Vec::with_capacity(names.decls.len());
+    for scope in &names.scopes {
+        for (own, &value) in &scope.values {
+            let first = match value {
+                Valued::One(decl) => Some(decl),
+                Valued::Family(family) => names.value_families[family].first().copied(),
+            };
+            if let Some(decl) = first {
+                let (kind, declared) = (kind_of(&names.decls[decl]), Some(names.span_of(value)));
+                all.push(Name { name: [&scope.prefix, *own].concat(), kind, declared, uses: uses(Used::of(value)) });
+            }
+        }
+    }
+    all
+}
+
+fn kind_of(decl: &Decl<'_>) -> NameKind {
+    match decl.kind {
+        DeclKind::Parameter { constant: false, .. } => NameKind::Parameter,
+        DeclKind::Parameter { constant: true, .. } => NameKind::Constant,
+        DeclKind::Input(_) => NameKind::Input,
+        DeclKind::Let(_) => NameKind::Let,
+        DeclKind::Output(_) => NameKind::Output,
+        DeclKind::State(_) => NameKind::State,
+        DeclKind::Function(_) => NameKind::Function,
+    }
 }
 
 fn nodes(flat: &Flat<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
-    let mut all = Vec::new();
-    for scope in &flat.names.scopes {
-        for (own, &(node, declared)) in &scope.nodes {
-            let kind = match node {
-                Node::Part(part) if flat.parts[part].word.is_junction() => NameKind::Junction,
-                Node::Part(_) => NameKind::Element,
-                Node::Instance(_) => NameKind::Instance,
-                Node::Joint(_) => NameKind::Port,
-                Node::Bond(_) => NameKind::Bond,
-                Node::Constraint(_) => NameKind::Constraint,
-                Node::Broken => continue,
-            };
-            let name = [&scope.prefix, *own].concat();
-            all.push(Name { name, kind, declared: Some(declared), uses: uses(Used::Node(node)) });
-        }
+    flat.names.scopes.iter().flat_map(|scope| nodes_of(flat, scope, uses)).collect()
+}
+
+fn nodes_of(flat: &Flat<'_>, scope: &Scope<'_>, uses: &mut dyn FnMut(Used) -> Vec<Span>) -> Vec<Name> {
+    let mut all = Vec::with_capacity(scope.nodes.len());
+    for (own, &(node, declared)) in &scope.nodes {
+        let one = match node {
+            Node::Family(family) => flat.names.node_families[family].first().map(|(node, _)| *node),
+            node => Some(node),
+        };
+        let kind = match one {
+            Some(Node::Part(part)) if flat.parts[part].word.is_junction() => NameKind::Junction,
+            Some(Node::Part(_)) => NameKind::Element,
+            Some(Node::Instance(_)) => NameKind::Instance,
+            Some(Node::Joint(_)) => NameKind::Port,
+            Some(Node::Bond(_)) => NameKind::Bond,
+            Some(Node::Constraint(_)) => NameKind::Constraint,
+            Some(Node::Broken | Node::Family(_)) | None => continue,
+        };
+        let name = [&scope.prefix, *own].concat();
+        all.push(Name { name, kind, declared: Some(declared), uses: uses(Used::Node(node)) });
     }
     all
 }

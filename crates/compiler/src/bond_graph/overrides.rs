@@ -1,8 +1,11 @@
 //! Values of parameters that replace those of the model (`--set k=3`).
 
-use super::decls::unit_of_literal;
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
 use super::flatten::Flat;
-use super::scope::DeclKind;
+use super::scope::{Decl, DeclId, DeclKind, Valued};
 use crate::ast::{self, Expr, StatementKind};
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, Sources, codes};
@@ -14,7 +17,7 @@ use crate::span::Span;
 /// that a number without a unit is SI, or in the unit after the `:` of the declaration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Override {
-    /// Full name of the parameter, such as `k` or `motor.r`.
+    /// Full name of the parameter, such as `k`, `motor.r` or `k[3]`; `k` sets all of an array.
     pub name: String,
     /// Its value as text.
     pub value: String,
@@ -22,8 +25,10 @@ pub struct Override {
 
 /// An override that has been read.
 pub(super) struct Given {
-    name: String,
-    value: Expr,
+    /// Full name of the parameter, or of an array of parameters.
+    pub name: String,
+    /// Its value.
+    pub value: Expr,
     span: Span,
 }
 
@@ -46,7 +51,10 @@ pub(super) fn parse(overrides: &[Override], sources: &mut Sources, faults: &mut 
             _ => None,
         };
         match value {
-            Some(value) => given.push(Given { name: o.name.clone(), value, span }),
+            Some(value) => {
+                let name = o.name.split_whitespace().collect();
+                given.push(Given { name, value, span });
+            }
             None if fine => faults.push(
                 Diagnostic::error(codes::N019, format!("no value for `{}`", o.name), span, "not one value")
                     .hint("write `name=value`, such as `k=3` or `k=18 kN/m`"),
@@ -57,39 +65,54 @@ pub(super) fn parse(overrides: &[Override], sources: &mut Sources, faults: &mut 
     given
 }
 
-/// Puts the values in the place of those of the model.
-pub(super) fn apply<'a>(given: &'a [Given], flat: &mut Flat<'a>, faults: &mut Vec<Diagnostic>) {
-    for g in given {
-        let decls = &mut flat.names.decls;
-        let found = decls.iter_mut().find(|d| d.name == g.name);
-        let fault = match found {
-            Some(d) => match &mut d.kind {
-                DeclKind::Parameter { value, constant: false } => {
-                    d.replaced_unit = value.and_then(unit_of_literal);
-                    *value = Some(&g.value);
-                    d.reads = 0;
-                    continue;
-                }
-                DeclKind::Parameter { .. } => {
-                    let hint = "declare it with `param` to change it";
-                    Diagnostic::error(codes::N019, format!("`{}` is a constant", g.name), g.span, "set here")
-                        .also(d.span, "declared here")
-                        .hint(hint)
-                }
-                _ => Diagnostic::error(codes::N019, format!("`{}` is no parameter", g.name), g.span, "set here")
-                    .also(d.span, "declared here")
-                    .hint("only parameters can be set; inputs are given as files or by their default"),
-            },
-            None => {
-                let known = decls.iter().filter(|d| matches!(d.kind, DeclKind::Parameter { constant: false, .. }));
-                let d =
-                    Diagnostic::error(codes::N019, format!("there is no parameter `{}`", g.name), g.span, "set here");
-                match nearest(&g.name, known.map(|d| d.name.as_str())) {
-                    Some(near) => d.hint(format!("did you mean `{near}`?")),
-                    None => d.hint("declare it in the model: `param name = …`"),
-                }
-            }
-        };
-        faults.push(fault);
+/// Says which values have no parameter to be put in place of.
+pub(super) fn refuse_idle(given: &[Given], flat: &Flat<'_>, faults: &mut Vec<Diagnostic>) {
+    if given.is_empty() {
+        return;
     }
+    let decls = &flat.names.decls;
+    let by_name: FxHashMap<&str, DeclId> =
+        decls.iter().enumerate().rev().map(|(id, d)| (d.name.as_str(), id)).collect();
+    let arrays = arrays(flat);
+    for g in given {
+        let decl = by_name.get(g.name.as_str()).or_else(|| arrays.get(&g.name)).map(|id| &decls[*id]);
+        faults.extend(idle(g, decl, flat, &arrays));
+    }
+}
+
+/// A declaration of each array, by its name.
+fn arrays(flat: &Flat<'_>) -> BTreeMap<String, DeclId> {
+    let mut all = BTreeMap::new();
+    for scope in &flat.names.scopes {
+        for (name, value) in &scope.values {
+            if let Valued::Family(family) = value
+                && let Some(&first) = flat.names.value_families[*family].first()
+            {
+                all.insert([&scope.prefix, *name].concat(), first);
+            }
+        }
+    }
+    all
+}
+
+fn idle(g: &Given, decl: Option<&Decl<'_>>, flat: &Flat<'_>, arrays: &BTreeMap<String, DeclId>) -> Option<Diagnostic> {
+    let fault = |title: String| Diagnostic::error(codes::N019, title, g.span, "set here");
+    Some(match decl {
+        Some(Decl { kind: DeclKind::Parameter { constant: false, .. }, .. }) => return None,
+        Some(d @ Decl { kind: DeclKind::Parameter { .. }, .. }) => fault(format!("`{}` is a constant", g.name))
+            .also(d.span, "declared here")
+            .hint("declare it with `param` to change it"),
+        Some(d) => fault(format!("`{}` is no parameter", g.name))
+            .also(d.span, "declared here")
+            .hint("only parameters can be set; inputs are given as files or by their default"),
+        None => {
+            let free = |d: &&Decl<'_>| matches!(d.kind, DeclKind::Parameter { constant: false, .. });
+            let known = flat.names.decls.iter().filter(free).map(|d| d.name.as_str());
+            let fault = fault(format!("there is no parameter `{}`", g.name));
+            match nearest(&g.name, known.chain(arrays.keys().map(String::as_str))) {
+                Some(near) => fault.hint(format!("did you mean `{near}`?")),
+                None => fault.hint("declare it in the model: `param name = …`"),
+            }
+        }
+    })
 }

@@ -20,7 +20,8 @@ impl Builder<'_, '_> {
     ) -> Option<(Table<SignalId, IntegratedSignal>, BTreeMap<Symbol, Expr>)> {
         let mut replaced = BTreeMap::new();
         let mut kept: Vec<IntegratedSignal> = Vec::new();
-        for SignalDraft { name, symbol, rate, initial, unit, span } in std::mem::take(&mut self.signals).into_values() {
+        let signals = std::mem::take(&mut self.signals).into_values().enumerate();
+        for (at, SignalDraft { name, symbol, rate, initial, unit, span }) in signals {
             let written = rate?;
             let rate = self.exprs.substitute(written, rates);
             match self.repeated(structure, rate, initial) {
@@ -28,7 +29,8 @@ impl Builder<'_, '_> {
                     replaced.insert(symbol, value);
                     self.roles[symbol.0 as usize] = None;
                     let (doc, quantity) = (String::new(), Quantity::Any);
-                    self.lets.push(NamedDraft { name, value, unit, unit_is_written: false, quantity, doc, span });
+                    let place = (span, at);
+                    self.lets.push(NamedDraft { name, value, unit, unit_is_written: false, quantity, doc, place });
                 }
                 None => {
                     self.mean(symbol, Meaning::Signal(SignalId::new(kept.len())), self.quantity(symbol));

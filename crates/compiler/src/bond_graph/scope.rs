@@ -2,6 +2,10 @@
 
 use rustc_hash::FxHashMap;
 
+use super::families::{Families, FamilyId, Indices, spelled};
+use super::repeat::Repeats;
+use super::uses::Used;
+use super::value::Reading;
 use crate::ast;
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
@@ -46,6 +50,33 @@ pub(super) type ScopeId = usize;
 pub(super) type DeclId = usize;
 /// Index of a component as it is written in a scope.
 pub(super) type ComponentId = usize;
+/// Index of a turn of a repetition.
+pub(super) type TurnId = usize;
+
+/// Where names are looked up: a scope, and the turn of the repetition in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Here {
+    /// The scope.
+    pub scope: ScopeId,
+    /// The turn; 0 outside of repetitions.
+    pub turn: TurnId,
+}
+
+impl Here {
+    /// A scope, outside of its repetitions.
+    pub fn of(scope: ScopeId) -> Here {
+        Here { scope, turn: 0 }
+    }
+}
+
+/// What a name of the first namespace stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Valued {
+    /// A value or function.
+    One(DeclId),
+    /// Values with indices.
+    Family(FamilyId),
+}
 
 /// The names of the model itself, or of one instance of a component.
 pub(super) struct Scope<'a> {
@@ -55,12 +86,12 @@ pub(super) struct Scope<'a> {
     pub parent: Option<ScopeId>,
     /// The component and where it is used, if it is an instance.
     pub instance: Option<(&'a ast::Component, Span)>,
-    /// The scope in which it is used.
-    pub user: ScopeId,
+    /// Where it is used.
+    pub user: Here,
     /// Number of instances around it.
     pub depth: usize,
     /// Parameters, signals and functions.
-    pub values: FxHashMap<&'a str, DeclId>,
+    pub values: FxHashMap<&'a str, Valued>,
     /// Elements, instances, ports, named bonds and constraints.
     pub nodes: FxHashMap<&'a str, (Node, Span)>,
     /// Components written here.
@@ -80,6 +111,8 @@ pub(super) enum Node {
     Bond(usize),
     /// A `constraint`: index into the constraints.
     Constraint(usize),
+    /// Several with indices.
+    Family(FamilyId),
     /// Something whose declaration is at fault; said already.
     Broken,
 }
@@ -88,8 +121,17 @@ pub(super) enum Node {
 pub(super) struct Decl<'a> {
     /// Its full name.
     pub name: String,
-    /// The scope that its expression reads.
-    pub reads: ScopeId,
+    /// Its name as it is written, and the scope that it belongs to.
+    pub own: &'a str,
+    pub scope: ScopeId,
+    /// Where its expression reads.
+    pub reads: Here,
+    /// Which element it is, if its expression is for all elements of an array.
+    pub item: Indices,
+    /// The array.
+    pub array: Option<FamilyId>,
+    /// Whether it has a value of its own in an array.
+    pub alone: bool,
     /// What it is.
     pub kind: DeclKind<'a>,
     /// Unit after `:`, if written.
@@ -124,14 +166,21 @@ pub(super) enum DeclKind<'a> {
     Function(&'a ast::Function),
 }
 
-impl<'a> Decl<'a> {
+impl<'a> DeclKind<'a> {
     /// The expression as written, except for states and functions.
     pub fn value(&self) -> Option<&'a ast::Expr> {
-        match self.kind {
+        match *self {
             DeclKind::Parameter { value, .. } | DeclKind::Input(value) => value,
             DeclKind::Let(value) | DeclKind::Output(value) => value,
             DeclKind::State(_) | DeclKind::Function(_) => None,
         }
+    }
+}
+
+impl Decl<'_> {
+    /// How its expression is read.
+    pub fn reading(&self) -> Reading<'_> {
+        Reading { item: &self.item, array: self.array, ..Reading::of(self.reads, &self.name) }
     }
 }
 
@@ -144,19 +193,33 @@ pub(super) struct Names<'a> {
     pub decls: Vec<Decl<'a>>,
     /// The components, each with the scope that it is written in.
     pub components: Vec<(ScopeId, &'a ast::Component)>,
+    /// Values with indices.
+    pub value_families: Families<DeclId>,
+    /// Elements, instances and the like with indices, each with its place.
+    pub node_families: Families<(Node, Span)>,
+    /// New values of parameters, by full name.
+    pub overrides: FxHashMap<&'a str, &'a ast::Expr>,
+    /// Values that are declared further down, by scope and name.
+    pub ahead: FxHashMap<(ScopeId, &'a str), &'a ast::Declaration>,
 }
 
 impl<'a> Names<'a> {
     /// The value of that name seen from a scope.
-    pub fn value(&self, from: ScopeId, name: &str) -> Option<DeclId> {
-        let mut scope = Some(from);
-        while let Some(s) = scope {
-            if let Some(&decl) = self.scopes[s].values.get(name) {
-                return Some(decl);
-            }
-            scope = self.scopes[s].parent;
+    pub fn value(&self, from: ScopeId, name: &str) -> Option<Valued> {
+        self.around(from).find_map(|s| self.scopes[s].values.get(name).copied())
+    }
+
+    /// The turn of a repetition that something stands in, perhaps that of an instance around it; 0 if it stands in none.
+    pub fn turn_around(&self, mut here: Here) -> TurnId {
+        while here.turn == 0 && here.scope != 0 {
+            here = self.scopes[here.scope].user;
         }
-        None
+        here.turn
+    }
+
+    /// A scope and those in which its component is written, from within.
+    pub fn around(&self, from: ScopeId) -> impl Iterator<Item = ScopeId> + '_ {
+        std::iter::successors(Some(from), |s| self.scopes[*s].parent)
     }
 
     /// The component of that name seen from a scope.
@@ -184,7 +247,13 @@ impl<'a> Names<'a> {
     }
 
     /// Adds a declaration under a name, unless the name is taken; says so if it is.
-    pub fn declare(&mut self, scope: ScopeId, name: &'a ast::Name, decl: Decl<'a>) -> Result<DeclId, Box<Diagnostic>> {
+    pub fn declare(
+        &mut self,
+        scope: ScopeId,
+        name: &'a ast::Name,
+        indices: &[i64],
+        decl: Decl<'a>,
+    ) -> Result<DeclId, Box<Diagnostic>> {
         let text = name.text.as_str();
         if RESERVED.contains(&text) {
             return Err(Box::new(reserved(name)));
@@ -194,47 +263,139 @@ impl<'a> Names<'a> {
             return Err(Box::new(d.hint("give the function another name")));
         }
         let id = self.decls.len();
-        if let Some(&first) = self.scopes[scope].values.get(text) {
-            return Err(Box::new(twice(text, name.span, self.decls[first].span)));
+        let first = match self.scopes[scope].values.get(text).copied() {
+            None if indices.is_empty() => {
+                self.scopes[scope].values.insert(text, Valued::One(id));
+                None
+            }
+            None => {
+                let family = self.value_families.open(indices.len(), name.span);
+                self.scopes[scope].values.insert(text, Valued::Family(family));
+                self.value_families.add(family, indices, id)
+            }
+            Some(Valued::Family(family)) if self.value_families[family].takes(indices) => {
+                self.value_families.add(family, indices, id)
+            }
+            Some(other) => return Err(Box::new(twice(&spelled(text, indices), name.span, self.span_of(other)))),
+        };
+        if let Some(first) = first {
+            return Err(Box::new(twice(&spelled(text, indices), name.span, self.decls[first].span)));
         }
-        self.scopes[scope].values.insert(text, id);
         self.decls.push(decl);
         Ok(id)
     }
 
-    /// Adds an element, instance, port, bond or constraint under a name, unless the name is taken; says so if it is.
-    pub fn place(&mut self, scope: ScopeId, name: &'a ast::Name, node: Node) -> Result<(), Box<Diagnostic>> {
-        if let Some((_, first)) = self.scopes[scope].nodes.get(name.text.as_str()) {
-            let hint = format!(
-                "the kind stands only where the element first stands: write `{}` here, or use another name",
-                name.text
-            );
-            return Err(Box::new(Diagnostic { hint: Some(hint), ..twice(&name.text, name.span, *first) }));
+    /// The declaration that a name with its indices stands for. Without indices, in an expression for all elements of an
+    /// array, it is the element `item`.
+    pub fn decl_of(
+        &self,
+        repeats: &mut Repeats<'a>,
+        here: Here,
+        value: Valued,
+        part: &'a ast::PathPart,
+        item: &[i64],
+    ) -> Result<DeclId, Box<Diagnostic>> {
+        match (value, part.indices.first()) {
+            (Valued::One(decl), None) => Ok(decl),
+            (Valued::One(_), Some(index)) => Err(Box::new(no_indices(&part.name, index.span))),
+            (Valued::Family(family), None) => self.value_families.get(family, &part.name, item).copied(),
+            (Valued::Family(family), Some(_)) => {
+                let indices = repeats.indices(self, here, &part.indices)?;
+                self.value_families.get(family, &part.name, &indices).copied()
+            }
         }
-        self.scopes[scope].nodes.insert(&name.text, (node, name.span));
-        Ok(())
+    }
+
+    /// What a use of a declaration is one of: of its own name, or of that of an array.
+    pub fn used(&self, decl: DeclId) -> Option<Used> {
+        let d = &self.decls[decl];
+        self.scopes[d.scope].values.get(d.own).map(|value| Used::of(*value))
+    }
+
+    /// Where a value is declared, or the first of several.
+    pub fn span_of(&self, value: Valued) -> Span {
+        match value {
+            Valued::One(decl) => self.decls[decl].span,
+            Valued::Family(family) => self.value_families[family].span,
+        }
+    }
+
+    /// Makes a name stand for values with indices, of which there may be none.
+    pub fn array(&mut self, scope: ScopeId, name: &'a ast::Name, indices: usize) {
+        if !self.scopes[scope].values.contains_key(name.text.as_str()) {
+            let family = self.value_families.open(indices, name.span);
+            self.scopes[scope].values.insert(&name.text, Valued::Family(family));
+        }
+    }
+
+    /// Adds an element, instance, port, bond or constraint under a name, unless the name is taken; says so if it is.
+    pub fn place(
+        &mut self,
+        scope: ScopeId,
+        name: &'a ast::Name,
+        indices: &[i64],
+        node: Node,
+    ) -> Result<(), Box<Diagnostic>> {
+        let text = name.text.as_str();
+        let entry = (node, name.span);
+        let mut named_otherwise = false;
+        let first = match self.scopes[scope].nodes.get(text).copied() {
+            None if indices.is_empty() => {
+                self.scopes[scope].nodes.insert(text, entry);
+                None
+            }
+            None => {
+                let family = self.node_families.open(indices.len(), name.span);
+                self.scopes[scope].nodes.insert(text, (Node::Family(family), name.span));
+                self.node_families.add(family, indices, entry)
+            }
+            Some((Node::Family(family), _)) if self.node_families[family].takes(indices) => {
+                self.node_families.add(family, indices, entry)
+            }
+            Some(other) => {
+                named_otherwise = !indices.is_empty() || matches!(other.0, Node::Family(_));
+                Some(other)
+            }
+        };
+        let Some((_, first)) = first else { return Ok(()) };
+        let full = spelled(text, indices);
+        let hint = if named_otherwise {
+            "one name has the same number of indices everywhere".to_string()
+        } else if first == name.span {
+            format!("give it indices that differ from turn to turn, such as `{text}[i]`")
+        } else {
+            format!("the kind stands only where the element first stands: write `{full}` here, or use another name")
+        };
+        Err(Box::new(Diagnostic { hint: Some(hint), ..twice(&full, name.span, first) }))
     }
 
     /// What a dotted name stands for as far as it names nodes, and how many of its parts that took.
-    pub fn node(&self, from: ScopeId, path: &ast::Path) -> Result<(Node, usize), Box<Diagnostic>> {
-        self.walk(from, path, &mut |_, _| {})
+    pub fn node(
+        &self,
+        repeats: &mut Repeats<'a>,
+        from: Here,
+        path: &'a ast::Path,
+    ) -> Result<(Node, usize), Box<Diagnostic>> {
+        self.walk(repeats, from, path, &mut |_, _| {})
     }
 
     /// The same, visiting each node on the way, with the place of its name.
     pub fn walk(
         &self,
-        from: ScopeId,
-        path: &ast::Path,
+        repeats: &mut Repeats<'a>,
+        from: Here,
+        path: &'a ast::Path,
         visit: &mut dyn FnMut(Node, Span),
     ) -> Result<(Node, usize), Box<Diagnostic>> {
-        let mut scope = from;
+        let mut scope = from.scope;
         let mut at = 0;
         loop {
-            let name = &path.parts[at].name;
-            let Some(&(node, _)) = self.scopes[scope].nodes.get(name.text.as_str()) else {
-                return Err(Box::new(self.unknown_node(scope, name, at > 0)));
+            let part = &path.parts[at];
+            let Some(&(named, _)) = self.scopes[scope].nodes.get(part.name.text.as_str()) else {
+                return Err(Box::new(self.unknown_node(scope, &part.name, at > 0)));
             };
-            visit(node, name.span);
+            visit(named, part.name.span);
+            let node = self.with_indices(repeats, from, named, part)?;
             at += 1;
             match node {
                 Node::Instance(inner) if at < path.parts.len() => {
@@ -249,6 +410,24 @@ impl<'a> Names<'a> {
         }
     }
 
+    /// The node that a name with its indices stands for.
+    pub fn with_indices(
+        &self,
+        repeats: &mut Repeats<'a>,
+        from: Here,
+        named: Node,
+        part: &'a ast::PathPart,
+    ) -> Result<Node, Box<Diagnostic>> {
+        let Node::Family(family) = named else {
+            return match part.indices.first() {
+                Some(index) if named != Node::Broken => Err(Box::new(no_indices(&part.name, index.span))),
+                _ => Ok(named),
+            };
+        };
+        let indices = repeats.indices(self, from, &part.indices)?;
+        self.node_families.get(family, &part.name, &indices).map(|(node, _)| *node)
+    }
+
     /// What an instance has, for a hint.
     fn inner_names(&self, scope: ScopeId) -> String {
         let s = &self.scopes[scope];
@@ -259,7 +438,7 @@ impl<'a> Names<'a> {
     }
 
     /// The diagnostic for an element that nobody declared.
-    fn unknown_node(&self, scope: ScopeId, name: &ast::Name, inside: bool) -> Diagnostic {
+    pub fn unknown_node(&self, scope: ScopeId, name: &ast::Name, inside: bool) -> Diagnostic {
         let owner = self.scopes[scope].prefix.trim_end_matches('.');
         let whose = if inside { format!("`{owner}` has no part") } else { "there is no element".to_string() };
         let title = format!("{whose} `{}`", name.text);
@@ -291,6 +470,12 @@ fn reserved(name: &ast::Name) -> Diagnostic {
     let meaning = if name.text == "t" { "time" } else { "the number pi" };
     let title = format!("`{}` is {meaning} and cannot be declared", name.text);
     Diagnostic::error(codes::N003, title, name.span, "here").hint("use another name")
+}
+
+/// The diagnostic for indices behind a name that has none.
+pub(super) fn no_indices(name: &ast::Name, span: Span) -> Diagnostic {
+    let title = format!("`{}` has no indices", name.text);
+    Diagnostic::error(codes::N021, title, span, "an index").hint(format!("write `{}`", name.text))
 }
 
 /// The diagnostic for a name that is declared twice.

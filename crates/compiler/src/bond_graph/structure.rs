@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::assemble::cell_of;
 use super::builder::Builder;
 use super::wire::Wire;
 use super::{Bond, BondId, Element, ElementId, Kind, Port, PortRef};
@@ -31,7 +32,7 @@ impl Builder<'_, '_> {
         let p = self.part(part);
         let name_of = |port: usize| match p.word {
             w if w.is_two_port() => ["in", "out"][port].to_string(),
-            _ => p.ast.ports.get(port).map_or(String::new(), |n| n.text.clone()),
+            _ => p.ports.get(port).map_or(String::new(), |n| n.text.clone()),
         };
         let ports = self.wiring.ports[part].iter().flatten().enumerate();
         let ports = ports.map(|(port, (wire, inward))| Port {
@@ -39,7 +40,9 @@ impl Builder<'_, '_> {
             bond: Self::bond_id(*wire),
             inward: *inward,
         });
-        Element { name: p.name.clone(), kind, ports: ports.collect(), span: p.ast.span, label: self.label(part) }
+        let cell = cell_of(self.flat.names.turn_around(p.here));
+        let (name, label) = (p.name.clone(), self.label(part));
+        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell }
     }
 
     fn bond(&self, wire: usize, w: &Wire) -> Bond {
@@ -58,7 +61,7 @@ impl Builder<'_, '_> {
 impl Structure {
     /// A new element without bonds.
     pub fn add(&mut self, name: String, kind: Kind, span: Span, label: String) -> ElementId {
-        self.elements.push(Element { name, kind, ports: Vec::new(), span, label })
+        self.elements.push(Element { name, kind, ports: Vec::new(), span, label, cell: None })
     }
 
     /// A new bond between two elements, at new ports of these names.

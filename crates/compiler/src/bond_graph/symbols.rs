@@ -58,7 +58,7 @@ impl Builder<'_, '_> {
             };
             let mut symbols = Vec::new();
             for port in 0..self.wiring.ports[part].len() {
-                let name = match p.ast.ports.get(port) {
+                let name = match p.ports.get(port) {
                     Some(n) => [&p.name, ".", &n.text, ".", letter].concat(),
                     None => [&p.name, ".", letter].concat(),
                 };
@@ -77,8 +77,8 @@ impl Builder<'_, '_> {
 
     /// The bond of every `constraint` will come after all that are drawn; its variables have names already.
     fn make_reactions(&mut self) {
-        for (scope, c, _) in &self.flat.constraints {
-            let name = format!("{}{}", self.flat.names.scopes[*scope].prefix, c.name.text);
+        for held in &self.flat.constraints {
+            let name = &held.name;
             let effort = self.fresh(&format!("{name}.e"), Facts::default());
             let flow = self.fresh(&format!("{name}.f"), Facts::default());
             self.play(effort, Role::Reaction, Quantity::Any);
@@ -135,7 +135,7 @@ impl Builder<'_, '_> {
             if p.word.is_junction() || p.word.is_two_port() {
                 return None;
             }
-            Some(match p.ast.ports.get(port) {
+            Some(match p.ports.get(port) {
                 Some(n) => format!("{}.{}", p.name, n.text),
                 None => p.name.clone(),
             })

@@ -2,7 +2,9 @@
 
 use super::builder::{Builder, Value};
 use super::dimension::Quantity;
-use super::scope::{DeclKind, FUNCTIONS, ScopeId};
+use super::families::FamilyId;
+use super::repeat::too_long;
+use super::scope::{DeclKind, FUNCTIONS, Here, ScopeId, Valued};
 use super::uses::Used;
 use crate::algebra::{Comparison, Expr, Function, Symbol};
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
@@ -14,7 +16,11 @@ use crate::unit::{Dimension as Dim, WHOLE};
 #[derive(Clone, Copy)]
 pub(super) struct Reading<'r> {
     /// Where names are looked up.
-    pub scope: ScopeId,
+    pub here: Here,
+    /// Which element of it is asked for, if it is for all elements of an array.
+    pub item: &'r [i64],
+    /// That array.
+    pub array: Option<FamilyId>,
     /// The part whose argument it is, if it is one.
     pub own: Option<usize>,
     /// Whether `e f q p` are the part's own before anything else.
@@ -29,8 +35,8 @@ pub(super) struct Reading<'r> {
 
 impl<'r> Reading<'r> {
     /// An expression that belongs to a name.
-    pub fn of(scope: ScopeId, owner: &'r str) -> Reading<'r> {
-        Reading { scope, own: None, law: false, formals: &[], plain: false, owner }
+    pub fn of(here: Here, owner: &'r str) -> Reading<'r> {
+        Reading { here, item: &[], array: None, own: None, law: false, formals: &[], plain: false, owner }
     }
 }
 
@@ -71,11 +77,66 @@ impl<'a> Builder<'a, '_> {
             ExprKind::Binary(b) => self.binary(cx, b, e.span),
             ExprKind::If(i) => self.choice(cx, i, e.span),
             ExprKind::Text(_) => self.misplaced(e.span, "text", "text is only read by `table`"),
-            ExprKind::List(_) => {
-                self.misplaced(e.span, "a list", "lists are only read by `tf` and by matrices of fields")
+            ExprKind::List(list) if !cx.item.is_empty() => {
+                let (first, rest) = cx.item.split_first()?;
+                let entry = list.get(usize::try_from(first - 1).ok()?)?;
+                self.read(&Reading { item: rest, ..*cx }, entry)
             }
+            ExprKind::Repeated(list) if !cx.item.is_empty() => self.entry(cx, list),
+            ExprKind::Sum(sum) => self.total(cx, sum, e.span),
+            ExprKind::List(_) | ExprKind::Repeated(_) => self.misplaced(
+                e.span,
+                "a list",
+                "lists are only read by `tf`, by matrices of fields and by arrays such as `param k[3] = [1, 2, 3]`",
+            ),
             ExprKind::Missing => {
                 self.incomplete = true;
+                None
+            }
+        }
+    }
+
+    /// The entry of a list with `for` that is asked for.
+    fn entry(&mut self, cx: &Reading<'_>, list: &'a ast::Repeated) -> Option<Value> {
+        let (first, rest) = cx.item.split_first()?;
+        let from = self.whole(cx, &list.from, "where a list begins")?;
+        let turn = self.repeats.turn(&list.variable, from + first - 1, cx.here);
+        self.read(&Reading { item: rest, here: Here { turn, ..cx.here }, ..*cx }, &list.value)
+    }
+
+    /// `sum(i in 1..n, …)`.
+    fn total(&mut self, cx: &Reading<'_>, sum: &'a ast::Repeated, span: Span) -> Option<Value> {
+        let ends = (self.whole(cx, &sum.from, "where a sum begins"), self.whole(cx, &sum.to, "where a sum ends"));
+        let blocks = self.open_blocks.len();
+        let Some(values) = self.repeats.terms_of(ends.0?, ends.1?) else {
+            self.fault(too_long(span));
+            return None;
+        };
+        let mut terms: Vec<Expr> = Vec::new();
+        let mut quantity = Quantity::Any;
+        for value in values {
+            let before = self.faults.len();
+            let turn = self.repeats.turn(&sum.variable, value, cx.here);
+            let term = self.number(&Reading { here: Here { turn, ..cx.here }, ..*cx }, &sum.value);
+            self.met_in(Here { turn, ..cx.here }, before);
+            let term = term?;
+            self.equal(&quantity, &term.quantity, sum.value.span, "the terms of this sum");
+            quantity = known_of(&quantity, &term.quantity);
+            terms.push(term.expr);
+            if self.open_blocks.len() == blocks {
+                self.repeats.forget(turn);
+            }
+        }
+        Some(Value::number(self.exprs.add(&terms), quantity))
+    }
+
+    /// A whole number that shapes the model; says so if it is none.
+    fn whole(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, what: &str) -> Option<i64> {
+        match self.repeats.whole(&self.flat.names, cx.here, e, what) {
+            Ok(value) => Some(value),
+            Err(fault) => {
+                self.incomplete |= fault.is_none();
+                self.faults.maybe(fault.map(|f| *f));
                 None
             }
         }
@@ -196,8 +257,8 @@ impl<'a> Builder<'a, '_> {
 
     fn call(&mut self, cx: &Reading<'_>, call: &'a ast::Call, span: Span) -> Option<Value> {
         let name = call.function.text.as_str();
-        let declared = self.flat.names.value(cx.scope, name);
-        if let Some(decl) = declared
+        let declared = self.flat.names.value(cx.here.scope, name);
+        if let Some(Valued::One(decl)) = declared
             && let DeclKind::Function(f) = self.flat.names.decls[decl].kind
         {
             self.uses.add(Used::Value(decl), call.function.span);
@@ -226,7 +287,7 @@ impl<'a> Builder<'a, '_> {
         let title = format!("there is no function `{}`", name.text);
         let d =
             Diagnostic::error(codes::N006, title, name.span, if is_value { "this is a value" } else { "not known" });
-        let known = FUNCTIONS.iter().map(|f| f.0).chain(self.visible_functions(cx.scope));
+        let known = FUNCTIONS.iter().map(|f| f.0).chain(self.visible_functions(cx.here.scope));
         self.fault(match crate::diagnostic::nearest(&name.text, known) {
             _ if is_value => d.hint(format!("write `{}*( … )` for a product", name.text)),
             _ if matches!(name.text.as_str(), "der" | "ddt" | "dot" | "derivative") => {
@@ -240,8 +301,7 @@ impl<'a> Builder<'a, '_> {
     fn visible_functions(&self, scope: ScopeId) -> impl Iterator<Item = &'a str> + '_ {
         let names = &self.flat.names;
         names.visible_values(scope).filter(move |name| {
-            let decl = names.value(scope, name);
-            decl.is_some_and(|d| matches!(names.decls[d].kind, DeclKind::Function(_)))
+            matches!(names.value(scope, name), Some(Valued::One(d)) if matches!(names.decls[d].kind, DeclKind::Function(_)))
         })
     }
 

@@ -1,7 +1,8 @@
 //! From drawn bonds to bonds between ports of elements: ports of components vanish, every port gets its bond.
 
+use super::faults::Faults;
 use super::flatten::{At, Drawn, End, Flat, Part, Word};
-use super::scope::Names;
+use super::scope::{Here, Names};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 
@@ -32,7 +33,7 @@ pub(super) struct Wiring {
     /// The bond at every port of an instance.
     pub of_joint: Vec<Option<usize>>,
     /// What is wrong with the drawing.
-    pub faults: Vec<Diagnostic>,
+    pub faults: Faults,
     /// Whether a bond ends at nothing, which has been said.
     pub broken: bool,
     /// Parts with more bonds than fit.
@@ -64,7 +65,9 @@ pub(super) fn wire(flat: &Flat<'_>) -> Wiring {
     let mut done = vec![false; flat.drawn.len()];
     for i in 0..flat.drawn.len() {
         if !done[i] {
+            let before = wiring.faults.len();
             wiring.join(flat, &sides, i, &mut done, &mut touched);
+            wiring.met_in(flat, flat.drawn[i].here, before);
         }
     }
     wiring.check_ports(flat, &touched);
@@ -76,7 +79,7 @@ fn slots(part: &Part<'_>) -> usize {
     match part.word {
         w if w.is_junction() => 0,
         w if w.is_two_port() => 2,
-        _ => part.ast.ports.len().max(1),
+        _ => part.ports.len().max(1),
     }
 }
 
@@ -96,20 +99,24 @@ impl Wiring {
                     None => *side = Some((i, starts)),
                     Some((first, _)) => {
                         sides[joint].broken = true;
+                        let before = self.faults.len();
                         self.crowded(flat, joint, end, flat.drawn[first].span, outside);
+                        self.met_in(flat, drawn.here, before);
                     }
                 }
             }
         }
         for (joint, side) in sides.iter_mut().enumerate() {
+            let before = self.faults.len();
             self.check_joint(flat, joint, side);
+            self.met_in(flat, Here::of(flat.joints[joint].instance), before);
         }
         sides
     }
 
     /// Two bonds at one side of a port of a component.
     fn crowded(&mut self, flat: &Flat<'_>, joint: usize, end: End, first: Span, outside: bool) {
-        let name = &flat.joints[joint].name.text;
+        let name = &flat.joints[joint].name;
         let place = if outside { "from outside" } else { "in the component" };
         self.fault(
             Diagnostic::error(codes::B002, format!("two bonds at port `{name}` {place}"), end.span, "the second bond")
@@ -122,7 +129,7 @@ impl Wiring {
     fn check_joint(&mut self, flat: &Flat<'_>, joint: usize, sides: &mut Sides) {
         let port = &flat.joints[joint];
         let Some((component, used)) = flat.names.scopes[port.instance].instance else { return };
-        let name = &port.name.text;
+        let name = &port.name;
         let instance = flat.names.scopes[port.instance].prefix.trim_end_matches('.');
         match (sides.outside, sides.inside) {
             _ if sides.broken => {}
@@ -144,7 +151,7 @@ impl Wiring {
                 sides.broken = true;
                 let title = format!("port `{name}` of component `{}` leads nowhere", component.name.text);
                 self.fault(
-                    Diagnostic::error(codes::B005, title, port.name.span, "no bond in the component ends here")
+                    Diagnostic::error(codes::B005, title, port.span, "no bond in the component ends here")
                         .hint(format!("write `{name} -> …` or `… -> {name}` in the component")),
                 );
             }
@@ -153,10 +160,18 @@ impl Wiring {
                 let title = format!("port `{instance}.{name}` is not connected");
                 self.fault(
                     Diagnostic::error(codes::B005, title, used, "no bond ends at this port")
-                        .also(port.name.span, "declared here")
+                        .also(port.span, "declared here")
                         .hint(format!("write `… -> {instance}.{name}`; for a free end, join `Se:free(0)` to it")),
                 );
             }
+        }
+    }
+
+    /// Says of the faults since `before` in which turn of a repetition they were found.
+    fn met_in(&mut self, flat: &Flat<'_>, here: Here, before: usize) {
+        let turn = flat.names.turn_around(here);
+        if turn != 0 {
+            self.faults.in_turn(before, || flat.repeats.words(turn));
         }
     }
 
@@ -297,11 +312,11 @@ impl Wiring {
             );
             return None;
         }
-        match (p.ast.ports.len(), named) {
+        match (p.ports.len(), named) {
             (0 | 1, _) => Some(0),
             (_, Some(slot)) => Some(slot),
             (_, None) => {
-                let list: Vec<&str> = p.ast.ports.iter().map(|n| n.text.as_str()).collect();
+                let list: Vec<&str> = p.ports.iter().map(|n| n.text.as_str()).collect();
                 let name = &p.ast.name.text;
                 self.fault(
                     Diagnostic::error(codes::B009, format!("which port of `{}`?", p.name), end, "it has several")
@@ -320,14 +335,15 @@ impl Wiring {
             if p.word.is_junction() && found > 0 || !p.word.is_junction() && found == self.ports[i].len() {
                 continue;
             }
+            let before = self.faults.len();
             if !touched[i] && found == 0 {
                 self.fault(unconnected(p, &flat.names));
             } else if p.word.is_two_port() && found == 1 && !self.crowded_parts.contains(&i) {
                 self.fault(half_connected(p, self.ports[i][0].is_none()));
-            } else if p.ast.ports.len() > 1 && found > 0 {
+            } else if p.ports.len() > 1 && found > 0 {
                 let ports = self.ports[i].clone();
-                let empty = p.ast.ports.iter().zip(&ports).enumerate().filter(|(_, (_, found))| found.is_none());
-                let named_before = |i: usize, name: &str| p.ast.ports[..i].iter().any(|port| port.text == name);
+                let empty = p.ports.iter().zip(&ports).enumerate().filter(|(_, (_, found))| found.is_none());
+                let named_before = |i: usize, name: &str| p.ports[..i].iter().any(|port| port.text == name);
                 for (_, (port, _)) in empty.filter(|(i, (port, _))| !named_before(*i, &port.text)) {
                     self.fault(
                         Diagnostic::error(
@@ -343,6 +359,7 @@ impl Wiring {
                     );
                 }
             }
+            self.met_in(flat, p.here, before);
         }
     }
 }
@@ -393,7 +410,7 @@ fn taken(p: &Part<'_>, slot: usize, drawn: Span, first: Span) -> Diagnostic {
             .note("one bond points at a TF or GY, one leaves it")
             .hint(remedy);
     }
-    let port = p.ast.ports.get(slot).map_or(String::new(), |n| format!(".{}", n.text));
+    let port = p.ports.get(slot).map_or(String::new(), |n| format!(".{}", n.text));
     Diagnostic::error(
         codes::B002,
         format!("a second bond at {} `{}{port}`", p.word.text(), p.name),
@@ -408,12 +425,12 @@ fn taken(p: &Part<'_>, slot: usize, drawn: Span, first: Span) -> Diagnostic {
 fn unconnected(p: &Part<'_>, names: &Names<'_>) -> Diagnostic {
     let name = &p.ast.name.text;
     let what = if p.word.is_junction() { format!("{}-junction", p.word.text()) } else { p.word.text().to_string() };
-    let around = if names.scopes[p.scope].instance.is_some() { " in the component" } else { "" };
+    let around = if names.scopes[p.here.scope].instance.is_some() { " in the component" } else { "" };
     let remedy = match p.word {
         Word::Se | Word::Sf | Word::Zc | Word::ResidualSe | Word::ResidualSf => format!("write `{name} -> …`{around}"),
         w if w.is_two_port() => format!("write `… -> {name} -> …`{around}"),
-        w if w.is_law() && p.ast.ports.len() > 1 => {
-            format!("write `… -> {name}.{}`{around}", p.ast.ports[0].text)
+        w if w.is_law() && p.ports.len() > 1 => {
+            format!("write `… -> {name}.{}`{around}", p.ports[0].text)
         }
         _ => format!("write `… -> {name}`{around}"),
     };

@@ -177,8 +177,14 @@ fn detect(graph: &mut BondGraph, symbol: Symbol) -> Option<PortRef> {
         false => vec![port(bond, true), port(ids[0], false), port(ids[1], false)],
     };
     let span = graph.bonds[bond].span;
-    let element =
-        |name: &str, kind, ports| Element { name: format!("{name}{number}"), kind, ports, span, label: String::new() };
+    let element = |name: &str, kind, ports| Element {
+        name: format!("{name}{number}"),
+        kind,
+        ports,
+        span,
+        label: String::new(),
+        cell: None,
+    };
     let (inner, outer) = match effort {
         true => (Kind::Zero, Kind::EffortDetector),
         false => (Kind::One, Kind::FlowDetector),

@@ -71,6 +71,8 @@ codes! {
     N018 "a variable that an element does not have";
     N019 "a parameter that cannot be set";
     N020 "a table that cannot be used";
+    N021 "indices that belong to no element";
+    N022 "something that must be known when the model is compiled";
     B001 "a half arrow out of an I, C or R";
     B002 "too many bonds at a port";
     B003 "a two-port without one bond in and one out";

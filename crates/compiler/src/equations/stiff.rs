@@ -61,6 +61,7 @@ fn parameter(graph: &mut BondGraph, kind: ParameterKind, value: Expr) -> Symbol 
         symbol,
         value,
         constant: false,
+        shapes: false,
         kind,
         unit: None,
         doc: doc.to_string(),

@@ -133,6 +133,8 @@ pub struct Parameter {
     pub default: Value,
     /// Whether it cannot be set.
     pub constant: bool,
+    /// Whether that is because it shapes the model, which is compiled anew for another value.
+    pub shapes: bool,
     /// What it is.
     pub kind: ParameterKind,
     /// SI unit, where known.

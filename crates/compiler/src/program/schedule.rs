@@ -124,6 +124,7 @@ impl Schedule<'_> {
                 name: p.name.clone(),
                 default: default.expect("every parameter has been given its value"),
                 constant: p.constant,
+                shapes: p.shapes,
                 kind: p.kind,
                 unit: p.unit.clone(),
             })

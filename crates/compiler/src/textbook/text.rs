@@ -6,8 +6,8 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{Dependent, DisplayEquation, Shown, ShownDefinition, places};
 use crate::algebra::{
-    Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, mathml, mathml_name, mathml_owner,
-    unicode, unicode_name,
+    Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, latex_owner, mathml, mathml_name,
+    mathml_owner, unicode, unicode_name,
 };
 use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
 use crate::causal_paths::Refusal;
@@ -241,7 +241,7 @@ impl Names for Written<'_> {
         let (name, rates) = self.for_people(symbol);
         match subscripted(&name) {
             Some((variable, element)) => {
-                format!("{}_{{\\mathrm{{{}}}}}", latex_name(variable, rates), element.replace('_', "\\_"))
+                format!("{}_{{{}}}", latex_name(variable, rates), latex_owner(element))
             }
             None => latex_name(&name, rates),
         }

@@ -74,6 +74,8 @@ pub fn empty(name: &str) -> BondGraph {
         guesses: Vec::new(),
         constraints: Vec::new(),
         time,
+        repetitions: Table::new(),
+        cells: Table::new(),
     }
 }
 
@@ -102,6 +104,7 @@ impl Builder<'_> {
                 symbol,
                 value,
                 constant: false,
+                shapes: false,
                 kind: ParameterKind::Declared,
                 unit: None,
                 doc,
@@ -161,7 +164,7 @@ impl Builder<'_> {
             let kind = self.kind(data, id, &ports);
             let name = data["name"].as_str().expect("a name").to_owned();
             let label = data["parameter"].as_str().unwrap_or_default().to_owned();
-            self.graph.elements.push(Element { name, kind, ports, span: Span::default(), label });
+            self.graph.elements.push(Element { name, kind, ports, span: Span::default(), label, cell: None });
         }
     }
 

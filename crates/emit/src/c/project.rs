@@ -12,7 +12,8 @@ use crate::Real;
 /// `main.c`.
 pub(super) fn main(export: &Export, name: &str) -> String {
     let recorded: Vec<&Observed> = export.recorded.iter().map(|&i| &export.program.observed[i]).collect();
-    let field = |text: &str| format!(",{}", messages::escaped(text)).replace('%', "%%");
+    let quoted = |text: &str| if text.contains(',') { format!("\"{text}\"") } else { text.to_string() };
+    let field = |text: &str| format!(",{}", messages::escaped(&quoted(text))).replace('%', "%%");
     let names: String = recorded.iter().map(|o| field(&o.name)).collect();
     let unit = |o: &Observed| o.unit.as_ref().map(ToString::to_string).unwrap_or_default();
     let units: String = recorded.iter().map(|o| field(&unit(o))).collect();

@@ -12,6 +12,8 @@ pub enum ParameterError {
     Unknown(String),
     /// It is declared `const`.
     Constant(String),
+    /// It shapes the model, which has another value of it.
+    Shapes(String),
     /// The value is not finite.
     NotFinite(String),
     /// With this value the equations of parameters have no solution.
@@ -23,6 +25,9 @@ impl fmt::Display for ParameterError {
         match self {
             ParameterError::Unknown(name) => write!(f, "there is no parameter `{name}`"),
             ParameterError::Constant(name) => write!(f, "`{name}` is a const: declare it as param to set it"),
+            ParameterError::Shapes(name) => {
+                write!(f, "`{name}` shapes the model: another value needs the model compiled anew, as by --set")
+            }
             ParameterError::NotFinite(name) => write!(f, "the value of `{name}` is not a finite number"),
             ParameterError::Unsolvable(failure) => failure.fmt(f),
         }

@@ -32,12 +32,20 @@ impl Setup {
     /// Sets a parameter, in SI units, in every mode that has it.
     ///
     /// # Errors
-    /// There is no such parameter, it is a constant, or the value is not finite.
+    /// There is no such parameter, it is a constant, it shapes the model and this is another value, or the value is not
+    /// finite.
     pub fn set_parameter(&mut self, compiled: &Compiled, name: &str, value: f64) -> Result<(), ParameterError> {
         let mut known = false;
         for (mode, given) in compiled.modes().zip(&mut self.modes) {
             let parameters = &mode.program.parameters;
             let Some(index) = parameters.iter().position(|p| p.name == name) else { continue };
+            if parameters[index].shapes {
+                known |= mode.program.values.constant(parameters[index].default) == Some(value);
+                match known {
+                    true => continue,
+                    false => return Err(ParameterError::Shapes(name.to_string())),
+                }
+            }
             if parameters[index].constant {
                 return Err(ParameterError::Constant(name.to_string()));
             }

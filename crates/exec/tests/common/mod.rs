@@ -69,6 +69,7 @@ impl Sketch {
             symbol,
             value,
             constant: false,
+            shapes: false,
             kind: ParameterKind::Declared,
             unit,
             doc,
@@ -91,7 +92,14 @@ impl Sketch {
     }
     pub fn element(&mut self, name: &str) -> ElementId {
         let (ports, label) = (Vec::new(), String::new());
-        self.elements.push(Element { name: name.into(), kind: Kind::Zero, ports, span: Span::default(), label })
+        self.elements.push(Element {
+            name: name.into(),
+            kind: Kind::Zero,
+            ports,
+            span: Span::default(),
+            label,
+            cell: None,
+        })
     }
     /// A state, recorded by default; its rate is given by [`rate`](Sketch::rate).
     pub fn state(&mut self, name: &str) -> Expr {
@@ -172,6 +180,8 @@ impl Sketch {
             guesses: Vec::new(),
             constraints: Vec::new(),
             time: self.time,
+            repetitions: Table::new(),
+            cells: Table::new(),
         };
         Equations {
             form: Form::Minimal,

@@ -1,5 +1,5 @@
 //! Which equations a set of parameters is run with: those of the model as it stands, or others, where its values break
-//! what these rest on.
+//! what these rest on, or shape the model otherwise.
 
 use std::collections::BTreeMap;
 
@@ -99,7 +99,7 @@ fn overrides(plan: &Plan, set: usize) -> Vec<Override> {
 fn holds(system: &mut exec::Model, plan: &Plan, set: usize) -> bool {
     match system.set_parameters(plan.names().iter().map(String::as_str).zip(plan.values(set))) {
         Ok(()) => system.broken().is_none(),
-        Err(ParameterError::Unsolvable(_)) => false,
+        Err(ParameterError::Unsolvable(_) | ParameterError::Shapes(_)) => false,
         Err(_) => true,
     }
 }

@@ -6,7 +6,7 @@ mod numbers;
 mod render;
 mod shape;
 
-pub use names::{Names, Place, PlainNames, Sort, latex_name, mathml_name, mathml_owner, unicode_name};
+pub use names::{Names, Place, PlainNames, Sort, latex_name, latex_owner, mathml_name, mathml_owner, unicode_name};
 
 use super::exprs::Exprs;
 use super::node::Expr;

@@ -129,7 +129,7 @@ const GREEK: [(&str, char, &str); 34] = [
 /// A name of the model language in Unicode, with its time derivatives: `phi_1` once is `φ_1'`, `omega2` is `ω2`.
 pub fn unicode_name(name: &str, rates: usize) -> String {
     let words: Vec<String> =
-        name.split('.').map(|part| part.split('_').map(unicode_word).collect::<Vec<_>>().join("_")).collect();
+        name.split('.').map(|part| part.split('_').map(indexed_word).collect::<Vec<_>>().join("_")).collect();
     dotted(&words.join("."), rates)
 }
 
@@ -140,12 +140,14 @@ pub fn latex_name(name: &str, rates: usize) -> String {
         Some((owner, own)) => (Some(owner), own),
         None => (None, name),
     };
+    let (own, indices) = split_indices(own);
     let mut parts = own.split('_').filter(|p| !p.is_empty());
     let (letters, digits) = split_digits(parts.next().unwrap_or(own));
     let mut below: Vec<String> = Vec::new();
     below.extend(Some(digits).filter(|d| !d.is_empty()).map(str::to_owned));
     below.extend(parts.map(latex_subscript));
-    below.extend(owner.map(|o| o.split(['.', '_']).map(latex_subscript).collect::<Vec<_>>().join("\\,")));
+    below.extend(Some(indices).filter(|i| !i.is_empty()).map(str::to_owned));
+    below.extend(owner.map(|o| o.split('.').map(latex_part).collect::<Vec<_>>().join("\\,")));
     let base = latex_word(letters);
     let base = match rates {
         0 => base,
@@ -163,11 +165,13 @@ pub fn mathml_name(name: &str, rates: usize) -> String {
         Some((owner, own)) => (Some(owner), own),
         None => (None, name),
     };
+    let (own, indices) = split_indices(own);
     let mut parts = own.split('_').filter(|p| !p.is_empty());
     let (letters, digits) = split_digits(parts.next().unwrap_or(own));
     let mut below: Vec<String> = Vec::new();
     below.extend(Some(digits).filter(|d| !d.is_empty()).map(|digits| format!("<mn>{digits}</mn>")));
     below.extend(parts.map(mathml_subscript));
+    below.extend(Some(indices).filter(|i| !i.is_empty()).map(mathml_indices));
     below.extend(owner.map(mathml_owner));
     let base = mathml_word(letters);
     let base = match rates {
@@ -182,7 +186,38 @@ pub fn mathml_name(name: &str, rates: usize) -> String {
 
 /// The name of an element as a subscript.
 pub fn mathml_owner(owner: &str) -> String {
-    format!("<mi mathvariant=\"normal\">{}</mi>", super::mathml::escape(owner))
+    let upright = |text: &str| format!("<mi mathvariant=\"normal\">{}</mi>", super::mathml::escape(text));
+    if !owner.contains('[') {
+        return upright(owner);
+    }
+    let part = |part: &str| match split_indices(part) {
+        (name, "") => upright(name),
+        (name, indices) => format!("<msub>{}<mrow>{}</mrow></msub>", upright(name), mathml_indices(indices)),
+    };
+    format!("<mrow>{}</mrow>", owner.split('.').map(part).collect::<Vec<_>>().join("<mo>.</mo>"))
+}
+
+fn mathml_indices(indices: &str) -> String {
+    let index = |index: &str| format!("<mn>{}</mn>", index.replace('-', "−"));
+    indices.split(',').map(index).collect::<Vec<_>>().join("<mo>,</mo>")
+}
+
+/// The name of an element as an upright subscript: `motor.coil`, `spring[3]`.
+pub fn latex_owner(owner: &str) -> String {
+    let upright = |text: &str| format!("\\mathrm{{{}}}", text.replace('_', "\\_"));
+    if !owner.contains('[') {
+        return upright(owner);
+    }
+    let part = |part: &str| match split_indices(part) {
+        (name, "") => upright(name),
+        (name, indices) => format!("{}_{{{indices}}}", upright(name)),
+    };
+    owner.split('.').map(part).collect::<Vec<_>>().join(".")
+}
+
+/// A name and what stands in brackets behind it.
+fn split_indices(name: &str) -> (&str, &str) {
+    name.strip_suffix(']').and_then(|n| n.split_once('[')).unwrap_or((name, ""))
 }
 
 fn mathml_word(word: &str) -> String {
@@ -206,6 +241,20 @@ fn mathml_subscript(word: &str) -> String {
 fn split_digits(word: &str) -> (&str, &str) {
     let end = word.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     if end == 0 { (word, "") } else { word.split_at(end) }
+}
+
+fn indexed_word(word: &str) -> String {
+    match split_indices(word) {
+        (_, "") => unicode_word(word),
+        (name, indices) => format!("{}[{indices}]", unicode_word(name)),
+    }
+}
+
+/// A part of the name of an element in a subscript.
+fn latex_part(part: &str) -> String {
+    let (name, indices) = split_indices(part);
+    let name = name.split('_').map(latex_subscript).collect::<Vec<_>>().join("\\,");
+    if indices.is_empty() { name } else { format!("{name}_{{{indices}}}") }
 }
 
 fn unicode_word(word: &str) -> String {

@@ -25,7 +25,7 @@ impl Parser<'_> {
         let doc = self.doc();
         let left_over = document(&mut to, doc);
         self.idle_doc(left_over);
-        let name = if self.eat_word("as") { self.name("the name of the bond") } else { None };
+        let name = if self.eat_word("as") { self.indexed("the name of the bond") } else { None };
         let doc = if name.is_some() { self.doc() } else { None };
         Bond { arrow, to, name, doc }
     }
@@ -94,14 +94,14 @@ impl Parser<'_> {
         }
         self.bump(); // the colon
         let name = self.name("the name of the node");
-        let (ports, index) = if self.is(TokenKind::LBracket) { self.ports() } else { (Vec::new(), None) };
+        let (indices, ports) = self.brackets();
         let args = if self.is(TokenKind::LParen) { self.args().0 } else { Vec::new() };
         let span = self.since(start);
         let port = self.port_of_declaration(span, name.as_ref());
         match name {
             Some(name) => {
                 let kind = self.name_of(kind);
-                Node::Declared(Box::new(Element { kind, width, name, ports, index, args, doc: None, port, span }))
+                Node::Declared(Box::new(Element { kind, width, name, indices, ports, args, doc: None, port, span }))
             }
             None => Node::Missing(span),
         }
@@ -138,22 +138,41 @@ impl Parser<'_> {
         widths.pop()
     }
 
-    /// `[el, me]`, or an index.
-    fn ports(&mut self) -> (Vec<Name>, Option<Expr>) {
-        if self.plain_name_in_brackets() {
-            return (self.bracketed(TokenKind::RBracket, |p| p.name("the name of a port")), None);
+    /// What stands in brackets behind the name of an element: indices, then ports. Names alone are ports here.
+    fn brackets(&mut self) -> (Vec<Expr>, Vec<Name>) {
+        if !self.is(TokenKind::LBracket) {
+            return (Vec::new(), Vec::new());
         }
-        let start = self.span();
-        let mut indices = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
-        self.remark(reserved(self.since(start), "an index", "give each element a name of its own"));
-        indices.truncate(1);
-        (Vec::new(), indices.pop())
+        if self.names_in_brackets() && !self.second_brackets() {
+            return (Vec::new(), self.port_names());
+        }
+        let indices = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
+        let ports = if self.is(TokenKind::LBracket) && self.adjacent(0) { self.port_names() } else { Vec::new() };
+        (indices, ports)
     }
 
-    fn plain_name_in_brackets(&self) -> bool {
-        let after = self.ahead(2).kind;
-        self.ahead(1).kind == TokenKind::RBracket
-            || (self.ahead(1).kind == TokenKind::Ident && matches!(after, TokenKind::Comma | TokenKind::RBracket))
+    fn port_names(&mut self) -> Vec<Name> {
+        self.bracketed(TokenKind::RBracket, |p| p.name("the name of a port"))
+    }
+
+    /// Whether only names stand in the brackets that open here, or nothing.
+    fn names_in_brackets(&self) -> bool {
+        self.ahead(self.names_and_commas()).kind == TokenKind::RBracket
+    }
+
+    /// Whether brackets follow those that open here.
+    fn second_brackets(&self) -> bool {
+        let close = self.names_and_commas();
+        self.ahead(close + 1).kind == TokenKind::LBracket && self.adjacent(close + 1)
+    }
+
+    /// How far ahead names and commas reach behind the bracket that opens here.
+    fn names_and_commas(&self) -> usize {
+        let mut i = 1;
+        while matches!(self.ahead(i).kind, TokenKind::Ident | TokenKind::Comma) {
+            i += 1;
+        }
+        i
     }
 
     /// `R(5)`: a kind without a name, or arguments where the node is not declared.

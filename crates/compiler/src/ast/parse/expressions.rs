@@ -159,6 +159,7 @@ impl Parser<'_> {
             TokenKind::LBracket => self.list(),
             TokenKind::Ident if self.is_word("if") => self.conditional(),
             TokenKind::Ident if RESERVED.contains(&self.text_of(self.token())) => self.no_value(),
+            TokenKind::Ident if self.sum_follows() => self.nested(Self::sum).unwrap_or_else(|| self.missing()),
             TokenKind::Ident if self.ahead(1).kind == TokenKind::LParen && self.ahead(1).newlines == 0 => self.call(),
             TokenKind::Ident => {
                 let (path, height) = self.tall_path();
@@ -242,12 +243,63 @@ impl Parser<'_> {
     fn list(&mut self) -> Tall {
         let start = self.span();
         let mut height = 0;
-        let items = self.bracketed(TokenKind::RBracket, |p| {
+        let mut repeated = None;
+        let mut items = self.bracketed(TokenKind::RBracket, |p| {
             let (item, item_height) = p.tall();
             height = height.max(item_height);
-            Some(item)
+            if !p.is_word("for") {
+                return Some(item);
+            }
+            let (list, range_height) = p.for_list(item)?;
+            height = height.max(range_height);
+            repeated = Some(list);
+            None
         });
-        (Expr { span: self.since(start), kind: ExprKind::List(items) }, height + 1)
+        let span = self.since(start);
+        let Some(repeated) = repeated else { return (Expr { span, kind: ExprKind::List(items) }, height + 1) };
+        if let Some(other) = items.pop() {
+            let title = "a list with `for` has nothing beside it";
+            self.report(Diagnostic::error(codes::S001, title, other.span, "beside it").hint("write two lists"));
+        }
+        (Expr { span, kind: ExprKind::Repeated(repeated) }, height + 1)
+    }
+
+    /// `[value for i in 1..n]`, of which the value has been read; the bracket is closed by the caller.
+    fn for_list(&mut self, value: Expr) -> Option<(Repeated, usize)> {
+        self.bump(); // `for`
+        let (variable, from, to, height) = self.range()?;
+        Some((Repeated { value: Box::new(value), variable, from: Box::new(from), to: Box::new(to) }, height))
+    }
+
+    /// `sum(i in 1..n, value)`.
+    fn sum(&mut self) -> Tall {
+        let start = self.span();
+        self.bump();
+        let open = self.span();
+        self.bump();
+        self.brackets += 1;
+        let range = self.range();
+        if range.is_some() && !self.eat(TokenKind::Comma) {
+            self.expected("`,` and what is added up");
+        }
+        let (value, height) = self.tall();
+        if !self.is(TokenKind::RParen) && !self.boundary() {
+            self.unexpected("`)`");
+            self.skip_group();
+        }
+        self.close(open, TokenKind::RParen);
+        let Some((variable, from, to, range_height)) = range else { return self.missing() };
+        let sum = Repeated { value: Box::new(value), variable, from: Box::new(from), to: Box::new(to) };
+        (Expr { span: self.since(start), kind: ExprKind::Sum(sum) }, 1 + height.max(range_height))
+    }
+
+    /// Whether `sum(i in` comes.
+    fn sum_follows(&self) -> bool {
+        self.is_word("sum")
+            && self.ahead(1).kind == TokenKind::LParen
+            && self.ahead(2).kind == TokenKind::Ident
+            && self.ahead(3).kind == TokenKind::Ident
+            && self.text_of(self.ahead(3)) == "in"
     }
 
     fn conditional(&mut self) -> Tall {
@@ -327,11 +379,9 @@ impl Parser<'_> {
         let mut height = 1;
         loop {
             let token = self.bump();
-            let index = self.index().map(|(index, index_height)| {
-                height = height.max(1 + index_height);
-                Box::new(index)
-            });
-            parts.push(PathPart { name: self.name_of(token), index });
+            let (indices, index_height) = self.indices();
+            height = height.max(1 + index_height);
+            parts.push(PathPart { name: self.name_of(token), indices });
             let goes_on =
                 self.is(TokenKind::Dot) && self.ahead(1).kind == TokenKind::Ident && self.ahead(1).newlines == 0;
             if !goes_on {
@@ -346,16 +396,39 @@ impl Parser<'_> {
         (Path { parts, span: self.since(start) }, height)
     }
 
-    /// `[i]` right after a name.
-    fn index(&mut self) -> Option<Tall> {
+    /// `[i, j]` right after a name: the indices and their greatest height.
+    pub(super) fn indices(&mut self) -> (Vec<Expr>, usize) {
+        let mut height = 0;
         if !self.is(TokenKind::LBracket) || !self.adjacent(0) {
-            return None;
+            return (Vec::new(), height);
         }
-        let start = self.span();
-        let mut indices = self.bracketed(TokenKind::RBracket, |p| Some(p.tall()));
-        self.remark(reserved(self.since(start), "an index", "give each element a name of its own"));
-        indices.truncate(1);
-        indices.pop()
+        let open = self.span();
+        let indices = self.bracketed(TokenKind::RBracket, |p| {
+            let (index, index_height) = p.tall();
+            height = height.max(index_height);
+            Some(index)
+        });
+        if indices.is_empty() {
+            let fault = Diagnostic::error(codes::S001, "an index is expected", self.since(open), "nothing stands here");
+            self.report(fault.hint("write `name[1]`, or the name alone"));
+        }
+        (indices, height)
+    }
+
+    /// A name that may have indices.
+    pub(super) fn indexed(&mut self, what: &str) -> Option<PathPart> {
+        let name = self.name(what)?;
+        Some(PathPart { name, indices: self.indices().0 })
+    }
+
+    /// `i in 1..n`: the variable, its first and last value and their greatest height; nothing if there is no variable.
+    pub(super) fn range(&mut self) -> Option<(Name, Expr, Expr, usize)> {
+        let variable = self.name("the name of a variable")?;
+        self.expect_word("in");
+        let (from, a) = self.tall();
+        self.expect(TokenKind::DotDot, "`..`");
+        let (to, b) = self.tall();
+        Some((variable, from, to, a.max(b)))
     }
 }
 

@@ -134,6 +134,9 @@ impl Parser<'_> {
             }
         };
         let node = matches!(self.ahead(1).kind, TokenKind::Arrow | TokenKind::Colon | TokenKind::Dot);
+        if !node && self.choice_follows() {
+            return Some(StatementKind::Choice(Box::new(self.choice())));
+        }
         if node || !(KEYWORDS.contains(&word) || word == "model") {
             return self.chain_or_mistake();
         }
@@ -158,7 +161,7 @@ impl Parser<'_> {
             "constraint" => StatementKind::Constraint(Box::new(self.constraint()?)),
             "domain" => StatementKind::Domain(Box::new(self.domain()?)),
             "when" => StatementKind::When(Box::new(self.when(start))),
-            "for" => StatementKind::For(Box::new(self.for_loop(start)?)),
+            "for" => StatementKind::For(Box::new(self.for_loop()?)),
             _ => {
                 let hint = "put the other model into a file of its own, or make it a `component`";
                 let fault =
@@ -229,7 +232,7 @@ impl Parser<'_> {
     /// `name : unit = value : unit "doc"`, with the unit in one of the two places.
     fn declaration(&mut self, value: Value) -> Option<Declaration> {
         let start = self.span();
-        let name = self.name("a name")?;
+        let PathPart { name, indices } = self.indexed("a name")?;
         let unit = self.unit();
         let value = match value {
             _ if self.eat(TokenKind::Assign) => Some(self.expr()),
@@ -241,7 +244,7 @@ impl Parser<'_> {
         };
         let unit = self.second_unit(unit);
         let doc = self.doc();
-        Some(Declaration { name, unit, value, doc, span: self.since(start) })
+        Some(Declaration { name, indices, unit, value, doc, span: self.since(start) })
     }
 
     /// `path : unit = value : unit "doc"`, with the unit in one of the two places.
@@ -293,7 +296,7 @@ impl Parser<'_> {
     }
 
     fn state(&mut self) -> Option<State> {
-        let name = self.name("the name of a signal")?;
+        let PathPart { name, indices } = self.indexed("the name of a signal")?;
         if !self.eat(TokenKind::Prime) {
             let fault = Diagnostic::error(codes::S001, "`'` is expected", self.gap(), "missing here")
                 .hint(format!("a state is given by its derivative: `state {}' = ... from ...`", name.text));
@@ -304,7 +307,7 @@ impl Parser<'_> {
         let start = if self.eat_word("from") { Some(self.expr()) } else { None };
         let unit = self.unit();
         let doc = self.doc();
-        Some(State { name, rate, start, unit, doc })
+        Some(State { name, indices, rate, start, unit, doc })
     }
 
     fn import(&mut self) -> Option<Import> {
@@ -472,16 +475,16 @@ impl Parser<'_> {
     }
 
     /// A path that names a bond: it has one part.
-    fn bond_name(&mut self, mut path: Path) -> Option<Name> {
+    fn bond_name(&mut self, mut path: Path) -> Option<PathPart> {
         if path.parts.len() == 1 {
-            return path.parts.pop().map(|part| part.name);
+            return path.parts.pop();
         }
         self.expected("`->` and the other end of the bond");
         None
     }
 
     fn constraint(&mut self) -> Option<Constraint> {
-        let name = self.name("the name of the constraint")?;
+        let PathPart { name, indices } = self.indexed("the name of the constraint")?;
         self.expect(TokenKind::Colon, "`:`");
         let left = self.expr();
         let right = if self.eat(TokenKind::Assign) {
@@ -491,7 +494,7 @@ impl Parser<'_> {
             Expr { span: self.gap(), kind: ExprKind::Missing }
         };
         let doc = self.doc();
-        Some(Constraint { name, left, right, doc })
+        Some(Constraint { name, indices, left, right, doc })
     }
 
     fn domain(&mut self) -> Option<DomainBlock> {
@@ -550,15 +553,57 @@ impl Parser<'_> {
         Some(Reset { target, value: self.expr() })
     }
 
-    fn for_loop(&mut self, start: Span) -> Option<For> {
-        let variable = self.name("the name of a loop variable")?;
-        self.expect_word("in");
-        let from = self.expr();
-        self.expect(TokenKind::DotDot, "`..`");
-        let to = self.expr();
-        self.remark(reserved(self.since(start), "`for`", "write the parts out, or use a component several times"));
+    fn for_loop(&mut self) -> Option<For> {
+        let (variable, from, to, _) = self.range()?;
         let body = self.expect_block();
         Some(For { variable, from, to, body })
+    }
+
+    /// Whether `if` with a block comes. Without one it is an expression that was meant to go on.
+    fn choice_follows(&self) -> bool {
+        if self.text_of(self.token()) != "if" {
+            return false;
+        }
+        let mut open = 0usize;
+        for token in self.tokens.iter().skip(self.pos + 1) {
+            match token.kind {
+                TokenKind::End | TokenKind::RBrace => return false,
+                _ if token.newlines > 0 && open == 0 => return false,
+                TokenKind::LBrace => return true,
+                TokenKind::LParen | TokenKind::LBracket => open += 1,
+                TokenKind::RParen | TokenKind::RBracket => open = open.saturating_sub(1),
+                TokenKind::Ident if open == 0 && self.text_of(*token) == "then" => return false,
+                _ => {}
+            }
+        }
+        false
+    }
+
+    /// `if cond { ... } else { ... }`; `if` is this token.
+    fn choice(&mut self) -> Choice {
+        self.bump();
+        let cond = self.expr();
+        let yes = self.expect_block();
+        let no = if self.word_after_block("else") { self.otherwise() } else { Vec::new() };
+        Choice { cond, yes, no }
+    }
+
+    /// Whether a word follows the block that has ended, perhaps on the next line.
+    fn word_after_block(&self, word: &str) -> bool {
+        self.kind() == TokenKind::Ident && self.text_of(self.token()) == word
+    }
+
+    /// What follows `else`, which is this token.
+    fn otherwise(&mut self) -> Vec<Statement> {
+        self.tokens[self.pos].newlines = 0;
+        self.bump();
+        let start = self.span();
+        if !self.choice_follows() {
+            return self.expect_block();
+        }
+        let choice = self.nested(Self::choice);
+        let span = self.since(start);
+        choice.map(|c| Statement { span, kind: StatementKind::Choice(Box::new(c)) }).into_iter().collect()
     }
 }
 

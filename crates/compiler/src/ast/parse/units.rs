@@ -3,7 +3,7 @@
 use super::*;
 
 /// Words that can follow a number without being a unit.
-const NOT_UNITS: [&str; 5] = ["as", "at", "from", "elseif", "elif"];
+const NOT_UNITS: [&str; 6] = ["as", "at", "from", "for", "elseif", "elif"];
 
 impl Parser<'_> {
     /// The unit right after a number, on the same line. A `*` after it is a product, not part of the unit.

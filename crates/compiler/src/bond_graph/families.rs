@@ -1,0 +1,148 @@
+//! Names with indices: their elements, found by their indices in one step.
+
+use rustc_hash::FxHashMap;
+use std::fmt::Write;
+
+use crate::ast;
+use crate::diagnostic::{Diagnostic, codes};
+use crate::span::Span;
+
+/// Indices of an element; none of what has none.
+pub(super) type Indices = Box<[i64]>;
+
+/// Index of a [`Family`].
+pub(super) type FamilyId = usize;
+
+/// What a name with indices stands for.
+pub(super) struct Family<T> {
+    /// Its elements.
+    elements: FxHashMap<Indices, T>,
+    /// Least and greatest value of each index.
+    ranges: Vec<(i64, i64)>,
+    /// Where the first is declared.
+    pub span: Span,
+}
+
+impl<T> Family<T> {
+    /// Whether an element of these indices belongs to it.
+    pub fn takes(&self, indices: &[i64]) -> bool {
+        self.ranges.len() == indices.len()
+    }
+
+    /// The element of these indices.
+    pub fn element(&self, indices: &[i64]) -> Option<&T> {
+        self.elements.get(indices)
+    }
+
+    /// One of its elements, that of the least indices.
+    pub fn first(&self) -> Option<&T> {
+        self.elements.iter().min_by(|a, b| a.0.cmp(b.0)).map(|(_, element)| element)
+    }
+
+    /// Whether both have elements of the same indices, as far as their ranges tell.
+    pub fn is_like<S>(&self, other: &Family<S>) -> bool {
+        self.ranges == other.ranges && self.elements.len() == other.elements.len()
+    }
+
+    /// Which elements there are, in words.
+    pub fn words(&self, name: &str) -> String {
+        if self.elements.is_empty() {
+            return format!("`{name}` has no elements");
+        }
+        let range = |&(low, high): &(i64, i64)| if low == high { low.to_string() } else { format!("{low}..{high}") };
+        let ranges: Vec<String> = self.ranges.iter().map(range).collect();
+        let whole = self.ranges.iter().map(|(low, high)| (high - low + 1) as usize).product::<usize>();
+        let some = if whole == self.elements.len() { "" } else { ", not all of them" };
+        format!("there is `{name}[{}]`{some}", ranges.join(","))
+    }
+
+    /// The name of an element for an example.
+    pub fn example(&self, name: &str) -> String {
+        spelled(name, &self.ranges.iter().map(|(low, _)| *low).collect::<Vec<_>>())
+    }
+}
+
+/// The families of one namespace.
+pub(super) struct Families<T>(Vec<Family<T>>);
+
+impl<T> Default for Families<T> {
+    fn default() -> Self {
+        Families(Vec::new())
+    }
+}
+
+impl<T> std::ops::Index<FamilyId> for Families<T> {
+    type Output = Family<T>;
+    fn index(&self, id: FamilyId) -> &Family<T> {
+        &self.0[id]
+    }
+}
+
+impl<T: Copy> Families<T> {
+    /// A family without elements.
+    pub fn open(&mut self, indices: usize, span: Span) -> FamilyId {
+        self.0.push(Family { elements: FxHashMap::default(), ranges: vec![(i64::MAX, i64::MIN); indices], span });
+        self.0.len() - 1
+    }
+
+    /// Adds an element, unless there is one of these indices, which is given back.
+    pub fn add(&mut self, family: FamilyId, indices: &[i64], element: T) -> Option<T> {
+        let family = &mut self.0[family];
+        if let Some(first) = family.elements.get(indices) {
+            return Some(*first);
+        }
+        for (range, index) in family.ranges.iter_mut().zip(indices) {
+            *range = (range.0.min(*index), range.1.max(*index));
+        }
+        family.elements.insert(indices.into(), element);
+        None
+    }
+
+    /// The element of these indices, which stand behind this name.
+    pub fn get(&self, family: FamilyId, name: &ast::Name, indices: &[i64]) -> Result<&T, Box<Diagnostic>> {
+        let family = &self.0[family];
+        family.element(indices).ok_or_else(|| Box::new(missing(family, name, indices)))
+    }
+}
+
+/// The diagnostic for an element that is not there.
+fn missing<T>(family: &Family<T>, name: &ast::Name, indices: &[i64]) -> Diagnostic {
+    let text = name.text.as_str();
+    if indices.is_empty() {
+        let d = Diagnostic::error(codes::N021, format!("`{text}` has indices"), name.span, "which one?");
+        return d
+            .also(family.span, "declared here")
+            .note(family.words(text))
+            .hint(format!("write `{}`", family.example(text)));
+    }
+    let title = format!("there is no `{}`", spelled(text, indices));
+    let d = Diagnostic::error(codes::N021, title, name.span, "no such element").also(family.span, "declared here");
+    let d = d.note(family.words(text));
+    match family.takes(indices) {
+        true => d.hint("use an index that is there; at the ends of a row, leave something out: `if i > 1 { … }`"),
+        false => d.hint(format!("it has {}, as in `{}`", count(family.ranges.len()), family.example(text))),
+    }
+}
+
+fn count(indices: usize) -> String {
+    if indices == 1 { "one index".to_string() } else { format!("{indices} indices") }
+}
+
+/// A name with its indices as it stands in results: `spring[3]`, `node[1,2]`.
+pub(super) fn spelled(name: &str, indices: &[i64]) -> String {
+    let mut full = String::with_capacity(name.len() + 8 * indices.len());
+    spell(&mut full, name, indices);
+    full
+}
+
+/// Adds a name with its indices to a text.
+pub(super) fn spell(out: &mut String, name: &str, indices: &[i64]) {
+    out.push_str(name);
+    for (i, index) in indices.iter().enumerate() {
+        out.push(if i == 0 { '[' } else { ',' });
+        write!(out, "{index}").expect("a string takes any text");
+    }
+    if !indices.is_empty() {
+        out.push(']');
+    }
+}
