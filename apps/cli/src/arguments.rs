@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::Styles;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use halfarrow::Family;
 
 /// Bond graphs: causality, zero-order causal paths, the smallest equations, and what they do.
 #[derive(Debug, Parser)]
@@ -22,7 +23,11 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Write a commented starter model that runs at once
-    #[command(after_help = "Example:\n  halfarrow new car          writes car.bond")]
+    #[command(after_help = "\
+Examples:
+  halfarrow new car                        writes car.bond
+  halfarrow new --family ladder 1000       writes ladder.bond with 1000 sections; also mesh, beam, chain, grid, fourbars
+  halfarrow new --family grid plate 100    writes plate.bond")]
     New(New),
     /// Report everything that is wrong with a model, and what is odd
     #[command(after_help = "Example:\n  halfarrow check car.bond")]
@@ -148,8 +153,14 @@ pub struct PageArguments {
 /// `new`.
 #[derive(Debug, Args)]
 pub struct New {
-    /// Name of the model; the file is NAME.bond
+    /// Name of the model; the file is NAME.bond. With --family it may be left out
     pub name: String,
+    /// Write a model of this family instead, whose size is a parameter: to see how cost grows
+    #[arg(long, value_name = "FAMILY", value_parser = family)]
+    pub family: Option<Family>,
+    /// Number of cells of the family, along a side of a mesh or grid
+    #[arg(value_name = "N", requires = "family")]
+    pub cells: Option<String>,
     /// Print one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
@@ -664,6 +675,13 @@ fn pair(text: &str) -> Result<(String, String), String> {
         }
         _ => Err(format!("`{text}` is not of the form name=value")),
     }
+}
+
+/// Reads the name of a family.
+fn family(text: &str) -> Result<Family, String> {
+    let known = || Family::ALL.map(Family::name).join(", ");
+    let named = Family::ALL.into_iter().find(|family| family.name() == text);
+    named.ok_or_else(|| format!("there are {}", known()))
 }
 
 /// Reads a time in s, with or without a unit.

@@ -76,6 +76,29 @@ fn a_new_model_runs_at_once() {
 }
 
 #[test]
+fn families_of_any_size_are_written() {
+    let at = folder("families");
+    for family in ["ladder", "mesh", "beam", "chain", "grid", "fourbars"] {
+        let output = halfarrow(&at, &["new", "--family", family, "3"]);
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        let file = format!("{family}.bond");
+        assert_eq!(status(&halfarrow(&at, &["fmt", "--check", &file])), 0, "{family}");
+        let run = halfarrow(&at, &["simulate", &file, "--to", "0.01", "--set", "n=4"]);
+        assert_eq!(status(&run), 0, "{family}: {}", stderr(&run));
+    }
+    assert_eq!(status(&halfarrow(&at, &["new", "--family", "grid", "plate", "5"])), 0);
+    let plate = std::fs::read_to_string(at.join("plate.bond")).unwrap();
+    assert!(plate.starts_with("model Plate") && plate.contains("\nparam n = 5 "), "{plate}");
+    for wrong in [
+        &["new", "--family", "grid", "0"][..],
+        &["new", "--family", "grid", "g", "x"],
+        &["new", "--family", "tree", "3"],
+    ] {
+        assert_eq!(status(&halfarrow(&at, wrong)), 2, "{wrong:?}");
+    }
+}
+
+#[test]
 fn check_shows_all_faults_at_their_places() {
     let here = folder("check");
     let file = write(&here, "faulty.bond", FAULTY);

@@ -78,6 +78,15 @@ impl Compiled {
         self.form
     }
 
+    /// How many operations one evaluation of its rates or residuals takes, solve blocks included: of those that are solved by
+    /// iteration one.
+    pub fn operations(&self) -> usize {
+        match &self.ready {
+            Ready::Explicit(system) => system.operations().total(),
+            Ready::Form { system, .. } => system.operations().total(),
+        }
+    }
+
     /// The value of a parameter or constant, in SI units; `None` if there is none of that name.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         self.minimal().parameter(name)

@@ -32,6 +32,7 @@ mod draw;
 mod equations;
 mod error;
 mod export;
+mod families;
 mod input;
 #[cfg(feature = "fmu")]
 mod library;
@@ -63,6 +64,7 @@ pub use draw::{NamedRuns, Picture};
 pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
 pub use error::{Error, Problem};
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
+pub use families::Family;
 pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;

@@ -28,6 +28,8 @@ mod faults_steps;
 mod faults_strokes;
 #[path = "forms.rs"]
 mod forms;
+#[path = "growth.rs"]
+mod growth;
 #[path = "linearize.rs"]
 mod linearize;
 #[path = "names.rs"]

@@ -16,7 +16,7 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
     BTreeMap::from([
         ("apps/cli", &["halfarrow"][..]),
         ("crates/audit", &["halfarrow-compiler"]),
-        ("crates/compiler", &[]),
+        ("crates/compiler", &["halfarrow-sparse"]),
         ("crates/draw", &["halfarrow-compiler"]),
         ("crates/emit", &["halfarrow-compiler"]),
         ("crates/exec", &["halfarrow-compiler", "halfarrow-sim"]),
@@ -32,7 +32,8 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
                 "halfarrow-trace",
             ],
         ),
-        ("crates/sim", &[]),
+        ("crates/sim", &["halfarrow-sparse"]),
+        ("crates/sparse", &[]),
         ("crates/trace", &["halfarrow-sim"]),
     ])
 }

@@ -13,11 +13,11 @@ use crate::screen;
 /// A model to start from.
 const STARTER: &str = include_str!("starter.bond");
 
-/// Writes the starter model; never over a file.
+/// Writes the starter model, or one of a family; never over a file.
 pub fn new(arguments: &arguments::New) -> u8 {
-    let path = PathBuf::from(&arguments.name).with_extension("bond");
-    match write_new(&path) {
-        Ok(()) => {
+    let written = start(arguments).and_then(|start| write_new(&start).map(|()| start.path));
+    match written {
+        Ok(path) => {
             let shown = path.display();
             let printed = match arguments.json {
                 true => screen::print_json(&json!({"written": path})),
@@ -31,16 +31,40 @@ pub fn new(arguments: &arguments::New) -> u8 {
     }
 }
 
-fn write_new(path: &Path) -> Result<(), Problem> {
-    let name = model_name(path);
-    let text = STARTER.replacen("Starter", &name, 1);
+/// A file to begin with.
+struct Start {
+    path: PathBuf,
+    text: String,
+}
+
+/// What is asked for. Of a family the name may be left out: then the first word is the number of cells.
+fn start(arguments: &arguments::New) -> Result<Start, Problem> {
+    let at = |name: &str| PathBuf::from(name).with_extension("bond");
+    let Some(family) = arguments.family else {
+        let path = at(&arguments.name);
+        let text = STARTER.replacen("Starter", &model_name(&path), 1);
+        return Ok(Start { path, text });
+    };
+    let (name, cells) = match &arguments.cells {
+        Some(cells) => (arguments.name.as_str(), cells),
+        None => (family.name(), &arguments.name),
+    };
+    let size = cells.parse().ok().filter(|&size: &usize| size > 0).ok_or_else(|| Problem::BadOption {
+        reason: format!("`{cells}` is no number of cells: write `halfarrow new --family {} 100`", family.name()),
+    })?;
+    let path = at(name);
+    let text = family.model(&model_name(&path), size);
+    Ok(Start { path, text })
+}
+
+fn write_new(Start { path, text }: &Start) -> Result<(), Problem> {
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(|why| {
         let why = match why.kind() {
             ErrorKind::AlreadyExists => "it is there already".to_string(),
             _ => why.to_string(),
         };
-        Problem::Unwritable { path: path.into(), why }
+        Problem::Unwritable { path: path.clone(), why }
     })
 }
 

@@ -41,7 +41,12 @@ impl Model {
         }
         let mut other = Model::with_jacobian(self.code.program.clone())?;
         let along = ALONG * directions * self.operations().total();
-        if other.code.jacobian.as_ref().is_some_and(|at_once| Operations::of(&at_once.routine).total() < along) {
+        if other
+            .code
+            .jacobian
+            .as_ref()
+            .is_some_and(|at_once| Operations::of(&at_once.routine, &other.code.program).total() < along)
+        {
             other.set_up(&self.setup)?;
             *self = other;
         }

@@ -2,7 +2,7 @@
 
 use super::Model;
 use crate::bytecode::{Instruction, Operation, Routine, Solve};
-use halfarrow_compiler::program::{Cost, Op};
+use halfarrow_compiler::program::{Block, Cost, Op, Program};
 
 /// Operations of one evaluation of rates or residuals.
 ///
@@ -29,12 +29,12 @@ impl Operations {
         self.additions + self.multiplications + self.divisions + self.calls
     }
 
-    pub(super) fn of(routine: &Routine) -> Operations {
+    pub(super) fn of(routine: &Routine, program: &Program) -> Operations {
         let mut counted = Operations::default();
         // What is handed through or guarded is not counted, blocks are below.
         let operations = routine.code.iter().filter_map(|i| if let Instruction::Op(o) = i { Some(o) } else { None });
         operations.for_each(|operation| counted.count(operation));
-        routine.solves.iter().for_each(|solve| counted.solve(solve));
+        routine.solves.iter().for_each(|solve| counted.solve(solve, &program.blocks[solve.block]));
         counted
     }
 
@@ -49,13 +49,24 @@ impl Operations {
         }
     }
 
-    /// Elimination of a full matrix with one right side, and the code of an iteration.
-    fn solve(&mut self, solve: &Solve) {
+    /// Elimination with one right side, sparse where the block is, and the code of an iteration.
+    fn solve(&mut self, solve: &Solve, block: &Block) {
         let n = solve.unknowns.len();
-        let products = n * n.saturating_sub(1) * (2 * n).saturating_sub(1) / 6 + n * n.saturating_sub(1);
+        let (Block::Linear { matrix, .. } | Block::Newton { jacobian: matrix, .. }) = block;
+        let (products, divisions) = match &matrix.factors {
+            Some(factors) => {
+                let (lower, upper) = (&factors.lower, &factors.upper);
+                let rows = lower.columns().iter().map(|&k| upper.columns_of(k as usize).len()).sum::<usize>();
+                // Once more for the refinement, with the residual before it.
+                (rows + 2 * (lower.len() + upper.len()) + factors.matrix.len(), lower.len() + 2 * n)
+            }
+            None => {
+                (n * n.saturating_sub(1) * (2 * n).saturating_sub(1) / 6 + n * n.saturating_sub(1), n * (n + 1) / 2)
+            }
+        };
         self.multiplications += products;
         self.additions += products;
-        self.divisions += n * (n + 1) / 2;
+        self.divisions += divisions;
         if !solve.guess.is_empty() {
             self.iterated += 1;
             self.additions += n;
@@ -67,6 +78,6 @@ impl Operations {
 impl Model {
     /// What one evaluation of the rates takes.
     pub fn operations(&self) -> Operations {
-        Operations::of(&self.code.rates)
+        Operations::of(&self.code.rates, self.program())
     }
 }
