@@ -6,7 +6,7 @@ use crate::regions::Classes;
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst, above};
-use halfarrow_compiler::algebra::{Expr, Symbol};
+use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, Storage, StorageLaw};
 use std::collections::BTreeSet;
 
@@ -226,7 +226,9 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Ve
     if graph.exprs.symbols_of(law).into_iter().any(|s| s != own && values.parameter(s).is_none()) {
         return None;
     }
-    let z = |x: f64| graph.exprs.eval(law, &mut |s| if s == own { x } else { values.parameter(s).unwrap_or(f64::NAN) });
+    let law = EvaluationOrder::new(&graph.exprs, &[law]);
+    let parameter = |s: Symbol| values.parameter(s).unwrap_or(f64::NAN);
+    let z = |x: f64| law.values(&mut |s| if s == own { x } else { parameter(s) })[0];
     // What an impulse gives or takes is no power of any sample.
     let jumps = jumps(values.times, x, JUMPED * greatest(x));
     let mut energy = vec![0.0; x.len()];

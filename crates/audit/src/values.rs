@@ -1,7 +1,7 @@
 //! Recorded values by symbol.
 
 use crate::Run;
-use halfarrow_compiler::algebra::{Evaluator, Expr, Function, Node, Symbol};
+use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::ids::Table;
 use std::collections::{BTreeMap, BTreeSet};
@@ -167,8 +167,12 @@ impl<'a> Values<'a> {
         let state = |s: Symbol| s != time && !self.parameters.contains_key(&s);
         let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
         let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
-        let moves = read.into_iter().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
-        Ok(Reader { values: self, wanted: wanted.to_vec(), rates, moves, jumpy, timed })
+        let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
+        let order = |e: Expr| EvaluationOrder::new(x, &[e]);
+        let rates: BTreeMap<Symbol, EvaluationOrder> = rates.into_iter().map(|(s, rate)| (s, order(rate))).collect();
+        let column = |s: &Symbol| Some((*s, self.recorded(*s)?));
+        let columns = read.iter().filter_map(column).collect();
+        Ok(Reader { values: self, wanted: EvaluationOrder::new(x, wanted), rates, columns, moves, jumpy, timed })
     }
 
     /// The column of a symbol, or of the effort or flow that it is the rate of a stored quantity as.
@@ -239,9 +243,11 @@ impl<'a> Values<'a> {
 /// Expressions at samples.
 pub(crate) struct Reader<'v, 'a> {
     values: &'v Values<'a>,
-    wanted: Vec<Expr>,
+    wanted: EvaluationOrder<'a>,
     /// Rates of integrated signals among what is read.
-    rates: BTreeMap<Symbol, Expr>,
+    rates: BTreeMap<Symbol, EvaluationOrder<'a>>,
+    /// What is recorded of what is read.
+    columns: BTreeMap<Symbol, &'a [f64]>,
     /// Recorded symbols among what is read.
     moves: Vec<Symbol>,
     /// Whether a value jumps with the state, and with time.
@@ -271,9 +277,7 @@ impl Reader<'_, '_> {
             Side::After if self.timed => t + reach,
             _ => t,
         };
-        let mut at = |s: Symbol| self.at(s, sample, t, moved);
-        let mut evaluator = Evaluator::new(&values.graph.exprs, &mut at);
-        Some(self.wanted.iter().map(|&e| evaluator.value(e)).collect())
+        Some(self.wanted.values(&mut |s| self.at(s, sample, t, moved)))
     }
 
     fn at(&self, symbol: Symbol, sample: usize, t: f64, moved: Option<(Symbol, f64)>) -> f64 {
@@ -282,10 +286,10 @@ impl Reader<'_, '_> {
             return t;
         }
         if let Some(rate) = self.rates.get(&symbol) {
-            return values.graph.exprs.eval(*rate, &mut |s| self.at(s, sample, t, moved));
+            return rate.values(&mut |s| self.at(s, sample, t, moved))[0];
         }
         let by = moved.filter(|(s, _)| *s == symbol).map_or(0.0, |(_, by)| by);
-        match values.recorded(symbol) {
+        match self.columns.get(&symbol) {
             Some(column) => column[sample] + by,
             None => values.parameters.get(&symbol).copied().unwrap_or(f64::NAN),
         }

@@ -57,6 +57,54 @@ impl<'a> Evaluator<'a> {
     }
 }
 
+/// Expressions that are evaluated at many points, in an order that is worked out once.
+///
+/// ```
+/// use halfarrow_compiler::algebra::{EvaluationOrder, Exprs, Facts};
+/// let mut x = Exprs::default();
+/// let q = x.symbol("q", Facts::default());
+/// let e = x.sym(q);
+/// let square = x.powi(e, 2);
+/// let order = EvaluationOrder::new(&x, &[square, e]);
+/// assert_eq!(order.values(&mut |_| 3.0), [9.0, 3.0]);
+/// assert_eq!(order.values(&mut |_| 4.0), [16.0, 4.0]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct EvaluationOrder<'a> {
+    pool: &'a Exprs,
+    /// What is evaluated, parts before wholes.
+    order: Vec<Expr>,
+    /// Where the values of the expressions stand.
+    wanted: Vec<usize>,
+}
+
+impl<'a> EvaluationOrder<'a> {
+    /// Of these expressions.
+    pub fn new(pool: &'a Exprs, wanted: &[Expr]) -> Self {
+        let order = pool.below(wanted, &|_| true);
+        let wanted = wanted.iter().map(|&e| place(&order, e)).collect();
+        EvaluationOrder { pool, order, wanted }
+    }
+
+    /// Their values at given values of symbols; NaN where one is not defined. Each symbol is asked for once.
+    pub fn values(&self, symbols: &mut dyn FnMut(Symbol) -> f64) -> Vec<f64> {
+        let mut values: Vec<f64> = Vec::with_capacity(self.order.len());
+        for &part in &self.order {
+            let value = match self.pool.node(part) {
+                Node::Symbol(s) => symbols(*s),
+                node => node_value(self.pool, node, &|c| values[place(&self.order, c)]),
+            };
+            values.push(value);
+        }
+        self.wanted.iter().map(|&at| values[at]).collect()
+    }
+}
+
+/// The place of an expression in an ascending list that holds it.
+fn place(order: &[Expr], e: Expr) -> usize {
+    order.binary_search(&e).expect("parts are evaluated before wholes")
+}
+
 impl Exprs {
     /// The value of an expression at given values of its symbols; NaN where it is not defined.
     pub fn eval(&self, e: Expr, symbols: &mut dyn FnMut(Symbol) -> f64) -> f64 {

@@ -37,7 +37,7 @@ pub use cost::Cost;
 pub use elimination::{
     BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,
 };
-pub use evaluate::Evaluator;
+pub use evaluate::{EvaluationOrder, Evaluator};
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use lowest_terms::LowestTerms;
 pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
