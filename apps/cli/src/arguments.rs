@@ -49,6 +49,7 @@ Examples:
     #[command(after_help = "\
 Examples:
   halfarrow equations car.bond
+  halfarrow equations line.bond --only C3.q,R3.f
   halfarrow equations car.bond --form inverted --format latex > car.tex")]
     Equations(Equations),
     /// Put all formulations beside each other: size, cost, time at equal error, agreement
@@ -255,6 +256,9 @@ pub struct Equations {
     /// The formulation
     #[arg(long, default_value = "minimal")]
     pub form: Form,
+    /// Only the equations of these variables: names with commas between them
+    #[arg(long, value_name = "NAMES")]
+    pub only: Vec<String>,
     /// How to write them
     #[arg(long, default_value = "text")]
     pub format: Format,

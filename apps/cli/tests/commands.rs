@@ -76,6 +76,26 @@ fn a_new_model_runs_at_once() {
 }
 
 #[test]
+fn equations_of_what_is_asked_for() {
+    let at = folder("only");
+    assert_eq!(status(&halfarrow(&at, &["new", "--family", "ladder", "400"])), 0);
+    let asked = halfarrow(&at, &["equations", "ladder.bond", "--only", "c[7].q,r[9].f", "--json"]);
+    assert_eq!(status(&asked), 0, "{}", stderr(&asked));
+    let told = json(&asked);
+    assert_eq!(told["states"].as_array().map(Vec::len), Some(400));
+    let lines = |field: &str| -> Vec<String> { serde_json::from_value(told[field].clone()).unwrap() };
+    assert_eq!(lines("equations").len(), 1, "{:?}", lines("equations"));
+    assert!(lines("equations")[0].starts_with("c[7].q' = "), "{:?}", lines("equations"));
+    let definitions = lines("definitions");
+    assert!(definitions.iter().any(|line| line.starts_with("r[9].f = ")), "{definitions:?}");
+    // Down to the states, and nothing beside.
+    assert!(definitions.len() < 20 && !definitions.iter().any(|line| line.contains("[300]")), "{definitions:?}");
+    let unknown = halfarrow(&at, &["equations", "ladder.bond", "--only", "c[401].q"]);
+    assert_eq!(status(&unknown), 2);
+    assert!(stderr(&unknown).contains("c[401].q"), "{}", stderr(&unknown));
+}
+
+#[test]
 fn families_of_any_size_are_written() {
     let at = folder("families");
     for family in ["ladder", "mesh", "beam", "chain", "grid", "fourbars"] {

@@ -21,7 +21,7 @@ pub(crate) fn integrate(times: &[f64], rates: &[f64]) -> Integral {
             if end < k {
                 end = (k..n).find(|&j| j + 1 == n || times[j + 1] <= times[j]).unwrap_or(n - 1);
             }
-            let fine = piece(times, rates, (start, end), k, 6);
+            let fine = piece(times, rates, (start, end), k, MOST);
             step = fine;
             doubt = (fine - piece(times, rates, (start, end), k, 5)).abs();
             if end - start < 5 {
@@ -47,12 +47,16 @@ fn stands_apart(times: &[f64], (first, last): (usize, usize), k: usize) -> bool 
     beside.into_iter().flatten().reduce(f64::max).is_some_and(|longest| own > APART * longest)
 }
 
+/// Samples that a polynomial goes through at most.
+const MOST: usize = 6;
+
 /// Integral from sample `k - 1` to `k` of the polynomial through up to `count` samples around them in `[first, last]`.
 fn piece(times: &[f64], rates: &[f64], (first, last): (usize, usize), k: usize, count: usize) -> f64 {
     let count = count.min(last - first + 1);
     let low = (k as isize - (count as isize + 1) / 2).max(first as isize) as usize;
     let low = low.min(last + 1 - count);
-    let (t, mut c) = (&times[low..low + count], rates[low..low + count].to_vec());
+    let (t, mut c) = (&times[low..low + count], [0.0; MOST]);
+    c[..count].copy_from_slice(&rates[low..low + count]);
     for level in 1..count {
         for i in (level..count).rev() {
             c[i] = (c[i] - c[i - 1]) / (t[i] - t[i - level]);

@@ -1,13 +1,15 @@
 //! The equations, as plain data.
 
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_compiler::equations::{Algebraic, AlgebraicRole, Equations, Form, StateKind};
 use halfarrow_compiler::textbook::{
-    Shown, Style, print, print_certificate, print_definitions, print_expr, print_form, print_meanings, print_symbol,
-    show,
+    Shown, Style, only, print, print_certificate, print_definitions, print_expr, print_form, print_meanings,
+    print_symbol, show,
 };
 use serde::Serialize;
 
-use crate::error::Error;
+use crate::error::{Error, Problem};
 use crate::loops::Count;
 use crate::model::Model;
 
@@ -103,13 +105,24 @@ impl Model {
     /// # Errors
     /// The model has errors.
     pub fn equations(&self, form: Form) -> Result<EquationsReport, Error> {
+        self.equations_for(form, &[])
+    }
+
+    /// The equations of some variables alone, named as `--record` takes them, with what stands behind the names in them; of
+    /// none: all equations.
+    ///
+    /// # Errors
+    /// The model has errors, or no variable of a name.
+    pub fn equations_for(&self, form: Form, names: &[String]) -> Result<EquationsReport, Error> {
         let equations = self.equations_in(form)?;
+        let asked = names.iter().map(|name| variable(&equations, name)).collect::<Result<Vec<_>, _>>()?;
         let states = states(&equations, &self.unknowns_at_start(&equations));
         let x = &equations.graph.exprs;
         let implicit = equations.implicit.iter().map(|&s| x.name(s).to_string());
         let implicit: Vec<String> = equations.algebraic.iter().map(|a| a.name.clone()).chain(implicit).collect();
         let algebraic = algebraic(&equations);
         let shown = show(equations);
+        let shown = if asked.is_empty() { shown } else { only(shown, &asked) };
         let equations = &shown.equations;
         Ok(EquationsReport {
             model: equations.graph.name.clone(),
@@ -142,6 +155,16 @@ impl Model {
     pub fn form_text(&self, form: Form) -> Result<String, Error> {
         Ok(print_form(&show(self.equations_in(form)?)))
     }
+}
+
+/// The variable of a name.
+fn variable(equations: &Equations, name: &str) -> Result<Symbol, Problem> {
+    let x = &equations.graph.exprs;
+    let known = || equations.graph.variables.keys().copied();
+    x.find_symbol(name).filter(|s| equations.graph.variables.contains_key(s)).ok_or_else(|| Problem::UnknownVariable {
+        name: name.into(),
+        nearest: nearest(name, known().map(|s| x.name(s))).map(str::to_string),
+    })
 }
 
 fn meanings(shown: &Shown, style: Style) -> Vec<String> {

@@ -5,6 +5,7 @@ use std::time::Instant;
 use halfarrow::{CheckReport, EquationsReport, Error, Form, LoopsReport, Model, Stage};
 use serde_json::json;
 
+use super::run::all_listed;
 use super::{note_timings, overrides, source, with_model};
 use crate::arguments::{self, Format, ModelArguments};
 use crate::page::Page;
@@ -152,7 +153,7 @@ fn counts_text(report: &LoopsReport, page: Page) -> String {
 /// The equations.
 pub fn equations(arguments: &arguments::Equations) -> u8 {
     with_model(&arguments.model, |model: &Model| -> Result<u8, Error> {
-        let report = model.equations(form(arguments.form))?;
+        let report = model.equations_for(form(arguments.form), &all_listed(&arguments.only))?;
         match (arguments.model.model.json, arguments.format) {
             (true, _) | (_, Format::Json) => screen::print_json(&json!(report)),
             (_, Format::Text) => screen::print(&Page::of(&arguments.page).lines(&equations_text(&report))),

@@ -3,10 +3,12 @@
 
 mod display;
 mod named;
+mod only;
 mod places;
 mod text;
 
 pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
+pub use only::only;
 pub use text::{
     Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
     print_sides, print_symbol,
