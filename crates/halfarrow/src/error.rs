@@ -44,7 +44,7 @@ pub enum Problem {
         /// What the system says.
         why: String,
     },
-    /// A variable to record that does not exist.
+    /// A variable that is asked for and does not exist.
     UnknownVariable {
         /// As asked for.
         name: String,
@@ -177,7 +177,7 @@ impl fmt::Display for Problem {
             Problem::Unreadable { path, why } => write!(f, "{} cannot be read: {why}", path.display()),
             Problem::Unwritable { path, why } => write!(f, "{} cannot be written: {why}", path.display()),
             Problem::UnknownVariable { name, nearest } => {
-                write!(f, "there is no variable `{name}` to record")?;
+                write!(f, "there is no variable `{name}`")?;
                 match nearest {
                     Some(nearest) => write!(f, "; did you mean `{nearest}`?"),
                     None => write!(f, "; `--record all` shows what there is"),

@@ -43,7 +43,7 @@ fn work_grows_with_the_cells() {
         }
         let [_, middle, large] = counted.map(|count| count as f64);
         let [_, fewer, more] = sizes.map(|size| cells(size) as f64);
-        let exponent = (large / middle).ln() / (more / fewer).ln();
+        let exponent = libm::log(large / middle) / libm::log(more / fewer);
         assert!(exponent <= most, "{} grows as the power {exponent:.3} of its cells", family.name());
     }
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/growth.txt");

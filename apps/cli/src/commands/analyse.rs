@@ -177,11 +177,12 @@ pub fn form(form: arguments::Form) -> Form {
 }
 
 fn equations_text(report: &EquationsReport) -> String {
-    let mut text = report.text.join("\n") + "\n";
-    if !report.legend.is_empty() {
+    let mut text: String = report.text.iter().map(|line| format!("{line}\n")).collect();
+    let indent = if text.is_empty() { "" } else { "    " };
+    if !report.legend.is_empty() && !text.is_empty() {
         text += "\nwhere\n";
     }
-    report.legend.iter().for_each(|line| text += &format!("    {line}\n"));
+    report.legend.iter().for_each(|line| text += &format!("{indent}{line}\n"));
     if !report.certificate.is_empty() {
         text += "\n";
     }

@@ -2,17 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::display::{Shown, ShownDefinition};
-use crate::algebra::{Expr, Symbol, SymbolKind};
+use super::display::{Dependent, Shown, ShownDefinition};
+use crate::algebra::{Expr, Symbol};
 use crate::equations::Definition;
 
-/// The equations that tell these variables or their rates, and what stands behind the names in them. A variable that the page
+/// The equations that tell these variables, of states their rates, and what stands behind the names in them. A variable that the page
 /// has put into other equations gets the definition of its own, with those that this reads, down to the states.
 pub fn only(mut shown: Shown, asked: &[Symbol]) -> Shown {
     let x = &shown.equations.graph.exprs;
     let of_state = shown.equations.states.iter().filter(|state| asked.contains(&state.symbol)).map(|state| state.rate);
-    let rates = asked.iter().filter_map(|&s| x.find_made_of(SymbolKind::Rate(s)));
-    let wanted: BTreeSet<Symbol> = asked.iter().copied().chain(of_state).chain(rates).collect();
+    let wanted: BTreeSet<Symbol> = asked.iter().copied().chain(of_state).collect();
     let reads = |e: Expr| x.symbols_of(e);
     let tells = |left: Expr| reads(left).iter().any(|s| wanted.contains(s));
     let mut told: BTreeSet<Symbol> = shown.display.iter().flat_map(|row| reads(row.left)).collect();
@@ -20,12 +19,12 @@ pub fn only(mut shown: Shown, asked: &[Symbol]) -> Shown {
     told.extend(shown.equations.states.iter().map(|state| state.symbol));
     shown.display.retain(|row| tells(row.left));
     shown.dependent.retain(|row| wanted.contains(&row.variable));
+    let dependent = shown.dependent.iter().map(|&Dependent { variable: symbol, value }| definition(symbol, value));
     let put_in: Vec<Symbol> = wanted.iter().copied().filter(|s| !told.contains(s)).collect();
-    let added = definitions_of(&shown, &put_in, &told);
+    let added: Vec<ShownDefinition> = definitions_of(&shown, &put_in, &told).into_iter().chain(dependent).collect();
     let mut read: BTreeSet<Symbol> = wanted.clone();
     let sides = shown.display.iter().flat_map(|row| [row.left, row.right]);
-    let values = shown.dependent.iter().map(|row| row.value).chain(added.iter().map(|d| d.value));
-    read.extend(sides.chain(values).flat_map(reads));
+    read.extend(sides.chain(added.iter().map(|d| d.value)).flat_map(reads));
     // What is defined first is read by what comes later.
     for definition in shown.definitions.iter().rev() {
         if read.contains(&definition.symbol) {
@@ -42,6 +41,10 @@ pub fn only(mut shown: Shown, asked: &[Symbol]) -> Shown {
     shown
 }
 
+fn definition(symbol: Symbol, value: Expr) -> ShownDefinition {
+    ShownDefinition { symbol, value, closed: value, of_dependent: false }
+}
+
 /// The definitions of variables, each behind those that it reads.
 fn definitions_of(shown: &Shown, symbols: &[Symbol], told: &BTreeSet<Symbol>) -> Vec<ShownDefinition> {
     let x = &shown.equations.graph.exprs;
@@ -54,7 +57,7 @@ fn definitions_of(shown: &Shown, symbols: &[Symbol], told: &BTreeSet<Symbol>) ->
     while let Some((symbol, ready)) = open.pop() {
         let Some(value) = value(symbol) else { continue };
         if ready {
-            found.push(ShownDefinition { symbol, value, closed: value, of_dependent: false });
+            found.push(definition(symbol, value));
         } else if done.insert(symbol) {
             open.push((symbol, true));
             open.extend(x.symbols_of(value).into_iter().map(|s| (s, false)));
