@@ -106,6 +106,9 @@ fn families_of_any_size_are_written() {
         let run = halfarrow(&at, &["simulate", &file, "--to", "0.01", "--set", "n=4"]);
         assert_eq!(status(&run), 0, "{family}: {}", stderr(&run));
     }
+    let long =
+        stdout(&halfarrow(&at, &["simulate", "ladder.bond", "--to", "1e-6", "--set", "n=70", "--record", "all"]));
+    assert!(long.contains("more: name those of interest") && long.lines().count() < 80, "{long}");
     assert_eq!(status(&halfarrow(&at, &["new", "--family", "grid", "plate", "5"])), 0);
     let plate = std::fs::read_to_string(at.join("plate.bond")).unwrap();
     assert!(plate.starts_with("model Plate") && plate.contains("\nparam n = 5 "), "{plate}");

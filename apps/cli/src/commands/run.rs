@@ -193,14 +193,30 @@ fn json_of(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<
 
 /// How exact each state was kept.
 fn tolerances(report: &RunReport, page: Page) -> String {
-    let rows = report.tolerances.iter();
+    let rows = report.tolerances.iter().take(shown(report.tolerances.len()));
     let rows = rows.map(|kept| [kept.name.clone(), screen::short(kept.scale), format!("{:.1e}", kept.absolute)]);
     page.table(["state", "scale (SI)", "error allowed in a step"], rows)
+        + &more(report.tolerances.len(), "--json has them")
+}
+
+/// Tables of more rows than this show the first [`FIRST`] of them.
+const LONG: usize = 60;
+const FIRST: usize = 20;
+
+/// How many of so many rows are shown.
+fn shown(rows: usize) -> usize {
+    if rows > LONG { FIRST } else { rows }
+}
+
+/// What is said of those that are not.
+fn more(rows: usize, where_else: &str) -> String {
+    if rows > LONG { format!("and {} more: {where_else}\n", rows - FIRST) } else { String::new() }
 }
 
 /// Start, end, least and greatest value of every column.
 fn values(trace: &Trace, page: Page) -> String {
-    let rows = trace.columns.iter().map(|c| {
+    let columns = trace.columns.len();
+    let rows = trace.columns.iter().take(shown(columns)).map(|c| {
         let first = c.values.first().copied().unwrap_or(f64::NAN);
         let last = c.values.last().copied().unwrap_or(f64::NAN);
         let least = c.values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -209,6 +225,7 @@ fn values(trace: &Trace, page: Page) -> String {
         [c.name.clone(), c.unit.clone(), first, last, least, greatest]
     });
     page.table(["variable", "unit", "start", "end", "least", "greatest"], rows)
+        + &more(columns, "name those of interest with --record, or write all with --out")
 }
 
 fn summary(report: &RunReport) -> String {
