@@ -19,8 +19,8 @@ const SQUARE: fn(usize) -> usize = |n| n * n;
 
 const FAMILIES: [Growing; 6] = [
     Growing { family: Family::Ladder, sizes: [10, 100, 1000], cells: LINE, most: 1.01 },
-    // Factors of a square net fill up as the power 1.5 of its nodes.
-    Growing { family: Family::Mesh, sizes: [10, 20, 30], cells: SQUARE, most: 1.5 },
+    // Its loops lie along diagonals, each a band.
+    Growing { family: Family::Mesh, sizes: [10, 20, 40], cells: SQUARE, most: 1.1 },
     Growing { family: Family::Grid, sizes: [5, 10, 20], cells: SQUARE, most: 1.1 },
     Growing { family: Family::Chain, sizes: [5, 40, 80], cells: LINE, most: 1.1 },
     Growing { family: Family::Beam, sizes: [5, 20, 80], cells: LINE, most: 1.1 },

@@ -9,7 +9,7 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 /// Matrices of up to this many rows are better treated as full ones,
-const SMALL: usize = 32;
+const SMALL: usize = 12;
 /// and those for which a full one takes less than this many times the operations.
 const GAIN: u64 = 4;
 
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn full_and_small_ones_are_left() {
         assert_eq!(SymbolicFactors::of_large(&Pattern::new((0..60).map(|_| 0..60))), None);
-        assert_eq!(SymbolicFactors::of_large(&net(5)), None);
+        assert_eq!(SymbolicFactors::of_large(&net(3)), None);
         assert!(SymbolicFactors::of_large(&net(10)).is_some());
     }
 }
