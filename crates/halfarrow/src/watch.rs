@@ -15,7 +15,7 @@ pub struct StageTime {
     pub stage: &'static str,
     /// Time on the wall, in s.
     pub seconds: f64,
-    /// Memory of the process in bytes when the stage was over; `None` where the system does not tell.
+    /// Memory of the process in bytes when the stage was first over; `None` where the system does not tell.
     pub memory: Option<usize>,
 }
 
@@ -35,11 +35,11 @@ impl Watch {
 
     /// Notes what a stage took, in s, that is over now.
     pub fn note(&self, stage: &'static str, seconds: f64) {
-        let memory = memory_in_use();
         let mut noted = self.lock();
         match noted.iter_mut().find(|known| known.stage == stage) {
-            Some(known) => *known = StageTime { stage, seconds: known.seconds + seconds, memory },
-            None => noted.push(StageTime { stage, seconds, memory }),
+            // A model that runs again and again does not ask the system each time.
+            Some(known) => known.seconds += seconds,
+            None => noted.push(StageTime { stage, seconds, memory: memory_in_use() }),
         }
     }
 

@@ -1,9 +1,7 @@
 //! Small dense linear equations with complex numbers, without allocation.
 
+use super::pivot_row;
 use faer::c64;
-
-/// The diagonal stays the pivot while it is at least this fraction of the best one in its column.
-const THRESHOLD: f64 = 0.1;
 
 /// A dense square matrix, whose rows should be of like size, and its triangular factors in the same place; all memory is
 /// taken in [`new`](ComplexLu::new).
@@ -70,14 +68,7 @@ impl ComplexLu {
     /// The row to bring to place `k`: the diagonal one if it is good enough. `None` if all are 0 to rounding.
     fn pivot(&self, k: usize) -> Option<usize> {
         let weight = |row: usize| self.entries[row * self.size + k].l1_norm();
-        let mut best = k;
-        for row in k + 1..self.size {
-            if weight(row) > weight(best) || weight(row).is_nan() {
-                best = row;
-            }
-        }
-        let best = if weight(k) >= THRESHOLD * weight(best) { k } else { best };
-        (weight(best) > f64::EPSILON * self.size as f64).then_some(best)
+        pivot_row(k..self.size, weight)
     }
 
     fn swap(&mut self, a: usize, b: usize) {

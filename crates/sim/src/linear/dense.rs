@@ -1,7 +1,6 @@
 //! Small dense linear equations without allocation.
 
-/// The diagonal stays the pivot while it is at least this fraction of the best one in its column.
-const THRESHOLD: f64 = 0.1;
+use super::pivot_row;
 
 /// A dense square matrix and its triangular factors in the same place; all memory is taken in [`new`](Lu::new).
 /// Rows are scaled by their greatest entry for the choice of the pivot.
@@ -78,14 +77,7 @@ impl Lu {
     /// The row to bring to place `k`: the diagonal one if it is good enough. `None` if all are 0 to rounding.
     fn pivot(&self, k: usize) -> Option<usize> {
         let weight = |row: usize| self.entries[row * self.size + k].abs() / self.scale[row];
-        let mut best = k;
-        for row in k + 1..self.size {
-            if weight(row) > weight(best) || weight(row).is_nan() {
-                best = row;
-            }
-        }
-        let best = if weight(k) >= THRESHOLD * weight(best) { k } else { best };
-        (weight(best) > f64::EPSILON * self.size as f64).then_some(best)
+        pivot_row(k..self.size, weight)
     }
 
     fn swap(&mut self, a: usize, b: usize) {

@@ -11,7 +11,24 @@ pub(crate) use dense::Lu;
 pub(crate) use sparse::SparseLu;
 
 use faer::c64;
-use std::ops::{AddAssign, Mul, Sub, SubAssign};
+use std::ops::{AddAssign, Mul, Range, Sub, SubAssign};
+
+/// The diagonal of a full matrix stays the pivot while it is at least this fraction of the best one in its column.
+const THRESHOLD: f64 = 0.1;
+
+/// The row to bring to the first place of these, up to the last of the matrix: the one that stands there if it is good
+/// enough. `None` if all are 0 to rounding.
+fn pivot_row(places: Range<usize>, weight: impl Fn(usize) -> f64) -> Option<usize> {
+    let (first, size) = (places.start, places.end);
+    let mut best = first;
+    for row in first + 1..size {
+        if weight(row) > weight(best) || weight(row).is_nan() {
+            best = row;
+        }
+    }
+    let best = if weight(first) >= THRESHOLD * weight(best) { first } else { best };
+    (weight(best) > f64::EPSILON * size as f64).then_some(best)
+}
 
 /// What matrices are made of: real or complex numbers.
 pub(crate) trait Number:
