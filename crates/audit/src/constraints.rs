@@ -20,11 +20,9 @@ pub(crate) struct Share {
     pub multiplier: BondId,
 }
 
-/// The shares of all constraints, over the graph whose pool has their factors.
-pub(crate) fn shares(graph: &BondGraph) -> (BondGraph, Vec<Share>) {
-    let mut x = graph.exprs.clone();
-    let all = graph.constraints.iter().flat_map(|c| shares_of(graph, &mut x, c)).collect();
-    (graph.with_exprs(x), all)
+/// The shares of all constraints, with their factors in the pool.
+pub(crate) fn shares(graph: &BondGraph, x: &mut Exprs) -> Vec<Share> {
+    graph.constraints.iter().flat_map(|c| shares_of(graph, x, c)).collect()
 }
 
 fn shares_of(graph: &BondGraph, x: &mut Exprs, constraint: &Constraint) -> Vec<Share> {

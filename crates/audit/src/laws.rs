@@ -5,7 +5,7 @@ use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::terms::Terms;
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
-use halfarrow_compiler::algebra::{Expr, Node, ONE, Symbol};
+use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw};
 use std::collections::BTreeMap;
 
@@ -32,16 +32,14 @@ enum Law<'a> {
 /// Moduli that are written as quotients whose divisor may vanish: what stands over and under the line.
 pub(crate) type Quotients = BTreeMap<Expr, (Expr, Expr)>;
 
-/// Those of a graph, over the graph whose pool has their parts.
-pub(crate) fn quotients(graph: BondGraph) -> (BondGraph, Quotients) {
-    let mut x = graph.exprs.clone();
+/// Those of a graph, with their parts in the pool.
+pub(crate) fn quotients(graph: &BondGraph, x: &mut Exprs) -> Quotients {
     let modulus = |element: &Element| match element.kind {
         Kind::Transformer { modulus } | Kind::Gyrator { modulus } => Some(modulus),
         _ => None,
     };
     let all = graph.elements.values().filter_map(modulus).map(|modulus| (modulus, x.over_and_under(modulus)));
-    let quotients = all.filter(|(_, (_, under))| *under != ONE).collect();
-    (graph.with_exprs(x), quotients)
+    all.filter(|(_, (_, under))| *under != ONE).collect()
 }
 
 /// Takes note of the law whose miss is greatest.

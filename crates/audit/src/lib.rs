@@ -117,8 +117,10 @@ impl Auditor {
     /// Nothing has been seen yet.
     pub fn new(graph: &BondGraph) -> Auditor {
         let none = worst::Worst::default;
-        let (graph, shares) = constraints::shares(graph);
-        let (graph, quotients) = laws::quotients(graph);
+        let mut x = graph.exprs.clone();
+        let shares = constraints::shares(graph, &mut x);
+        let quotients = laws::quotients(graph, &mut x);
+        let graph = graph.with_exprs(x);
         Auditor {
             scales: scales::Scales::new(&graph),
             graph,

@@ -1,6 +1,7 @@
 //! Typed ids and the tables keyed by them.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 /// An id: a small integer with a type.
 pub trait Id: Copy + Ord {
@@ -28,16 +29,22 @@ macro_rules! id {
 }
 pub(crate) use id;
 
-/// A table with one entry per id, in the order of the ids.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A table with one entry per id, in the order of the ids. Copies share their entries until one of them is changed.
+#[derive(Debug, PartialEq, Eq)]
 pub struct Table<K, V> {
-    entries: Vec<V>,
+    entries: Arc<Vec<V>>,
     key: PhantomData<K>,
+}
+
+impl<K, V> Clone for Table<K, V> {
+    fn clone(&self) -> Self {
+        Table { entries: self.entries.clone(), key: PhantomData }
+    }
 }
 
 impl<K, V> Default for Table<K, V> {
     fn default() -> Self {
-        Table { entries: Vec::new(), key: PhantomData }
+        Table { entries: Arc::default(), key: PhantomData }
     }
 }
 
@@ -51,11 +58,14 @@ impl<K: Id, V> Table<K, V> {
     where
         V: Clone,
     {
-        Table { entries: vec![value; n], key: PhantomData }
+        Table { entries: Arc::new(vec![value; n]), key: PhantomData }
     }
     /// Adds an entry and gives its id.
-    pub fn push(&mut self, value: V) -> K {
-        self.entries.push(value);
+    pub fn push(&mut self, value: V) -> K
+    where
+        V: Clone,
+    {
+        Arc::make_mut(&mut self.entries).push(value);
         K::new(self.entries.len() - 1)
     }
     /// Number of entries.
@@ -75,16 +85,22 @@ impl<K: Id, V> Table<K, V> {
         self.entries.iter().enumerate().map(|(i, v)| (K::new(i), v))
     }
     /// Ids and entries in order, to change.
-    pub fn iter_mut(&mut self) -> impl DoubleEndedIterator<Item = (K, &mut V)> {
-        self.entries.iter_mut().enumerate().map(|(i, v)| (K::new(i), v))
+    pub fn iter_mut(&mut self) -> impl DoubleEndedIterator<Item = (K, &mut V)>
+    where
+        V: Clone,
+    {
+        Arc::make_mut(&mut self.entries).iter_mut().enumerate().map(|(i, v)| (K::new(i), v))
     }
     /// The entries in order.
     pub fn values(&self) -> std::slice::Iter<'_, V> {
         self.entries.iter()
     }
     /// The entries in order, taken out.
-    pub fn into_values(self) -> std::vec::IntoIter<V> {
-        self.entries.into_iter()
+    pub fn into_values(self) -> std::vec::IntoIter<V>
+    where
+        V: Clone,
+    {
+        Arc::unwrap_or_clone(self.entries).into_iter()
     }
     /// The entry, if the id is in range.
     pub fn get(&self, id: K) -> Option<&V> {
@@ -99,48 +115,56 @@ impl<K: Id, V> std::ops::Index<K> for Table<K, V> {
     }
 }
 
-impl<K: Id, V> std::ops::IndexMut<K> for Table<K, V> {
+impl<K: Id, V: Clone> std::ops::IndexMut<K> for Table<K, V> {
     fn index_mut(&mut self, id: K) -> &mut V {
-        &mut self.entries[id.index()]
+        &mut Arc::make_mut(&mut self.entries)[id.index()]
     }
 }
 
 impl<K: Id, V> FromIterator<V> for Table<K, V> {
     fn from_iter<I: IntoIterator<Item = V>>(values: I) -> Self {
-        Table { entries: values.into_iter().collect(), key: PhantomData }
+        Table { entries: Arc::new(values.into_iter().collect()), key: PhantomData }
     }
 }
 
-/// A map keyed by ids most of which are present: as a `BTreeMap`, with one place per id.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A map keyed by ids most of which are present: as a `BTreeMap`, with one place per id. Copies share their values until
+/// one of them is changed.
+#[derive(Debug, PartialEq, Eq)]
 pub struct Map<K, V> {
-    places: Vec<Option<(K, V)>>,
+    places: Arc<Vec<Option<(K, V)>>>,
     len: usize,
+}
+
+impl<K, V> Clone for Map<K, V> {
+    fn clone(&self) -> Self {
+        Map { places: self.places.clone(), len: self.len }
+    }
 }
 
 impl<K, V> Default for Map<K, V> {
     fn default() -> Self {
-        Map { places: Vec::new(), len: 0 }
+        Map { places: Arc::default(), len: 0 }
     }
 }
 
-impl<K: Id, V> Map<K, V> {
+impl<K: Id, V: Clone> Map<K, V> {
     /// An empty map.
     pub fn new() -> Self {
         Self::default()
     }
     /// Puts a value in the place of an id; gives what was there.
     pub fn insert(&mut self, id: K, value: V) -> Option<V> {
-        if self.places.len() <= id.index() {
-            self.places.resize_with(id.index() + 1, || None);
+        let places = Arc::make_mut(&mut self.places);
+        if places.len() <= id.index() {
+            places.resize_with(id.index() + 1, || None);
         }
-        let before = self.places[id.index()].replace((id, value));
+        let before = places[id.index()].replace((id, value));
         self.len += usize::from(before.is_none());
         before.map(|(_, value)| value)
     }
     /// Takes a value out.
     pub fn remove(&mut self, id: &K) -> Option<V> {
-        let (_, value) = self.places.get_mut(id.index())?.take()?;
+        let (_, value) = Arc::make_mut(&mut self.places).get_mut(id.index())?.take()?;
         self.len -= 1;
         Some(value)
     }
@@ -150,7 +174,7 @@ impl<K: Id, V> Map<K, V> {
     }
     /// The value of an id, to change.
     pub fn get_mut(&mut self, id: &K) -> Option<&mut V> {
-        self.places.get_mut(id.index())?.as_mut().map(|(_, value)| value)
+        Arc::make_mut(&mut self.places).get_mut(id.index())?.as_mut().map(|(_, value)| value)
     }
     /// Whether the id has a value.
     pub fn contains_key(&self, id: &K) -> bool {
@@ -178,11 +202,11 @@ impl<K: Id, V> Map<K, V> {
     }
     /// The values in order, to change.
     pub fn values_mut(&mut self) -> impl DoubleEndedIterator<Item = &mut V> {
-        self.places.iter_mut().flatten().map(|(_, value)| value)
+        Arc::make_mut(&mut self.places).iter_mut().flatten().map(|(_, value)| value)
     }
     /// Keeps only the values for which `keep` holds.
     pub fn retain(&mut self, mut keep: impl FnMut(&K, &mut V) -> bool) {
-        for place in &mut self.places {
+        for place in Arc::make_mut(&mut self.places) {
             if place.as_mut().is_some_and(|(id, value)| !keep(id, value)) {
                 *place = None;
                 self.len -= 1;
@@ -191,14 +215,14 @@ impl<K: Id, V> Map<K, V> {
     }
 }
 
-impl<K: Id, V> std::ops::Index<&K> for Map<K, V> {
+impl<K: Id, V: Clone> std::ops::Index<&K> for Map<K, V> {
     type Output = V;
     fn index(&self, id: &K) -> &V {
         self.get(id).expect("the id has a value")
     }
 }
 
-impl<'a, K: Id, V> IntoIterator for &'a Map<K, V> {
+impl<'a, K: Id, V: Clone> IntoIterator for &'a Map<K, V> {
     type Item = (&'a K, &'a V);
     type IntoIter =
         std::iter::Map<std::iter::Flatten<std::slice::Iter<'a, Option<(K, V)>>>, fn(&'a (K, V)) -> (&'a K, &'a V)>;
@@ -207,7 +231,7 @@ impl<'a, K: Id, V> IntoIterator for &'a Map<K, V> {
     }
 }
 
-impl<K: Id, V> Extend<(K, V)> for Map<K, V> {
+impl<K: Id, V: Clone> Extend<(K, V)> for Map<K, V> {
     fn extend<I: IntoIterator<Item = (K, V)>>(&mut self, pairs: I) {
         pairs.into_iter().for_each(|(id, value)| {
             self.insert(id, value);
@@ -215,7 +239,7 @@ impl<K: Id, V> Extend<(K, V)> for Map<K, V> {
     }
 }
 
-impl<K: Id, V> FromIterator<(K, V)> for Map<K, V> {
+impl<K: Id, V: Clone> FromIterator<(K, V)> for Map<K, V> {
     fn from_iter<I: IntoIterator<Item = (K, V)>>(pairs: I) -> Self {
         let mut map = Map::new();
         map.extend(pairs);
@@ -223,7 +247,7 @@ impl<K: Id, V> FromIterator<(K, V)> for Map<K, V> {
     }
 }
 
-impl<K: Id, V, const N: usize> From<[(K, V); N]> for Map<K, V> {
+impl<K: Id, V: Clone, const N: usize> From<[(K, V); N]> for Map<K, V> {
     fn from(pairs: [(K, V); N]) -> Self {
         pairs.into_iter().collect()
     }

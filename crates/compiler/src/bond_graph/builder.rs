@@ -50,6 +50,7 @@ pub(super) enum Role {
 }
 
 /// An input; its default is read after its symbol is known.
+#[derive(Clone)]
 pub(super) struct InputDraft {
     pub name: String,
     pub symbol: Symbol,
@@ -60,6 +61,7 @@ pub(super) struct InputDraft {
 }
 
 /// An integrated signal; its rate is read after its symbol is known.
+#[derive(Clone)]
 pub(super) struct SignalDraft {
     pub name: String,
     pub symbol: Symbol,
@@ -70,6 +72,7 @@ pub(super) struct SignalDraft {
 }
 
 /// A delayed or sampled signal; its source is read after its symbol is known.
+#[derive(Clone)]
 pub(super) struct HeldDraft {
     pub name: String,
     pub symbol: Symbol,

@@ -9,7 +9,7 @@ use super::structure::Structure;
 use super::wire::Wiring;
 use super::{Bond, BondGraph, BondId, ElementId, Kind, Meaning};
 use crate::algebra::{Facts, Symbol};
-use crate::ids::Id;
+use crate::ids::{Id, Map};
 
 /// The bond of each junction whose variable stands for the common one, by part: at a 1 that of an `I`, at a 0 that of a
 /// `C`, else one inside the junction structure, else the first. `None` for other parts.
@@ -121,7 +121,7 @@ impl Builder<'_, '_> {
     }
 
     /// The bonds of all junctions, for the graph.
-    pub fn common_bonds(&self) -> BTreeMap<ElementId, BondId> {
+    pub fn common_bonds(&self) -> Map<ElementId, BondId> {
         let known = self.common.iter().enumerate();
         known.filter_map(|(part, wire)| Some((ElementId::new(part), Self::bond_id((*wire)?)))).collect()
     }

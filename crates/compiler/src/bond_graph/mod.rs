@@ -54,8 +54,6 @@ pub use overrides::Override;
 pub use verify::verify;
 pub use warnings::warnings;
 
-use std::collections::BTreeMap;
-
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::ids::{Map, Table, id};
 use crate::span::Span;
@@ -114,7 +112,7 @@ pub struct BondGraph {
     /// Bonds, in the order written.
     pub bonds: Table<BondId, Bond>,
     /// The bond of each drawn junction whose variable stands for the common one. Two that touch have each its own.
-    pub common: BTreeMap<ElementId, BondId>,
+    pub common: Map<ElementId, BondId>,
     /// Parameters and constants.
     pub parameters: Table<ParameterId, Parameter>,
     /// Inputs.

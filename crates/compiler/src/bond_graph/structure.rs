@@ -1,13 +1,11 @@
 //! Elements and bonds: as they are drawn, and with the constraints that are built into them.
 
-use std::collections::BTreeMap;
-
 use super::assemble::cell_of;
 use super::builder::Builder;
 use super::wire::Wire;
 use super::{Bond, BondId, Element, ElementId, Kind, Port, PortRef};
 use crate::algebra::Symbol;
-use crate::ids::{Id, Table};
+use crate::ids::{Id, Map, Table};
 use crate::span::Span;
 
 /// The elements and bonds of a graph.
@@ -15,7 +13,7 @@ pub(super) struct Structure {
     pub elements: Table<ElementId, Element>,
     pub bonds: Table<BondId, Bond>,
     /// The bond that stands for each drawn junction.
-    pub common: BTreeMap<ElementId, BondId>,
+    pub common: Map<ElementId, BondId>,
 }
 
 impl Builder<'_, '_> {

@@ -81,7 +81,7 @@ fn elements(graph: &BondGraph) -> Result<(), String> {
 /// The bond that stands for a junction is one of its own, and stands for no other that it joins to this one unless these
 /// two touch nothing else.
 fn junctions(graph: &BondGraph) -> Result<(), String> {
-    for (&junction, &bond) in &graph.common {
+    for (&junction, &bond) in graph.common.iter() {
         let element = &graph.elements[junction];
         let name = &element.name;
         if !element.ports.iter().any(|p| p.bond == bond) {
