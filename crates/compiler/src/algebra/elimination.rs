@@ -1,4 +1,4 @@
-//! Sparse exact elimination.
+//! Sparse exact elimination, over expressions or over their values in a prime field.
 //!
 //! Pivots are taken class by class; within a class the simplest first (1 and -1, other numbers, parameters, what
 //! depends on the state), then those that fill in least. Where a point is given, a pivot that varies and is small there
@@ -10,49 +10,166 @@ use super::node::{Expr, Node, Symbol};
 use crate::ids::Map;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
+use std::fmt;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A linear relation: the sum of coefficient times column is zero. Sorted by column; no coefficient is zero.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct SparseRow(pub Vec<(usize, Expr)>);
+pub struct SparseRow<E = Expr>(pub Vec<(usize, E)>);
 
 /// A column expressed by a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pivot {
+pub struct Pivot<E = Expr> {
     /// The column.
     pub column: usize,
     /// The row, divided so that the coefficient of the column is 1.
-    pub row: SparseRow,
+    pub row: SparseRow<E>,
     /// What it was divided by.
-    pub divisor: Expr,
+    pub divisor: E,
     /// Which of the rows it was, before other pivots were taken off it.
     pub source: usize,
 }
 
 /// What elimination leaves.
-#[derive(Debug, Clone, Default)]
-pub struct Elimination {
+#[derive(Debug, Clone)]
+pub struct Elimination<E = Expr> {
     /// In the order of elimination: a row may hold the columns of later pivots, never of earlier ones.
-    pub pivots: Vec<Pivot>,
+    pub pivots: Vec<Pivot<E>>,
     /// The rows without a column of any class.
-    pub rest: Vec<SparseRow>,
+    pub rest: Vec<SparseRow<E>>,
     /// Divisors that are not known to be nonzero: they are watched while the program runs.
-    pub watched: Vec<Expr>,
+    pub watched: Vec<E>,
     /// Coefficients that are zero at the given parameters though not in general, taken as zero.
-    pub degenerate: Vec<Expr>,
+    pub degenerate: Vec<E>,
+}
+
+impl<E> Default for Elimination<E> {
+    fn default() -> Self {
+        Elimination { pivots: Vec::new(), rest: Vec::new(), watched: Vec::new(), degenerate: Vec::new() }
+    }
 }
 
 /// How good a pivot is: less is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Quality {
+pub enum Quality {
+    /// 1 or -1.
     Unit,
+    /// Another number, or a value that nothing more is known of than that it is not zero.
     Number,
+    /// Of parameters, known to be nonzero.
     Parameters,
+    /// It varies, and is known to be nonzero.
     Nonzero,
+    /// Of parameters, not known to be nonzero.
     DoubtfulParameters,
+    /// It varies, and is not known to be nonzero.
     Doubtful,
+    /// It is small at the point where pivots should not be.
     Vanishing,
+}
+
+/// Whether a coefficient is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Zero {
+    /// It is not.
+    No,
+    /// At the given parameters, though not in general.
+    Given,
+    /// Always.
+    Always,
+}
+
+/// What elimination computes with: a pool of expressions, or a prime field.
+pub trait Coefficients {
+    /// A coefficient.
+    type Entry: Copy + PartialEq + fmt::Debug;
+    /// The coefficient 1.
+    const ONE: Self::Entry;
+    /// Whether it is zero.
+    fn zero(&self, e: Self::Entry) -> Zero;
+    /// How good a pivot it is, and how long it is written.
+    fn quality(&self, e: Self::Entry) -> (Quality, u32);
+    /// Whether it is small at a point, beside the greatest of its row.
+    fn is_small(&self, point: &mut NumericPoint, row: &[(usize, Self::Entry)], e: Self::Entry) -> bool;
+    /// It is taken as a pivot of this quality: what it is known by counts from now on, or it is watched, in this form.
+    fn take_pivot(&mut self, e: Self::Entry, quality: Quality) -> Option<Self::Entry>;
+    /// The sum.
+    fn plus(&mut self, a: Self::Entry, b: Self::Entry) -> Self::Entry;
+    /// The product.
+    fn times(&mut self, a: Self::Entry, b: Self::Entry) -> Self::Entry;
+    /// With its sign reversed.
+    fn minus(&mut self, e: Self::Entry) -> Self::Entry;
+    /// 1 divided by what is not zero.
+    fn inverse(&mut self, e: Self::Entry) -> Self::Entry;
+}
+
+impl Coefficients for Exprs {
+    type Entry = Expr;
+    const ONE: Expr = ONE;
+
+    fn zero(&self, e: Expr) -> Zero {
+        if self.is_number(e).is_some() {
+            return if e == ZERO { Zero::Always } else { Zero::No };
+        }
+        match (self.is_zero(e), self.is_zero_given(e)) {
+            (true, _) => Zero::Always,
+            (false, true) => Zero::Given,
+            (false, false) => Zero::No,
+        }
+    }
+
+    fn quality(&self, e: Expr) -> (Quality, u32) {
+        if e == ONE || e == MINUS_ONE {
+            return (Quality::Unit, 0);
+        }
+        if matches!(self.node(e), Node::Number(_)) {
+            return (Quality::Number, 0);
+        }
+        let varies = self.depends_on_any(e, &|s| self.facts(s).given.is_none());
+        let quality = match (varies, self.is_known_nonzero(e)) {
+            (false, true) => Quality::Parameters,
+            (true, true) => Quality::Nonzero,
+            (false, false) => Quality::DoubtfulParameters,
+            (true, false) => Quality::Doubtful,
+        };
+        (quality, self.entry(e).size)
+    }
+
+    fn is_small(&self, point: &mut NumericPoint, row: &[(usize, Expr)], e: Expr) -> bool {
+        let own = point.value(self, e).abs();
+        let most = row.iter().map(|&(_, e)| point.value(self, e).abs()).fold(0.0, nan_or_greater);
+        own < SMALL * most || own == 0.0 || most.is_nan()
+    }
+
+    fn take_pivot(&mut self, e: Expr, quality: Quality) -> Option<Expr> {
+        if quality < Quality::DoubtfulParameters {
+            let _ = self.nonzero(e);
+            return None;
+        }
+        self.assume_nonzero(e);
+        // What is defined may be written shorter.
+        let short = self.simplify(e);
+        self.assume_nonzero(short);
+        Some(short)
+    }
+
+    fn plus(&mut self, a: Expr, b: Expr) -> Expr {
+        let sum = self.add(&[a, b]);
+        if self.is_number(sum).is_some() { sum } else { self.simplify(sum) }
+    }
+
+    fn times(&mut self, a: Expr, b: Expr) -> Expr {
+        self.mul(&[a, b])
+    }
+
+    fn minus(&mut self, e: Expr) -> Expr {
+        self.neg(e)
+    }
+
+    fn inverse(&mut self, e: Expr) -> Expr {
+        self.recip(e)
+    }
 }
 
 /// A pivot that varies is small at a point below this fraction of the greatest entry of its row there.
@@ -104,7 +221,11 @@ impl NumericPoint {
 /// let done = eliminate(&mut x, rows, &[vec![0, 1]]);
 /// assert_eq!(done.pivots.len(), 2);
 /// ```
-pub fn eliminate(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) -> Elimination {
+pub fn eliminate<A: Coefficients>(
+    x: &mut A,
+    rows: Vec<SparseRow<A::Entry>>,
+    classes: &[Vec<usize>],
+) -> Elimination<A::Entry> {
     let mut work = Eliminator::new(x, rows, classes.iter().flatten().copied().max().map_or(0, |c| c + 1));
     for class in classes {
         work.eliminate(x, class);
@@ -113,9 +234,9 @@ pub fn eliminate(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) ->
 }
 
 /// An elimination under way, for those who choose the next class by what the last ones have left.
-#[derive(Debug, Clone)]
-pub struct Eliminator {
-    rows: Vec<Vec<(usize, Expr)>>,
+#[derive(Debug)]
+pub struct Eliminator<A: Coefficients = Exprs> {
+    rows: Vec<Vec<(usize, A::Entry)>>,
     active: Vec<bool>,
     /// The rows of a column; some may have lost it since, or stand there twice.
     column_rows: Vec<Vec<u32>>,
@@ -123,15 +244,15 @@ pub struct Eliminator {
     stamps: Vec<u32>,
     /// Where pivots should not be small.
     point: Option<NumericPoint>,
-    done: Elimination,
+    done: Elimination<A::Entry>,
 }
 
 /// Quality, fill, column; then row and stamp. `row` is `None` as long as the entry is a lower bound.
 type Candidate = Reverse<(Quality, usize, usize, u32, Option<u32>)>;
 
-impl Eliminator {
+impl<A: Coefficients> Eliminator<A> {
     /// A system of rows over at least this many columns.
-    pub fn new(x: &mut Exprs, rows: Vec<SparseRow>, columns: usize) -> Eliminator {
+    pub fn new(x: &A, rows: Vec<SparseRow<A::Entry>>, columns: usize) -> Eliminator<A> {
         let columns = rows.iter().flat_map(|r| r.0.iter().map(|e| e.0 + 1)).max().unwrap_or(0).max(columns);
         let mut work = Eliminator {
             rows: Vec::with_capacity(rows.len()),
@@ -151,28 +272,22 @@ impl Eliminator {
     }
 
     /// The same, with pivots that are not small at a point, as far as there are any.
-    pub fn near(mut self, point: NumericPoint) -> Eliminator {
+    pub fn near(mut self, point: NumericPoint) -> Eliminator<A> {
         self.point = Some(point);
         self
     }
 
     /// Whether a coefficient counts as zero.
-    fn vanishes(&mut self, x: &Exprs, e: Expr) -> bool {
-        if x.is_number(e).is_some() {
-            return e == ZERO;
-        }
-        if x.is_zero(e) {
-            return true;
-        }
-        let degenerate = x.is_zero_given(e);
-        if degenerate {
+    fn vanishes(&mut self, x: &A, e: A::Entry) -> bool {
+        let zero = x.zero(e);
+        if zero == Zero::Given {
             self.done.degenerate.push(e);
         }
-        degenerate
+        zero != Zero::No
     }
 
     /// Eliminates the columns of one class as far as rows hold them; gives the number of pivots.
-    pub fn eliminate(&mut self, x: &mut Exprs, columns: &[usize]) -> usize {
+    pub fn eliminate(&mut self, x: &mut A, columns: &[usize]) -> usize {
         let before = self.done.pivots.len();
         let mut open: FxHashSet<usize> = columns.iter().copied().collect();
         let mut heap: BinaryHeap<Candidate> = columns.iter().map(|&c| self.bound(c)).collect();
@@ -198,6 +313,121 @@ impl Eliminator {
         self.done.pivots.len() - before
     }
 
+    /// Eliminates a column by a row that holds it.
+    pub fn eliminate_by(&mut self, x: &mut A, column: usize, row: u32) {
+        if let Some(e) = coefficient(&self.rows[row as usize], column) {
+            self.decide(x, row as usize, column, x.quality(e).0);
+        }
+        for touched in self.eliminate_column(x, row as usize, column) {
+            self.stamps[touched] += 1;
+        }
+    }
+
+    /// What a column would be divided by if it were eliminated next; `None` if no row holds it.
+    pub fn divisor(&mut self, x: &A, column: usize) -> Option<A::Entry> {
+        let Reverse((.., row)) = self.best_row(x, column)?;
+        coefficient(&self.rows[row? as usize], column)
+    }
+
+    fn bound(&self, column: usize) -> Candidate {
+        let fill = self.column_rows[column].len().saturating_sub(1);
+        Reverse((Quality::Unit, fill, column, self.stamps[column], None))
+    }
+
+    /// The best row to express the column by.
+    fn best_row(&mut self, x: &A, column: usize) -> Option<Candidate> {
+        let list = self.rows_of(column);
+        let others = list.len().saturating_sub(1);
+        let rows = &self.rows;
+        let point = &mut self.point;
+        let rated = list.iter().filter_map(|&r| {
+            let row = &rows[r as usize];
+            let e = coefficient(row, column)?;
+            let (quality, size) = x.quality(e);
+            let small = quality >= Quality::Nonzero && point.as_mut().is_some_and(|point| x.is_small(point, row, e));
+            Some((if small { Quality::Vanishing } else { quality }, size, others * row.len(), r))
+        });
+        let (quality, _, fill, row) = rated.min()?;
+        Some(Reverse((quality, fill, column, self.stamps[column], Some(row))))
+    }
+
+    /// The rows that hold a column.
+    fn rows_of(&mut self, column: usize) -> Vec<u32> {
+        let (active, rows) = (&self.active, &self.rows);
+        self.column_rows[column].sort_unstable();
+        self.column_rows[column].dedup();
+        self.column_rows[column].retain(|&r| active[r as usize] && coefficient(&rows[r as usize], column).is_some());
+        self.column_rows[column].clone()
+    }
+
+    /// A pivot is taken, and watched if need be.
+    fn decide(&mut self, x: &mut A, row: usize, column: usize, quality: Quality) {
+        let Some(e) = coefficient(&self.rows[row], column) else { return };
+        self.done.watched.extend(x.take_pivot(e, quality));
+    }
+
+    /// Makes the row the pivot of the column and takes the column out of all other rows; the columns that changed.
+    fn eliminate_column(&mut self, x: &mut A, row: usize, column: usize) -> Vec<usize> {
+        let mut pivot = std::mem::take(&mut self.rows[row]);
+        self.active[row] = false;
+        let divisor = coefficient(&pivot, column).unwrap_or(A::ONE);
+        if divisor != A::ONE {
+            let inverse = x.inverse(divisor);
+            for (c, e) in &mut pivot {
+                *e = if *c == column { A::ONE } else { x.times(*e, inverse) };
+            }
+        }
+        let touched = pivot.iter().map(|e| e.0).filter(|&c| c != column).collect();
+        for other in std::mem::take(&mut self.column_rows[column]) {
+            if self.active[other as usize] {
+                self.subtract(x, other as usize, &pivot, column);
+            }
+        }
+        self.done.pivots.push(Pivot { column, row: SparseRow(pivot), divisor, source: row });
+        touched
+    }
+
+    /// Takes the pivot's column out of a row, which may have lost it already.
+    fn subtract(&mut self, x: &mut A, other: usize, pivot: &[(usize, A::Entry)], column: usize) {
+        let mut row = std::mem::take(&mut self.rows[other]);
+        if let Ok(at) = row.binary_search_by_key(&column, |e| e.0) {
+            let minus = x.minus(row.remove(at).1);
+            for &(c, e) in pivot.iter().filter(|e| e.0 != column) {
+                let change = x.times(minus, e);
+                self.add_entry(x, &mut row, c, change, other as u32);
+            }
+        }
+        self.rows[other] = row;
+    }
+
+    fn add_entry(&mut self, x: &mut A, row: &mut Vec<(usize, A::Entry)>, column: usize, change: A::Entry, id: u32) {
+        match row.binary_search_by_key(&column, |e| e.0) {
+            Ok(at) => {
+                let sum = x.plus(row[at].1, change);
+                if self.vanishes(x, sum) {
+                    row.remove(at);
+                } else {
+                    row[at].1 = sum;
+                }
+            }
+            Err(at) => {
+                if !self.vanishes(x, change) {
+                    row.insert(at, (column, change));
+                    self.column_rows[column].push(id);
+                }
+            }
+        }
+    }
+
+    /// What has been eliminated, and what is left.
+    pub fn finish(mut self) -> Elimination<A::Entry> {
+        let rows = self.rows.into_iter().zip(&self.active);
+        self.done.rest = rows.filter(|(r, active)| **active && !r.is_empty()).map(|(r, _)| SparseRow(r)).collect();
+        self.done
+    }
+}
+
+impl Eliminator {
     /// The row in which a column weighs most at the point, beside the other columns that have a weight, and how much: 1
     /// or less, where another one is greater. `None` if no row holds the column with a value that is finite and not 0.
     pub fn heaviest(&mut self, x: &Exprs, column: usize, weights: &BTreeMap<usize, f64>) -> Option<(f64, u32)> {
@@ -216,161 +446,14 @@ impl Eliminator {
         self.point = Some(point);
         best
     }
-
-    /// Eliminates a column by a row that holds it.
-    pub fn eliminate_by(&mut self, x: &mut Exprs, column: usize, row: u32) {
-        if let Some(e) = coefficient(&self.rows[row as usize], column) {
-            self.decide(x, row as usize, column, quality(x, e).0);
-        }
-        for touched in self.eliminate_column(x, row as usize, column) {
-            self.stamps[touched] += 1;
-        }
-    }
-
-    /// What a column would be divided by if it were eliminated next; `None` if no row holds it.
-    pub fn divisor(&mut self, x: &Exprs, column: usize) -> Option<Expr> {
-        let Reverse((.., row)) = self.best_row(x, column)?;
-        coefficient(&self.rows[row? as usize], column)
-    }
-
-    fn bound(&self, column: usize) -> Candidate {
-        let fill = self.column_rows[column].len().saturating_sub(1);
-        Reverse((Quality::Unit, fill, column, self.stamps[column], None))
-    }
-
-    /// The best row to express the column by.
-    fn best_row(&mut self, x: &Exprs, column: usize) -> Option<Candidate> {
-        let list = self.rows_of(column);
-        let others = list.len().saturating_sub(1);
-        let rows = &self.rows;
-        let point = &mut self.point;
-        let rated = list.iter().filter_map(|&r| {
-            let row = &rows[r as usize];
-            let e = coefficient(row, column)?;
-            let (quality, size) = quality(x, e);
-            let small = quality >= Quality::Nonzero && point.as_mut().is_some_and(|point| is_small(x, point, row, e));
-            Some((if small { Quality::Vanishing } else { quality }, size, others * row.len(), r))
-        });
-        let (quality, _, fill, row) = rated.min()?;
-        Some(Reverse((quality, fill, column, self.stamps[column], Some(row))))
-    }
-
-    /// The rows that hold a column.
-    fn rows_of(&mut self, column: usize) -> Vec<u32> {
-        let (active, rows) = (&self.active, &self.rows);
-        self.column_rows[column].sort_unstable();
-        self.column_rows[column].dedup();
-        self.column_rows[column].retain(|&r| active[r as usize] && coefficient(&rows[r as usize], column).is_some());
-        self.column_rows[column].clone()
-    }
-
-    /// A pivot is taken: what it is known by counts from now on, or it is watched.
-    fn decide(&mut self, x: &mut Exprs, row: usize, column: usize, quality: Quality) {
-        let Some(e) = coefficient(&self.rows[row], column) else { return };
-        if quality < Quality::DoubtfulParameters {
-            let _ = x.nonzero(e);
-        } else {
-            x.assume_nonzero(e);
-            // What is defined may be written shorter.
-            let short = x.simplify(e);
-            x.assume_nonzero(short);
-            self.done.watched.push(short);
-        }
-    }
-
-    /// Makes the row the pivot of the column and takes the column out of all other rows; the columns that changed.
-    fn eliminate_column(&mut self, x: &mut Exprs, row: usize, column: usize) -> Vec<usize> {
-        let mut pivot = std::mem::take(&mut self.rows[row]);
-        self.active[row] = false;
-        let divisor = coefficient(&pivot, column).unwrap_or(ONE);
-        if divisor != ONE {
-            let inverse = x.recip(divisor);
-            for (c, e) in &mut pivot {
-                *e = if *c == column { ONE } else { x.mul(&[*e, inverse]) };
-            }
-        }
-        let touched = pivot.iter().map(|e| e.0).filter(|&c| c != column).collect();
-        for other in std::mem::take(&mut self.column_rows[column]) {
-            if self.active[other as usize] {
-                self.subtract(x, other as usize, &pivot, column);
-            }
-        }
-        self.done.pivots.push(Pivot { column, row: SparseRow(pivot), divisor, source: row });
-        touched
-    }
-
-    /// Takes the pivot's column out of a row, which may have lost it already.
-    fn subtract(&mut self, x: &mut Exprs, other: usize, pivot: &[(usize, Expr)], column: usize) {
-        let mut row = std::mem::take(&mut self.rows[other]);
-        if let Ok(at) = row.binary_search_by_key(&column, |e| e.0) {
-            let minus = x.neg(row.remove(at).1);
-            for &(c, e) in pivot.iter().filter(|e| e.0 != column) {
-                let change = x.mul(&[minus, e]);
-                self.add_entry(x, &mut row, c, change, other as u32);
-            }
-        }
-        self.rows[other] = row;
-    }
-
-    fn add_entry(&mut self, x: &mut Exprs, row: &mut Vec<(usize, Expr)>, column: usize, change: Expr, id: u32) {
-        match row.binary_search_by_key(&column, |e| e.0) {
-            Ok(at) => {
-                let sum = x.add(&[row[at].1, change]);
-                let sum = if x.is_number(sum).is_some() { sum } else { x.simplify(sum) };
-                if self.vanishes(x, sum) {
-                    row.remove(at);
-                } else {
-                    row[at].1 = sum;
-                }
-            }
-            Err(at) => {
-                if !self.vanishes(x, change) {
-                    row.insert(at, (column, change));
-                    self.column_rows[column].push(id);
-                }
-            }
-        }
-    }
-
-    /// What has been eliminated, and what is left.
-    pub fn finish(mut self) -> Elimination {
-        let rows = self.rows.into_iter().zip(&self.active);
-        self.done.rest = rows.filter(|(r, active)| **active && !r.is_empty()).map(|(r, _)| SparseRow(r)).collect();
-        self.done
-    }
 }
 
-fn coefficient(row: &[(usize, Expr)], column: usize) -> Option<Expr> {
+fn coefficient<E: Copy>(row: &[(usize, E)], column: usize) -> Option<E> {
     row.binary_search_by_key(&column, |e| e.0).ok().map(|i| row[i].1)
-}
-
-/// Whether an entry is small at a point, beside the greatest of its row.
-fn is_small(x: &Exprs, point: &mut NumericPoint, row: &[(usize, Expr)], e: Expr) -> bool {
-    let own = point.value(x, e).abs();
-    let most = row.iter().map(|&(_, e)| point.value(x, e).abs()).fold(0.0, nan_or_greater);
-    own < SMALL * most || own == 0.0 || most.is_nan()
 }
 
 fn nan_or_greater(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
-/// How good a pivot is, and how long it is written.
-fn quality(x: &Exprs, e: Expr) -> (Quality, u32) {
-    if e == ONE || e == MINUS_ONE {
-        return (Quality::Unit, 0);
-    }
-    if matches!(x.node(e), Node::Number(_)) {
-        return (Quality::Number, 0);
-    }
-    let varies = x.depends_on_any(e, &|s| x.facts(s).given.is_none());
-    let quality = match (varies, x.is_known_nonzero(e)) {
-        (false, true) => Quality::Parameters,
-        (true, true) => Quality::Nonzero,
-        (false, false) => Quality::DoubtfulParameters,
-        (true, false) => Quality::Doubtful,
-    };
-    (quality, x.entry(e).size)
 }
 
 /// Columns expressed by those that are no pivots, worked out when asked for and kept.

@@ -2,6 +2,7 @@
 
 use super::assumptions::Assumptions;
 use super::fingerprint::{Fingerprint, mix};
+use super::grown::Grown;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
@@ -31,7 +32,7 @@ use std::fmt;
 /// ```
 #[derive(Clone)]
 pub struct Exprs {
-    pub(super) entries: Vec<PoolEntry>,
+    pub(super) entries: Grown<PoolEntry>,
     ids: HashTable<u32>,
     pub(super) symbols: Vec<SymbolEntry>,
     pub(super) by_label: HashTable<u32>,
@@ -65,7 +66,7 @@ pub(super) struct PoolEntry {
 impl Default for Exprs {
     fn default() -> Self {
         let mut pool = Exprs {
-            entries: Vec::new(),
+            entries: Grown::default(),
             ids: HashTable::new(),
             symbols: Vec::new(),
             by_label: HashTable::new(),

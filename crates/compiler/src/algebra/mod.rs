@@ -13,6 +13,7 @@ mod exprs;
 mod field;
 mod fingerprint;
 mod functions;
+mod grown;
 mod linear;
 mod lowest_terms;
 pub mod math;
@@ -35,14 +36,15 @@ mod zero;
 pub use assumptions::{Assumption, Assumptions, Holds};
 pub use cost::Cost;
 pub use elimination::{
-    BackSubstitution, Elimination, Eliminator, NumericPoint, Pivot, SparseRow, back_substitute, eliminate,
+    BackSubstitution, Coefficients, Elimination, Eliminator, NumericPoint, Pivot, Quality, SparseRow, Zero,
+    back_substitute, eliminate,
 };
 pub use evaluate::{EvaluationOrder, Evaluator};
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use lowest_terms::LowestTerms;
 pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;
-pub use residue::Residue;
+pub use residue::{PrimeField, Residue, Residues};
 pub use share::Shared;
 pub use symbol_sets::Symbols;
 pub use symbols::{SymbolKind, dotted};

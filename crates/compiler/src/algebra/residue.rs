@@ -1,8 +1,9 @@
 //! Values of expressions in a prime field, to compute with.
 
+use super::elimination::{Coefficients, NumericPoint, Quality, Zero};
 use super::exprs::Exprs;
-use super::field;
-use super::fingerprint::{GENERIC, POISON};
+use super::field::{self, P};
+use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::Expr;
 
 /// The value of an expression in a prime field, where every symbol has a random value. Sums and products of values are
@@ -38,5 +39,70 @@ impl Exprs {
     /// The value of an expression in the prime field; `None` where it has none.
     pub fn residue(&self, e: Expr) -> Option<Residue> {
         Some(self.fingerprint(e)[GENERIC.start]).filter(|&v| v != POISON).map(Residue)
+    }
+}
+
+/// The values of an expression in a prime field: with all symbols random, and with parameters as they are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Residues {
+    generic: u64,
+    given: u64,
+}
+
+impl Residues {
+    fn each(self, other: Residues, by: impl Fn(u64, u64) -> u64) -> Residues {
+        Residues { generic: by(self.generic, other.generic), given: by(self.given, other.given) }
+    }
+}
+
+impl Exprs {
+    /// The values of an expression in the prime field; `None` where they do not decide whether it is zero.
+    pub fn residues(&self, e: Expr) -> Option<Residues> {
+        let properties = &self.entry(e).properties;
+        let lanes = self.fingerprint(e);
+        let (generic, given) = (lanes[GENERIC.start], lanes[GIVEN.start]);
+        let decides = !properties.radical && properties.opaque == [false; 2] && generic != POISON && given != POISON;
+        decides.then_some(Residues { generic, given })
+    }
+}
+
+/// The prime field as what elimination computes with: it tells which columns follow from which, and what each row is
+/// divided by is left open.
+#[derive(Debug, Clone, Copy)]
+pub struct PrimeField;
+
+impl Coefficients for PrimeField {
+    type Entry = Residues;
+    const ONE: Residues = Residues { generic: 1, given: 1 };
+
+    fn zero(&self, e: Residues) -> Zero {
+        match (e.generic, e.given) {
+            (0, _) => Zero::Always,
+            (_, 0) => Zero::Given,
+            _ => Zero::No,
+        }
+    }
+    fn quality(&self, e: Residues) -> (Quality, u32) {
+        let unit = e == Self::ONE || e == Residues { generic: P - 1, given: P - 1 };
+        (if unit { Quality::Unit } else { Quality::Number }, 0)
+    }
+    fn is_small(&self, _: &mut NumericPoint, _: &[(usize, Residues)], _: Residues) -> bool {
+        false
+    }
+    fn take_pivot(&mut self, _: Residues, _: Quality) -> Option<Residues> {
+        None
+    }
+    fn plus(&mut self, a: Residues, b: Residues) -> Residues {
+        a.each(b, field::add)
+    }
+    fn times(&mut self, a: Residues, b: Residues) -> Residues {
+        a.each(b, field::mul)
+    }
+    fn minus(&mut self, e: Residues) -> Residues {
+        Residues { generic: field::neg(e.generic), given: field::neg(e.given) }
+    }
+    fn inverse(&mut self, e: Residues) -> Residues {
+        let inverse = |v| field::inverse(v).unwrap_or(0);
+        Residues { generic: inverse(e.generic), given: inverse(e.given) }
     }
 }

@@ -58,13 +58,17 @@ impl BlockRows {
 
 /// Each pivot column of an elimination as a combination of columns of its block, of blocks before it and of columns that are
 /// no pivots. The determinant of the whole is the product of those of the blocks, so that what they are divided by is what
-/// has to be watched: each loop of a chain has a divisor of its own.
-pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination) -> Option<BlockRows> {
+/// has to be watched: each loop of a chain has a divisor of its own. `None` also if a block has more than `most` columns.
+pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination, most: usize) -> Option<BlockRows> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done, true)?;
     let mut found =
         BlockRows { rows: Vec::with_capacity(row_of.len()), divisors: Vec::new(), residues: BTreeSet::new() };
-    for mut columns in blocks(&rows, &row_of) {
+    let blocks = blocks(&rows, &row_of);
+    if blocks.iter().any(|columns| columns.len() > most) {
+        return None;
+    }
+    for mut columns in blocks {
         columns.sort_unstable();
         let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
         let own = eliminate(x, own, &[columns.clone()]);

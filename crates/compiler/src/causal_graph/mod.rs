@@ -13,6 +13,7 @@ mod local;
 mod matched;
 mod ports;
 mod rank;
+mod roles;
 mod rules;
 pub mod signals;
 pub(crate) mod start_point;

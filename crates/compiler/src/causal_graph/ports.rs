@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::matched::{BlockRows, block_rows, matched_rows};
 use super::{Combination, PortState, Role};
 use crate::algebra::{
-    Assumptions, Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate,
+    Assumptions, Coefficients, Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate,
 };
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
@@ -118,6 +118,10 @@ pub(super) struct Net {
     pub inner: Vec<usize>,
 }
 
+/// Parts with more elements than this are solved by the roles of their ports alone, if they can be: elimination fills the
+/// rows of a chain in.
+const LARGE: usize = 600;
+
 /// Solves the junction structure of one connected part. Definitions are as short as the elements write them where that
 /// can be.
 pub fn solve_part(
@@ -127,7 +131,13 @@ pub fn solve_part(
     preferences: &CausalityPreferences,
 ) -> Solved {
     let before = x.assumed();
-    let (net, done, outputs) = eliminated(x, graph, members, preferences);
+    let net = Net::new(x, graph, members, preferences);
+    if members.len() > LARGE
+        && let Some(solved) = net.solved_by_roles(x, preferences)
+    {
+        return solved;
+    }
+    let (done, outputs) = net.eliminated(x, preferences);
     net.solved(x, done, &outputs, preferences, Way::Short(before))
 }
 
@@ -138,44 +148,9 @@ pub fn solve_part_at_length(
     members: &[ElementId],
     preferences: &CausalityPreferences,
 ) -> Solved {
-    let (net, done, outputs) = eliminated(x, graph, members, preferences);
-    net.solved(x, done, &outputs, preferences, Way::Eliminated)
-}
-
-/// The rows of a part with one variable of every port eliminated; the roles of ports, by their numbers.
-fn eliminated(
-    x: &mut Exprs,
-    graph: &BondGraph,
-    members: &[ElementId],
-    preferences: &CausalityPreferences,
-) -> (Net, Elimination, BTreeMap<usize, Role>) {
     let net = Net::new(x, graph, members, preferences);
-    let mut work = Eliminator::new(x, net.rows.clone(), net.symbols.len());
-    work.eliminate(x, &net.inner);
-
-    // Pivots are taken in ascending priority as inputs: reactions, rates, laws, co-energies. Pivot columns are outputs.
-    let imposed: Vec<usize> = net.ports_where(|o| matches!(o, Offer::Imposed(_)));
-    let storages = net.storage_order(preferences);
-    let laws = net.ports_where(|o| o == Offer::Law);
-    let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
-    for &p in &imposed {
-        let determined = work.eliminate(x, &[net.ports[p].conjugate()]) == 1;
-        outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
-    }
-    for &p in &storages {
-        work.eliminate(x, &[net.ports[p].conjugate()]);
-    }
-    for &p in laws.iter().rev() {
-        let port = &net.ports[p];
-        let causality = law_causality(x, &mut work, port, preferences);
-        work.eliminate(x, &[port.column(causality == PortCausality::Conductive)]);
-        outputs.insert(p, Role::Algebraic(causality));
-    }
-    for &p in storages.iter().rev() {
-        let dependent = work.eliminate(x, &[net.ports[p].given()]) == 1;
-        outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
-    }
-    (net, work.finish(), outputs)
+    let (done, outputs) = net.eliminated(x, preferences);
+    net.solved(x, done, &outputs, preferences, Way::Eliminated)
 }
 
 impl NetPort {
@@ -361,6 +336,11 @@ impl Net {
         Combination(terms)
     }
 
+    /// A column as a combination of others, by their symbols.
+    pub(super) fn definition(&self, (column, row): (usize, Vec<(usize, Expr)>)) -> (Symbol, Combination) {
+        (self.symbols[column], self.combination(&row))
+    }
+
     /// The result of an elimination as roles, definitions and relations.
     pub fn solved(
         &self,
@@ -377,13 +357,12 @@ impl Net {
         solved
     }
 
-    fn report(
+    /// Inputs and outputs of the ports, with their roles.
+    pub(super) fn report_ports(
         &self,
-        done: Elimination,
         outputs: &BTreeMap<usize, Role>,
         preferences: &CausalityPreferences,
-        (solved, way): (&mut Solved, Way),
-        x: &mut Exprs,
+        solved: &mut Solved,
     ) {
         for (&p, &role) in outputs {
             let port = &self.ports[p];
@@ -403,6 +382,17 @@ impl Net {
                 None => solved.definitions.push((self.symbols[input], Combination::default())),
             }
         }
+    }
+
+    fn report(
+        &self,
+        done: Elimination,
+        outputs: &BTreeMap<usize, Role>,
+        preferences: &CausalityPreferences,
+        (solved, way): (&mut Solved, Way),
+        x: &mut Exprs,
+    ) {
+        self.report_ports(outputs, preferences, solved);
         let mut defined = vec![false; self.symbols.len()];
         done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
         let all = self.inner.iter().all(|&c| defined[c]) && !outputs.values().any(|&role| role == Role::Redundant);
@@ -423,8 +413,7 @@ impl Net {
             Some(BlockRows { rows, divisors, .. }) => (rows, divisors),
             None => (whole, regular.map_or(done.watched, |regular| vec![regular.determinant])),
         };
-        let named = |(column, row): (usize, Vec<(usize, Expr)>)| (self.symbols[column], self.combination(&row));
-        solved.definitions.extend(rows.into_iter().map(named));
+        solved.definitions.extend(rows.into_iter().map(|row| self.definition(row)));
         let free = |&c: &usize| !defined[c];
         solved.undetermined = self.inner.iter().copied().filter(free).map(|c| self.symbols[c]).collect();
         for (&p, &role) in outputs {
@@ -438,6 +427,51 @@ impl Net {
 }
 
 impl Net {
+    /// The rows with one variable of every port eliminated; the roles of ports, by their numbers.
+    fn eliminated(&self, x: &mut Exprs, preferences: &CausalityPreferences) -> (Elimination, BTreeMap<usize, Role>) {
+        let causality = |x: &Exprs, port: &NetPort, divisors: [Option<Expr>; 2]| {
+            law_causality(port, divisors.map(|e| e.map(|e| super::magnitude(x, e))), preferences)
+        };
+        self.eliminated_over(x, self.rows.clone(), preferences, causality)
+    }
+
+    /// The same over any coefficients. `causality` chooses that of a law by what its effort, or its flow, would be divided by.
+    pub(super) fn eliminated_over<A: Coefficients>(
+        &self,
+        x: &mut A,
+        rows: Vec<SparseRow<A::Entry>>,
+        preferences: &CausalityPreferences,
+        mut causality: impl FnMut(&A, &NetPort, [Option<A::Entry>; 2]) -> PortCausality,
+    ) -> (Elimination<A::Entry>, BTreeMap<usize, Role>) {
+        let mut work = Eliminator::new(x, rows, self.symbols.len());
+        work.eliminate(x, &self.inner);
+
+        // Pivots are taken in ascending priority as inputs: reactions, rates, laws, co-energies. Pivot columns are outputs.
+        let imposed: Vec<usize> = self.ports_where(|o| matches!(o, Offer::Imposed(_)));
+        let storages = self.storage_order(preferences);
+        let laws = self.ports_where(|o| o == Offer::Law);
+        let mut outputs: BTreeMap<usize, Role> = BTreeMap::new();
+        for &p in &imposed {
+            let determined = work.eliminate(x, &[self.ports[p].conjugate()]) == 1;
+            outputs.insert(p, if determined { Role::Source } else { Role::Redundant });
+        }
+        for &p in &storages {
+            work.eliminate(x, &[self.ports[p].conjugate()]);
+        }
+        for &p in laws.iter().rev() {
+            let port = &self.ports[p];
+            let divisors = [port.effort, port.flow].map(|column| work.divisor(x, column));
+            let causality = causality(x, port, divisors);
+            work.eliminate(x, &[port.column(causality == PortCausality::Conductive)]);
+            outputs.insert(p, Role::Algebraic(causality));
+        }
+        for &p in storages.iter().rev() {
+            let dependent = work.eliminate(x, &[self.ports[p].given()]) == 1;
+            outputs.insert(p, if dependent { Role::Dependent } else { Role::Independent });
+        }
+        (work.finish(), outputs)
+    }
+
     /// The rows block by block, if several blocks have divisors of their own and that is less than half as long. What is
     /// assumed is then what was assumed `before` the elimination, and these divisors.
     fn parted(
@@ -449,7 +483,7 @@ impl Net {
     ) -> Option<BlockRows> {
         let eliminated = x.assumed();
         x.suppose(before);
-        let parted = block_rows(x, &self.rows, done);
+        let parted = block_rows(x, &self.rows, done, usize::MAX);
         let parted = parted.filter(|p| p.divisors.len() > 1 && 2 * length(x, &p.rows) < length(x, whole));
         if parted.is_none() {
             x.suppose(eliminated);
@@ -474,16 +508,15 @@ fn offer(graph: &BondGraph, port: PortRef) -> Offer {
     }
 }
 
-/// The causality of an algebraic port: the one preferred for if it is admissible and well conditioned.
-fn law_causality(
-    x: &Exprs,
-    work: &mut Eliminator,
+/// The causality of an algebraic port: the one preferred for if it is admissible and well conditioned. `effort`, `flow`: how
+/// great the divisor is, if there is one.
+pub(super) fn law_causality(
     port: &NetPort,
+    [effort, flow]: [Option<f64>; 2],
     preferences: &CausalityPreferences,
 ) -> PortCausality {
     let wish = port.port.and_then(|p| preferences.algebraic.get(&p).copied()).unwrap_or(PortCausality::Resistive);
-    let mut size = |column| work.divisor(x, column).map(|e| super::magnitude(x, e));
-    match (size(port.effort), size(port.flow)) {
+    match (effort, flow) {
         (Some(_), None) => PortCausality::Conductive,
         (None, Some(_)) => PortCausality::Resistive,
         (Some(effort), Some(flow)) => match wish {

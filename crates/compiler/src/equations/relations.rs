@@ -22,7 +22,12 @@ pub struct Relations {
     pub rows: Vec<Moved>,
     /// Number of drives.
     pub drives: usize,
+    /// Whether there may be rows that are not written out, because all of them together are too long.
+    pub unwritten: bool,
 }
+
+/// Terms of rows that are written out at most.
+const TERMS: usize = 100_000;
 
 /// One row: `Σ factor · quantity' = Σ coefficient · drive`.
 #[derive(Debug, Clone)]
@@ -53,8 +58,12 @@ pub(super) fn relations(assembled: &mut Assembled, causal: &CausalGraph) -> Rela
     let ports = Ports::of(&assembled.d, causal);
     let states = assembled.states.clone();
     let entangled = entangled(assembled, &ports, &states);
-    let entangled = states.iter().zip(entangled).filter(|state| state.1);
-    let mut rows: Vec<Row> = entangled.filter_map(|(state, _)| row(assembled, &ports, state)).collect();
+    let entangled: Vec<&Chosen> =
+        states.iter().zip(entangled).filter(|state| state.1).map(|(state, _)| state).collect();
+    if are_long(assembled, &ports, &entangled) {
+        return Relations { unwritten: true, ..Relations::default() };
+    }
+    let mut rows: Vec<Row> = entangled.into_iter().filter_map(|state| row(assembled, &ports, state)).collect();
     // Rows with a drive of their own go wherever the others go.
     let drives: Vec<Vec<Drive>> = rows.iter().map(|row| row.by.keys().copied().collect()).collect();
     let mut left = without_own(&drives).into_iter();
@@ -63,7 +72,16 @@ pub(super) fn relations(assembled: &mut Assembled, causal: &CausalGraph) -> Rela
     let number: BTreeMap<Drive, usize> = drives.into_iter().zip(0..).collect();
     let numbered =
         |r: Row| Moved { quantity: r.quantity, by: r.by.into_iter().map(|(drive, c)| (number[&drive], c)).collect() };
-    Relations { drives: number.len(), rows: rows.into_iter().map(numbered).collect() }
+    Relations { drives: number.len(), rows: rows.into_iter().map(numbered).collect(), unwritten: false }
+}
+
+/// Whether the rows of these states are too long to be written out.
+fn are_long(assembled: &mut Assembled, ports: &Ports, states: &[&Chosen]) -> bool {
+    let mut terms = 0;
+    states.iter().filter_map(|state| ports.rate_of(state)).any(|rate| {
+        terms += assembled.rows.inputs_of(&mut assembled.d.x, rate).len();
+        terms > TERMS
+    })
 }
 
 /// What the ports are to the rows.

@@ -199,6 +199,8 @@ pub struct Relations {
     pub rows: Vec<Moved>,
     /// Number of drives.
     pub drives: usize,
+    /// Whether there may be rows that are not written out, because all of them together are too long.
+    pub unwritten: bool,
 }
 
 /// One row: `Σ factor · quantity' = Σ coefficient · drive`.

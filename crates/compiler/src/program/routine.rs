@@ -56,7 +56,7 @@ pub enum Step {
         scale: Arg,
     },
     /// A solve block.
-    Solve(Solve),
+    Solve(Box<Solve>),
 }
 
 /// A solve block in a routine.
@@ -164,7 +164,7 @@ impl Code {
 
     /// Its solve blocks.
     pub fn solves(&self) -> impl Iterator<Item = &Solve> {
-        self.steps.iter().filter_map(|step| if let Step::Solve(solve) = step { Some(solve) } else { None })
+        self.steps.iter().filter_map(|step| if let Step::Solve(solve) = step { Some(&**solve) } else { None })
     }
 }
 
@@ -428,7 +428,7 @@ impl<'a> Builder<'a> {
         });
         let unknowns = unknowns.collect();
         let pattern = Arc::clone(matrix.pattern());
-        self.code.steps.push(Step::Solve(Solve { block, unknowns, pattern, method }));
+        self.code.steps.push(Step::Solve(Box::new(Solve { block, unknowns, pattern, method })));
     }
 
     fn arg(&self, v: Value) -> Arg {

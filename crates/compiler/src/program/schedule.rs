@@ -444,5 +444,5 @@ fn relations(lower: &mut Lowering, graph: &BondGraph, of: &crate::equations::Rel
             by: row.by.iter().map(|&(drive, c)| (drive, lower.value(c))).collect(),
         });
     }
-    Relations { rows, drives: of.drives }
+    Relations { rows, drives: of.drives, unwritten: of.unwritten }
 }

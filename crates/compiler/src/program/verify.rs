@@ -318,7 +318,9 @@ mod tests {
         assert!(code.verify().is_err());
         code = whole;
         for step in &mut code.steps {
-            if let Step::Solve(Solve { method: Method::Newton { outer, .. }, .. }) = step {
+            if let Step::Solve(solve) = step
+                && let Method::Newton { outer, .. } = &mut solve.method
+            {
                 outer.clear();
             }
         }

@@ -1,0 +1,63 @@
+//! The roles of ports by elimination in a prime field, and definitions from the rows of the elements as they stand.
+//!
+//! Which variable of a port follows from which takes no more than ranks, and these are the same in a prime field where every
+//! symbol has a random value (up to a probability of 2^-60). No expression is made that the definitions do not need, so that
+//! a chain of bodies costs as much as its junctions, not the sums along it.
+
+use std::collections::BTreeMap;
+
+use super::Role;
+use super::matched::{block_rows, matched_rows};
+use super::ports::{CausalityPreferences, Net, NetPort, Solved, law_causality};
+use crate::algebra::{Elimination, Exprs, ONE, Pivot, PrimeField, Residues, SparseRow};
+
+/// Blocks with more columns than this are left to the elimination of the whole, which looks for common divisors.
+const BLOCK: usize = 48;
+
+impl Net {
+    /// The part solved by its roles. `None` if something is redundant, undetermined, contradictory or degenerate, or if
+    /// definitions would take what only expressions tell: sizes of coefficients, or large blocks.
+    pub(super) fn solved_by_roles(&self, x: &mut Exprs, preferences: &CausalityPreferences) -> Option<Solved> {
+        let (done, outputs) = self.roles(x, preferences)?;
+        let mut solved = Solved::default();
+        self.report_ports(&outputs, preferences, &mut solved);
+        let matched = x.if_found(|x| matched_rows(x, &self.rows, &done));
+        let rows = match matched {
+            Some(rows) => rows,
+            None => {
+                let blocks = x.if_found(|x| block_rows(x, &self.rows, &done, BLOCK))?;
+                solved.watched = blocks.divisors;
+                blocks.rows
+            }
+        };
+        solved.definitions.extend(rows.into_iter().map(|row| self.definition(row)));
+        Some(solved)
+    }
+
+    /// The columns that follow from others, each with the row that it was found by, and the roles of the ports.
+    fn roles(&self, x: &Exprs, preferences: &CausalityPreferences) -> Option<(Elimination, BTreeMap<usize, Role>)> {
+        let values = |row: &SparseRow| {
+            let values = row.0.iter().map(|&(column, e)| Some((column, x.residues(e)?)));
+            values.collect::<Option<_>>().map(SparseRow)
+        };
+        let rows = self.rows.iter().map(values).collect::<Option<_>>()?;
+        // A law that may go either way is chosen by sizes, which the field does not tell.
+        let mut doubtful = false;
+        let causality = |_: &PrimeField, port: &NetPort, divisors: [Option<Residues>; 2]| {
+            doubtful |= divisors.iter().all(Option::is_some);
+            law_causality(port, divisors.map(|e| e.map(|_| 1.0)), preferences)
+        };
+        let (done, outputs) = self.eliminated_over(&mut PrimeField, rows, preferences, causality);
+        let mut defined = vec![false; self.symbols.len()];
+        done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
+        let regular = !doubtful
+            && done.rest.is_empty()
+            && done.degenerate.is_empty()
+            && self.inner.iter().all(|&c| defined[c])
+            && !outputs.values().any(|&role| role == Role::Redundant);
+        let pivot =
+            |p: &Pivot<_>| Pivot { column: p.column, row: SparseRow(Vec::new()), divisor: ONE, source: p.source };
+        let pivots = done.pivots.iter().map(pivot).collect();
+        regular.then(|| (Elimination { pivots, ..Elimination::default() }, outputs))
+    }
+}
