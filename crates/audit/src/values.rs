@@ -109,7 +109,16 @@ impl<'a> Values<'a> {
                 columns.entry(bond.flow).or_insert(c);
             });
         }
-        Values { graph, times: run.times, quadrature: Quadrature::new(run.times), columns, parameters, efforts, flows, same }
+        Values {
+            graph,
+            times: run.times,
+            quadrature: Quadrature::new(run.times),
+            columns,
+            parameters,
+            efforts,
+            flows,
+            same,
+        }
     }
 
     pub fn effort(&self, bond: BondId) -> Option<&'a [f64]> {

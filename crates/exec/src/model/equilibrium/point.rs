@@ -1,10 +1,10 @@
 //! A state with what the next step of a search is made of.
 
+use super::super::{Model, minimum_norm};
+use super::FEW_STATES;
 use super::leaf::{Directions, Leaf};
 use super::open_equations::{Entry, OpenEquations, greatest};
 use super::tangent::Tangent;
-use super::super::{Model, minimum_norm};
-use super::FEW_STATES;
 use halfarrow_sim::{Failure, Jacobian};
 
 /// A state with its rates, their derivatives, and the ways in which constraints let it move.

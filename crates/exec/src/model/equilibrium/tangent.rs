@@ -47,11 +47,7 @@ impl Tangent {
     }
 
     /// Square equations for a move in the leaf: these for the states, but for a part that no move in the leaf can take up.
-    pub fn equations(
-        &self,
-        entries: impl Iterator<Item = Entry>,
-        right: impl Iterator<Item = f64>,
-    ) -> OpenEquations {
+    pub fn equations(&self, entries: impl Iterator<Item = Entry>, right: impl Iterator<Item = f64>) -> OpenEquations {
         // Unknowns: the move, the drives, and the part beside the leaf as a combination of the rows.
         let (drives, rows) = (self.states, self.states + self.drives);
         let moves = self.moves.iter().flat_map(|&(i, j, v)| [(rows + i, j, v), (j, rows + i, v)]);
