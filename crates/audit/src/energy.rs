@@ -1,7 +1,7 @@
 //! What is stored changes by what flows in.
 
 use crate::laws::sensitivities;
-use crate::quadrature::{gauss, integrate};
+use crate::quadrature::gauss;
 use crate::regions::Classes;
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
@@ -69,7 +69,7 @@ pub(crate) fn rates(
                             .push(format!("the impulse that {name} takes at t = {time} s: no effort or flow tells it"));
                     }
                     let held = IntegratedQuantity { name: &element.name, x, rate, terms };
-                    held.compare(values.times, settled, worst, Vec::new);
+                    held.compare(values, settled, worst, Vec::new);
                 }
                 _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
             }
@@ -87,7 +87,9 @@ pub(crate) fn rates(
                 continue;
             }
         };
-        let rate: Vec<f64> = (0..x.len()).map(|k| reader.values(k, None).map_or(f64::NAN, |v| v[0])).collect();
+        let mut room = Vec::new();
+        let mut at = |k: usize| reader.values_in(&mut room, k, None).map_or(f64::NAN, |v| v[0]);
+        let rate: Vec<f64> = (0..x.len()).map(&mut at).collect();
         if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
             unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
             continue;
@@ -98,7 +100,7 @@ pub(crate) fn rates(
             rate: &rate,
             terms: vec![Term::of(Quantity::Of(signal.symbol), 1.0)],
         };
-        held.compare(values.times, settled, worst, || {
+        held.compare(values, settled, worst, || {
             // What its rate reads moves it: the terms that its rate has in the middle of the run.
             let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
             reads.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight * scales.span())).collect()
@@ -116,8 +118,8 @@ struct IntegratedQuantity<'a> {
 
 impl IntegratedQuantity<'_> {
     /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
-    fn compare(&self, times: &[f64], settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
-        let integral = integrate(times, self.rate);
+    fn compare(&self, values: &Values, settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
+        let (times, integral) = (values.times, values.quadrature.integrate(self.rate));
         let moved = integral.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let mut terms = self.terms.clone();
         terms.push(Term::of(Quantity::Number, moved));
@@ -159,13 +161,17 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
         };
         any = true;
         held = held.max(energy_held(graph, values, port));
-        let by_law = stored_by_law(graph, values, port);
-        let through = integrate(values.times, &power);
-        let own: &[f64] = by_law.as_deref().unwrap_or(&through.values);
-        for k in 0..n {
-            balance[k] += own[k];
-            moved[k] = moved[k].max(own[k].abs());
-            uncertainty[k] += if by_law.is_none() { through.uncertainty[k] } else { 0.0 };
+        let own = match stored_by_law(graph, values, port) {
+            Some(energy) => energy,
+            None => {
+                let through = values.quadrature.integrate(&power);
+                uncertainty.iter_mut().zip(&through.uncertainty).for_each(|(sum, own)| *sum += own);
+                through.values
+            }
+        };
+        for ((balance, moved), own) in balance.iter_mut().zip(&mut moved).zip(&own) {
+            *balance += own;
+            *moved = moved.max(own.abs());
         }
     }
     let moved = moved.into_iter().fold(held, f64::max);
@@ -228,13 +234,14 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Ve
     }
     let law = EvaluationOrder::new(&graph.exprs, &[law]);
     let parameter = |s: Symbol| values.parameter(s).unwrap_or(f64::NAN);
-    let z = |x: f64| law.values(&mut |s| if s == own { x } else { parameter(s) })[0];
+    let mut room = Vec::new();
+    let mut z = |x: f64| law.values_in(&mut room, &mut |s| if s == own { x } else { parameter(s) })[0];
     // What an impulse gives or takes is no power of any sample.
     let jumps = jumps(values.times, x, JUMPED * greatest(x));
     let mut energy = vec![0.0; x.len()];
     for k in 1..x.len() {
         let by_impulse = jumps[k] != jumps[k - 1];
-        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { gauss(x[k - 1], x[k], z) };
+        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { gauss(x[k - 1], x[k], &mut z) };
     }
     Some(energy)
 }

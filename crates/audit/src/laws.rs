@@ -341,13 +341,14 @@ impl Check<'_, '_> {
         more: &dyn Fn(usize, &[f64]) -> Vec<Term>,
     ) {
         let scale = self.settled.scale(&[Term::of(of, 1.0)]);
+        let mut room = Vec::new();
         for (k, &time) in self.values.times.iter().enumerate() {
-            let Some(found) = reader.values(k, None) else { continue };
-            let off = miss(k, &found);
+            let Some(found) = reader.values_in(&mut room, k, None) else { continue };
+            let off = miss(k, found);
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             self.worst.note(off, scale, settled, || {
                 let mut terms = vec![Term::of(of, 1.0)];
-                terms.extend(more(k, &found));
+                terms.extend(more(k, found));
                 let all = sensitivities(graph, scales, settled, reader, k, |v| miss(k, v));
                 terms.extend(all.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight)));
                 raw(off, time, name, what, terms)

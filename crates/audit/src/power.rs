@@ -25,18 +25,21 @@ pub(crate) fn power(
         }
     }
     for ports in ports.values() {
-        let powers: Vec<Option<Vec<f64>>> = ports.iter().map(|&port| values.power(port)).collect();
-        if let Some(missing) = powers.iter().position(Option::is_none) {
-            let name = &graph.elements[ports[missing].element].name;
+        let mut misses = vec![-0.0; values.times.len()];
+        let missing = ports.iter().find(|&&port| {
+            let power = values.power(port);
+            power.iter().flatten().zip(&mut misses).for_each(|(power, sum)| *sum += power);
+            power.is_none()
+        });
+        if let Some(port) = missing {
+            let name = &graph.elements[port.element].name;
             unchecked.push(format!("the power balance of the part with {name}: its effort or flow is not known"));
             continue;
         }
-        let powers: Vec<Vec<f64>> = powers.into_iter().flatten().collect();
         let place = format!("the part with {}", graph.elements[ports[0].element].name);
         let natural = Term::of(scales.power(graph, ports[0]), 1.0);
         let scale = settled.scale(&[natural]);
-        for (sample, &time) in values.times.iter().enumerate() {
-            let miss = powers.iter().map(|p| p[sample]).sum();
+        for (sample, (&time, &miss)) in values.times.iter().zip(&misses).enumerate() {
             worst.note(miss, scale, settled, || {
                 let mut terms = vec![natural];
                 ports.iter().for_each(|&port| terms.extend(changes(graph, values, scales, port, sample)));

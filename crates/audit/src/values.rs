@@ -1,6 +1,7 @@
 //! Recorded values by symbol.
 
 use crate::Run;
+use crate::quadrature::Quadrature;
 use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::ids::Table;
@@ -61,6 +62,8 @@ enum Side {
 pub(crate) struct Values<'a> {
     graph: &'a BondGraph,
     pub times: &'a [f64],
+    /// What the samples weigh in integrals.
+    pub quadrature: Quadrature,
     columns: BTreeMap<Symbol, &'a [f64]>,
     parameters: BTreeMap<Symbol, f64>,
     efforts: Table<BondId, Option<&'a [f64]>>,
@@ -106,7 +109,16 @@ impl<'a> Values<'a> {
                 columns.entry(bond.flow).or_insert(c);
             });
         }
-        Values { graph, times: run.times, columns, parameters, efforts, flows, same }
+        Values {
+            graph,
+            times: run.times,
+            quadrature: Quadrature::new(run.times),
+            columns,
+            parameters,
+            efforts,
+            flows,
+            same,
+        }
     }
 
     pub fn effort(&self, bond: BondId) -> Option<&'a [f64]> {
@@ -264,6 +276,16 @@ impl Reader<'_, '_> {
     /// The values at a sample, one symbol moved by so much; `None` where the law is not clear: at a switch the state stands
     /// just beyond the border while the old law still holds.
     pub fn values(&self, sample: usize, moved: Option<(Symbol, f64)>) -> Option<Vec<f64>> {
+        self.values_in(&mut Vec::new(), sample, moved).map(<[f64]>::to_vec)
+    }
+
+    /// The same in memory that is used again.
+    pub fn values_in<'r>(
+        &self,
+        room: &'r mut Vec<f64>,
+        sample: usize,
+        moved: Option<(Symbol, f64)>,
+    ) -> Option<&'r [f64]> {
         let values = self.values;
         let side = values.side(sample);
         if self.jumpy && side == Side::Before {
@@ -277,7 +299,7 @@ impl Reader<'_, '_> {
             Side::After if self.timed => t + reach,
             _ => t,
         };
-        Some(self.wanted.values(&mut |s| self.at(s, sample, t, moved)))
+        Some(self.wanted.values_in(room, &mut |s| self.at(s, sample, t, moved)))
     }
 
     fn at(&self, symbol: Symbol, sample: usize, t: f64, moved: Option<(Symbol, f64)>) -> f64 {

@@ -3,6 +3,8 @@
 mod common;
 mod recipes;
 
+#[path = "equilibria.rs"]
+mod equilibria;
 #[path = "evaluation.rs"]
 mod evaluation;
 #[path = "forms.rs"]

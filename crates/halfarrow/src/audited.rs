@@ -65,7 +65,8 @@ struct Book {
     parameters: BTreeMap<String, f64>,
     names: Vec<String>,
     times: Vec<f64>,
-    columns: Vec<Vec<f64>>,
+    /// The values of all names at each time, one time after the other.
+    samples: Vec<f64>,
     /// Where the recorded values of the user stand among all.
     shown: Vec<usize>,
     /// The order in which a value that is not finite is looked for: what sources give comes first.
@@ -94,7 +95,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         let book = Book {
             parameters: known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect(),
             shown: (names.len()..count).collect(),
-            columns: vec![Vec::new(); names.len()],
+            samples: Vec::new(),
             times: Vec::new(),
             auditor: Auditor::new(graph),
             neglected: Vec::new(),
@@ -192,12 +193,15 @@ impl Book {
             self.audit();
         }
         self.times.push(t);
-        self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+        self.samples.extend_from_slice(&values[..self.names.len()]);
         Ok(())
     }
 
     /// A value of the graph that is not finite, of a source if there is one.
     fn not_finite(&self, values: &[f64]) -> Option<&str> {
+        if values[..self.names.len()].iter().all(|value| value.is_finite()) {
+            return None;
+        }
         let found = self.suspects.iter().find(|&&i| !values[i].is_finite());
         found.map(|&i| self.names[i].as_str())
     }
@@ -205,9 +209,9 @@ impl Book {
     /// A value that is beyond all it is for half of the time by this factor at its greatest: its name, what it is then, when.
     fn grown(&self, among: &[usize], factor: f64) -> Option<(&str, f64, f64)> {
         among.iter().find_map(|&i| {
-            let column = &self.columns[i];
+            let column: Vec<f64> = self.samples.iter().skip(i).step_by(self.names.len()).copied().collect();
             let peak = (0..column.len()).max_by(|&a, &b| column[a].abs().total_cmp(&column[b].abs()))?;
-            let usual = self.usual(column);
+            let usual = self.usual(&column);
             let grew = usual > 0.0 && column[peak].abs() > factor * usual;
             grew.then(|| (self.names[i].as_str(), column[peak], self.times[peak]))
         })
@@ -242,12 +246,27 @@ impl Book {
         if self.times.len() < 2 {
             return;
         }
-        let columns = self.names.iter().cloned().zip(self.columns.iter().map(Vec::as_slice)).collect();
+        let columns = turned(&self.samples, self.names.len());
+        let columns = self.names.iter().cloned().zip(columns.chunks(self.times.len())).collect();
         self.auditor.take(&audit::Run { times: &self.times, columns: &columns, parameters: &self.parameters });
         let last = self.times.len() - 1;
         self.times.drain(..last);
-        self.columns.iter_mut().for_each(|column| drop(column.drain(..last)));
+        self.samples.drain(..last * self.names.len());
     }
+}
+
+/// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.
+fn turned(rows: &[f64], columns: usize) -> Vec<f64> {
+    let (count, side) = (rows.len() / columns.max(1), 32);
+    let mut all = vec![0.0; rows.len()];
+    for (row, column) in (0..count).step_by(side).flat_map(|r| (0..columns).step_by(side).map(move |c| (r, c))) {
+        for i in row..count.min(row + side) {
+            for j in column..columns.min(column + side) {
+                all[j * count + i] = rows[i * columns + j];
+            }
+        }
+    }
+    all
 }
 
 impl Audited<'_, exec::Model> {

@@ -7,7 +7,7 @@ use crate::{Failure, Sparsity, System};
 const LONG: usize = 256;
 
 /// Computes the nonzeros of `∂f/∂x`; all memory is taken in [`new`](Jacobian::new), unless a long row asks for groups.
-pub(crate) struct Jacobian {
+pub struct Jacobian {
     sparsity: Sparsity,
     groups: Option<Vec<Vec<usize>>>,
     direction: Vec<f64>,
@@ -16,7 +16,8 @@ pub(crate) struct Jacobian {
 }
 
 impl Jacobian {
-    pub(crate) fn new(sparsity: &Sparsity) -> Jacobian {
+    /// For systems whose Jacobian has this pattern.
+    pub fn new(sparsity: &Sparsity) -> Jacobian {
         let states = sparsity.states();
         Jacobian {
             sparsity: sparsity.clone(),
@@ -29,7 +30,10 @@ impl Jacobian {
 
     /// Calls `entry(row, column, place, value)` for every nonzero of the Jacobian at `(t, x)`; `place` is its number in
     /// the order of the pattern.
-    pub(crate) fn visit(
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn visit(
         &mut self,
         system: &mut dyn System,
         t: f64,

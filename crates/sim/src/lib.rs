@@ -28,6 +28,8 @@ pub use events::Events;
 pub use failure::{Affected, Failure, Leap};
 pub use implicit::simulate_implicit;
 pub use implicit_system::{HybridImplicitSystem, ImplicitSystem, halves, halves_mut};
+pub use jacobian::Jacobian;
+pub use linear::{Number, SparseLu};
 pub use options::{AbsoluteTolerance, Method, Options};
 pub use signal::{Signal, SignalError};
 pub use simulate::simulate;

@@ -60,8 +60,12 @@ impl Sparsity {
     /// # Panics
     /// If there is none.
     pub fn place(&self, row: usize, column: usize) -> usize {
-        let found = self.column(column).binary_search(&row).expect("a nonzero of the pattern");
-        self.places(column).start + found
+        self.find(row, column).expect("a nonzero of the pattern")
+    }
+
+    /// The number of the nonzero in a row and column, if there is one.
+    pub fn find(&self, row: usize, column: usize) -> Option<usize> {
+        self.column(column).binary_search(&row).ok().map(|found| self.places(column).start + found)
     }
 
     /// The pattern with the whole diagonal.

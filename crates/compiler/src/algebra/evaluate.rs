@@ -74,6 +74,8 @@ pub struct EvaluationOrder<'a> {
     pool: &'a Exprs,
     /// What is evaluated, parts before wholes.
     order: Vec<Expr>,
+    /// The values of those that are numbers.
+    numbers: Vec<Option<f64>>,
     /// Where the values of the expressions stand.
     wanted: Vec<usize>,
 }
@@ -83,20 +85,28 @@ impl<'a> EvaluationOrder<'a> {
     pub fn new(pool: &'a Exprs, wanted: &[Expr]) -> Self {
         let order = pool.below(wanted, &|_| true);
         let wanted = wanted.iter().map(|&e| place(&order, e)).collect();
-        EvaluationOrder { pool, order, wanted }
+        let number = |&e: &Expr| pool.is_number(e).map(|number| number.to_f64());
+        EvaluationOrder { pool, numbers: order.iter().map(number).collect(), order, wanted }
     }
 
     /// Their values at given values of symbols; NaN where one is not defined. Each symbol is asked for once.
     pub fn values(&self, symbols: &mut dyn FnMut(Symbol) -> f64) -> Vec<f64> {
-        let mut values: Vec<f64> = Vec::with_capacity(self.order.len());
-        for &part in &self.order {
-            let value = match self.pool.node(part) {
-                Node::Symbol(s) => symbols(*s),
-                node => node_value(self.pool, node, &|c| values[place(&self.order, c)]),
+        self.values_in(&mut Vec::new(), symbols).to_vec()
+    }
+
+    /// The same in memory that is used again.
+    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, symbols: &mut dyn FnMut(Symbol) -> f64) -> &'r [f64] {
+        room.clear();
+        for (&part, number) in self.order.iter().zip(&self.numbers) {
+            let value = match (number, self.pool.node(part)) {
+                (Some(number), _) => *number,
+                (None, Node::Symbol(s)) => symbols(*s),
+                (None, node) => node_value(self.pool, node, &|c| room[place(&self.order, c)]),
             };
-            values.push(value);
+            room.push(value);
         }
-        self.wanted.iter().map(|&at| values[at]).collect()
+        self.wanted.iter().for_each(|&at| room.push(room[at]));
+        &room[self.order.len()..]
     }
 }
 

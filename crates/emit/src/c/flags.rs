@@ -71,6 +71,10 @@ flags! {
     time_passes
     /// Linear blocks with a constant matrix.
     linear_constant
+    /// The matrix of an implicit step has an order of elimination,
+    step_order
+    /// and room for a full one.
+    step_full
     solves_start
     guesses
     start_groups

@@ -2,7 +2,7 @@
 
 use halfarrow_compiler::program::EventTrigger;
 
-use super::plan::Plan;
+use super::plan::{Plan, StepOrder};
 use crate::{Method, Real};
 
 /// What a member is.
@@ -188,15 +188,29 @@ fn of_steps(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Int, &["order"], s.order, "");
     }
     if method.is_implicit() {
-        let sizes = [("matrix", nx * nx), ("matrix_scale", nx), ("matrix_work", nx)];
-        list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
-        if single {
-            list.arrays(Kind::Real, &["matrix_columns"], nx, "");
+        let order = plan.step_order.as_ref();
+        if let Some(order) = order {
+            let factors = &order.factors;
+            let sizes = [("step_entries", order.entries()), ("step_lower", factors.lower.len())];
+            list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+            let sizes = [("step_upper", factors.upper.len()), ("step_rest", 3 * nx)];
+            list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+            list.arrays(Kind::Real, &["step_inverse", "step_row"], nx, "");
+        }
+        if order.is_none_or(StepOrder::has_full) {
+            let sizes = [("matrix", nx * nx), ("matrix_scale", nx), ("matrix_work", nx)];
+            list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
+            list.arrays(Kind::Int, &["matrix_order"], nx, "");
+            if single {
+                list.arrays(Kind::Real, &["matrix_columns"], nx, "");
+            }
+        }
+        if order.is_some_and(StepOrder::has_full) {
+            list.one(Kind::Int, &["step_full"], "whether the full matrix is taken");
         }
         if single && method == Method::ImplicitMidpoint {
             list.arrays(Kind::Real, &["half_way"], nx, "from the beginning of a step to its middle");
         }
-        list.arrays(Kind::Int, &["matrix_order"], nx, "");
         list.arrays(Kind::Real, &["middle", "sizes", "correction", "direction", "product"], nx, "");
     }
 }

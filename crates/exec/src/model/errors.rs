@@ -155,8 +155,6 @@ pub enum EquilibriumError {
     None(Vec<(String, f64)>),
     /// Where all is at rest, this constraint is missed by so much.
     Missed(String, f64),
-    /// So many states are beyond the dense equations that the search solves.
-    TooLarge(usize),
     /// The model has no value on the way.
     Failure(Failure),
 }
@@ -164,10 +162,6 @@ pub enum EquilibriumError {
 impl fmt::Display for EquilibriumError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            EquilibriumError::TooLarge(states) => write!(
-                f,
-                "an equilibrium of {states} states is not searched for: let the model run until it is at rest"
-            ),
             EquilibriumError::None(rates) => {
                 write!(f, "no equilibrium was found: at the nearest point")?;
                 for (i, (name, rate)) in rates.iter().enumerate() {

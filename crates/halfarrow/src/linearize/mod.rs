@@ -27,6 +27,8 @@ pub use symbolic::{SymbolicReport, TransferFunction};
 
 /// Tolerance of the run to the time at which is linearised.
 const RTOL: f64 = 1e-10;
+/// Matrices of more states are not formed: poles take the cube of their number.
+const MOST_STATES: usize = 2000;
 
 /// Where to linearise, and between what.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,6 +184,10 @@ impl Model {
     fn linearize_between(&self, wanted: &Linearize, inputs: &[String]) -> Result<LinearizeReport, Error> {
         let equations = self.equations_in(Form::Minimal)?;
         let mut system = self.system(&equations)?;
+        let size = system.program().states.len();
+        if size > MOST_STATES {
+            return Err(Problem::NoMatrices { reason: too_many(size) }.into());
+        }
         connect(&system.program().inputs.clone(), &wanted.series, |name, t, v| system.connect(name, t, v))?;
         let outputs = wanted.outputs.clone().unwrap_or_else(|| default_outputs(&self.graph, system.program()));
         let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
@@ -294,6 +300,12 @@ impl Model {
         }
         notes
     }
+}
+
+fn too_many(states: usize) -> String {
+    format!(
+        "{states} states are more than the {MOST_STATES} of which full matrices and all poles are computed: linearise a model with fewer cells; where it rests, `simulate --start equilibrium` tells"
+    )
 }
 
 fn delay(name: &str) -> String {

@@ -8,7 +8,7 @@ mod static_order;
 
 pub(crate) use complex::ComplexLu;
 pub(crate) use dense::Lu;
-pub(crate) use sparse::SparseLu;
+pub use sparse::SparseLu;
 
 use faer::c64;
 use std::ops::{AddAssign, Mul, Range, Sub, SubAssign};
@@ -31,7 +31,7 @@ fn pivot_row(places: Range<usize>, weight: impl Fn(usize) -> f64) -> Option<usiz
 }
 
 /// What matrices are made of: real or complex numbers.
-pub(crate) trait Number:
+pub trait Number:
     faer::traits::ComplexField + Copy + Default + AddAssign + SubAssign + Sub<Output = Self> + Mul<Output = Self>
 {
     /// One over it.

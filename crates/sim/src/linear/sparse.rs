@@ -19,7 +19,7 @@ const MOST_POOR: usize = 3;
 /// Pivots stand where the pattern puts them, so that a factorisation takes the same operations each time and no memory.
 /// Each time it is tried on equations of known solution whether they do; if not, rows are exchanged, which takes memory
 /// when it comes to that first.
-pub(crate) struct SparseLu<T: Number> {
+pub struct SparseLu<T: Number> {
     pattern: Sparsity,
     values: Vec<T>,
     fixed: Option<StaticLu<T>>,
@@ -34,7 +34,7 @@ pub(crate) struct SparseLu<T: Number> {
 
 impl<T: Number> SparseLu<T> {
     /// For matrices of this pattern.
-    pub(crate) fn new(pattern: &Sparsity) -> SparseLu<T> {
+    pub fn new(pattern: &Sparsity) -> SparseLu<T> {
         let cheap = |fixed: &StaticLu<T>| fixed.operations() <= MOST_OPERATIONS * fixed.entries().max(1) as u64;
         let size = pattern.states();
         SparseLu {
@@ -51,17 +51,17 @@ impl<T: Number> SparseLu<T> {
     }
 
     /// Where the matrix may have entries.
-    pub(crate) fn pattern(&self) -> &Sparsity {
+    pub fn pattern(&self) -> &Sparsity {
         &self.pattern
     }
 
     /// The entries of the matrix, in the order of the pattern: what the next factorisation takes.
-    pub(crate) fn values(&mut self) -> &mut [T] {
+    pub fn values(&mut self) -> &mut [T] {
         &mut self.values
     }
 
     /// Factors the matrix. `false` if it is singular, or there is no memory.
-    pub(crate) fn factor(&mut self) -> bool {
+    pub fn factor(&mut self) -> bool {
         self.is_pivoted = false;
         if let Some(fixed) = self.fixed.as_mut().filter(|_| self.poor < MOST_POOR) {
             if fixed.factor(&self.values) && self.left_over() <= ALLOWED {
@@ -78,7 +78,7 @@ impl<T: Number> SparseLu<T> {
     }
 
     /// Replaces `b` by the solution.
-    pub(crate) fn solve(&mut self, b: &mut [T]) {
+    pub fn solve(&mut self, b: &mut [T]) {
         match (&mut self.pivoting, &mut self.fixed) {
             (Some(pivoting), _) if self.is_pivoted => pivoting.solve(b),
             (_, Some(fixed)) => fixed.solve(b),

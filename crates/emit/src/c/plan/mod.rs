@@ -4,6 +4,7 @@ mod checks;
 mod routines;
 mod shapes;
 mod source;
+mod step_order;
 mod words;
 mod work;
 
@@ -22,6 +23,7 @@ use super::write::{Moving, Shape, TimeRate, Writer};
 use crate::EmitError;
 use routines::{Routines, newton_of};
 use shapes::{ALONG, CLOCK, PLAIN, PREAMBLE, block_functions, of_parameters};
+pub(super) use step_order::StepOrder;
 
 /// Points that all delays together may keep.
 const MOST_POINTS: f64 = 1e6;
@@ -52,6 +54,8 @@ pub(super) struct Plan<'a> {
     pub sizes: Sizes,
     passes: Vec<Pass>,
     pub groups: Vec<Group>,
+    /// How the matrix of an implicit step is eliminated, if that is sparse.
+    pub step_order: Option<StepOrder>,
     works: Works,
 }
 
@@ -108,9 +112,13 @@ impl<'a> Plan<'a> {
             sizes: Sizes::default(),
             passes: Vec::new(),
             groups: Vec::new(),
+            step_order: None,
             works: Works::default(),
         };
         (plan.passes, plan.groups) = start::plan(program);
+        if export.method.is_implicit() {
+            plan.step_order = StepOrder::of(&plan.columns());
+        }
         plan.write_functions();
         Ok(plan)
     }

@@ -4,6 +4,7 @@ use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::program::{ConditionKind, EventTrigger, LawDomain, Reads};
 
 use super::Plan;
+use super::step_order::StepOrder;
 use crate::c::flags::Flags;
 use crate::c::fragment::{Fragment, assembled};
 use crate::c::header::comment;
@@ -122,6 +123,8 @@ impl Plan<'_> {
             time_derivative,
             time_passes: time_derivative || held,
             linear_constant: self.sizes.factored > 0,
+            step_order: self.step_order.is_some(),
+            step_full: self.step_order.as_ref().is_some_and(StepOrder::has_full),
             solves_start: self.solves_start(),
             guesses: !p.guesses.is_empty(),
             start_groups: self.groups.iter().any(|g| g.together),

@@ -106,6 +106,11 @@ impl Plan<'_> {
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
+        let ints = |values: Vec<u32>| lines(values.iter().map(u32::to_string).collect());
+        let order = self.step_order.iter().flat_map(|order| {
+            let places = ("STEP_PLACES", order.places(&columns));
+            order.tables().into_iter().chain([places]).map(|(word, values)| (word, ints(values)))
+        });
         let more = linearly_implicit(self.export.method, real);
         let tables = [
             ("TABLES", Written::of(self.tables())),
@@ -114,6 +119,7 @@ impl Plan<'_> {
         ];
         words
             .into_iter()
+            .chain(order)
             .chain(more)
             .chain(tolerances(real))
             .map(|(word, text)| (word, Written::of(text)))
@@ -231,8 +237,9 @@ impl Plan<'_> {
 }
 
 /// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value, of
-/// residuals in units of their own; how far beside a point is another one; and the least damping of Newton's method at a start.
-fn tolerances(real: Real) -> [(&'static str, String); 6] {
+/// residuals in units of their own; how far beside a point is another one; the least damping of Newton's method at a start; and
+/// what a solution in a fixed order may leave of an equation.
+fn tolerances(real: Real) -> [(&'static str, String); 7] {
     let words = [
         "CLOSE_TO_ROUNDING",
         "ROUNDING_OF_ENTRIES",
@@ -240,13 +247,14 @@ fn tolerances(real: Real) -> [(&'static str, String); 6] {
         "BORROWED_ROUNDING",
         "BESIDE",
         "LEAST_DAMPING",
+        "LEFT_OVER",
     ];
     // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4],
     };
-    [0, 1, 2, 3, 4, 5].map(|i| (words[i], real.number(values[i])))
+    [0, 1, 2, 3, 4, 5, 6].map(|i| (words[i], real.number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.

@@ -33,6 +33,13 @@ impl Plan<'_> {
         groups
     }
 
+    /// Operations to factor the matrix of an implicit step and to solve with it so many times.
+    fn step_elimination(&self, solutions: u64) -> u64 {
+        let n = self.program.states.len() as u64;
+        let full = n * n * n + (4 + 2 * solutions) * n * n;
+        self.step_order.as_ref().map_or(full, |order| order.operations(solutions.max(1)))
+    }
+
     /// What a step costs at most.
     pub(in crate::c) fn cost(&self) -> Cost {
         let w = &self.works;
@@ -42,13 +49,13 @@ impl Plan<'_> {
             Method::ImplicitMidpoint => {
                 let groups = self.column_groups().len() as u64;
                 let mut one = w.rates.clone() + w.directional.clone() * groups;
-                one.operations += n * n * n + 4 * n * n;
+                one.operations += self.step_elimination(0);
                 one * 20
             }
             Method::LinearlyImplicitEuler | Method::Rosenbrock => {
                 let (groups, stages) = (self.column_groups().len() as u64, method.stages() as u64);
                 let mut all = w.rates.clone() * stages + w.directional.clone() * (groups + 1);
-                all.operations += n * n * n + 4 * n * n + stages * (2 * n * n + (2 * stages + 4) * n);
+                all.operations += self.step_elimination(stages) + stages * (2 * stages + 4) * n;
                 all
             }
             _ => {

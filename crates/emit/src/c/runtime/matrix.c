@@ -110,17 +110,216 @@ static void ha_dense_solve(ha_model *m, $real *b)
     }
 }
 
+//if step_order
+//item ha_step_starts
+/* The matrix with its whole diagonal: for each column its first entry, and the row of each entry. */
+static const int ha_step_starts[] = {
+$STEP_STARTS
+};
+//item ha_step_rows
+static const int ha_step_rows[] = {
+$STEP_ROWS
+};
+//item ha_step_diagonal
+static const int ha_step_diagonal[] = {
+$STEP_DIAGONAL
+};
+//item ha_step_places
+/* For each entry of the Jacobian its place in the matrix. */
+static const int ha_step_places[] = {
+$STEP_PLACES
+};
+//item ha_step_from
+/* The order of elimination: for each entry of a row in it where it stands in the matrix, and its column in the order. */
+static const int ha_step_from[] = {
+$STEP_FROM
+};
+//item ha_step_matrix_starts
+static const int ha_step_matrix_starts[] = {
+$STEP_MATRIX_STARTS
+};
+//item ha_step_matrix_columns
+static const int ha_step_matrix_columns[] = {
+$STEP_MATRIX
+};
+//item ha_step_lower_starts
+static const int ha_step_lower_starts[] = {
+$STEP_LOWER_STARTS
+};
+//item ha_step_lower
+static const int ha_step_lower[] = {
+$STEP_LOWER
+};
+//item ha_step_upper_starts
+static const int ha_step_upper_starts[] = {
+$STEP_UPPER_STARTS
+};
+//item ha_step_upper
+static const int ha_step_upper[] = {
+$STEP_UPPER
+};
+//item ha_step_order
+/* The row in each place of the order, then the column in each. */
+static const int ha_step_order[] = {
+$STEP_ORDER
+};
+//item ha_fixed_factor
+/* Factors m->step_entries in the fixed order; the place without pivot, or -1. */
+static int ha_fixed_factor(ha_model *m)
+{
+    $real *row = m->step_row;
+    int place;
+    int e;
+    int i;
+    for (place = 0; place < HA_NX; ++place) {
+        $real pivot;
+        for (e = $ha_step_lower_starts[place]; e < $ha_step_lower_starts[place + 1]; ++e) {
+            row[$ha_step_lower[e]] = $0.0;
+        }
+        for (e = $ha_step_upper_starts[place]; e < $ha_step_upper_starts[place + 1]; ++e) {
+            row[$ha_step_upper[e]] = $0.0;
+        }
+        row[place] = $0.0;
+        for (e = $ha_step_matrix_starts[place]; e < $ha_step_matrix_starts[place + 1]; ++e) {
+            row[$ha_step_matrix_columns[e]] = m->step_entries[$ha_step_from[e]];
+        }
+        for (e = $ha_step_lower_starts[place]; e < $ha_step_lower_starts[place + 1]; ++e) {
+            const int k = $ha_step_lower[e];
+            const $real factor = row[k] * m->step_inverse[k];
+            m->step_lower[e] = factor;
+            for (i = $ha_step_upper_starts[k]; i < $ha_step_upper_starts[k + 1]; ++i) {
+                const $real product = factor * m->step_upper[i];
+                row[$ha_step_upper[i]] -= product;
+            }
+        }
+        pivot = row[place];
+        m->step_inverse[place] = $1.0 / pivot;
+        for (e = $ha_step_upper_starts[place]; e < $ha_step_upper_starts[place + 1]; ++e) {
+            m->step_upper[e] = row[$ha_step_upper[e]];
+        }
+        if (!($fabs(pivot) > $0.0 && $ha_finite(pivot))) {
+            return place;
+        }
+    }
+    return -1;
+}
+
+//item ha_fixed_solve
+static void ha_fixed_solve(ha_model *m, $real *b)
+{
+    $real *row = m->step_row;
+    int place;
+    int e;
+    for (place = 0; place < HA_NX; ++place) {
+        $real left = b[$ha_step_order[place]];
+        for (e = $ha_step_lower_starts[place]; e < $ha_step_lower_starts[place + 1]; ++e) {
+            const $real product = m->step_lower[e] * row[$ha_step_lower[e]];
+            left -= product;
+        }
+        row[place] = left;
+    }
+    for (place = HA_NX - 1; place >= 0; --place) {
+        $real left = row[place];
+        for (e = $ha_step_upper_starts[place]; e < $ha_step_upper_starts[place + 1]; ++e) {
+            const $real product = m->step_upper[e] * row[$ha_step_upper[e]];
+            left -= product;
+        }
+        row[place] = left * m->step_inverse[place];
+        b[$ha_step_order[HA_NX + place]] = row[place];
+    }
+}
+
+//item ha_fixed_holds
+/* Tries the factors on equations of which ones are the solution: whether theirs leaves little of each. */
+static int ha_fixed_holds(ha_model *m)
+{
+    $real *rest = m->step_rest;
+    $real *size = m->step_rest + HA_NX;
+    $real *trial = m->step_rest + 2 * HA_NX;
+    int column;
+    int e;
+    $ha_fill(rest, $0.0, 2 * HA_NX);
+    for (e = 0; e < $ha_step_starts[HA_NX]; ++e) {
+        rest[$ha_step_rows[e]] += m->step_entries[e];
+        size[$ha_step_rows[e]] += $fabs(m->step_entries[e]);
+    }
+    $ha_copy(trial, rest, HA_NX);
+    $ha_fixed_solve(m, trial);
+    for (column = 0; column < HA_NX; ++column) {
+        for (e = $ha_step_starts[column]; e < $ha_step_starts[column + 1]; ++e) {
+            const $real term = m->step_entries[e] * trial[column];
+            rest[$ha_step_rows[e]] -= term;
+            size[$ha_step_rows[e]] += $fabs(term);
+        }
+    }
+    for (column = 0; column < HA_NX; ++column) {
+        if (!($fabs(rest[column]) / size[column] <= $LEFT_OVER)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+//item ha_step_factor
+/* Factors the matrix: in the fixed order, or as a full one where its pivots do not do; the column without pivot, or -1. */
+static int ha_step_factor(ha_model *m)
+{
+    int place = $ha_fixed_factor(m);
+//if step_full
+    int column;
+    int e;
+    m->step_full = 0;
+    if (place < 0 && $ha_fixed_holds(m)) {
+        return -1;
+    }
+    m->step_full = 1;
+    $ha_fill(m->matrix, $0.0, HA_NX * HA_NX);
+    for (column = 0; column < HA_NX; ++column) {
+        for (e = $ha_step_starts[column]; e < $ha_step_starts[column + 1]; ++e) {
+            m->matrix[$ha_step_rows[e] * HA_NX + column] = m->step_entries[e];
+        }
+    }
+    place = $ha_dense_factor(m);
+    return place;
+//else
+    if (place < 0) {
+        return $ha_fixed_holds(m) ? -1 : 0;
+    }
+    return $ha_step_order[HA_NX + place];
+//end
+}
+
+//item ha_step_solve
+static void ha_step_solve(ha_model *m, $real *b)
+{
+//if step_full
+    if (m->step_full) {
+        $ha_dense_solve(m, b);
+        return;
+    }
+//end
+    $ha_fixed_solve(m, b);
+}
+
+//end
 //item ha_step_matrix
-/* Puts 1 - factor * Jacobian at x into m->matrix; m->sizes takes up what its rows add up where the states are. */
+/* Factors 1 - factor * Jacobian at x; m->sizes takes up what its rows add up where the states are. */
 static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
 {
     int group;
     int i;
     int j;
+//if step_order
+    $ha_fill(m->step_entries, $0.0, $ha_step_starts[HA_NX]);
+    for (i = 0; i < HA_NX; ++i) {
+        m->step_entries[$ha_step_diagonal[i]] = $1.0;
+    }
+//else
     $ha_fill(m->matrix, $0.0, HA_NX * HA_NX);
     for (i = 0; i < HA_NX; ++i) {
         m->matrix[i * HA_NX + i] = $1.0;
     }
+//end
     for (group = 0; group < $GROUPS; ++group) {
         int status;
         $ha_fill(m->direction, $0.0, HA_NX);
@@ -136,11 +335,19 @@ static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
             for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
                 const int row = $ha_column_rows[j];
                 const $real value = factor * m->product[row];
+//if step_order
+                m->step_entries[$ha_step_places[j]] += -factor * m->product[row];
+//else
                 m->matrix[row * HA_NX + column] += -factor * m->product[row];
+//end
                 m->sizes[row] += $fabs(value * x[column]);
             }
         }
     }
+//if step_order
+    i = $ha_step_factor(m);
+//else
     i = $ha_dense_factor(m);
+//end
     return i >= 0 ? $ha_fail(m, $MODEL_STEP_SINGULAR, i, t) : $MODEL_OK;
 }

@@ -1,8 +1,8 @@
 //! Continuation of equilibria under smaller and smaller loads, from the start to where nothing but the model itself acts: by
 //! arclength, hence round folds. Source: [Deuflhard], chapter 5.
 
+use super::super::{Model, minimum_norm};
 use super::leaf::{Directions, Leaf, leading_rows};
-use super::{Model, minimum_norm};
 
 /// Steps along the path, and states up to which one is followed.
 const PATH_STEPS: usize = 400;

@@ -6,8 +6,10 @@
 //! relations hold. Closed forms of the relations are not needed: a direction is carried along the leaf by integrating what
 //! of it lies in the leaf.
 
-use super::start::ConstraintResidual;
-use super::{Model, minimum_norm};
+use super::super::start::ConstraintResidual;
+use super::super::{Model, minimum_norm};
+use super::tangent::Tangent;
+use super::{FEW_STATES, open_equations::Entry};
 use crate::bytecode::Routine;
 use faer::Mat;
 use halfarrow_compiler::program::Op;
@@ -51,7 +53,7 @@ struct RelationRow {
 
 /// Directions in which states may go: all of them, or the columns of a matrix that are orthonormal where each state counts
 /// in parts of its size.
-pub(super) enum Directions {
+pub(in crate::model) enum Directions {
     /// Every state by itself.
     All,
     /// Row by row, a row for each state.
@@ -137,14 +139,17 @@ impl Model {
         };
         let own = own(self);
         leaf.size = match self.structure(&leaf, t, x) {
-            Some((moves, drives)) => (0..x.len()).map(|j| reach(&moves, &drives, j).unwrap_or(own[j])).collect(),
+            Some(rows) => {
+                let reached = |(reach, own): (f64, f64)| if reach > 0.0 && reach.is_finite() { reach } else { own };
+                rows.reaches().into_iter().zip(own).map(reached).collect()
+            }
             None => own,
         };
         Some(leaf)
     }
 
     /// What each state counts as one of: its magnitude; where nothing but rounding tells it, the least of the others or 1.
-    pub(super) fn sizes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+    pub(in crate::model) fn sizes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let size = self.magnitudes(t, x);
         let noise = NOISE * size.iter().fold(0.0f64, |most, s| most.max(*s));
         let least = size.iter().copied().filter(|s| *s > noise).fold(f64::INFINITY, f64::min);
@@ -152,7 +157,7 @@ impl Model {
     }
 
     /// The directions from `x` along its leaf before any magnitude is known.
-    pub(super) fn first_directions(&mut self, t: f64, x: &[f64]) -> Option<Directions> {
+    pub(in crate::model) fn first_directions(&mut self, t: f64, x: &[f64]) -> Option<Directions> {
         let leaf = self.leaf_by(t, x, |_| vec![1.0; x.len()]);
         self.directions(leaf.as_ref(), t, x)
     }
@@ -160,9 +165,8 @@ impl Model {
     /// The directions from `x` along the leaf. `None` if something has no value there.
     pub(super) fn directions(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Option<Directions> {
         let Some(leaf) = leaf else { return Some(Directions::All) };
-        let kept = self.kept(leaf, t, x)?;
         let n = x.len();
-        let svd = kept.svd().ok()?;
+        let svd = kept(&self.tangent(leaf, t, x)?)?.svd().ok()?;
         let (values, v) = (svd.S().column_vector(), svd.V());
         let rank = rank_of(&values.iter().copied().collect::<Vec<_>>());
         // A state that no way moves but by rounding stays.
@@ -263,8 +267,11 @@ impl Model {
     /// What of a direction lies in the leaf at `x + z`.
     fn within(&mut self, leaf: &Leaf, t: f64, x: &[f64], direction: &[f64], z: &[f64]) -> Option<Vec<f64>> {
         let at: Vec<f64> = x.iter().zip(z).zip(&leaf.size).map(|((x, z), size)| x + z * size).collect();
-        let kept = self.kept(leaf, t, &at)?;
-        let svd = kept.thin_svd().ok()?;
+        let rows = self.tangent(leaf, t, &at)?;
+        if x.len() > FEW_STATES {
+            return rows.within(direction);
+        }
+        let svd = kept(&rows)?.thin_svd().ok()?;
         let (values, v) = (svd.S().column_vector(), svd.V());
         let mut inside = direction.to_vec();
         for k in 0..rank_of(&values.iter().copied().collect::<Vec<_>>()) {
@@ -274,80 +281,59 @@ impl Model {
         Some(inside)
     }
 
-    /// The rows whose product with any way vanishes, by states in parts of their size.
-    fn kept(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<Mat<f64>> {
-        let (mut moves, mut drives) = self.structure(leaf, t, x)?;
-        let (m, n) = (leaf.rows.len(), x.len());
-        for i in 0..m {
-            let most = (0..n).fold(0.0f64, |most, j| most.max(moves[(i, j)].abs()));
-            if most > 0.0 {
-                (0..n).for_each(|j| moves[(i, j)] /= most);
-                (0..leaf.drives).for_each(|k| drives[(i, k)] /= most);
-            }
-        }
-        for k in 0..leaf.drives {
-            let most = (0..m).fold(0.0f64, |most, i| most.max(drives[(i, k)].abs()));
-            if most > 0.0 {
-                (0..m).for_each(|i| drives[(i, k)] /= most);
-            }
-        }
-        if leaf.drives == 0 {
-            return Some(moves);
-        }
-        // What the drives cannot do: combinations of rows from which all of them vanish.
-        let svd = drives.svd().ok()?;
-        let rank = rank_of(&svd.S().column_vector().iter().copied().collect::<Vec<_>>());
-        let u = svd.U();
-        let sum = |a: usize, j: usize| (0..m).map(|i| u[(i, rank + a)] * moves[(i, j)]).sum();
-        Some(Mat::from_fn(m - rank, n, sum))
+    /// The moves from `x` that the leaf allows. `None` if something has no value there.
+    pub(super) fn tangent(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<Tangent> {
+        Some(self.structure(leaf, t, x)?.balanced())
     }
 
     /// Quantities by states in parts of their size, and by drives: both sides of the rows.
-    fn structure(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<(Mat<f64>, Mat<f64>)> {
-        let (m, n) = (leaf.rows.len(), x.len());
+    fn structure(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<Tangent> {
         self.place(t, x);
         self.frame.run(&leaf.routine).ok()?;
         let values: Vec<f64> = leaf.routine.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
         if values.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let (mut moves, mut drives) = (Mat::zeros(m, n), Mat::zeros(m, leaf.drives));
+        let (mut moves, mut by): (Vec<Entry>, Vec<Entry>) = (Vec::new(), Vec::new());
         for (i, row) in leaf.rows.iter().enumerate() {
-            row.by.clone().zip(&row.drives).for_each(|(at, &k)| drives[(i, k)] += values[at]);
+            by.extend(row.by.clone().zip(&row.drives).map(|(at, &k)| (i, k, values[at])));
             for (at, state) in row.quantity.clone().step_by(2).zip(&row.state) {
-                if let Some(j) = *state {
-                    moves[(i, j)] += values[at] * leaf.size[j];
-                }
+                moves.extend(state.map(|j| (i, j, values[at] * leaf.size[j])));
             }
         }
-        if leaf.rows.iter().all(|row| row.state.iter().all(Option::is_some)) {
-            return Some((moves, drives));
-        }
-        for j in 0..n {
+        let all_states = leaf.rows.iter().all(|row| row.state.iter().all(Option::is_some));
+        for j in (0..x.len()).filter(|_| !all_states) {
             self.place(t, x);
             self.still();
             self.frame.d[self.code.layout.states as usize + j] = 1.0;
             self.frame.run_along(&leaf.routine).ok()?;
             for (i, row) in leaf.rows.iter().enumerate() {
-                for (at, state) in row.quantity.clone().step_by(2).zip(&row.state) {
-                    if state.is_none() {
-                        let slope = self.frame.d[leaf.routine.outputs[at + 1] as usize];
-                        moves[(i, j)] += values[at] * slope * leaf.size[j];
-                    }
-                }
+                let followers = row.quantity.clone().step_by(2).zip(&row.state).filter(|(_, state)| state.is_none());
+                let slope = |at: usize| self.frame.d[leaf.routine.outputs[at + 1] as usize];
+                let moved = followers.map(|(at, _)| (i, j, values[at] * slope(at) * leaf.size[j]));
+                moves.extend(moved.filter(|entry| entry.2 != 0.0));
             }
         }
-        let finite = (0..m).all(|i| (0..n).all(|j| moves[(i, j)].is_finite()));
-        finite.then_some((moves, drives))
+        let finite = moves.iter().all(|entry| entry.2.is_finite());
+        finite.then(|| Tangent::new((leaf.rows.len(), x.len(), leaf.drives), moves, by))
     }
 }
 
-/// How far the drives, each by 1, take a state that stands in a row with them.
-fn reach(moves: &Mat<f64>, drives: &Mat<f64>, state: usize) -> Option<f64> {
-    let most = |i: usize| (0..drives.ncols()).fold(0.0f64, |most, k| most.max(drives[(i, k)].abs()));
-    let rows = (0..moves.nrows()).filter(|&i| moves[(i, state)] != 0.0).map(|i| most(i) / moves[(i, state)].abs());
-    let reach = rows.fold(0.0f64, f64::max);
-    (reach > 0.0 && reach.is_finite()).then_some(reach)
+/// The rows whose product with any way vanishes, by states in parts of their size.
+fn kept(rows: &Tangent) -> Option<Mat<f64>> {
+    let mut moves = Mat::<f64>::zeros(rows.rows, rows.states);
+    let mut drives = Mat::<f64>::zeros(rows.rows, rows.drives);
+    rows.moves.iter().for_each(|&(i, j, v)| moves[(i, j)] += v);
+    rows.by.iter().for_each(|&(i, k, v)| drives[(i, k)] += v);
+    if rows.drives == 0 {
+        return Some(moves);
+    }
+    // What the drives cannot do: combinations of rows from which all of them vanish.
+    let svd = drives.svd().ok()?;
+    let rank = rank_of(&svd.S().column_vector().iter().copied().collect::<Vec<_>>());
+    let u = svd.U();
+    let sum = |a: usize, j: usize| (0..rows.rows).map(|i| u[(i, rank + a)] * moves[(i, j)]).sum();
+    Some(Mat::from_fn(rows.rows - rank, rows.states, sum))
 }
 
 fn rank_of(values: &[f64]) -> usize {

@@ -1,0 +1,158 @@
+//! Equilibria: Newton's method, and pseudo-transient continuation where it fails. Source: [KelleyKeyes].
+//!
+//! Equations are sparse, and of the size of the model: those of a net of many nodes are solved as those of an implicit step
+//! are. Up to a few states they are full, and the shortest of many solutions is told by singular values.
+
+mod leaf;
+mod loads;
+mod open_equations;
+mod point;
+mod rest;
+mod tangent;
+
+use super::{EquilibriumError, Model};
+use halfarrow_sim::{Jacobian, System};
+use leaf::Leaf;
+use rest::Rest;
+
+const ITERATIONS: usize = 200;
+/// Up to so many states equations are full.
+const FEW_STATES: usize = 50;
+/// A constraint counts as kept if it is missed by less than this fraction of what its displacements come to.
+const KEPT: f64 = 1e-8;
+
+/// A state at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equilibrium {
+    /// The state.
+    pub x: Vec<f64>,
+    /// How many combinations of states may have any value: 0 if the equilibrium stands alone, 1 on a line of them, of
+    /// which this is one near the start values.
+    pub free: usize,
+    /// Iterations made.
+    pub iterations: usize,
+}
+
+/// The least rates of a search, all weighed as at its beginning.
+struct LeastRates {
+    weights: Vec<f64>,
+    least: f64,
+    /// The states that still move there, with their rates.
+    moving: Vec<(usize, f64)>,
+}
+
+impl LeastRates {
+    fn update(&mut self, rates: &[f64], rest: &Rest) {
+        let size = rates.iter().zip(&self.weights).fold(0.0f64, |most, (r, w)| most.max((r * w).abs()));
+        if size < self.least {
+            (self.least, self.moving) = (size, rest.moving(rates));
+        }
+    }
+}
+
+impl Model {
+    /// The equilibrium nearest to `x` at time `t`, with inputs and conditions as they are then: Newton with the exact
+    /// Jacobian, by way of pseudo-transient continuation where Newton alone does not get there; where that fails as well,
+    /// by continuation: the loads that would hold `x` at rest are taken away little by little, and the equilibrium is followed,
+    /// round folds too.
+    ///
+    /// The search goes only where the junction structure lets the states go from `x`: relations of displacements hold at
+    /// the equilibrium as they do at `x`, those of constraints and those that the graph implies. `x` should keep the
+    /// constraints.
+    ///
+    /// # Errors
+    /// There is none near, or the model has no value on the way.
+    pub fn equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+        self.restart();
+        let leaf = self.leaf(t, x);
+        let leaf = leaf.as_ref();
+        let refused = match self.settle(leaf, t, x).and_then(|found| self.audited(leaf, t, found)) {
+            Err(EquilibriumError::Failure(failure)) => return Err(EquilibriumError::Failure(failure)),
+            Err(refused) => refused,
+            found => return found,
+        };
+        let released = self.release_loads(leaf, t, x);
+        let settled = released.and_then(|near| self.settle(leaf, t, &near).ok());
+        settled.and_then(|found| self.audited(leaf, t, found).ok()).ok_or(refused)
+    }
+
+    /// What was found, if the constraints are kept there.
+    fn audited(&mut self, leaf: Option<&Leaf>, t: f64, found: Equilibrium) -> Result<Equilibrium, EquilibriumError> {
+        let constraints = self.constraints();
+        match self.unmet_constraint(&constraints, t, &found.x, leaf.map_or(&[], |leaf| &leaf.size), KEPT) {
+            Some((name, miss)) => Err(EquilibriumError::Missed(name, miss)),
+            None => Ok(found),
+        }
+    }
+
+    /// Newton's method from `x`; where it fails pseudo-transient continuation, whose step grows as the rates shrink (switched
+    /// evolution relaxation), until it is Newton's again.
+    fn settle(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+        let mut jacobian = Jacobian::new(self.sparsity());
+        let mut pseudo_step = f64::INFINITY;
+        let mut least: Option<LeastRates> = None;
+        let mut rest = Rest::new(x.len());
+        let mut at = self.point(&mut jacobian, leaf, t, x.to_vec()).map_err(EquilibriumError::Failure)?;
+        for iteration in 0..ITERATIONS {
+            rest.see(&at);
+            let Some(newton) = at.newton_step() else { break };
+            let found = || Equilibrium { x: at.x.clone(), free: newton.free, iterations: iteration };
+            if newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs()) || rest.is_exact(&at) {
+                if rest.is_reached(&at) {
+                    return Ok(found());
+                }
+                if pseudo_step.is_infinite() {
+                    break;
+                }
+            }
+            let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
+            let before = norm(&at.rates);
+            let weights = || LeastRates { weights: newton.weights.clone(), least: f64::INFINITY, moving: Vec::new() };
+            least.get_or_insert_with(weights).update(&at.rates, &rest);
+            let step = match pseudo_step.is_infinite() {
+                true => newton.step.clone(),
+                false => at.pseudo_transient_step(pseudo_step).unwrap_or_else(|| newton.step.clone()),
+            };
+            let least_damping = if pseudo_step.is_infinite() { 1e-3 } else { 1e-9 };
+            let mut damping = 1.0;
+            let moved = loop {
+                let part: Vec<f64> = step.iter().map(|s| damping * s).collect();
+                let trial = self.moved(leaf, t, &at.x, &part);
+                let kept = trial.filter(|trial| !self.leaves_constraints(leaf, t, trial));
+                let nearer = kept.filter(|trial| {
+                    let known = self.rates_at(t, trial).is_ok();
+                    known && (norm(&self.dx) < before || !pseudo_step.is_infinite())
+                });
+                match nearer.and_then(|trial| self.point(&mut jacobian, leaf, t, trial).ok()) {
+                    Some(next) => break Some(next),
+                    _ if damping < least_damping => break None,
+                    _ => damping *= 0.5,
+                }
+            };
+            match moved {
+                Some(next) => {
+                    let gain = (before / norm(&next.rates).max(f64::MIN_POSITIVE)).clamp(0.3, 10.0);
+                    pseudo_step *= gain;
+                    pseudo_step = if pseudo_step > 1e12 { f64::INFINITY } else { pseudo_step };
+                    at = next;
+                }
+                // No step comes nearer, since only rounding is left.
+                None if rest.is_reached(&at) => return Ok(found()),
+                // Newton's method fails: follow the motion in pseudo-time, with a small step at first.
+                None if pseudo_step.is_infinite() => {
+                    let fastest = at.entries().fold(0.0f64, |most, (_, _, j)| most.max(j.abs()));
+                    pseudo_step = if fastest > 0.0 { 0.1 / fastest } else { break };
+                }
+                None => break,
+            }
+        }
+        let moving = least.map(|least| least.moving).filter(|moving| !moving.is_empty());
+        let moving = moving.unwrap_or_else(|| rest.moving(&at.rates));
+        Err(EquilibriumError::None(moving.into_iter().map(|(i, rate)| (self.state_name(i), rate)).collect()))
+    }
+
+    /// Whether a move has left a constraint: near a position where a form is singular a long one may.
+    fn leaves_constraints(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
+        leaf.is_some_and(|leaf| self.unmet_constraint(&leaf.constraints, t, x, &leaf.size, KEPT).is_some())
+    }
+}

@@ -1,0 +1,93 @@
+//! When a state counts as one of rest: rates are compared with the terms that they are made of.
+
+use super::point::LinearisedPoint;
+
+/// Rates below this fraction of their own terms count as zero.
+const AT_REST: f64 = 1e-9;
+/// Rates below this fraction of the greatest terms of what they are joined to are rounding: normwise backward error. Source:
+/// [Higham], chapter 7.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// What the rates of a search are compared with.
+pub(super) struct Rest {
+    /// The greatest terms of each rate on the way.
+    terms: Vec<f64>,
+    /// The terms that each rate would have if all that is joined to it were as great as the greatest of it.
+    joined: Vec<f64>,
+    /// The fastest rate of the model, in 1/s.
+    fastest: f64,
+}
+
+impl Rest {
+    pub fn new(states: usize) -> Rest {
+        Rest { terms: vec![0.0; states], joined: vec![0.0; states], fastest: 0.0 }
+    }
+
+    /// Takes a point of the search into account.
+    pub fn see(&mut self, at: &LinearisedPoint) {
+        let mut terms: Vec<f64> = vec![0.0; at.x.len()];
+        at.entries().for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
+        for ((most, own), rate) in self.terms.iter_mut().zip(terms).zip(&at.rates) {
+            *most = most.max(rate.abs()).max(own);
+        }
+        self.fastest = at.fastest_pair();
+        self.joined = joined(at);
+    }
+
+    /// Whether all rates vanish as far as their own terms tell.
+    pub fn is_exact(&self, at: &LinearisedPoint) -> bool {
+        (0..at.x.len()).all(|i| at.rates[i].abs() <= 1e-15 * self.terms[i] || self.is_idle(at, i, 1e-15))
+    }
+
+    /// Whether all rates are as good as zero.
+    pub fn is_reached(&self, at: &LinearisedPoint) -> bool {
+        (0..at.x.len()).all(|i| !self.moves(i, at.rates[i]) || self.is_idle(at, i, 1e-13))
+    }
+
+    /// Whether a rate changes nothing in the shortest time that the model knows.
+    fn is_idle(&self, at: &LinearisedPoint, i: usize, part: f64) -> bool {
+        at.rates[i].abs() <= part * at.x[i].abs() * self.fastest
+    }
+
+    fn moves(&self, i: usize, rate: f64) -> bool {
+        rate.abs() > AT_REST * self.terms[i] && rate.abs() > ROUNDING * self.joined[i]
+    }
+
+    /// The states that move most, with their rates.
+    pub fn moving(&self, rates: &[f64]) -> Vec<(usize, f64)> {
+        let mut worst: Vec<usize> = (0..rates.len()).filter(|&i| self.moves(i, rates[i])).collect();
+        let share = |i: usize| rates[i].abs() / self.terms[i].max(f64::MIN_POSITIVE);
+        worst.sort_by(|&a, &b| share(b).total_cmp(&share(a)).then(a.cmp(&b)));
+        worst.truncate(3);
+        worst.into_iter().map(|i| (i, rates[i])).collect()
+    }
+}
+
+/// What the terms of each rate would add up to, were all states that are joined by rates as great as the greatest of them,
+/// where each counts by what it does to rates.
+fn joined(at: &LinearisedPoint) -> Vec<f64> {
+    let (rows, columns) = at.weights();
+    let mut component: Vec<usize> = (0..at.x.len()).collect();
+    at.entries().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| {
+        let (a, b) = (root(&mut component, i), root(&mut component, j));
+        component[a.max(b)] = a.min(b);
+    });
+    let mut greatest = vec![0.0f64; at.x.len()];
+    for (i, x) in at.x.iter().enumerate() {
+        let own = root(&mut component, i);
+        greatest[own] = greatest[own].max(x.abs() / columns[i]);
+    }
+    let mut joined = vec![0.0; at.x.len()];
+    at.entries().for_each(|(i, j, v)| joined[i] += (rows[i] * v * columns[j]).abs());
+    let scaled = |(i, sum): (usize, f64)| sum / rows[i] * greatest[root(&mut component, i)];
+    joined.into_iter().enumerate().map(scaled).collect()
+}
+
+/// The least state that is joined to this one.
+fn root(component: &mut [usize], mut i: usize) -> usize {
+    while component[i] != i {
+        component[i] = component[component[i]];
+        i = component[i];
+    }
+    i
+}

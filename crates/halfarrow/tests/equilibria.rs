@@ -1,0 +1,155 @@
+//! Equilibria of families of models, at three sizes each, against closed forms and raw equations.
+
+use std::collections::BTreeMap;
+
+use halfarrow::{Error, Family, Linearize, Model, Point, Problem, Record, Run, Start};
+
+fn run_at_rest(text: &str) -> Result<BTreeMap<String, f64>, Error> {
+    let model = Model::from_text("rest.bond", text, &[])?;
+    let run = Run { to: 1e-9, start: Start::Equilibrium, record: Record::All, ..Run::default() };
+    let done = model.simulate(&run, &mut |_| true)?;
+    Ok(done.trace.columns.iter().map(|c| (c.name.clone(), c.values[0])).collect())
+}
+
+fn at_rest(family: Family, size: usize) -> BTreeMap<String, f64> {
+    run_at_rest(&family.model("Rest", size)).unwrap_or_else(|e| panic!("{family:?} {size}: {}", e.render(false)))
+}
+
+/// No current flows: every capacitor holds `c` times the voltage of the source, 1 V.
+#[test]
+fn capacitors_of_ladders_and_grids_are_full() {
+    for (family, size) in [
+        (Family::Ladder, 5),
+        (Family::Ladder, 60),
+        (Family::Ladder, 600),
+        (Family::Grid, 3),
+        (Family::Grid, 8),
+        (Family::Grid, 24),
+    ] {
+        let rest = at_rest(family, size);
+        let charges: Vec<f64> = rest.iter().filter(|(name, _)| name.ends_with(".q")).map(|(_, q)| *q).collect();
+        assert_eq!(charges.len(), if family == Family::Grid { size * size } else { size });
+        charges.iter().for_each(|q| assert!((q - 1e-3).abs() < 1e-13, "{family:?} {size}: {q:e}"));
+    }
+}
+
+/// Potentials of the resistors alone, of 1 ohm each, from the raw equations of the nodes: capacitors take no current. A band
+/// as wide as a row of nodes, whose pivots need no exchange.
+fn potentials(n: usize) -> Vec<f64> {
+    let size = n * n;
+    let (mut matrix, mut right) = (vec![vec![0.0; 2 * n + 1]; size], vec![0.0; size]);
+    let mut join = |a: usize, b: Option<usize>| {
+        matrix[a][n] += 1.0;
+        if let Some(b) = b {
+            matrix[b][n] += 1.0;
+            matrix[a][n + b - a] -= 1.0;
+            matrix[b][n + a - b] -= 1.0;
+        }
+    };
+    join(0, None);
+    right[0] = 1.0;
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let node = i * n + j;
+        if (i + 1) * n % 3 != (3 - (j + 1) % 3) % 3 {
+            join(node, None);
+        }
+        if i > 0 {
+            join(node - n, Some(node));
+        }
+        if j > 0 {
+            join(node - 1, Some(node));
+        }
+    }
+    for k in 0..size {
+        for row in k + 1..size.min(k + n + 1) {
+            let factor = matrix[row][n + k - row] / matrix[k][n];
+            (k..size.min(k + n + 1)).for_each(|j| matrix[row][n + j - row] -= factor * matrix[k][n + j - k]);
+            right[row] -= factor * right[k];
+        }
+    }
+    for k in (0..size).rev() {
+        let known: f64 = (k + 1..size.min(k + n + 1)).map(|j| matrix[k][n + j - k] * right[j]).sum();
+        right[k] = (right[k] - known) / matrix[k][n];
+    }
+    right
+}
+
+/// Far from the source a capacitor holds less than the last digit of the nearest one.
+#[test]
+fn capacitors_of_a_mesh_hold_what_its_resistors_leave_them() {
+    for size in [5, 12, 30] {
+        let (rest, exact) = (at_rest(Family::Mesh, size), potentials(size));
+        let mut found = 0;
+        for (node, potential) in exact.iter().enumerate() {
+            let name = format!("store[{},{}].e", node / size + 1, node % size + 1);
+            let Some(e) = rest.get(&name) else { continue };
+            found += 1;
+            assert!((e - potential).abs() < 1e-15, "{size}: {name} is {e:e}, not {potential:e}");
+        }
+        assert!(found >= size * size / 3 - size, "{found}");
+    }
+}
+
+/// The spring of each joint bears the load by its lever up to the tip: `k bend = -load · Σ l cos(angle)`.
+#[test]
+fn springs_of_a_beam_bear_its_load() {
+    for size in [4, 12, 40] {
+        let rest = at_rest(Family::Beam, size);
+        let angle = |i: usize| rest[&format!("angle[{i}]")];
+        let mut lever = 0.0;
+        for i in (1..=size).rev() {
+            lever += libm::cos(angle(i)) / size as f64;
+            let bend = rest[&format!("spring[{i}].q")];
+            let before = if i > 1 { angle(i - 1) } else { 0.0 };
+            assert!((bend - (angle(i) - before)).abs() < 1e-13, "{size}: joint {i} bends by {bend}");
+            assert!((50.0 * bend + 0.5 * lever).abs() < 1e-12, "{size}: joint {i} bends by {bend}");
+            assert!(rest[&format!("rotor[{i}].f")].abs() < 1e-12);
+        }
+    }
+}
+
+/// A row of capacitors joined by resistors, with this at its near end.
+fn row(count: usize, end: &str) -> String {
+    format!(
+        "model Row \"joined\"\n{end} -> node[1]\nfor i in 1..{count} {{\n    0:node[i] -> C:c[i](1 mF)\n    if i > 1 {{\n        node[i - 1] -> 1:wire[i] -> node[i]\n        wire[i] -> R:r[i](1 ohm)\n    }}\n}}\n"
+    )
+}
+
+#[test]
+fn a_net_that_fills_for_ever_has_no_equilibrium() {
+    for count in [4, 100] {
+        assert!(run_at_rest(&row(count, "Se:source(1 V) -> 1:feed -> R:input(1 ohm)\nfeed")).is_ok());
+        match run_at_rest(&row(count, "Sf:source(1 mA)")) {
+            Err(error @ Error::Usage(Problem::NoEquilibrium { .. })) => {
+                let text = error.render(false);
+                assert!(text.contains("still changes at") && text.contains("a source that drives it"), "{text}");
+            }
+            Err(other) => panic!("{}", other.render(false)),
+            Ok(_) => panic!("{count}: it rests"),
+        }
+    }
+}
+
+/// Full matrices have a bound; a cart that rests anywhere beside a net is told.
+#[test]
+fn large_models_are_linearised_at_rest_or_refused_with_the_reason() {
+    let linearize = |text: &str| {
+        let model = Model::from_text("rest.bond", text, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        model.linearize(&Linearize { at: Point::Equilibrium, ..Linearize::default() })
+    };
+    let report = linearize(&Family::Ladder.model("Line", 80)).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert!(report.stable && report.notes.is_empty(), "{:?}", report.notes);
+    let cart = "1:cart -> I:mass(1 kg)\ncart -> R:damper(1 N.s/m)\nstate x' = cart.f\n";
+    let open = linearize(&(Family::Ladder.model("Line", 80) + cart));
+    match open {
+        Ok(report) => assert!(report.notes.iter().any(|n| n.contains("1 combinations")), "{:?}", report.notes),
+        Err(error) => panic!("{}", error.render(false)),
+    }
+    match linearize(&Family::Ladder.model("Line", 2100)) {
+        Err(error @ Error::Usage(Problem::NoMatrices { .. })) => {
+            assert!(error.render(false).contains("2100 states are more than"), "{}", error.render(false));
+        }
+        Err(other) => panic!("{}", other.render(false)),
+        Ok(_) => panic!("it is linearised"),
+    }
+}
