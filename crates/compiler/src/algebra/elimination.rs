@@ -389,34 +389,25 @@ impl<A: Coefficients> Eliminator<A> {
 
     /// Takes the pivot's column out of a row, which may have lost it already.
     fn subtract(&mut self, x: &mut A, other: usize, pivot: &[(usize, A::Entry)], column: usize) {
-        let mut row = std::mem::take(&mut self.rows[other]);
-        if let Ok(at) = row.binary_search_by_key(&column, |e| e.0) {
-            let minus = x.minus(row.remove(at).1);
-            for &(c, e) in pivot.iter().filter(|e| e.0 != column) {
-                let change = x.times(minus, e);
-                self.add_entry(x, &mut row, c, change, other as u32);
-            }
-        }
-        self.rows[other] = row;
-    }
-
-    fn add_entry(&mut self, x: &mut A, row: &mut Vec<(usize, A::Entry)>, column: usize, change: A::Entry, id: u32) {
-        match row.binary_search_by_key(&column, |e| e.0) {
-            Ok(at) => {
-                let sum = x.plus(row[at].1, change);
-                if self.vanishes(x, sum) {
-                    row.remove(at);
-                } else {
-                    row[at].1 = sum;
-                }
-            }
-            Err(at) => {
-                if !self.vanishes(x, change) {
-                    row.insert(at, (column, change));
-                    self.column_rows[column].push(id);
+        let Some(own) = coefficient(&self.rows[other], column) else { return };
+        let minus = x.minus(own);
+        let row = std::mem::take(&mut self.rows[other]);
+        let mut reduced = Vec::with_capacity(row.len() + pivot.len() - 2);
+        let mut row = row.into_iter().filter(|e| e.0 != column).peekable();
+        for &(c, e) in pivot.iter().filter(|e| e.0 != column) {
+            reduced.extend(std::iter::from_fn(|| row.next_if(|e| e.0 < c)));
+            let change = x.times(minus, e);
+            let before = row.next_if(|e| e.0 == c);
+            let after = before.map_or(change, |(_, e)| x.plus(e, change));
+            if !self.vanishes(x, after) {
+                reduced.push((c, after));
+                if before.is_none() {
+                    self.column_rows[c].push(other as u32);
                 }
             }
         }
+        reduced.extend(row);
+        self.rows[other] = reduced;
     }
 
     /// What has been eliminated, and what is left.

@@ -155,6 +155,8 @@ pub enum EquilibriumError {
     None(Vec<(String, f64)>),
     /// Where all is at rest, this constraint is missed by so much.
     Missed(String, f64),
+    /// The relations that the structure implies among its states are too long to be written out.
+    Relations,
     /// The model has no value on the way.
     Failure(Failure),
 }
@@ -172,6 +174,10 @@ impl fmt::Display for EquilibriumError {
             EquilibriumError::Missed(constraint, miss) => write!(
                 f,
                 "no equilibrium was found: where all rates vanish the constraint {constraint} is missed by {miss:e}; start nearer to the position that is meant, by start values or `guess`"
+            ),
+            EquilibriumError::Relations => write!(
+                f,
+                "no equilibrium was looked for: the bodies of this model hang together in so many ways that the relations which their motion keeps are too long to be written out; let it come to rest in a run with more damping, and start there"
             ),
             EquilibriumError::Failure(failure) => failure.fmt(f),
         }

@@ -156,8 +156,12 @@ impl Model {
         size.into_iter().map(|s| if s > noise { s } else { least.min(1.0) }).collect()
     }
 
-    /// The directions from `x` along its leaf before any magnitude is known.
+    /// The directions from `x` along its leaf before any magnitude is known. `None` if something has no value there, or if
+    /// the leaf is not written out.
     pub(in crate::model) fn first_directions(&mut self, t: f64, x: &[f64]) -> Option<Directions> {
+        if self.code.program.relations.unwritten {
+            return None;
+        }
         let leaf = self.leaf_by(t, x, |_| vec![1.0; x.len()]);
         self.directions(leaf.as_ref(), t, x)
     }

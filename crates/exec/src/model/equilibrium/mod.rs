@@ -61,8 +61,12 @@ impl Model {
     /// constraints.
     ///
     /// # Errors
-    /// There is none near, or the model has no value on the way.
+    /// There is none near, the relations that states keep are too long to be written out, or the model has no value on the
+    /// way.
     pub fn equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+        if self.code.program.relations.unwritten {
+            return Err(EquilibriumError::Relations);
+        }
         self.restart();
         let leaf = self.leaf(t, x);
         let leaf = leaf.as_ref();
