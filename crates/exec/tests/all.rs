@@ -5,6 +5,9 @@ mod recipes;
 
 #[path = "evaluation.rs"]
 mod evaluation;
+#[cfg(feature = "machine")]
+#[path = "execution.rs"]
+mod execution;
 #[path = "forms.rs"]
 mod forms;
 #[path = "jacobian.rs"]

@@ -4,6 +4,8 @@
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "execution.rs"]
+mod execution;
 #[path = "faults_assumptions.rs"]
 mod faults_assumptions;
 #[path = "faults_audit.rs"]

@@ -30,6 +30,7 @@ pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
 pub use implicit::{ImplicitMemory, ImplicitModel};
 pub use linear::Linearised;
+pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
 pub use operations::Operations;
 pub use setup::Setup;
@@ -40,7 +41,7 @@ use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
 use inputs::InputSignal;
-use machine::Codes;
+use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
 use recorded::Recorded;
 use std::sync::Arc;
@@ -55,7 +56,7 @@ pub struct Model {
     /// The code of the present mode.
     code: Arc<Mode>,
     recorded: Arc<Recorded>,
-    codes: Codes,
+    tiers: Tiers,
     setup: Setup,
     run: Remembered,
     frame: Frame,
@@ -112,7 +113,7 @@ impl Model {
         };
         let mut model = Model {
             recorded: Arc::new(Recorded::by_default(&code)),
-            codes: Codes::default(),
+            tiers: Tiers::default(),
             setup: Setup::new(&compiled),
             run,
             frame,
