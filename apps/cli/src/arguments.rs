@@ -290,6 +290,17 @@ pub enum Solver {
     Rosenbrock,
 }
 
+/// What evaluates a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Exec {
+    /// Machine code of what is evaluated so often that making it is repaid; the choice and why stand under --timings
+    Auto,
+    /// Bytecode
+    Bytecode,
+    /// Machine code, of x86-64 and AArch64
+    Machine,
+}
+
 /// How to find the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Start {
@@ -336,6 +347,9 @@ pub struct Simulate {
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,
+    /// What evaluates the model: bytecode, machine code, or what is sooner done. Results are the same to the last bit
+    #[arg(long, default_value = "auto")]
+    pub exec: Exec,
     /// Where to start
     #[arg(long, default_value = "given")]
     pub start: Start,
@@ -510,6 +524,9 @@ pub struct Sweep {
     /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,
+    /// What evaluates the model: bytecode, machine code, or what is sooner done. Results are the same to the last bit
+    #[arg(long, default_value = "auto")]
+    pub exec: Exec,
     /// Where to start
     #[arg(long, default_value = "given")]
     pub start: Start,
@@ -568,6 +585,10 @@ pub struct RunArguments {
     /// Evaluations at most each time nonlinear equations are solved; more stop the run
     #[arg(long, default_value_t = 50)]
     pub bound: usize,
+    /// What evaluates the model: bytecode, machine code, or machine code wherever there is any. Results are the same to the
+    /// last bit
+    #[arg(long, default_value = "auto")]
+    pub exec: Exec,
 }
 
 /// `draw`.

@@ -209,6 +209,33 @@ fn timings_tell_time_and_memory_of_every_stage() {
 }
 
 #[test]
+fn exec_says_what_evaluates_and_changes_nothing() {
+    let at = folder("exec");
+    let car = model("quarter_car");
+    let run = |exec: &str, more: &[&str]| {
+        let output = halfarrow(&at, &[&["simulate", &car, "--to", "0.1", "--exec", exec][..], more].concat());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        output
+    };
+    let [bytecode, machine] = ["bytecode", "machine"].map(|exec| json(&run(exec, &["--json"])));
+    assert_eq!(bytecode["values"], machine["values"]);
+    assert_eq!(bytecode["execution"][0]["routine"], "rates");
+    assert_eq!(bytecode["execution"][0]["machine"], false);
+    assert_eq!(machine["execution"][0]["machine"], true);
+    assert_eq!(machine["execution"][0]["by_bytecode"], 0);
+    let told = stderr(&run("auto", &["--timings"]));
+    assert!(told.contains("would repay machine code"), "{told}");
+    let rows = ["bytecode", "machine"].map(|exec| {
+        let file = format!("{exec}.csv");
+        let vary = ["--vary", "ks=lin(10e3,30e3,20)", "--to", "0.1", "--step", "1ms", "--out", &file, "--exec", exec];
+        let output = halfarrow(&at, &[&["sweep", &car][..], &vary].concat());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        std::fs::read_to_string(at.join(file)).expect("rows")
+    });
+    assert_eq!(rows[0], rows[1]);
+}
+
+#[test]
 fn equations_read_as_in_a_textbook() {
     let text = halfarrow(Path::new("."), &["equations", &model("pendulum")]);
     assert_eq!(stdout(&text), "(J + M a²) ω' = -M g a cos φ\nφ' = ω\n");

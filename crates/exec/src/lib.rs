@@ -1,7 +1,7 @@
 //! Runs a [`Program`](halfarrow_compiler::program::Program): [`Model`] is the [`System`](halfarrow_sim::System) that it
 //! becomes, with parameters that can be set, inputs that can be connected, and start values that fit.
 //!
-//! The bytecode is the meaning of a program; [`Model::compile_machine`] turns it into machine code with the same bits. Elementary functions come from [`math`] alone.
+//! The bytecode is the meaning of a program; [`Model::execute`] says when it is turned into machine code with the same bits. Elementary functions come from [`math`] alone.
 #![deny(unsafe_code)]
 
 mod bytecode;
@@ -15,6 +15,7 @@ mod model;
 pub use halfarrow_compiler::algebra::math;
 pub use machine::MachineError;
 pub use model::{
-    Compiled, Equilibrium, EquilibriumError, ImplicitMemory, ImplicitModel, InputError, Linearised, Memory, ModeId,
-    Model, Operations, ParameterError, RecordError, Setup, StartConflict, StartError, StartValue, WideModel,
+    Compiled, Equilibrium, EquilibriumError, Evaluated, Executed, Execution, Expected, ImplicitMemory, ImplicitModel,
+    InputError, Linearised, Memory, ModeId, Model, Operations, ParameterError, Reason, RecordError, Setup,
+    StartConflict, StartError, StartValue, WideModel,
 };

@@ -7,6 +7,9 @@ mod recipes;
 mod equilibria;
 #[path = "evaluation.rs"]
 mod evaluation;
+#[cfg(feature = "machine")]
+#[path = "execution.rs"]
+mod execution;
 #[path = "forms.rs"]
 mod forms;
 #[path = "jacobian.rs"]

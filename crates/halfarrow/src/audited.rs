@@ -14,8 +14,11 @@ use serde::Serialize;
 use crate::run::Recording;
 use crate::verdict::Verdict;
 
-/// Samples audited at once: bounds the memory of long runs.
+/// Samples audited at once at most, and at least: what bounds the memory of long runs.
 const CHUNK: usize = 4096;
+const LEAST: usize = 256;
+/// Values kept for the next audit, of models that have many.
+const KEPT: usize = 1 << 22;
 
 /// Greatest misses that the audit found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -108,6 +111,11 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         Audited { model, book }
     }
 
+    /// The model, which records for the audit.
+    pub fn model(&mut self) -> &mut M {
+        self.model
+    }
+
     /// What was found.
     pub fn finish(mut self) -> AuditReport {
         let tracked = self.model.program().tracked.iter();
@@ -189,7 +197,8 @@ impl Book {
             return Err(Failure::NotFinite { time: t, what: Affected::variable(what.to_string()) });
         }
         // A part of the run never ends between the two samples of a jump.
-        if self.times.len() >= CHUNK && self.times.last() != Some(&t) {
+        let chunk = (KEPT / self.names.len().max(1)).clamp(LEAST, CHUNK);
+        if self.times.len() >= chunk && self.times.last() != Some(&t) {
             self.audit();
         }
         self.times.push(t);

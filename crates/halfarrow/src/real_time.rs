@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::table_file::ReadTable;
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
-use halfarrow_exec as exec;
+use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, run_real_time};
 use halfarrow_sim::{Failure, Method, Nobody, Options};
@@ -58,6 +58,8 @@ pub struct RealTimeRun {
     pub on_miss: OnMiss,
     /// Evaluations of a block of nonlinear equations at most in one solution; `None`: 50.
     pub bound: Option<usize>,
+    /// Bytecode or machine code; `Auto`: machine code wherever there is any, made before the clock starts.
+    pub execution: Execution,
 }
 
 /// Where inputs come from.
@@ -165,12 +167,7 @@ impl Model {
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
         let audit = self.rehearse(&system, run, &x)?;
-        // Without machine code for this processor the bytecode runs on.
-        let machine = system.compile_machine().is_ok();
-        if machine && run.method.is_implicit() {
-            // So do derivatives.
-            let _ = system.compile_directional();
-        }
+        let machine = make_ready(&mut system, run)?;
         let mut ports = Channels::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
@@ -240,6 +237,20 @@ fn pace(run: &RealTimeRun) -> Result<Pace, Problem> {
     }
     let ticks = run.length.map(|length| (length * run.rate).round().max(1.0) as u64);
     Ok(Pace { step: 1.0 / run.rate, ticks, on_miss: run.on_miss })
+}
+
+/// Makes all machine code that a tick may need; whether there is any. Without it for this processor the bytecode runs on,
+/// unless machine code is asked for.
+fn make_ready(system: &mut exec::Model, run: &RealTimeRun) -> Result<bool, Problem> {
+    let made = match run.execution {
+        Execution::Bytecode => return Ok(false),
+        Execution::Auto | Execution::Machine => system.compile_machine(),
+    };
+    let made = made.and_then(|()| if run.method.is_implicit() { system.compile_directional() } else { Ok(()) });
+    match made {
+        Err(why) if run.execution == Execution::Machine => Err(Problem::BadOption { reason: why.to_string() }),
+        made => Ok(made.is_ok()),
+    }
 }
 
 /// The files among the sources, an input each.

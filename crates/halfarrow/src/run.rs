@@ -10,7 +10,7 @@ use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
 use halfarrow_compiler::program::Program;
 use halfarrow_compiler::unit::Unit;
-use halfarrow_exec::{self as exec, EquilibriumError, StartError};
+use halfarrow_exec::{self as exec, EquilibriumError, Execution, StartError};
 use halfarrow_sim::{
     AbsoluteTolerance, Affected, Crawl, Events as _, Failure, ImplicitSystem as _, Method, Options, Sink, Summary,
 };
@@ -23,6 +23,7 @@ use crate::clock::Moment;
 use crate::compiled::Ready;
 use crate::cost;
 use crate::error::{Error, Problem};
+use crate::execution::{RoutineReport, execute, executed};
 use crate::input::{Input, connect};
 use crate::model::Model;
 use crate::verdict::Made;
@@ -55,6 +56,8 @@ pub struct Run {
     pub start: Start,
     /// What to record.
     pub record: Record,
+    /// Bytecode or machine code. Results are the same to the last bit.
+    pub execution: Execution,
 }
 
 /// Where a run starts.
@@ -95,6 +98,7 @@ impl Default for Run {
             inputs: Vec::new(),
             start: Start::Given,
             record: Record::Default,
+            execution: Execution::Auto,
         }
     }
 }
@@ -131,6 +135,8 @@ pub struct RunReport {
     pub switches: usize,
     /// Whether the stiff method took over.
     pub stiff: bool,
+    /// What ran as machine code, and why.
+    pub execution: Vec<RoutineReport>,
     /// The audit.
     pub audit: AuditReport,
     /// What was left out or is to be known.
@@ -295,7 +301,7 @@ impl Model {
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
             notes.extend(advice(&system, &start, method, step));
         }
-        self.integrate(&mut system, start, &options, notes, progress)
+        self.integrate(&mut system, start, (&options, run.execution), notes, progress)
     }
 
     fn run_form(
@@ -318,8 +324,8 @@ impl Model {
             cost::check(system.reference_mut(), &x, &options, recorded)?;
         }
         match explicit {
-            true => self.integrate(&mut system.into_form(), y, &options, notes, progress),
-            false => self.integrate_implicit(&mut system, (y, yp), &options, notes, progress),
+            true => self.integrate(&mut system.into_form(), y, (&options, run.execution), notes, progress),
+            false => self.integrate_implicit(&mut system, (y, yp), (&options, run.execution), notes, progress),
         }
     }
 
@@ -327,17 +333,14 @@ impl Model {
         &self,
         system: &mut exec::Model,
         mut x: Vec<f64>,
-        options: &Options,
+        (options, execution): (&Options, Execution),
         notes: Vec<String>,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
-        if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
-            let evaluations = method.evaluations() * (options.to - options.from) / step;
-            system.compile_for(evaluations, method.is_implicit());
-        }
         let mut sink = Recorder::new(system, notes, progress);
         let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
+        execute(audited.model(), execution, options)?;
         let mut outcome = audited.simulate(options, &mut x, &mut sink);
         if let Err(stopped) = &mut outcome {
             stopped.failure = audited.explain(stopped);
@@ -347,27 +350,28 @@ impl Model {
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
-        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances)
+        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances, executed(system))
     }
 
     fn integrate_implicit(
         &self,
         system: &mut exec::ImplicitModel,
         (mut y, mut yp): (Vec<f64>, Vec<f64>),
-        options: &Options,
+        (options, execution): (&Options, Execution),
         notes: Vec<String>,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder::new(system, notes, progress);
         let names: Vec<String> = (0..y.len()).map(|i| system.unknown_name(i)).collect();
         let mut audited = Audited::new(system, &self.graph);
+        execute(audited.model(), execution, options)?;
         let outcome = audited.simulate(options, (&mut y, &mut yp), &mut sink);
         let tolerances = sink.tolerances(names);
         let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
-        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances)
+        kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances, executed(system))
     }
 
     fn ended(
@@ -416,6 +420,7 @@ impl Model {
             corners: summary.corners,
             switches: summary.crossings,
             stiff: summary.stiff,
+            execution: Vec::new(),
             audit,
             notes,
             tolerances: Vec::new(),
@@ -576,6 +581,10 @@ pub(crate) trait Recording {
     fn record(&mut self, names: &[&str]) -> Result<(), exec::RecordError>;
     /// Records everything that has a value.
     fn record_all(&mut self);
+    /// How it runs from now on.
+    fn execute(&mut self, execution: Execution, expected: Option<exec::Expected>) -> Result<(), exec::MachineError>;
+    /// How it has been run.
+    fn executed(&self) -> Vec<exec::Executed>;
 }
 
 macro_rules! recording {
@@ -592,6 +601,12 @@ macro_rules! recording {
             }
             fn record_all(&mut self) {
                 self.record_all();
+            }
+            fn execute(&mut self, execution: Execution, expected: Option<exec::Expected>) -> Result<(), exec::MachineError> {
+                self.execute(execution, expected)
+            }
+            fn executed(&self) -> Vec<exec::Executed> {
+                self.executed()
             }
         }
     )*};
@@ -637,13 +652,18 @@ impl<'p> Recorder<'p> {
     }
 }
 
-/// What ended, with how exact its states were kept.
-fn kept(mut ended: Result<Simulated, Error>, tolerances: Vec<StateTolerance>) -> Result<Simulated, Error> {
-    match &mut ended {
-        Ok(done) => done.report.tolerances = tolerances,
-        Err(Error::Run(stopped)) => stopped.report.tolerances = tolerances,
-        Err(_) => {}
-    }
+/// What ended, with how exact its states were kept and how it was evaluated.
+fn kept(
+    mut ended: Result<Simulated, Error>,
+    tolerances: Vec<StateTolerance>,
+    execution: Vec<RoutineReport>,
+) -> Result<Simulated, Error> {
+    let report = match &mut ended {
+        Ok(done) => &mut done.report,
+        Err(Error::Run(stopped)) => &mut stopped.report,
+        Err(_) => return ended,
+    };
+    (report.tolerances, report.execution) = (tolerances, execution);
     ended
 }
 

@@ -17,7 +17,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_compiler::unit::Unit;
-use halfarrow_exec as exec;
+use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
 use halfarrow_sim::{Options, simulate};
 use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
@@ -167,7 +167,9 @@ impl Model {
         crate::cost::check_stops(&system, &options)?;
         let columns = columns(&plan, &reducers, &system);
         let structures = Structures::of(self, &system, sweep, &plan);
-        Ok(Prepared { plan, reducers, options, columns, structures })
+        let execution = sweep.run.execution;
+        system.execute(execution, None).map_err(|why| Problem::BadOption { reason: why.to_string() })?;
+        Ok(Prepared { plan, reducers, options, columns, structures, execution })
     }
 
     fn sweep_report(&self, prepared: &Prepared, resumed: usize, failures: Failures, audit: SweepAudit) -> SweepReport {
@@ -184,9 +186,10 @@ impl Model {
 
     /// What tells one sweep from another.
     fn identity(&self, sweep: &Sweep, plan: &Plan, columns: &[(String, String)]) -> String {
-        // Everything that the rows depend on, as text.
+        // Everything that the rows depend on, as text; they are the same by bytecode and machine code.
         let graph = format!("{:?}", self.graph);
-        format!("{} {:016x} {:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()), sweep.run)
+        let run = Run { execution: Execution::Auto, ..sweep.run.clone() };
+        format!("{} {:016x} {run:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()))
     }
 }
 
@@ -198,12 +201,13 @@ struct Prepared {
     /// Names and units.
     columns: Vec<(String, String)>,
     structures: Structures,
+    execution: Execution,
 }
 
 impl Prepared {
     fn work(&self) -> SweepContext<'_> {
-        let Prepared { plan, reducers, options, structures, .. } = self;
-        SweepContext { plan, reducers, options, structures }
+        let Prepared { plan, reducers, options, structures, execution, .. } = self;
+        SweepContext { plan, reducers, options, structures, execution: *execution }
     }
 }
 
@@ -279,6 +283,7 @@ struct SweepContext<'a> {
     reducers: &'a [Reducers],
     options: &'a Options,
     structures: &'a Structures,
+    execution: Execution,
 }
 
 /// A core's own copies of the model, by the numbers of their equations.
@@ -344,8 +349,12 @@ impl<'a> Worker<'a> {
 impl<'a> Copies<'a> {
     fn of(work: &SweepContext<'a>, number: usize) -> Copies<'a> {
         let structure = work.structures.get(number);
-        let wide = is_wide(work.options.method).then(|| exec::WideModel::new(&structure.system));
-        Copies { model: &structure.model, wide, system: structure.system.clone() }
+        let mut system = structure.system.clone();
+        // That there is machine code where it is asked for was made sure of before. Evaluations of all sets count together.
+        let _ = system.execute(work.execution, None);
+        let wide = is_wide(work.options.method) && work.execution != Execution::Machine;
+        let wide = wide.then(|| exec::WideModel::new(&structure.system));
+        Copies { model: &structure.model, wide, system }
     }
 
     /// Sets with the same equations, together where the method allows that.

@@ -6,6 +6,8 @@ mod api;
 mod compare;
 #[path = "equilibria.rs"]
 mod equilibria;
+#[path = "execution.rs"]
+mod execution;
 #[path = "faults_assumptions.rs"]
 mod faults_assumptions;
 #[path = "faults_audit.rs"]

@@ -238,6 +238,7 @@ fn compare_and_real_time_and_reports_obey_the_audit() {
         start: halfarrow::Start::Given,
         on_miss: halfarrow::OnMiss::CatchUp,
         bound: None,
+        execution: halfarrow::Execution::Auto,
     };
     let outcome = model.run_real_time(&live, &halfarrow::Statistics::default(), &stop);
     assert_eq!(outcome.is_err(), refused);

@@ -8,7 +8,7 @@ use std::time::Duration;
 use halfarrow::{Durations, Feed, Form, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Statistics, frequency};
 use serde_json::json;
 
-use super::run::{method, record, start};
+use super::run::{execution, method, record, start};
 use super::{warn_of_step, with_model};
 use crate::arguments::{self, RunArguments};
 use crate::page::Page;
@@ -70,6 +70,7 @@ fn asked(arguments: &RunArguments) -> Result<RealTimeRun, Problem> {
             arguments::OnMiss::Skip => OnMiss::Skip,
         },
         bound: Some(arguments.bound),
+        execution: execution(arguments.exec),
     })
 }
 

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, Deviation, DrawOptions, Error, FixedMethod, Method, Model, Problem, Record, Run, RunReport, Simulated,
-    Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
+    AuditReport, Deviation, DrawOptions, Error, Execution, FixedMethod, Method, Model, Problem, Record, Run, RunReport,
+    Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ use super::analyse::form;
 use super::picture::{check_names, write_picture};
 use super::plots::{recorded, write_plots};
 use super::with_model;
-use crate::arguments::{self, Simulate, Solver};
+use crate::arguments::{self, Exec, Simulate, Solver};
 use crate::page::Page;
 use crate::screen::{self, Progress};
 use crate::stop;
@@ -67,6 +67,7 @@ fn run(arguments: &Simulate) -> Run {
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),
+        execution: execution(arguments.exec),
     }
 }
 
@@ -83,6 +84,15 @@ pub(super) fn method(solver: Solver) -> Method {
         Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
         Solver::LinearlyImplicitEuler => Method::Fixed(FixedMethod::LinearlyImplicitEuler),
         Solver::Rosenbrock => Method::Fixed(FixedMethod::Rosenbrock),
+    }
+}
+
+/// What evaluates the model.
+pub(super) fn execution(exec: Exec) -> Execution {
+    match exec {
+        Exec::Auto => Execution::Auto,
+        Exec::Bytecode => Execution::Bytecode,
+        Exec::Machine => Execution::Machine,
     }
 }
 
@@ -144,6 +154,7 @@ fn finish(
     untold.for_each(|note| screen::note(&format!("warning: {note}")));
     if arguments.model.timings && !arguments.model.model.json {
         screen::note(tolerances(&done.report, Page::of(&arguments.page)).trim_end());
+        screen::note(routines(&done.report, Page::of(&arguments.page)).trim_end());
     }
     if arguments.model.model.json {
         if !to_stdout {
@@ -197,6 +208,15 @@ fn tolerances(report: &RunReport, page: Page) -> String {
     let rows = rows.map(|kept| [kept.name.clone(), screen::short(kept.scale), format!("{:.1e}", kept.absolute)]);
     page.table(["state", "scale (SI)", "error allowed in a step"], rows)
         + &more(report.tolerances.len(), "--json has them")
+}
+
+/// What ran as machine code, and why.
+fn routines(report: &RunReport, page: Page) -> String {
+    let rows = report.execution.iter().map(|routine| {
+        let code = if routine.machine { "machine code" } else { "bytecode" };
+        [routine.routine.to_string(), routine.instructions.to_string(), code.to_string(), routine.reason.clone()]
+    });
+    page.table(["evaluated", "instructions", "by", "why"], rows)
 }
 
 /// Tables of more rows than this show the first [`FIRST`] of them.

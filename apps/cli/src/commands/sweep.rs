@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use halfarrow::{Error, Method, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
 use serde_json::json;
 
-use super::run::{all_listed, method, misses, start};
+use super::run::{all_listed, execution, method, misses, start};
 use super::{warn_of_step, with_model};
 use crate::arguments;
 use crate::screen::{self, Progress};
@@ -72,6 +72,7 @@ fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
         rtol: arguments.rtol,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
+        execution: execution(arguments.exec),
         ..Run::default()
     };
     Ok(Sweep {

@@ -39,7 +39,7 @@ impl Generator {
     pub fn new() -> Result<Generator, MachineError> {
         Err(MachineError::LeftOut)
     }
-    pub fn compile(&mut self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<MachineCode, MachineError> {
+    pub fn compile(&self, _: &Program, _: &Layout, _: &Routine, _: bool) -> Result<MachineCode, MachineError> {
         Err(MachineError::LeftOut)
     }
 }

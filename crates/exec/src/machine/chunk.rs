@@ -114,13 +114,12 @@ impl<'a, 'b> Chunk<'a, 'b> {
         }
     }
 
-    /// Stores live registers unless something is wrong or unusual, and returns the status.
-    pub fn end(mut self, live: impl Iterator<Item = Register>) -> Writer<'a> {
+    /// Stores registers that it has written unless something is wrong or unusual, and returns the status.
+    pub fn end(mut self, written: &[Register]) -> Writer<'a> {
         self.stop_unless_fine();
-        for register in live.filter(|r| !self.loaded.contains(r)).collect::<Vec<_>>() {
-            if let Some(&value) = self.r.get(&register) {
-                self.w.store(self.values, register, value);
-            }
+        for &register in written {
+            let value = self.r[&register];
+            self.w.store(self.values, register, value);
             if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
                 self.w.store(self.derivatives, register, slope);
             }

@@ -1,19 +1,21 @@
 //! Compiled routines and how they run.
 
 use super::chunk::{ChunkContext, ChunkItem};
+use super::functions::{Ends, Functions, Plan};
 use super::live::Live;
-use super::memory::{ArrayLengths, CodeBuffer, EntryPoint, ExecutablePages, Operands};
+use super::memory::{ArrayLengths, Operands};
 use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD, WRITTEN_OUT};
-use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Register, Routine, Solve, SolveError};
+use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Routine, Solve, SolveError};
 use halfarrow_compiler::algebra::Function;
 use halfarrow_compiler::program::{Op, Program};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// A segment of a routine, compiled as one function.
 #[derive(Debug, Clone)]
 struct Segment {
-    start: EntryPoint,
+    function: usize,
     /// The instructions that it replaces.
     code: Range<usize>,
 }
@@ -29,21 +31,19 @@ enum MachineStep {
 /// The machine code of a routine.
 #[derive(Debug)]
 pub(crate) struct MachineCode {
-    memory: ExecutablePages,
-    lengths: ArrayLengths,
+    functions: Functions,
     steps: Vec<MachineStep>,
     /// Inner code of each Newton block.
     inner: Vec<Option<Arc<InnerMachineCode>>>,
     along: bool,
     /// All of it from time and states to rates, if it is one chunk.
-    direct: Option<EntryPoint>,
+    direct: Option<usize>,
 }
 
 /// The machine code inside a Newton block.
 #[derive(Debug)]
 struct InnerMachineCode {
-    memory: ExecutablePages,
-    lengths: ArrayLengths,
+    functions: Functions,
     /// For values, and with derivatives.
     segments: [Vec<Segment>; 2],
 }
@@ -54,7 +54,7 @@ impl Generator {
     /// # Errors
     /// The generator refuses, or there is no executable memory.
     pub fn compile(
-        &mut self,
+        &self,
         program: &Program,
         layout: &Layout,
         routine: &Routine,
@@ -62,82 +62,81 @@ impl Generator {
     ) -> Result<MachineCode, MachineError> {
         let states = layout.states..layout.states + program.states.len() as u32;
         let context = ChunkContext { conditions: &program.conditions, time: layout.time, states };
-        let mut buffer = CodeBuffer::default();
-        let written_out: Vec<bool> =
-            (0..routine.solves.len()).map(|solve| !along && is_written_out(program, layout, routine, solve)).collect();
-        let cuts = cuts(routine, &written_out);
-        let mut live = Live::of(&routine.outputs);
-        let mut steps = Vec::with_capacity(cuts.len());
-        let inline = inlines(operations(&routine.code));
-        for cut in cuts.into_iter().rev() {
-            let items: Vec<ChunkItem> = routine.code[cut.clone()].iter().map(|i| item(routine, i)).collect();
-            if let [Instruction::Solve { solve }] = routine.code[cut.clone()]
-                && !written_out[solve as usize]
-            {
-                steps.push(MachineStep::Solve(solve as usize));
-                live.before_solve(&routine.solves[solve as usize]);
-                continue;
-            }
-            let start = self.chunk(&mut buffer, &context, &items, &live.registers(), (along, inline))?;
-            items.iter().rev().for_each(|item| match item {
-                ChunkItem::Op(operation) => live.before(operation),
-                ChunkItem::Guard { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(|r| live.read(r)),
-                ChunkItem::Solve(solve) => live.before_solve(solve),
-            });
-            steps.push(MachineStep::Segment(Segment { start, code: cut }));
-        }
-        steps.reverse();
+        let mut plans = Vec::new();
+        let steps = steps(program, layout, routine, along, &mut plans);
         let single = matches!(steps[..], [MachineStep::Segment(_)]) && routine.outputs.len() == program.states.len();
-        let direct = if single && !along {
-            let items: Vec<ChunkItem> = routine.code.iter().map(|i| item(routine, i)).collect();
-            Some(self.rates(&mut buffer, &context, &items, &routine.outputs, inline)?)
-        } else {
-            None
-        };
+        let direct = (single && !along).then(|| {
+            let items = routine.code.iter().map(|i| item(routine, i)).collect();
+            let inline = inlines(operations(&routine.code));
+            plans.push(Plan { items, ends: Ends::Rates(&routine.outputs), along, inline });
+            plans.len() - 1
+        });
         let mut inner = Vec::with_capacity(routine.solves.len());
         for solve in &routine.solves {
-            let value = self.inner(&mut buffer, &context, solve, false)?;
-            let derivatives = if along { self.inner(&mut buffer, &context, solve, true)? } else { Vec::new() };
+            let value = inner_segments(solve, false, &mut plans);
+            let derivatives = if along { inner_segments(solve, true, &mut plans) } else { Vec::new() };
             inner.push((!solve.code.is_empty()).then_some([value, derivatives]));
         }
-        let memory = buffer.seal().map_err(|why| MachineError::Memory(why.to_string()))?;
         let lengths = ArrayLengths {
             registers: layout.size.max(routine.registers) as usize,
             conditions: program.conditions.len(),
             tables: program.tables.len(),
             states: program.states.len(),
         };
+        let functions = Functions::new(self, &context, &plans, lengths)?;
         let inner = inner.into_iter().map(|segments| {
-            let memory = memory.clone();
-            segments.map(|segments| Arc::new(InnerMachineCode { memory, lengths, segments }))
+            segments.map(|segments| Arc::new(InnerMachineCode { functions: functions.clone(), segments }))
         });
         let inner = inner.collect();
-        Ok(MachineCode { memory, lengths, steps, inner, along, direct })
+        Ok(MachineCode { functions, steps, inner, along, direct })
     }
+}
 
-    /// The code inside a Newton block: its matrix and right side are the outputs.
-    fn inner(
-        &mut self,
-        buffer: &mut CodeBuffer,
-        context: &ChunkContext,
-        solve: &Solve,
-        along: bool,
-    ) -> Result<Vec<Segment>, MachineError> {
-        let wanted: Vec<Register> = solve.matrix.iter().chain(&solve.right).copied().collect();
-        let mut live = Live::of(&wanted);
-        let mut segments = Vec::new();
-        let inline = inlines(solve.code.iter());
-        let starts: Vec<usize> = (0..solve.code.len()).step_by(CHUNK).collect();
-        for start in starts.into_iter().rev() {
-            let code = start..(start + CHUNK).min(solve.code.len());
-            let items: Vec<ChunkItem> = solve.code[code.clone()].iter().map(ChunkItem::Op).collect();
-            let start = self.chunk(buffer, context, &items, &live.registers(), (along, inline))?;
-            solve.code[code.clone()].iter().rev().for_each(|operation| live.before(operation));
-            segments.push(Segment { start, code });
+/// The steps of a routine, and plans of the functions that they run.
+fn steps<'a>(
+    program: &Program,
+    layout: &Layout,
+    routine: &'a Routine,
+    along: bool,
+    plans: &mut Vec<Plan<'a>>,
+) -> Vec<MachineStep> {
+    let written_out = if along { vec![false; routine.solves.len()] } else { written_out(program, layout, routine) };
+    let inline = inlines(operations(&routine.code));
+    let mut live = Live::of(&routine.outputs);
+    let mut steps = Vec::new();
+    for code in cuts(routine, &written_out).into_iter().rev() {
+        match routine.code[code.clone()] {
+            [Instruction::Solve { solve }] if !written_out[solve as usize] => {
+                live.before_solve(&routine.solves[solve as usize]);
+                steps.push(MachineStep::Solve(solve as usize));
+            }
+            ref instructions => {
+                let items: Vec<ChunkItem> = instructions.iter().map(|i| item(routine, i)).collect();
+                let ends = Ends::Stores(live.before_all(&items));
+                plans.push(Plan { items, ends, along, inline });
+                steps.push(MachineStep::Segment(Segment { function: plans.len() - 1, code }));
+            }
         }
-        segments.reverse();
-        Ok(segments)
     }
+    steps.reverse();
+    steps
+}
+
+/// The code inside a Newton block: its matrix and right side are the outputs.
+fn inner_segments<'a>(solve: &'a Solve, along: bool, plans: &mut Vec<Plan<'a>>) -> Vec<Segment> {
+    let mut live = Live::of(solve.matrix.iter().chain(&solve.right));
+    let mut segments = Vec::new();
+    let inline = inlines(solve.code.iter());
+    let starts: Vec<usize> = (0..solve.code.len()).step_by(CHUNK).collect();
+    for start in starts.into_iter().rev() {
+        let code = start..(start + CHUNK).min(solve.code.len());
+        let items: Vec<ChunkItem> = solve.code[code.clone()].iter().map(ChunkItem::Op).collect();
+        let ends = Ends::Stores(live.before_all(&items));
+        plans.push(Plan { items, ends, along, inline });
+        segments.push(Segment { function: plans.len() - 1, code });
+    }
+    segments.reverse();
+    segments
 }
 
 /// Where a routine is cut: chunks, and solve blocks by themselves.
@@ -166,16 +165,18 @@ fn cuts(routine: &Routine, written_out: &[bool]) -> Vec<Range<usize>> {
     cuts
 }
 
-/// Whether a solve block is written out in its chunk: small, and such that no pivot is sought as a rule. One whose matrix
-/// never changes is factored once; one whose factors others use has to keep them.
-fn is_written_out(program: &Program, layout: &Layout, routine: &Routine, solve: usize) -> bool {
-    let solve = &routine.solves[solve];
-    let n = solve.right.len();
-    let linear = solve.guess.is_empty() && solve.shared.is_none();
-    let small = n == 1 || n <= WRITTEN_OUT && program.blocks[solve.block].is_symmetric();
-    let constant = solve.matrix.iter().all(|&r| r < layout.time);
-    let used = routine.solves.iter().any(|other| other.shared == Some(solve.block));
-    linear && small && !constant && !used
+/// Whether each solve block is written out in its chunk: small, and such that no pivot is sought as a rule. One whose
+/// matrix never changes is factored once; one whose factors others use has to keep them.
+fn written_out(program: &Program, layout: &Layout, routine: &Routine) -> Vec<bool> {
+    let used: BTreeSet<_> = routine.solves.iter().filter_map(|solve| solve.shared).collect();
+    let is_written_out = |solve: &Solve| {
+        let n = solve.right.len();
+        let linear = solve.guess.is_empty() && solve.shared.is_none();
+        let small = n == 1 || n <= WRITTEN_OUT && program.blocks[solve.block].is_symmetric();
+        let constant = solve.matrix.iter().all(|&r| r < layout.time);
+        linear && small && !constant && !used.contains(&solve.block)
+    };
+    routine.solves.iter().map(is_written_out).collect()
 }
 
 fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> ChunkItem<'a> {
@@ -199,6 +200,11 @@ fn operations(code: &[Instruction]) -> impl Iterator<Item = &Operation> {
 }
 
 impl MachineCode {
+    #[cfg(test)]
+    pub(super) fn functions(&self) -> &Functions {
+        &self.functions
+    }
+
     /// Runs the routine that it was made of, exactly as the bytecode does.
     ///
     /// # Errors
@@ -214,7 +220,7 @@ impl MachineCode {
         if [frame.conditions.clock, frame.conditions.state].contains(&Hold::Take) {
             return false;
         }
-        self.memory.enter_rates(start, self.lengths, arrays(frame), (t, x, dx)) == 0
+        self.functions.enter_rates(start, arrays(frame), (t, x, dx)) == 0
     }
 
     fn steps<const ALONG: bool>(&self, frame: &mut Frame, routine: &Routine) -> Result<(), SolveError> {
@@ -224,7 +230,7 @@ impl MachineCode {
         }
         for step in &self.steps {
             match step {
-                MachineStep::Segment(segment) => match enter(&self.memory, self.lengths, segment.start, frame) {
+                MachineStep::Segment(segment) => match self.functions.enter(segment.function, arrays(frame)) {
                     0 => {}
                     RARE => frame.part::<ALONG>(routine, &routine.code[segment.code.clone()])?,
                     status => return Err(SolveError::Vanished { guard: (status - STATUS_OF_GUARD) as u32 }),
@@ -245,16 +251,12 @@ impl MachineCode {
 impl InnerCode for InnerMachineCode {
     fn run(&self, frame: &mut Frame, solve: &Solve, along: bool) {
         for segment in &self.segments[usize::from(along)] {
-            if enter(&self.memory, self.lengths, segment.start, frame) != 0 {
+            if self.functions.enter(segment.function, arrays(frame)) != 0 {
                 let code = &solve.code[segment.code.clone()];
                 if along { frame.plain::<true>(code) } else { frame.plain::<false>(code) }
             }
         }
     }
-}
-
-fn enter(memory: &ExecutablePages, lengths: ArrayLengths, start: EntryPoint, frame: &mut Frame) -> u64 {
-    memory.enter(start, lengths, arrays(frame))
 }
 
 #[inline]

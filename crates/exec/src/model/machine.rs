@@ -1,50 +1,242 @@
-//! Which routines of a model run as machine code.
+//! Which routines of a model run as machine code, and from when on.
 
 use super::Model;
+use super::compiled::Mode;
 use super::inputs::InputSignal;
 use super::recorded::Recorded;
 use super::system::What;
+use crate::bytecode::Routine;
 use crate::machine::{Generator, MachineCode, MachineError};
 use std::sync::Arc;
 
-/// Machine code of routines, where it has been made; that of what is recorded lies with it. Shared by copies of a model.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Codes {
-    rates: Option<Arc<MachineCode>>,
-    along: Option<Arc<MachineCode>>,
-    indicators: Option<Arc<MachineCode>>,
-    jacobian: Option<Arc<MachineCode>>,
+/// How a model is run. Results are the same to the last bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Execution {
+    /// Machine code of each routine that is evaluated so often that making it is repaid, bytecode of the others.
+    #[default]
+    Auto,
+    /// Bytecode.
+    Bytecode,
+    /// Machine code of whatever is evaluated.
+    Machine,
 }
 
-impl Codes {
-    /// The machine code of a routine, if there is any.
-    pub fn of<'c>(&'c self, recorded: &'c Recorded, what: What, along: bool) -> Option<&'c Arc<MachineCode>> {
+/// How often a run evaluates, at least, where that is known before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Expected {
+    /// Evaluations of the rates.
+    pub rates: f64,
+    /// Steps: evaluations of what is recorded, of event indicators, and of derivatives by implicit methods.
+    pub steps: f64,
+}
+
+/// What of a model is evaluated by a routine of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Evaluated {
+    /// Rates, or residuals.
+    Rates,
+    /// Rates and their derivatives along a direction.
+    Directions,
+    /// What is recorded.
+    Recorded,
+    /// Event indicators.
+    Indicators,
+    /// All derivatives of the rates at once.
+    Jacobian,
+}
+
+/// How a routine was run, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Executed {
+    /// What it evaluates.
+    pub what: Evaluated,
+    /// Its instructions; those of solve blocks, which the bytecode's solvers run in any case, count once.
+    pub instructions: usize,
+    /// Evaluations after which machine code of it has repaid the time to make it, by the count of instructions.
+    pub repaid_after: u64,
+    /// Evaluations by bytecode, before there was machine code if it was made.
+    pub by_bytecode: u64,
+    /// Whether machine code of it was made.
+    pub machine: bool,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// Why a routine was run as it was.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// It was asked for.
+    Asked,
+    /// So many evaluations were to come.
+    Expected(f64),
+    /// Evaluations were counted.
+    Counted,
+    /// There is no machine code.
+    Refused(MachineError),
+}
+
+/// A routine: its machine code, where there is any, and when it is made.
+#[derive(Debug, Clone, Default)]
+struct Tier {
+    code: Option<Arc<MachineCode>>,
+    /// Evaluations by bytecode after which it is made; `None`: never.
+    after: Option<u64>,
+    by_bytecode: u64,
+    refused: Option<MachineError>,
+}
+
+/// All routines. Copies of a model share what was made before.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tiers {
+    of: [Tier; 5],
+    execution: Execution,
+    expected: Option<Expected>,
+}
+
+const ALL: [Evaluated; 5] =
+    [Evaluated::Rates, Evaluated::Directions, Evaluated::Recorded, Evaluated::Indicators, Evaluated::Jacobian];
+
+impl Evaluated {
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Evaluated::Rates => "rates",
+            Evaluated::Directions => "directional derivatives",
+            Evaluated::Recorded => "recorded",
+            Evaluated::Indicators => "event indicators",
+            Evaluated::Jacobian => "jacobian",
+        }
+    }
+
+    /// What a routine evaluates; none has machine code of recorded values with their derivatives.
+    fn by(what: What, along: bool) -> Option<Evaluated> {
         match (what, along) {
-            (What::Rates, false) => self.rates.as_ref(),
-            (What::Rates, true) => self.along.as_ref(),
-            (What::Recorded, false) => recorded.code.as_ref(),
-            (What::Indicators, false) => self.indicators.as_ref(),
-            (What::Jacobian, false) => self.jacobian.as_ref(),
+            (What::Rates, false) => Some(Evaluated::Rates),
+            (What::Rates, true) => Some(Evaluated::Directions),
+            (What::Recorded, false) => Some(Evaluated::Recorded),
+            (What::Indicators, false) => Some(Evaluated::Indicators),
+            (What::Jacobian, false) => Some(Evaluated::Jacobian),
             (_, true) => None,
+        }
+    }
+
+    fn routine<'m>(self, mode: &'m Mode, recorded: &'m Recorded) -> Option<&'m Routine> {
+        match self {
+            Evaluated::Rates | Evaluated::Directions => Some(&mode.rates),
+            Evaluated::Recorded => Some(&recorded.routine),
+            Evaluated::Indicators => (!mode.switching.is_empty()).then_some(&mode.indicators),
+            Evaluated::Jacobian => mode.jacobian.as_ref().map(|jacobian| &jacobian.routine),
         }
     }
 }
 
+impl Tiers {
+    /// The machine code of a routine, if there is any.
+    pub fn code(&self, what: What, along: bool) -> Option<&Arc<MachineCode>> {
+        self.of[Evaluated::by(what, along)? as usize].code.as_ref()
+    }
+}
+
+/// Instructions of a routine; blocks that the solver solves count by their inner code.
+fn instructions(routine: &Routine) -> usize {
+    routine.code.len() + routine.solves.iter().map(|solve| solve.code.len()).sum::<usize>()
+}
+
+/// Evaluations after which machine code is repaid, by what making it takes and what it saves: nanoseconds to begin with and
+/// for each instruction, about what docs/TESTING.md has. One core makes it; more of them are a gain that is not counted on,
+/// so that the choice is the same everywhere.
+fn repaid_after(what: Evaluated, instructions: usize) -> u64 {
+    const BEGIN: f64 = 3e5;
+    const MAKE: f64 = 6e3;
+    const SAVE: f64 = 1.0;
+    // Certain to be repaid: twice over.
+    const SURELY: f64 = 2.0;
+    // A derivative takes some three operations for each one.
+    let own = if what == Evaluated::Directions { 3.0 } else { 1.0 };
+    let instructions = own * instructions.max(1) as f64;
+    (SURELY * (BEGIN + MAKE * instructions) / (SAVE * instructions)).ceil() as u64
+}
+
 impl Model {
+    /// How it runs from now on, given what is known of how often it will be evaluated. Machine code is made where an
+    /// evaluation asks for it first, of nothing else.
+    ///
+    /// # Errors
+    /// There is no machine code for this processor or in this build, and it is asked for.
+    pub fn execute(&mut self, execution: Execution, expected: Option<Expected>) -> Result<(), MachineError> {
+        if execution == Execution::Machine {
+            Generator::new()?;
+        }
+        self.tiers = Tiers { execution, expected, ..Tiers::default() };
+        for what in ALL {
+            let Some(routine) = what.routine(&self.code, &self.recorded) else { continue };
+            let repaid = repaid_after(what, instructions(routine));
+            self.tiers.of[what as usize].after = match (execution, expected) {
+                (Execution::Bytecode, _) => None,
+                (Execution::Machine, _) => Some(0),
+                (Execution::Auto, None) => Some(repaid),
+                (Execution::Auto, Some(expected)) => (expected.of(what) > repaid as f64).then_some(0),
+            };
+        }
+        Ok(())
+    }
+
+    /// How the routines that were evaluated have been run.
+    pub fn executed(&self) -> Vec<Executed> {
+        let executed = |what: Evaluated| {
+            let (tier, routine) = (&self.tiers.of[what as usize], what.routine(&self.code, &self.recorded)?);
+            let ran = tier.code.is_some() || tier.by_bytecode > 0;
+            let instructions = instructions(routine);
+            let reason = match (&tier.refused, self.tiers.execution, self.tiers.expected) {
+                (Some(why), ..) => Reason::Refused(why.clone()),
+                (None, Execution::Bytecode | Execution::Machine, _) => Reason::Asked,
+                (None, Execution::Auto, Some(expected)) => Reason::Expected(expected.of(what)),
+                (None, Execution::Auto, None) => Reason::Counted,
+            };
+            ran.then(|| Executed {
+                what,
+                instructions,
+                repaid_after: repaid_after(what, instructions),
+                by_bytecode: tier.by_bytecode,
+                machine: tier.code.is_some(),
+                reason,
+            })
+        };
+        ALL.into_iter().filter_map(executed).collect()
+    }
+
+    /// Counts an evaluation by bytecode; makes machine code first where it is time to.
+    pub(super) fn before_evaluation(&mut self, what: What, along: bool) {
+        let Some(what) = Evaluated::by(what, along) else { return };
+        let tier = &mut self.tiers.of[what as usize];
+        if tier.code.is_some() {
+            return;
+        }
+        if tier.after.is_none_or(|after| tier.by_bytecode < after) {
+            tier.by_bytecode += 1;
+            return;
+        }
+        if let Err(why) = self.make(what) {
+            let tier = &mut self.tiers.of[what as usize];
+            (tier.refused, tier.after) = (Some(why), None);
+            tier.by_bytecode += 1;
+        }
+    }
+
     /// Rates by machine code from where time and states are given; false if that does not do.
     #[inline]
     pub(super) fn rates_directly(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> bool {
-        if self.codes.rates.is_none() {
+        if self.tiers.of[Evaluated::Rates as usize].code.is_none() {
             return false;
         }
         if !self.run.delays_and_samples.is_empty() || self.inputs().iter().any(InputSignal::moves) {
             self.place_time(t);
         }
-        let Model { codes, frame, code, run, .. } = self;
+        let Model { tiers, frame, code, run, .. } = self;
         if !run.conserved.is_empty() {
             frame.r[code.layout.conserved as usize..][..run.conserved.len()].copy_from_slice(&run.conserved);
         }
-        let Some(code) = &codes.rates else { return false };
+        let Some(code) = &tiers.of[Evaluated::Rates as usize].code else { return false };
         code.rates(frame, t, x, dx) && dx.iter().all(|rate| rate.is_finite())
     }
 
@@ -53,39 +245,20 @@ impl Model {
     /// # Errors
     /// As there.
     pub fn compile_rates(&mut self) -> Result<(), MachineError> {
-        let code = Generator::new()?.compile(&self.code.program, &self.code.layout, &self.code.rates, false)?;
-        self.codes.rates = Some(Arc::new(code));
-        Ok(())
+        self.make(Evaluated::Rates)
     }
 
-    /// From now on rates, recorded values and event indicators run as machine code: the same bits, sooner. It takes some
-    /// 4 µs an instruction once; a model that is evaluated thousands of times gains.
+    /// From now on rates, recorded values, event indicators and the Jacobian run as machine code: the same bits, sooner. Made
+    /// at once; [`execute`](Model::execute) makes what is needed where it is.
     ///
     /// # Errors
     /// There is no machine code for this processor or in this build; the model runs on as it did.
     pub fn compile_machine(&mut self) -> Result<(), MachineError> {
-        let mut generator = Generator::new()?;
-        let code = &*self.code;
-        let mut made = |routine, along| generator.compile(&code.program, &code.layout, routine, along).map(Arc::new);
-        self.codes = Codes {
-            rates: Some(made(&code.rates, false)?),
-            along: None,
-            indicators: if code.switching.is_empty() { None } else { Some(made(&code.indicators, false)?) },
-            jacobian: code.jacobian.as_ref().map(|jacobian| made(&jacobian.routine, false)).transpose()?,
-        };
-        self.compile_recorded()
-    }
-
-    /// Makes machine code of what a run with fixed step needs if so many evaluations repay it; whether it did. Results are
-    /// the same.
-    pub fn compile_for(&mut self, evaluations: f64, derivatives: bool) -> bool {
-        // Seconds to make the code, and saved by it, per instruction: about what docs/TESTING.md has.
-        let instructions = self.code.rates.code.len() as f64;
-        let (cost, gain) = (3e-4 + 6e-6 * instructions, 1e-9 * instructions);
-        if evaluations * gain <= 2.0 * cost || self.compile_machine().is_err() {
-            return false;
-        }
-        !derivatives || self.compile_directional().is_ok()
+        let all = ALL.into_iter().filter(|what| *what != Evaluated::Directions);
+        all.filter(|what| what.routine(&self.code, &self.recorded).is_some())
+            .collect::<Vec<_>>()
+            .into_iter()
+            .try_for_each(|what| self.make(what))
     }
 
     /// The same for derivatives along directions, which stiff methods ask for.
@@ -93,21 +266,34 @@ impl Model {
     /// # Errors
     /// As [`compile_machine`](Model::compile_machine).
     pub fn compile_directional(&mut self) -> Result<(), MachineError> {
-        let code = Generator::new()?.compile(&self.code.program, &self.code.layout, &self.code.rates, true)?;
-        self.codes.along = Some(Arc::new(code));
-        Ok(())
+        self.make(Evaluated::Directions)
     }
 
     /// Whether rates run as machine code.
     pub fn runs_machine_code(&self) -> bool {
-        self.codes.rates.is_some()
+        self.tiers.of[Evaluated::Rates as usize].code.is_some()
     }
 
-    /// The same for what is recorded.
-    pub(super) fn compile_recorded(&mut self) -> Result<(), MachineError> {
-        let Model { code, recorded, .. } = self;
-        let made = Generator::new()?.compile(&code.program, &code.layout, &recorded.routine, false)?;
-        Arc::make_mut(recorded).code = Some(Arc::new(made));
+    /// Something else is recorded; what ran as machine code does so again.
+    pub(super) fn recorded_anew(&mut self) {
+        let tier = &mut self.tiers.of[Evaluated::Recorded as usize];
+        if tier.code.take().is_some() {
+            // Without it the bytecode goes on recording.
+            let _ = self.make(Evaluated::Recorded);
+        }
+    }
+
+    fn make(&mut self, what: Evaluated) -> Result<(), MachineError> {
+        let Some(routine) = what.routine(&self.code, &self.recorded) else { return Ok(()) };
+        let along = what == Evaluated::Directions;
+        let made = Generator::new()?.compile(&self.code.program, &self.code.layout, routine, along)?;
+        self.tiers.of[what as usize].code = Some(Arc::new(made));
         Ok(())
+    }
+}
+
+impl Expected {
+    fn of(&self, what: Evaluated) -> f64 {
+        if what == Evaluated::Rates { self.rates } else { self.steps }
     }
 }

@@ -28,6 +28,7 @@ pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
 pub use implicit::{ImplicitMemory, ImplicitModel};
 pub use linear::Linearised;
+pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
 pub use operations::Operations;
 pub use setup::Setup;
@@ -38,7 +39,7 @@ use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
 use inputs::InputSignal;
-use machine::Codes;
+use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
 use recorded::Recorded;
 use std::sync::Arc;
@@ -53,7 +54,7 @@ pub struct Model {
     /// The code of the present mode.
     code: Arc<Mode>,
     recorded: Arc<Recorded>,
-    codes: Codes,
+    tiers: Tiers,
     setup: Setup,
     run: Remembered,
     frame: Frame,
@@ -110,7 +111,7 @@ impl Model {
         };
         let mut model = Model {
             recorded: Arc::new(Recorded::by_default(&code)),
-            codes: Codes::default(),
+            tiers: Tiers::default(),
             setup: Setup::new(&compiled),
             run,
             frame,

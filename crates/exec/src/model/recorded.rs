@@ -3,7 +3,6 @@
 use super::compiled::Mode;
 use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
-use crate::machine::MachineCode;
 use halfarrow_compiler::program::{BlockId, Value};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -18,8 +17,6 @@ pub(super) struct Recorded {
     pub batches: Option<Arc<BlockBatches>>,
     /// Newton blocks that it needs and no rate does.
     pub blocks: Vec<BlockId>,
-    /// Its machine code, where it has been made.
-    pub code: Option<Arc<MachineCode>>,
 }
 
 impl Recorded {
@@ -31,7 +28,7 @@ impl Recorded {
         let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
         let blocks = newton.filter(|block| !of_rates(block)).collect();
         let batches = BlockBatches::of(&mode.program, &mode.layout, &routine).map(Arc::new);
-        Recorded { chosen, routine, batches, blocks, code: None }
+        Recorded { chosen, routine, batches, blocks }
     }
 
     /// What is recorded where nothing is asked for.
@@ -76,13 +73,9 @@ impl Model {
 
     /// Makes room for it; what ran as machine code does so again.
     fn take_recorded(&mut self, recorded: Recorded) {
-        let machine = self.recorded.code.is_some();
         self.recorded = Arc::new(recorded);
         self.reserve_recorded();
-        if machine {
-            // Without it the bytecode goes on recording.
-            let _ = self.compile_recorded();
-        }
+        self.recorded_anew();
     }
 
     pub(super) fn reserve_recorded(&mut self) {

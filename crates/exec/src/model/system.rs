@@ -19,6 +19,7 @@ pub(super) enum What {
 
 impl Model {
     fn once(&mut self, what: What, along: bool) -> Result<bool, SolveError> {
+        self.before_evaluation(what, along);
         let routine = match what {
             What::Rates => &self.code.rates,
             What::Recorded => &self.recorded.routine,
@@ -30,7 +31,7 @@ impl Model {
             What::Recorded => self.recorded.batches.as_ref(),
             What::Indicators | What::Jacobian => None,
         });
-        match (self.codes.of(&self.recorded, what, along), along) {
+        match (self.tiers.code(what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,
             (None, false) => self.frame.run(routine)?,
             (None, true) => self.frame.run_along(routine)?,

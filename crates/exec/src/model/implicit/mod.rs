@@ -4,7 +4,10 @@ mod consistent;
 mod state_map;
 mod system;
 
-use super::{InputError, Memory, Model, Operations, ParameterError, RecordError, StartError};
+use super::{
+    Executed, Execution, Expected, InputError, Memory, Model, Operations, ParameterError, RecordError, StartError,
+};
+use crate::machine::MachineError;
 use halfarrow_compiler::program::Program;
 use halfarrow_sim::{Events as _, Failure, ImplicitSystem as _, System};
 use state_map::{StateMap, without_rates_of_inputs};
@@ -140,6 +143,20 @@ impl ImplicitModel {
     /// As [`Model::record_all`].
     pub fn record_all(&mut self) {
         self.form.record_all();
+    }
+
+    /// As [`Model::execute`], for both forms.
+    ///
+    /// # Errors
+    /// As [`Model::execute`].
+    pub fn execute(&mut self, execution: Execution, expected: Option<Expected>) -> Result<(), MachineError> {
+        self.reference.execute(execution, expected)?;
+        self.form.execute(execution, expected)
+    }
+
+    /// How the form has been run.
+    pub fn executed(&self) -> Vec<Executed> {
+        self.form.executed()
     }
 
     /// Indices into [`Program::observed`] of what is recorded.
