@@ -7,22 +7,27 @@ use super::{ConditionId, Value};
 use crate::algebra::Function;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
+use std::collections::{BTreeMap, BTreeSet};
 
 impl Values {
-    /// Derivatives of each of `wanted` by each of `guesses`, one column a guess. All of them were made after `from`.
+    /// Derivatives of each of `wanted` by each of `guesses`: for each guess those that are not zero, with their places in
+    /// `wanted`. All of them were made after `from`.
     ///
     /// A value that reads guesses through one other value alone, its *root* (the argument of a law, say), is derived by
     /// that once for all guesses.
-    pub(super) fn derivatives(&mut self, wanted: &[Value], guesses: &[Value], from: usize) -> Vec<Vec<Value>> {
-        let (zero, one) = (self.number(0.0), self.number(1.0));
+    pub(super) fn derivatives(&mut self, wanted: &[Value], guesses: &[Value], from: usize) -> Vec<Vec<(usize, Value)>> {
+        let one = self.number(1.0);
         let end = wanted.iter().map(|v| v.0 as usize + 1).max().unwrap_or(from);
-        let inner: Vec<Value> =
-            (from..end).map(|i| Value(i as u32)).filter(|v| self.reads(*v).includes(Reads::GUESS)).collect();
         let mut roots: FxHashMap<Value, Value> = guesses.iter().map(|&g| (g, g)).collect();
         let mut by_root: FxHashMap<Value, Value> = guesses.iter().map(|&g| (g, one)).collect();
-        for &value in inner.iter().filter(|v| !guesses.contains(v)) {
-            let mut read = Vec::new();
-            self.op(value).for_each_operand(|o| read.extend(roots.get(&o)));
+        // What reads several roots, by each of these.
+        let mut joints: FxHashMap<Value, Vec<Value>> = FxHashMap::default();
+        for value in (from..end).map(|i| Value(i as u32)) {
+            if by_root.contains_key(&value) || !self.reads(value).includes(Reads::GUESS) {
+                continue;
+            }
+            let mut read: SmallVec<[Value; 3]> = SmallVec::new();
+            self.op(value).for_each_operand(|o| read.extend(roots.get(&o).copied()));
             let root = match read.first() {
                 None => continue,
                 Some(&first) if read.iter().all(|&r| r == first) => first,
@@ -33,36 +38,41 @@ impl Values {
                 false => self.derivative(value, &|o| by_root.get(&o).filter(|_| roots.contains_key(&o)).copied()),
             };
             if let Some(slope) = slope {
+                if root == value {
+                    read.into_iter().for_each(|root| joints.entry(root).or_default().push(value));
+                }
                 roots.insert(value, root);
                 by_root.insert(value, slope);
             }
         }
-        let joints: Vec<Value> =
-            inner.into_iter().filter(|v| roots.get(v) == Some(v) && !guesses.contains(v)).collect();
+        let mut places: FxHashMap<Value, Vec<usize>> = FxHashMap::default();
+        for (place, value) in wanted.iter().enumerate() {
+            roots.get(value).into_iter().for_each(|&root| places.entry(root).or_default().push(place));
+        }
         let mut columns = Vec::with_capacity(guesses.len());
         for &guess in guesses {
-            let mut slopes: FxHashMap<Value, Value> = FxHashMap::from_iter([(guess, one)]);
-            for &value in &joints {
+            let mut slopes: BTreeMap<Value, Value> = BTreeMap::from([(guess, one)]);
+            let mut open: BTreeSet<Value> = joints.get(&guess).into_iter().flatten().copied().collect();
+            while let Some(value) = open.pop_first() {
                 let mut read: SmallVec<[(Value, Value); 3]> = SmallVec::new();
                 self.op(value).for_each_operand(|o| {
                     if let Some(&slope) = roots.get(&o).and_then(|root| slopes.get(root)) {
                         read.push((o, slope));
                     }
                 });
-                if read.is_empty() {
-                    continue;
-                }
                 read.iter_mut().for_each(|(o, slope)| *slope = self.times(by_root[o], *slope));
                 let of = |o: Value| read.iter().find(|(v, _)| *v == o).map(|(_, slope)| *slope);
                 if let Some(slope) = self.derivative(value, &of) {
                     slopes.insert(value, slope);
+                    open.extend(joints.get(&value).into_iter().flatten());
                 }
             }
-            let column = wanted.iter().map(|v| {
-                let slope = roots.get(v).and_then(|root| slopes.get(root)).copied();
-                slope.map_or(zero, |slope| self.times(by_root[v], slope))
-            });
-            columns.push(column.collect());
+            let at = |root| places.get(root).into_iter().flatten().copied();
+            let reached = slopes.iter().flat_map(|(root, &slope)| at(root).map(move |place| (place, slope)));
+            let mut column: Vec<(usize, Value)> = reached.collect();
+            column.sort_unstable_by_key(|entry| entry.0);
+            column.iter_mut().for_each(|(place, slope)| *slope = self.times(by_root[&wanted[*place]], *slope));
+            columns.push(column);
         }
         columns
     }

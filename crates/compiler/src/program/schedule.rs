@@ -189,11 +189,13 @@ impl Schedule<'_> {
             self.lower.define(symbol, value);
         }
         let values: Vec<Value> = residuals.iter().map(|&e| self.lower.value(e)).collect();
-        let columns = self.lower.values.derivatives(&values, &guesses, from);
-        let entry = |row: usize, column: usize| (column, columns[column][row]);
         let zero = self.lower.values.number(0.0);
-        let moves = |e: &(usize, Value)| e.1 != zero;
-        let rows = (0..values.len()).map(|row| (0..columns.len()).map(move |column| entry(row, column)).filter(moves));
+        let columns = self.lower.values.derivatives(&values, &guesses, from);
+        let mut rows: Vec<Vec<(usize, Value)>> = vec![Vec::new(); values.len()];
+        for (column, entries) in columns.into_iter().enumerate() {
+            let moving = entries.into_iter().filter(|entry| entry.1 != zero);
+            moving.for_each(|(row, value)| rows[row].push((column, value)));
+        }
         let jacobian = Arc::new(Matrix::new(SparseMatrix::new(rows)));
         let piecewise = self.lower.end_newton();
         let (unknown_names, elements) = (self.names_of(unknowns), self.concerned(elements, unknowns));
