@@ -297,7 +297,7 @@ pub enum Exec {
     Auto,
     /// Bytecode
     Bytecode,
-    /// Machine code, of x86-64 and AArch64
+    /// Machine code, which there is for x86-64
     Machine,
 }
 
