@@ -101,6 +101,8 @@ impl Model {
             rest.see(&at);
             let Some(newton) = at.newton_step() else { break };
             let found = || Equilibrium { x: at.x.clone(), free: newton.free, iterations: iteration };
+            let weights = || LeastRates { weights: newton.weights.clone(), least: f64::INFINITY, moving: Vec::new() };
+            least.get_or_insert_with(weights).update(&at.rates, &rest);
             if newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs()) || rest.is_exact(&at) {
                 if rest.is_reached(&at) {
                     return Ok(found());
@@ -111,8 +113,6 @@ impl Model {
             }
             let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
             let before = norm(&at.rates);
-            let weights = || LeastRates { weights: newton.weights.clone(), least: f64::INFINITY, moving: Vec::new() };
-            least.get_or_insert_with(weights).update(&at.rates, &rest);
             let step = match pseudo_step.is_infinite() {
                 true => newton.step.clone(),
                 false => at.pseudo_transient_step(pseudo_step).unwrap_or_else(|| newton.step.clone()),
