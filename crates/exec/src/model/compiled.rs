@@ -1,6 +1,8 @@
 //! What of a model never changes: its programs and the code made of them, shared by everything that runs it.
 
+use super::clauses::Clauses;
 use super::clock::Clock;
+use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
 use crate::bytecode::{BlockBatches, Layout, Routine};
@@ -78,6 +80,9 @@ pub(super) struct Mode {
     pub sources: Routine,
     /// States that jump with a source, if there are any.
     pub kept: Option<ConservedSums>,
+    pub clauses: Clauses,
+    /// How storages change at events, where they do.
+    pub impulses: Option<ImpulseBalance>,
 }
 
 impl Mode {
@@ -103,6 +108,8 @@ impl Mode {
             clock: Clock::new(&program, &layout),
             sources: layout.routine(&program, &sources),
             kept: ConservedSums::of(&program, &layout),
+            clauses: Clauses::of(&program, &layout),
+            impulses: ImpulseBalance::of(&program, &layout),
             layout,
             program,
         }
@@ -116,7 +123,9 @@ impl Mode {
             .as_ref()
             .map(|j| &j.routine)
             .into_iter()
-            .chain(self.kept.as_ref().map(ConservedSums::routine));
+            .chain(self.kept.as_ref().map(ConservedSums::routine))
+            .chain(self.clauses.routines())
+            .chain(self.impulses.as_ref().map(ImpulseBalance::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

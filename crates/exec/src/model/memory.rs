@@ -1,6 +1,7 @@
 //! What a run remembers.
 
 use super::Model;
+use super::clauses::ClauseMemory;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
@@ -44,15 +45,19 @@ pub(super) struct Remembered {
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
     pub delays_and_samples: Vec<DelayOrSample>,
+    /// Of each clause of the program.
+    pub clauses: Vec<ClauseMemory>,
     /// The piece of each input that holds.
     pub pieces: Vec<Option<PointRange>>,
 }
 
-/// The memory of a delay or a sample.
+/// The memory of a signal that is held from earlier times.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum DelayOrSample {
     Delay(Delay),
     Sample(Sample),
+    /// What an event has set last.
+    Discrete(f64),
 }
 
 impl Model {
@@ -108,6 +113,7 @@ impl Model {
             match h.kind {
                 HeldKind::Delay => DelayOrSample::Delay(Delay::new(time)),
                 HeldKind::Sample => DelayOrSample::Sample(Sample::new(time)),
+                HeldKind::Discrete | HeldKind::Impulse => DelayOrSample::Discrete(0.0),
             }
         });
         held.collect()
