@@ -110,6 +110,8 @@ pub struct Auditor {
     energy: worst::Worst,
     residual: worst::Worst,
     rates: worst::Worst,
+    /// What storages have gained by impulses, in J.
+    by_impulses: BTreeMap<String, f64>,
     unchecked: BTreeSet<String>,
 }
 
@@ -128,6 +130,7 @@ impl Auditor {
             energy: none(),
             residual: none(),
             rates: none(),
+            by_impulses: BTreeMap::new(),
             unchecked: BTreeSet::new(),
         }
     }
@@ -152,6 +155,9 @@ impl Auditor {
         laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
+        for (name, gained) in balance.into_iter().flat_map(|b| b.by_impulses) {
+            *self.by_impulses.entry(name).or_default() += gained;
+        }
         for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
             worst.end_part();
         }
@@ -166,12 +172,17 @@ impl Auditor {
     /// What was found.
     pub fn finish(self) -> Audit {
         let settled = self.scales.settled(&self.graph);
+        let mut notes = energy::notes(&self.graph);
+        if !self.graph.clauses.is_empty() {
+            let gained = self.by_impulses.iter();
+            notes.extend(gained.map(|(name, energy)| format!("events change the energy of {name} by {energy:.6} J in all")));
+        }
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
-            notes: energy::notes(&self.graph),
+            notes,
             unchecked: self.unchecked.into_iter().collect(),
         }
     }

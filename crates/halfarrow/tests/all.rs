@@ -4,6 +4,8 @@
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "events.rs"]
+mod events;
 #[path = "faults_assumptions.rs"]
 mod faults_assumptions;
 #[path = "faults_audit.rs"]

@@ -156,11 +156,7 @@ fn order_equations(
     let graph = &causal.graph;
     let UnorderedEquations { mut assembled, constraints, conserved, relations, breaks } = unordered;
     let momenta = assembled.momenta(truth);
-    let jumps = match form {
-        Form::Minimal | Form::Kane => assembled.jumps(truth, form)?,
-        Form::Stiff => assembled.jumps(causal, form)?,
-        _ => None,
-    };
+    let jumps = assembled.jumps(truth, form)?;
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
@@ -216,6 +212,8 @@ fn order_equations(
         .collect();
     let (algebraic, mut residuals) = unknowns(&d, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
+    // Forms with constraints left in them go by the minimal one at events.
+    let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, jumps.as_ref())?;
     let observed = observed::observed(&mut d, &states);
     // The other forms start as the minimal one does.

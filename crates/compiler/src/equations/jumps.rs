@@ -38,44 +38,45 @@ struct Moving<'p, 'a> {
 }
 
 impl Assembled<'_> {
-    /// How storages change at the events of a graph; `None` if none can. `causal` has the ports of the form, all of them with
-    /// states of their own in the form `stiff`.
-    pub(super) fn jumps(&mut self, causal: &CausalGraph, form: Form) -> Result<Option<Jumps>, Diagnostics> {
+    /// How storages change at the events of a graph; `None` if none can. `truth` is the graph with its exact ports.
+    pub(super) fn jumps(&mut self, truth: &CausalGraph, form: Form) -> Result<Option<Jumps>, Diagnostics> {
         let graph = self.d.graph;
-        let ports: Vec<StoragePort> = causal.ports.ports.iter().filter_map(|s| self.storage_port(causal, s)).collect();
-        let resets = graph.clauses.iter().flat_map(|c| &c.actions).any(|a| !is_discrete(graph, a));
+        let ports: Vec<StoragePort> = truth.ports.ports.iter().filter_map(|s| self.storage_port(truth, s)).collect();
+        let actions = || graph.clauses.iter().flat_map(|c| &c.actions);
+        let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);
-        if !resets && !(depend && graph.clauses.iter().any(|c| !c.actions.is_empty())) {
+        if reset.is_none() && (!depend || actions().next().is_none()) {
             return Ok(None);
         }
-        let alone = form == Form::Stiff;
-        let stays = |p: &StoragePort| alone || p.state.role == Role::Independent;
-        let own = ports.iter().enumerate().filter(|(_, p)| stays(p)).map(|(k, p)| (p.z, Some(k)));
-        let virtuals = causal.ports.virtual_speeds.iter().filter(|_| !alone).map(|v| (v.speed, None));
+        if let (Form::Stiff, true) = (form, depend) {
+            return reset.map_or(Ok(None), |action| Err(springs(action)));
+        }
+        let own = ports.iter().enumerate().filter(|(_, p)| p.state.role == Role::Independent);
+        let own = own.map(|(k, p)| (p.z, Some(k)));
+        let virtuals = truth.ports.virtual_speeds.iter().map(|v| (v.speed, None));
         let moving = Moving { independent: own.chain(virtuals).collect(), ports: &ports };
         let mut balances: Vec<Vec<(usize, Expr)>> =
             moving.independent.iter().map(|(_, own)| own.map(|k| (k, ONE)).into_iter().collect()).collect();
-        let mut rows = rows_of(&mut self.d, causal);
-        for (k, port) in ports.iter().enumerate().filter(|(_, p)| !stays(p)) {
+        let mut rows = rows_of(&mut self.d, truth);
+        for (k, port) in ports.iter().enumerate().filter(|(_, p)| p.state.role == Role::Dependent) {
             let row = rows.of(&mut self.d.x, port.z).cloned().unwrap_or_default();
             for (balance, (z, _)) in balances.iter_mut().zip(&moving.independent) {
                 balance.extend(row.coefficient(*z).map(|factor| (k, factor)));
             }
         }
         let mut impulses: Vec<Impulse> = Vec::new();
-        for action in graph.clauses.iter().flat_map(|c| &c.actions) {
+        for action in actions() {
             let Some(symbol) = action.impulse.filter(|s| impulses.iter().all(|i| i.symbol != *s)) else { continue };
             let along = match moving.storage_of(graph, action.target) {
-                Some(k) => balances
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(b, row)| row.iter().find(|t| t.0 == k).map(|t| (b, t.1)))
-                    .collect(),
-                None if alone => {
-                    Err(refused(action, "the form stiff gives every storage a speed of its own: no one takes it"))?
+                Some(k) => {
+                    let of = |row: &[(usize, Expr)]| row.iter().find(|t| t.0 == k).map(|t| t.1);
+                    balances.iter().enumerate().filter_map(|(b, row)| Some((b, of(row)?))).collect()
                 }
-                None => self.along(causal, &moving, &mut rows, action)?,
+                None => self.along(truth, &moving, &mut rows, action)?,
             };
+            if along.is_empty() {
+                return Err(refused(action, "a source sets it, or nothing that keeps an impulse stands there"));
+            }
             impulses.push(Impulse { symbol, along });
         }
         let stored = ports.iter().map(|p| p.stored).collect();
@@ -109,10 +110,7 @@ impl Assembled<'_> {
                 None => Err(refused(action, "it also follows from a law, which takes no impulse"))?,
             }
         }
-        match along.is_empty() {
-            true => Err(refused(action, "a source sets it, or nothing that keeps an impulse stands there")),
-            false => Ok(along),
-        }
+        Ok(along)
     }
 }
 
@@ -133,6 +131,12 @@ fn refused(action: &Action, why: &str) -> Diagnostics {
     Diagnostic::error(codes::E003, format!("{} cannot be reset", action.name), action.span, why)
         .hint("reset what a storage keeps that is free to move: `p` of an I, `q` of a C, or the flow of its junction")
         .into()
+}
+
+fn springs(action: &Action) -> Diagnostics {
+    let why = "the springs of this form would share the impulse out over time, where the machine shares it at once";
+    let title = format!("{} cannot be reset in the form stiff", action.name);
+    Diagnostic::error(codes::E003, title, action.span, why).hint("choose another form, such as minimal").into()
 }
 
 /// Refuses events that read what has no value.

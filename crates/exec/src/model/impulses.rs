@@ -85,13 +85,13 @@ impl Model {
         let (mut last, mut met) = (f64::INFINITY, false);
         for _ in 0..ITERATIONS {
             let (matrix, residual) = self.balanced(t, x, balance, &asked, &impulses)?;
+            met = residual.iter().all(|r| *r == 0.0);
+            if met {
+                break;
+            }
             let Some(step) = minimum_norm::step(&matrix, &residual, m) else { break };
             if step.rank < m {
                 return Err(self.dependent_resets(t));
-            }
-            if residual.iter().all(|r| *r == 0.0) {
-                met = true;
-                break;
             }
             let mut length = 0.0f64;
             for (&u, s) in balance.jumps.unknowns.iter().zip(&step.step) {

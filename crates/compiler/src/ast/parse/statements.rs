@@ -564,6 +564,10 @@ impl Parser<'_> {
                 _ => "put it around the `when`, or beside it: what happens at one instant happens at once",
             };
             self.report(Diagnostic::error(codes::S013, title, start, "here").hint(hint));
+            self.skip_to_brace();
+            if self.kind() == TokenKind::LBrace {
+                self.block();
+            }
             return None;
         }
         let reset = self.is_word("reset") && self.ahead(1).kind == TokenKind::Ident;
