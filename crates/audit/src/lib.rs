@@ -70,6 +70,8 @@ pub struct Audit {
     pub rates: Option<Finding>,
     /// Storages that make or eat energy, and why.
     pub notes: Vec<String>,
+    /// What storages have gained by the events of the model, in J, by their names; below 0 what they have lost.
+    pub events: BTreeMap<String, f64>,
     /// What could not be checked, and why.
     pub unchecked: Vec<String>,
 }
@@ -172,17 +174,15 @@ impl Auditor {
     /// What was found.
     pub fn finish(self) -> Audit {
         let settled = self.scales.settled(&self.graph);
-        let mut notes = energy::notes(&self.graph);
-        if !self.graph.clauses.is_empty() {
-            let gained = self.by_impulses.iter();
-            notes.extend(gained.map(|(name, energy)| format!("events change the energy of {name} by {energy:.6} J in all")));
-        }
+        let notes = energy::notes(&self.graph);
+        let events = if self.graph.clauses.is_empty() { BTreeMap::new() } else { self.by_impulses };
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
             notes,
+            events,
             unchecked: self.unchecked.into_iter().collect(),
         }
     }
@@ -208,6 +208,7 @@ impl fmt::Display for Audit {
                 None => writeln!(f, "{name}: nothing to check")?,
             }
         }
+        self.events.iter().try_for_each(|(name, gained)| writeln!(f, "events: {name} {gained:+.6e} J"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))?;
         self.unchecked.iter().try_for_each(|what| writeln!(f, "not checked: {what}"))
     }

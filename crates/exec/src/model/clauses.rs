@@ -336,6 +336,7 @@ impl Model {
     fn change(&mut self, t: f64, x: &mut [f64], first: bool) -> Result<(), Failure> {
         let code = self.code.clone();
         self.take_stored(t, x)?;
+        let positions = self.position_misses(t, x)?;
         let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
         let work = std::mem::take(&mut self.events);
         for (_, at, action) in Model::actions(&code, &work) {
@@ -348,9 +349,10 @@ impl Model {
             }
         }
         self.events = work;
-        if code.impulses.is_some() {
-            return self.balance_impulses(t, x, first);
+        match code.impulses {
+            Some(_) => self.balance_impulses(t, x, first)?,
+            None => _ = self.conserve_sums(t, x, &sums)?,
         }
-        self.conserve_sums(t, x, &sums).map(|_| ())
+        self.refuse_broken_positions(t, x, &positions)
     }
 }

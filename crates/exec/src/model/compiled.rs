@@ -5,6 +5,7 @@ use super::clock::Clock;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
+use super::positions::PositionConstraints;
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
 use halfarrow_sim::Sparsity;
@@ -83,6 +84,8 @@ pub(super) struct Mode {
     pub clauses: Clauses,
     /// How storages change at events, where they do.
     pub impulses: Option<ImpulseBalance>,
+    /// Constraints that events may break.
+    pub positions: Option<PositionConstraints>,
 }
 
 impl Mode {
@@ -110,6 +113,7 @@ impl Mode {
             kept: ConservedSums::of(&program, &layout),
             clauses: Clauses::of(&program, &layout),
             impulses: ImpulseBalance::of(&program, &layout),
+            positions: PositionConstraints::of(&program, &layout),
             layout,
             program,
         }
@@ -125,7 +129,8 @@ impl Mode {
             .into_iter()
             .chain(self.kept.as_ref().map(ConservedSums::routine))
             .chain(self.clauses.routines())
-            .chain(self.impulses.as_ref().map(ImpulseBalance::routine));
+            .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
+            .chain(self.positions.as_ref().map(PositionConstraints::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

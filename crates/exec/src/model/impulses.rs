@@ -222,7 +222,7 @@ impl Model {
         Ok((matrix, residual))
     }
 
-    fn what_is_reset(&self) -> String {
+    pub(super) fn what_is_reset(&self) -> String {
         let moved = Model::actions(&self.code, &self.events);
         let moved = moved.filter(|(.., a)| !matches!(a.target, Target::Discrete(_)));
         let mut names: Vec<&str> = moved.map(|(.., a)| a.name.as_str()).collect();

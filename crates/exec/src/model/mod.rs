@@ -21,6 +21,7 @@ mod machine;
 mod memory;
 mod minimum_norm;
 mod operations;
+mod positions;
 mod recorded;
 mod setup;
 mod start;

@@ -148,9 +148,7 @@ impl Model {
     /// The model has errors, an input or output does not exist, there is no such point, or the model holds a delay, which
     /// has no matrices.
     pub fn linearize(&self, wanted: &Linearize) -> Result<LinearizeReport, Error> {
-        if let Some(delayed) =
-            self.graph.held.values().find(|h| h.kind == HeldKind::Delay)
-        {
+        if let Some(delayed) = self.graph.held.values().find(|h| h.kind == HeldKind::Delay) {
             return Err(Problem::NoMatrices { reason: delay(&delayed.name) }.into());
         }
         let (names, model) = self.with_inputs(wanted.inputs.as_deref())?;

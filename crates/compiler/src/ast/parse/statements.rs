@@ -566,7 +566,7 @@ impl Parser<'_> {
             self.report(Diagnostic::error(codes::S013, title, start, "here").hint(hint));
             self.skip_to_brace();
             if self.kind() == TokenKind::LBrace {
-                self.block();
+                self.nested(Self::actions);
             }
             return None;
         }
