@@ -247,7 +247,7 @@ fn an_impulse_goes_through_the_structure() {
         }
     }
     let refused = model(BEAM).simulate(&Run { form: Form::Stiff, ..exact(1.0) }, &mut |_| true);
-    let refused = refused.err().expect("refused").render(false);
+    let refused = refused.expect_err("refused").render(false);
     assert!(refused.contains("left.f cannot be reset in the form stiff"), "{refused}");
 }
 
@@ -409,15 +409,15 @@ fn what_cannot_be_is_said() {
 
     let driven = with("Sf:drive(t) -> 1:w -> I:big(5)\nwhen x > 1 { reset big.f = 7 }");
     for form in FORMS {
-        let refused = model(&driven).equations(form).err().expect("it is refused").render(false);
+        let refused = model(&driven).equations(form).expect_err("it is refused").render(false);
         assert!(refused.contains("E003") && refused.contains("big.f cannot be reset"), "{form:?}: {refused}");
     }
     let of_a_law = model(&with("when x > 1 { reset r.e = 7; n = 1 }")).simulate(&run, &mut |_| true);
     // On its junction the effort of a resistor follows from the speed of the mass by its law alone.
-    assert!(of_a_law.err().expect("refused").render(false).contains("r.e cannot be reset"));
+    assert!(of_a_law.expect_err("refused").render(false).contains("r.e cannot be reset"));
 
     for target in [Target::C, Target::Fmu2, Target::Fmu3] {
-        let refused = model(BALL).export(&Export { target, ..Export::default() }).err().expect("refused").render(false);
+        let refused = model(BALL).export(&Export { target, ..Export::default() }).expect_err("refused").render(false);
         assert!(refused.contains("does not act at events yet: `when h < 0 m`"), "{refused}");
     }
 }

@@ -3,6 +3,7 @@
 //! All that happens at one instant happens in rounds. The clauses of a round read what there is before it and change it at
 //! once, so that their order says nothing; a clause whose condition becomes true by that happens in the next round.
 
+use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::Mode;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Layout, Routine};
@@ -11,13 +12,6 @@ use halfarrow_sim::{Affected, Failure};
 
 /// Rounds at one instant at most.
 const MOST_ROUNDS: usize = 200;
-/// Times in a row that a clause has to happen faster, or within no time, to accumulate.
-const IN_A_ROW: u32 = 8;
-/// What is left until events accumulate, as part of the time that has passed, from which on they do.
-const NEAR: f64 = 1e-10;
-/// What passes between two events that is no time, in the same measure.
-const NO_TIME: f64 = 1e-13;
-
 /// The clauses of a program as code.
 #[derive(Debug, Clone)]
 pub(super) struct Clauses {
@@ -62,68 +56,6 @@ impl Clauses {
 
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
         std::iter::once(&self.becomes).chain(&self.values)
-    }
-}
-
-/// What a run remembers of a clause.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum ClauseMemory {
-    /// Of one with a condition.
-    Becomes(Condition),
-    /// Of one with a period: that, and the number of the next time.
-    Every {
-        /// In s.
-        period: f64,
-        /// A whole number.
-        next: f64,
-    },
-}
-
-/// What a run remembers of a condition.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Condition {
-    /// Whether it holds.
-    pub holds: bool,
-    /// When the run began, and when the clause happened last, in s.
-    start: f64,
-    last: f64,
-    /// What passed between the last two times, in s, and how many times in a row that was less than before, or nothing.
-    interval: f64,
-    faster: u32,
-}
-
-impl ClauseMemory {
-    /// When it happens next whatever the state, in s.
-    pub fn next_time(&self) -> Option<f64> {
-        match self {
-            ClauseMemory::Becomes(_) => None,
-            ClauseMemory::Every { period, next } => Some(next * period),
-        }
-    }
-
-    pub fn is_due(&self, t: f64) -> bool {
-        self.next_time().is_some_and(|next| t >= next)
-    }
-}
-
-impl Condition {
-    fn begin(holds: bool, t: f64) -> Condition {
-        Condition { holds, start: t, last: f64::NEG_INFINITY, interval: f64::INFINITY, faster: 0 }
-    }
-
-    /// Takes notice that the clause happens at `t`. Gives where its events accumulate, if they do.
-    fn happens(&mut self, t: f64) -> Option<(f64, f64)> {
-        if t <= self.last {
-            return None;
-        }
-        let (interval, before, passed) = (t - self.last, self.interval, t - self.start);
-        (self.last, self.interval) = (t, interval);
-        let shrinks = interval < before || interval <= NO_TIME * passed;
-        self.faster = if shrinks { self.faster + 1 } else { 0 };
-        let ratio = interval / before;
-        let left = if ratio < 1.0 { interval * ratio / (1.0 - ratio) } else { 0.0 };
-        let near = left <= NEAR * passed && interval <= NEAR * passed;
-        (near && self.faster >= IN_A_ROW).then_some((interval, t + left))
     }
 }
 

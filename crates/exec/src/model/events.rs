@@ -1,6 +1,6 @@
 //! Events of a model: what is held between them, and what happens where one is handled.
 
-use super::clauses::ClauseMemory;
+use super::clause_memory::ClauseMemory;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, SolveError};

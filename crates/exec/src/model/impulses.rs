@@ -109,7 +109,8 @@ impl Model {
         self.place(t, x);
         self.frame.run(&balance.all).map_err(|error| self.failure(t, error))?;
         let now = |a: &Asked| self.frame.r[balance.all.outputs[a.output] as usize];
-        if !met || asked.iter().any(|a| !((now(a) - a.value).abs() <= MET * now(a).abs().max(a.value.abs()))) {
+        let fits = |a: &Asked| (now(a) - a.value).abs() <= MET * now(a).abs().max(a.value.abs());
+        if !(met && asked.iter().all(fits)) {
             return Err(self.unmet_resets(t));
         }
         if first {

@@ -1,7 +1,7 @@
 //! What a run remembers.
 
 use super::Model;
-use super::clauses::ClauseMemory;
+use super::clause_memory::ClauseMemory;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;

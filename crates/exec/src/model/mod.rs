@@ -1,6 +1,7 @@
 //! A model that runs: what never changes of it ([`Compiled`]), what is set ([`Setup`]), what a run remembers ([`Memory`]), and
 //! the registers on which all of it is computed.
 
+mod clause_memory;
 mod clauses;
 mod clock;
 mod compiled;

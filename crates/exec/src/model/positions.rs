@@ -52,7 +52,11 @@ impl Model {
         let code = self.code.clone();
         let Some(constraints) = &code.positions else { return Ok(()) };
         let after = self.position_misses(t, x)?;
-        for (i, (after, before)) in after.into_iter().zip(before).enumerate().filter(|(_, (a, b))| !(*a <= 2.0 * **b)) {
+        let fits = |after: f64, before: f64, size: f64| after <= 2.0 * before + MISSED * size;
+        for (i, (after, &before)) in after.into_iter().zip(before).enumerate() {
+            if fits(after, before, 0.0) {
+                continue;
+            }
             let mut size = 0.0;
             for &state in &constraints.reads[i] {
                 self.place(t, x);
@@ -61,7 +65,7 @@ impl Model {
                 self.frame.run_along(&constraints.residuals).map_err(|error| self.failure(t, error))?;
                 size += (self.frame.d[constraints.residuals.outputs[i] as usize] * x[state as usize]).abs();
             }
-            if !(after <= 2.0 * before + MISSED * size) {
+            if !fits(after, before, size) {
                 let name = &constraints.names[i];
                 let reason = format!(
                     "the constraint {name} is missed by {after:.3e} then; reset all positions that it reads, so that they fit \
