@@ -71,6 +71,27 @@ fn a_ball_bounces_when_it_should_until_its_impacts_accumulate() {
 }
 
 #[test]
+fn steps_of_fixed_length_stop_where_they_are_too_long_for_the_flights() {
+    for e in ["0.5", "0.6", "0.8", "0.9"] {
+        let text = BALL.replace("e = 0.8", &format!("e = {e}"));
+        let run = |method| Run { method: Method::Fixed(method), step: Some(1e-3), ..exact(20.0) };
+        let lowest = |trace: &Trace| column(trace, "h").iter().copied().fold(0.0, f64::min);
+        let stopped = stopped(&text, &run(FixedMethod::Rk4));
+        assert!(matches!(stopped.failure, Failure::Accumulation { .. }), "{e}: {}", stopped.failure);
+        assert!(lowest(&stopped.trace) > -5e-3, "{e}: it is at {}", lowest(&stopped.trace));
+        // The method of Euler feeds the ball, which may go on to jump: the audit says so.
+        match model(&text).simulate(&run(FixedMethod::Euler), &mut |_| true) {
+            Ok(done) => assert!(lowest(&done.trace) > -5e-3, "{e}"),
+            Err(Error::Run(stopped)) => {
+                let said = matches!(stopped.failure, Failure::Accumulation { .. } | Failure::Untrue { .. });
+                assert!(said, "{e}: {}", stopped.failure);
+            }
+            Err(error) => panic!("{}", error.render(false)),
+        }
+    }
+}
+
+#[test]
 fn a_rimless_wheel_comes_to_its_fixed_point() {
     let text = include_str!("../../../models/when_rimless_wheel/model.bond");
     let (alpha, gamma, g) = (0.4f64, 0.08f64, 9.81f64);

@@ -177,6 +177,10 @@ impl Events for Model {
         self.handle(t, x, &[])
     }
 
+    fn resolve_times(&mut self, step: f64) {
+        self.run.resolution = step;
+    }
+
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.has_delays() {
             self.place(t, x);

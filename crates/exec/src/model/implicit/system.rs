@@ -150,6 +150,11 @@ impl Events for ImplicitModel {
         self.settle(t, y, yp)
     }
 
+    fn resolve_times(&mut self, step: f64) {
+        self.reference.resolve_times(step);
+        self.form.resolve_times(step);
+    }
+
     fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
         let (y, yp) = halves(point);
         self.place_rates(yp);
