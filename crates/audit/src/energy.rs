@@ -141,6 +141,8 @@ pub(crate) struct Balance {
     missing: Vec<f64>,
     uncertainty: Vec<f64>,
     pub moved: f64,
+    /// What storages have gained by impulses, in J, by their names.
+    pub by_impulses: Vec<(String, f64)>,
 }
 
 /// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
@@ -149,7 +151,7 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
     let n = values.times.len();
     let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
-    let (mut any, mut held) = (false, 0.0f64);
+    let (mut any, mut held, mut by_impulses) = (false, 0.0f64, Vec::new());
     for port in graph.outer_ports() {
         let element = &graph.elements[port.element];
         if pseudo.contains(&parts.of(graph.bond_of(port))) {
@@ -162,7 +164,12 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
         any = true;
         held = held.max(energy_held(graph, values, port));
         let own = match stored_by_law(graph, values, port) {
-            Some(energy) => energy,
+            Some((energy, gained)) => {
+                if gained != 0.0 {
+                    by_impulses.push((graph.port_name(port), gained));
+                }
+                energy
+            }
             None => {
                 let through = values.quadrature.integrate(&power);
                 uncertainty.iter_mut().zip(&through.uncertainty).for_each(|(sum, own)| *sum += own);
@@ -175,7 +182,7 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
         }
     }
     let moved = moved.into_iter().fold(held, f64::max);
-    any.then_some(Balance { missing: balance, uncertainty, moved })
+    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses })
 }
 
 impl Balance {
@@ -219,9 +226,9 @@ fn greatest(x: &[f64]) -> f64 {
 /// Part of what it holds at most by which a stored quantity has to change at once to have jumped.
 const JUMPED: f64 = 1e-9;
 
-/// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample; `None` if its
-/// law is no function of its own stored quantity and parameters, or reads what is not known.
-fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Vec<f64>> {
+/// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample, without what it
+/// has gained by impulses, and that; `None` if its law is no function of its own stored quantity and parameters, or reads what is not known.
+fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, f64)> {
     let element = &graph.elements[port.element];
     let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
     let (StorageLaw::Integral(law) | StorageLaw::Known { law, .. }) = *storage.laws.first()? else { return None };
@@ -238,10 +245,12 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<Ve
     let mut z = |x: f64| law.values_in(&mut room, &mut |s| if s == own { x } else { parameter(s) })[0];
     // What an impulse gives or takes is no power of any sample.
     let jumps = jumps(values.times, x, JUMPED * greatest(x));
-    let mut energy = vec![0.0; x.len()];
+    let (mut energy, mut gained) = (vec![0.0; x.len()], 0.0);
     for k in 1..x.len() {
+        let change = gauss(x[k - 1], x[k], &mut z);
         let by_impulse = jumps[k] != jumps[k - 1];
-        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { gauss(x[k - 1], x[k], &mut z) };
+        gained += if by_impulse { change } else { 0.0 };
+        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { change };
     }
-    Some(energy)
+    Some((energy, gained))
 }

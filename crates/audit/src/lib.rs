@@ -70,6 +70,8 @@ pub struct Audit {
     pub rates: Option<Finding>,
     /// Storages that make or eat energy, and why.
     pub notes: Vec<String>,
+    /// What storages have gained by the events of the model, in J, by their names; below 0 what they have lost.
+    pub events: BTreeMap<String, f64>,
     /// What could not be checked, and why.
     pub unchecked: Vec<String>,
 }
@@ -110,6 +112,8 @@ pub struct Auditor {
     energy: worst::Worst,
     residual: worst::Worst,
     rates: worst::Worst,
+    /// What storages have gained by impulses, in J.
+    by_impulses: BTreeMap<String, f64>,
     unchecked: BTreeSet<String>,
 }
 
@@ -130,6 +134,7 @@ impl Auditor {
             energy: none(),
             residual: none(),
             rates: none(),
+            by_impulses: BTreeMap::new(),
             unchecked: BTreeSet::new(),
         }
     }
@@ -154,6 +159,9 @@ impl Auditor {
         laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
+        for (name, gained) in balance.into_iter().flat_map(|b| b.by_impulses) {
+            *self.by_impulses.entry(name).or_default() += gained;
+        }
         for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
             worst.end_part();
         }
@@ -168,12 +176,15 @@ impl Auditor {
     /// What was found.
     pub fn finish(self) -> Audit {
         let settled = self.scales.settled(&self.graph);
+        let notes = energy::notes(&self.graph);
+        let events = if self.graph.clauses.is_empty() { BTreeMap::new() } else { self.by_impulses };
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
-            notes: energy::notes(&self.graph),
+            notes,
+            events,
             unchecked: self.unchecked.into_iter().collect(),
         }
     }
@@ -199,6 +210,7 @@ impl fmt::Display for Audit {
                 None => writeln!(f, "{name}: nothing to check")?,
             }
         }
+        self.events.iter().try_for_each(|(name, gained)| writeln!(f, "events: {name} {gained:+.6e} J"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))?;
         self.unchecked.iter().try_for_each(|what| writeln!(f, "not checked: {what}"))
     }

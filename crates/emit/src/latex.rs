@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::textbook::{Shown, Style, print, print_meanings, print_symbol};
+use halfarrow_compiler::textbook::{Shown, Style, print, print_events, print_meanings, print_symbol};
 
 /// A document with the equations, what their names stand for, and the start values of the states.
 ///
@@ -21,6 +21,11 @@ pub fn document(shown: &Shown, start: &[f64]) -> String {
     let legend = print_meanings(shown, Style::Latex);
     if !legend.is_empty() {
         let _ = write!(text, "where\n{}", aligned(&legend));
+    }
+    let events = print_events(shown, Style::Latex);
+    if !events.is_empty() {
+        let lines: Vec<String> = events.iter().map(|line| format!("  & {line}")).collect();
+        let _ = write!(text, "Events\n\\begin{{align*}}\n{}\n\\end{{align*}}\n", lines.join(" \\\\\n"));
     }
     if !start.is_empty() && start.len() == equations.states.len() {
         let lines: Vec<String> = equations

@@ -1,6 +1,7 @@
 //! What a fixed step is to a model, from its eigenvalues at the start: said before anything is computed with it.
 
 use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::program::Trigger;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{Events as _, System};
@@ -54,6 +55,16 @@ pub(crate) fn advice(system: &exec::Model, x: &[f64], method: FixedMethod, step:
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let state = leading_state(&matrix, mode).map_or(String::new(), |state| system.state_name(state));
     Some(words(method, step, mode, longest, &state))
+}
+
+/// Periods of events that are no multiple of a fixed step: steps are shorter there.
+pub(crate) fn off_step(system: &exec::Model, step: f64) -> Option<String> {
+    let every = system.program().clauses.iter().filter_map(|c| match c.trigger {
+        Trigger::Every(period) => Some((&c.name, system.constant(period)? / step)),
+        Trigger::Becomes(_) => None,
+    });
+    let (name, steps) = every.into_iter().find(|(_, steps)| (steps - steps.round()).abs() > 1e-9 * steps.max(1.0))?;
+    Some(format!("`{name}` is {steps} steps of {step} s: the step before each of its events is a shorter one"))
 }
 
 /// The eigenvalues of a system at its start `x`, if one may be greater than `rate`, in 1/s; `None` also if it has too many states,

@@ -35,6 +35,8 @@ pub struct AuditReport {
     pub residual: Option<Deviation>,
     /// Stored quantities and integrated signals against the integrals of their rates.
     pub rates: Option<Deviation>,
+    /// What storages have gained by the events of the model, in J, by their names; below 0 what they have lost.
+    pub events: BTreeMap<String, f64>,
     /// Storages that make or eat energy, and why.
     pub notes: Vec<String>,
     /// What could not be checked, and why.
@@ -363,6 +365,7 @@ impl From<Audit> for AuditReport {
             residual: miss(a.residual),
             rates: miss(a.rates),
             notes: a.notes,
+            events: a.events,
             unchecked: a.unchecked,
             ..AuditReport::default()
         }

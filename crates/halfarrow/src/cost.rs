@@ -1,6 +1,7 @@
 //! What a run would cost, where that can be known before: stops, steps and memory.
 
 use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::program::Trigger;
 use halfarrow_exec as exec;
 use halfarrow_sim::{Method, Options};
 
@@ -64,19 +65,22 @@ fn free_memory() -> f64 {
 
 const STEP: &str = "take a longer step or a shorter --to";
 
-/// Delays and samples: the run stops at each.
+/// Delays, samples and periodic events: the run stops at each.
 pub(crate) fn held(system: &exec::Model, length: f64) -> Result<(), Problem> {
-    for held in &system.program().held {
-        let Some(time) = system.constant(held.time).filter(|time| *time > 0.0) else { continue };
-        let what = match held.kind {
-            HeldKind::Delay => "a delay",
-            HeldKind::Sample => "a sampling period",
-        };
+    const LONGER: &str = "take a longer period or a shorter --to";
+    let program = system.program();
+    let held = program.held.iter().filter_map(|held| match held.kind {
+        HeldKind::Delay => Some((held.time, "a delay", "leave out a delay that short, or take a shorter --to")),
+        HeldKind::Sample => Some((held.time, "a sampling period", LONGER)),
+        HeldKind::Discrete | HeldKind::Impulse => None,
+    });
+    let every = program.clauses.iter().filter_map(|clause| match clause.trigger {
+        Trigger::Every(period) => Some((period, "a `when every`", LONGER)),
+        Trigger::Becomes(_) => None,
+    });
+    for (time, what, remedy) in held.chain(every) {
+        let Some(time) = system.constant(time).filter(|time| *time > 0.0) else { continue };
         let words = |n: String| format!("{what} of {time:e} s in the model makes the run stop {n} times");
-        let remedy = match held.kind {
-            HeldKind::Delay => "leave out a delay that short, or take a shorter --to",
-            HeldKind::Sample => "take a longer period or a shorter --to",
-        };
         refuse_above(length / time, words, remedy)?;
     }
     Ok(())

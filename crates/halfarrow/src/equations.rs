@@ -4,8 +4,8 @@ use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_compiler::equations::{Algebraic, AlgebraicRole, Equations, Form, StateKind};
 use halfarrow_compiler::textbook::{
-    Shown, Style, only, print, print_certificate, print_definitions, print_expr, print_form, print_meanings,
-    print_symbol, show,
+    Shown, Style, only, print, print_certificate, print_definitions, print_events, print_expr, print_form,
+    print_meanings, print_symbol, show,
 };
 use serde::Serialize;
 
@@ -52,6 +52,12 @@ pub struct EquationsReport {
     pub legend: Vec<String>,
     /// The same for `latex`.
     pub latex_legend: Vec<String>,
+    /// What happens at events, in the model language; `+` marks what is after the event.
+    pub events: Vec<String>,
+    /// The same in Unicode.
+    pub events_text: Vec<String>,
+    /// The same in LaTeX.
+    pub events_latex: Vec<String>,
     /// Form `inverted`: which storage was inverted for which path, and why no other, a line each.
     pub certificate: Vec<String>,
     /// Differentiation index of what is left; 0 for explicit ordinary differential equations.
@@ -139,6 +145,9 @@ impl Model {
             conserved: conserved(&shown, Style::Ascii),
             legend: print_meanings(&shown, Style::Unicode),
             latex_legend: print_meanings(&shown, Style::Latex),
+            events: print_events(&shown, Style::Ascii),
+            events_text: print_events(&shown, Style::Unicode),
+            events_latex: print_events(&shown, Style::Latex),
             certificate: print_certificate(&shown),
             index: equations.index,
             counts: form_count(equations),

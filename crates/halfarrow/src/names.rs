@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::{Expr, Symbol};
-use halfarrow_compiler::bond_graph::{self, BondGraph, Element, Kind, NameKind, ResistorLaw, Storage, StorageLaw};
+use halfarrow_compiler::bond_graph::{
+    self, BondGraph, Element, HeldKind, Kind, NameKind, ResistorLaw, Storage, StorageLaw,
+};
 use halfarrow_compiler::diagnostic::Sources;
 use halfarrow_compiler::span::{FileId, Span};
 use serde::{Serialize, Serializer};
@@ -179,6 +181,15 @@ fn readers(graph: &BondGraph) -> Vec<Reader<'_>> {
         let reads: Vec<Expr> = std::iter::once(s.rate).chain(s.initial).collect();
         reader(&s.name, NameKind::State, s.span, &[s.symbol], &reads)
     }));
+    for held in graph.held.values().filter(|h| h.kind == HeldKind::Discrete) {
+        let setting = graph.clauses.iter().filter(|c| c.actions.iter().any(|a| a.target == held.symbol));
+        let mut reads = vec![held.source];
+        for clause in setting {
+            reads.push(clause.trigger.expr());
+            reads.extend(clause.actions.iter().filter(|a| a.target == held.symbol).map(|a| a.value));
+        }
+        all.push(reader(&held.name, NameKind::Discrete, held.span, &[held.symbol], &reads));
+    }
     all.extend(graph.lets.iter().map(|l| reader(&l.name, NameKind::Let, l.span, &[], &[l.value])));
     all.extend(graph.outputs.iter().map(|o| reader(&o.name, NameKind::Output, o.span, &[], &[o.value])));
     all.extend(

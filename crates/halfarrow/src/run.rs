@@ -17,7 +17,7 @@ use halfarrow_sim::{
 use halfarrow_trace::Trace;
 use serde::Serialize;
 
-use crate::advice::advice;
+use crate::advice::{advice, off_step};
 use crate::audited::{AuditReport, Audited};
 use crate::clock::Moment;
 use crate::compiled::Ready;
@@ -300,6 +300,7 @@ impl Model {
         }
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
             notes.extend(advice(&system, &start, method, step));
+            notes.extend(off_step(&system, step));
         }
         self.integrate(&mut system, start, (&options, run.execution), notes, progress)
     }

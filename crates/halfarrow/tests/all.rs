@@ -6,6 +6,8 @@ mod api;
 mod compare;
 #[path = "equilibria.rs"]
 mod equilibria;
+#[path = "events.rs"]
+mod events;
 #[path = "execution.rs"]
 mod execution;
 #[path = "faults_assumptions.rs"]

@@ -86,6 +86,42 @@ pub enum Failure {
         /// Which condition changed last.
         what: String,
     },
+    /// Events make each other happen at one instant, without end.
+    Livelock {
+        /// When, in s.
+        time: f64,
+        /// The events, as they begin in the model.
+        what: String,
+    },
+    /// Events come ever faster, towards an instant beyond which nothing is known.
+    Accumulation {
+        /// When, in s.
+        time: f64,
+        /// The event, as it begins in the model.
+        what: String,
+        /// What passed since the last one, in s.
+        interval: f64,
+        /// The instant, in s.
+        end: f64,
+    },
+    /// Two events at one instant give something different values.
+    Conflict {
+        /// When, in s.
+        time: f64,
+        /// What they change.
+        what: String,
+        /// The events, as they begin in the model, each with the value that it gives.
+        by: Box<[(String, f64); 2]>,
+    },
+    /// What an event asks for cannot be.
+    Reset {
+        /// When, in s.
+        time: f64,
+        /// What is reset.
+        what: String,
+        /// Why it cannot be.
+        reason: String,
+    },
     /// An option of the run makes no sense.
     BadOption {
         /// Name of the option.
@@ -177,6 +213,10 @@ impl Failure {
             | Failure::OutOfDomain { time, .. }
             | Failure::StepTooSmall { time, .. }
             | Failure::Chattering { time, .. }
+            | Failure::Livelock { time, .. }
+            | Failure::Accumulation { time, .. }
+            | Failure::Conflict { time, .. }
+            | Failure::Reset { time, .. }
             | Failure::Branch { time, .. }
             | Failure::Bound { time, .. }
             | Failure::Untrue { time, .. }
@@ -252,6 +292,24 @@ impl fmt::Display for Failure {
                 f,
                 "at t = {time} s {what} changes its side over and over and time stands still: give the law a finite slope at the switch"
             ),
+            Failure::Livelock { time, what } => write!(
+                f,
+                "at t = {time} s events make each other happen over and over and time stands still: {what}; let one of them leave \
+                 the condition of the other as it is, or put a gap between the conditions (hysteresis)"
+            ),
+            Failure::Accumulation { time, what, interval, end } => write!(
+                f,
+                "at t = {time} s `{what}` happens ever faster, {interval:.1e} s after the last time: its events accumulate at \
+                 t = {end} s, and what is beyond that the model does not say; end the run before it, or let a law take over \
+                 where it gets fast, such as a spring and a damper"
+            ),
+            Failure::Conflict { time, what, by } => write!(
+                f,
+                "at t = {time} s two events give {what} different values: `{}` gives {}, `{}` gives {}; say in one of them what \
+                 holds where both happen",
+                by[0].0, by[0].1, by[1].0, by[1].1
+            ),
+            Failure::Reset { time, what, reason } => write!(f, "at t = {time} s {what} cannot be reset: {reason}"),
             Failure::BadOption { option, value, expected } => {
                 write!(f, "{option} is {value}, but it must be {expected}")
             }

@@ -33,7 +33,8 @@ const NAME: usize = 28;
 ///
 /// Columns of one unit share a panel with a legend; the panels share the time axis. Of long columns first, least,
 /// greatest and last value of every pixel are drawn, so that nothing visible is lost. Values that are not finite leave a
-/// gap; a curve that lies on an earlier one is dashed, so that both are seen. At most 12 panels of 10 curves are drawn; the plot says what it leaves out. Equal traces give equal texts.
+/// gap; a curve that lies on an earlier one is dashed, so that both are seen. Where a time is given twice, before and after an
+/// event, a mark stands at the upper edge. At most 12 panels of 10 curves are drawn; the plot says what it leaves out. Equal traces give equal texts.
 ///
 /// ```
 /// use halfarrow_sim::Sink;
@@ -127,6 +128,7 @@ impl Page {
         let name = shorten(&names.join(", "), 80);
         self.text([0.0, -7.0], "fill=\"#4b5563\"", &format!("{name}{}", values.unit(&columns[0].unit)));
         self.grid(time, &values, last);
+        self.events(&trace.times, time);
         self.out.push_str("<g fill=\"none\" stroke-width=\"1.5\" stroke-linejoin=\"round\">\n");
         let hidden = hidden(drawn, &values);
         for (i, column) in drawn.iter().enumerate() {
@@ -141,6 +143,16 @@ impl Page {
         self.out.push_str("</g>\n");
         self.legend(columns, &hidden);
         self.out.push_str("</g>\n");
+    }
+    /// Marks at the upper edge where a time is given twice, before and after an event; one a pixel.
+    fn events(&mut self, times: &[f64], time: &Axis) {
+        let twice = times.windows(2).filter(|pair| pair[0] == pair[1]);
+        let mut places: Vec<i64> = twice.map(|pair| time.place(pair[0]).round() as i64).collect();
+        places.dedup();
+        if !places.is_empty() {
+            let marks: String = places.iter().map(|x| format!("M{x} 0v5")).collect();
+            _ = writeln!(self.out, "<path class=\"events\" d=\"{marks}\" stroke=\"#6b7280\" fill=\"none\"/>");
+        }
     }
     fn grid(&mut self, time: &Axis, values: &Axis, last: bool) {
         let [w, h] = AREA.map(n);

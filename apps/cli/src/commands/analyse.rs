@@ -183,6 +183,10 @@ fn equations_text(report: &EquationsReport) -> String {
         text += "\nwhere\n";
     }
     report.legend.iter().for_each(|line| text += &format!("{indent}{line}\n"));
+    if !report.events_text.is_empty() && !text.is_empty() {
+        text += "\n";
+    }
+    report.events_text.iter().for_each(|line| text += &format!("{line}\n"));
     if !report.certificate.is_empty() {
         text += "\n";
     }
@@ -198,6 +202,10 @@ fn latex_text(report: &EquationsReport) -> String {
     let mut text = aligned("align", &report.latex);
     if !report.latex_legend.is_empty() {
         text += &format!("where\n{}", aligned("align*", &report.latex_legend));
+    }
+    if !report.events_latex.is_empty() {
+        let lines: Vec<String> = report.events_latex.iter().map(|line| format!("  & {line}")).collect();
+        text += &format!("\\begin{{align*}}\n{}\n\\end{{align*}}\n", lines.join(" \\\\\n"));
     }
     text
 }

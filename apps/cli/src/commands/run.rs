@@ -263,7 +263,12 @@ fn summary(report: &RunReport) -> String {
     if report.corners > 0 {
         text += &format!(", {} corners of inputs", report.corners);
     }
-    text + &format!("\naudit: {}\n", misses(&report.audit))
+    let gained: f64 = report.audit.events.values().sum();
+    let events = match report.audit.events.is_empty() {
+        true => String::new(),
+        false => format!("; events changed the energy by {gained:.6} J"),
+    };
+    text + &format!("\naudit: {}{events}\n", misses(&report.audit))
 }
 
 /// The greatest miss of each kind.

@@ -67,6 +67,7 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
             write_block(out, &d.body, level);
         }
         StatementKind::Chain(c) => write_chain(out, c),
+        StatementKind::Discrete(list) => write_declarations(out, "discrete", list),
         StatementKind::When(w) => write_when(out, w),
         StatementKind::For(l) => {
             *out += &format!("for {} in {}..{}", l.variable.text, shown(&l.from), shown(&l.to));
@@ -253,11 +254,12 @@ fn write_indices(out: &mut String, indices: &[Expr]) {
 }
 
 fn write_when(out: &mut String, w: &When) {
-    *out += &format!("when {} {{", shown(&w.cond));
-    separated(out, " ", &w.resets, |out, r| {
-        *out += "reset ";
-        write_path(out, &r.target);
-        *out += &format!(" = {}", shown(&r.value));
+    let every = if matches!(w.trigger, Trigger::Every(_)) { "every " } else { "" };
+    *out += &format!("when {every}{} {{", shown(w.trigger.expr()));
+    separated(out, " ", &w.actions, |out, a| {
+        *out += if a.reset { "reset " } else { "" };
+        write_path(out, &a.target);
+        *out += &format!(" = {}", shown(&a.value));
     });
     *out += " }";
 }

@@ -99,7 +99,9 @@ pub enum StatementKind {
     Domain(Box<DomainBlock>),
     /// Nodes and the bonds between them: `Sf:ground(v) -> 0:tyre -> hub`.
     Chain(Chain),
-    /// `when cond { ... }`: reserved; an error of the parser says so.
+    /// `discrete n = 0`: a value that changes at events only; given is the one at the start.
+    Discrete(Vec<Declaration>),
+    /// `when cond { ... }`: what happens at an event.
     When(Box<When>),
     /// `for i in 1..n { ... }`: statements repeated.
     For(Box<For>),
@@ -509,22 +511,43 @@ pub struct If {
     pub no: Box<Expr>,
 }
 
-/// `when cond { reset m.p = expr }`: reserved.
+/// `when cond { reset m.p = expr ... }` or `when every 10 ms { n = n + 1 ... }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct When {
-    /// The condition.
-    pub cond: Expr,
-    /// What is reset, and to what.
-    pub resets: Vec<Reset>,
+    /// When it happens.
+    pub trigger: Trigger,
+    /// What happens then, all at once.
+    pub actions: Vec<Action>,
 }
 
-/// `reset m.p = expr`.
+/// When an event happens.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reset {
-    /// What is reset.
+pub enum Trigger {
+    /// Where the condition becomes true.
+    Becomes(Expr),
+    /// At every multiple of a period.
+    Every(Expr),
+}
+
+impl Trigger {
+    /// The condition or the period.
+    pub fn expr(&self) -> &Expr {
+        let (Trigger::Becomes(e) | Trigger::Every(e)) = self;
+        e
+    }
+}
+
+/// `reset m.p = expr`, or `n = expr` of a discrete variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Action {
+    /// Whether `reset` stands before it: a state is reset, else a discrete variable is set.
+    pub reset: bool,
+    /// What changes.
     pub target: Path,
     /// Its new value.
     pub value: Expr,
+    /// From its first to its last character.
+    pub span: Span,
 }
 
 /// `for i in from..to { ... }`.

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::builder::{Builder, NamedDraft, Role};
+use super::builder::{Builder, HeldDraft, NamedDraft, Role};
 use super::dimension::Quantity;
 use super::flatten::Word;
 use super::repeat::Turn;
 use super::scope::{DeclId, Here, ScopeId, TurnId};
 use super::structure::Structure;
 use super::{
-    BondGraph, Cell, CellId, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input, InputId,
-    IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, SignalId, Variable,
+    BondGraph, Cell, CellId, Clause, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input,
+    InputId, IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, SignalId,
+    Variable,
 };
 use crate::algebra::{Expr, Node, Symbol};
 use crate::ast::Header;
@@ -53,6 +54,7 @@ pub(super) struct Laws {
     pub structure: Structure,
     pub signals: Table<SignalId, IntegratedSignal>,
     pub held: Table<HeldId, HeldSignal>,
+    pub clauses: Vec<Clause>,
     pub lets: Vec<Named>,
     pub outputs: Vec<Named>,
     pub constraints: Vec<Constraint>,
@@ -63,6 +65,7 @@ struct Tables<'t> {
     parameters: &'t Table<ParameterId, Parameter>,
     inputs: &'t Table<InputId, Input>,
     signals: &'t Table<SignalId, IntegratedSignal>,
+    held: &'t Table<HeldId, HeldSignal>,
 }
 
 impl Laws {
@@ -74,6 +77,7 @@ impl Laws {
             signal.initial.iter_mut().for_each(&mut *visit);
         }
         self.held.iter_mut().for_each(|(_, h)| visit(&mut h.source));
+        self.clauses.iter_mut().for_each(|c| c.for_each_expr(visit));
         self.lets.iter_mut().chain(&mut self.outputs).for_each(|n| visit(&mut n.value));
         self.constraints.iter_mut().for_each(|c| visit(&mut c.expr));
         for guess in guesses {
@@ -97,7 +101,8 @@ impl Builder<'_, '_> {
         self.fix_parameters();
         let parameters = std::mem::take(&mut self.parameters);
         let (repetitions, cells) = self.cells();
-        let variables = self.variables(&Tables { parameters: &parameters, inputs: &inputs, signals: &laws.signals });
+        let tables = Tables { parameters: &parameters, inputs: &inputs, signals: &laws.signals, held: &laws.held };
+        let variables = self.variables(&tables);
         self.replace_symbols(&mut laws, &mut asked.guesses, rates);
         self.replace_symbols(&mut laws, &mut asked.guesses, repeated);
         Some(BondGraph {
@@ -112,6 +117,7 @@ impl Builder<'_, '_> {
             inputs,
             signals: laws.signals,
             held: laws.held,
+            clauses: laws.clauses,
             lets: laws.lets,
             outputs: laws.outputs,
             preferences: asked.preferences,
@@ -166,12 +172,12 @@ impl Builder<'_, '_> {
         whole.collect()
     }
 
-    /// The delayed and sampled signals; `None` if the source of one is missing.
+    /// The signals held from earlier times; `None` if the source of one is missing.
     pub fn whole_held(&mut self) -> Option<Table<HeldId, HeldSignal>> {
         let drafts = std::mem::take(&mut self.held).into_values();
         let whole = drafts.map(|h| {
-            let source = h.source?;
-            Some(HeldSignal { name: h.name, symbol: h.symbol, source, time: h.time, kind: h.kind, span: h.span })
+            let HeldDraft { name, symbol, source, time, kind, unit, span } = h;
+            Some(HeldSignal { name, symbol, source: source?, time, kind, unit, span })
         });
         whole.collect()
     }
@@ -255,6 +261,7 @@ impl Builder<'_, '_> {
             Meaning::Parameter(id) => tables.parameters[id].unit.as_ref(),
             Meaning::Input(id) => tables.inputs[id].unit.as_ref(),
             Meaning::Signal(id) => tables.signals[id].unit.as_ref(),
+            Meaning::Held(id) => tables.held[id].unit.as_ref(),
             Meaning::Time => return Some(Unit::si(Dimension::SECOND)),
             _ => None,
         };

@@ -62,7 +62,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// A value that must be known before the run, and is above zero.
-    fn positive(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, what: &str) -> Option<Expr> {
+    pub fn positive(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, what: &str) -> Option<Expr> {
         let value = self.number(cx, e)?;
         if !self.only_parameters(value.expr, e.span, what) {
             return None;
@@ -87,7 +87,7 @@ impl<'a> Builder<'a, '_> {
         let title = format!("{}.{name}", cx.owner);
         let symbol = self.fresh(&title, Facts::default());
         let name = self.exprs.name(symbol).to_string();
-        let id = self.held.push(HeldDraft { name, symbol, source: None, time, kind, span });
+        let id = self.held.push(HeldDraft { name, symbol, source: None, time, kind, unit: None, span });
         self.mean(symbol, Meaning::Held(id), Quantity::Any);
         self.open(cx, &call.args[0].value, BlockInput::Held(id));
         Some(self.symbol_value(symbol))

@@ -1,6 +1,6 @@
 //! What is known while a graph is being built: symbols, dimensions, values of names.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use rustc_hash::FxHashMap;
@@ -71,7 +71,7 @@ pub(super) struct SignalDraft {
     pub span: Span,
 }
 
-/// A delayed or sampled signal; its source is read after its symbol is known.
+/// A signal held from earlier times; its source is read after its symbol is known.
 #[derive(Clone)]
 pub(super) struct HeldDraft {
     pub name: String,
@@ -79,6 +79,7 @@ pub(super) struct HeldDraft {
     pub source: Option<Expr>,
     pub time: Expr,
     pub kind: HeldKind,
+    pub unit: Option<Unit>,
     pub span: Span,
 }
 
@@ -203,6 +204,8 @@ pub(super) struct Builder<'a, 'f> {
     pub open_blocks: Vec<OpenBlock<'a>>,
     /// Rates of signals that expressions ask for, and the signal of each.
     pub rate_symbols: FxHashMap<Symbol, SignalId>,
+    /// Integrated signals and stored quantities that an event changes: they go ways of their own.
+    pub reset: BTreeSet<Symbol>,
     /// Whether a bond carries no power.
     pub pseudo: Vec<bool>,
     /// Columns of the tables that were read.
@@ -249,6 +252,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             open_signals: Vec::new(),
             open_blocks: Vec::new(),
             rate_symbols: FxHashMap::default(),
+            reset: BTreeSet::new(),
             pseudo: Vec::new(),
             csv: FxHashMap::default(),
             uses: Uses::default(),

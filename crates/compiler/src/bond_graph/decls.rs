@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::builder::{Builder, InputDraft, NamedDraft, OpenSignal, Role, SignalDraft, Value};
+use super::builder::{Builder, HeldDraft, InputDraft, NamedDraft, OpenSignal, Role, SignalDraft, Value};
 use super::dimension::Quantity;
 use super::scope::{self, DeclId, DeclKind, Here, Valued};
 use super::value::Reading;
-use super::{InputId, Meaning, Parameter, ParameterKind};
+use super::{HeldId, HeldKind, InputId, Meaning, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts, Node};
 use crate::ast::{self, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -55,6 +55,11 @@ impl<'a> Builder<'a, '_> {
                 };
                 (Meaning::Signal(super::SignalId::new(self.signals.len())), quantity)
             }
+            DeclKind::Discrete(_) => {
+                let declared = d.unit.and_then(|u| self.unit(u)).map(|u| u.dim);
+                let quantity = declared.map_or_else(|| Quantity::var(self.dims.unknown()), Quantity::of);
+                (Meaning::Held(HeldId::new(self.held.len())), quantity)
+            }
             _ => return,
         };
         let symbol = self.fresh(&d.name, Facts::default());
@@ -65,6 +70,10 @@ impl<'a> Builder<'a, '_> {
                 let name = d.name.clone();
                 let id = self.signals.push(SignalDraft { name, symbol, rate: None, initial: None, unit, span: d.span });
                 self.open_signals.push(OpenSignal { id, state, decl });
+            }
+            DeclKind::Discrete(_) => {
+                let (name, kind, time, span) = (d.name.clone(), HeldKind::Discrete, self.exprs.int(1), d.span);
+                self.held.push(HeldDraft { name, symbol, source: None, time, kind, unit, span });
             }
             _ => {
                 let (name, doc) = (d.name.clone(), d.doc.to_string());
@@ -125,7 +134,7 @@ impl<'a> Builder<'a, '_> {
         } else if function {
             "functions cannot call themselves; write the result out"
         } else {
-            "a `state` breaks such a circle, since it is known before its rate; so do `delay` and `sample`"
+            "a `state` breaks such a circle, since it is known before its rate; so do `delay`, `sample` and `discrete`"
         };
         self.fault(d.hint(hint));
     }
@@ -155,7 +164,7 @@ impl<'a> Builder<'a, '_> {
         match &e.kind {
             ExprKind::Path(path) => {
                 if let Some(decl) = self.decl_of(here, path, own)
-                    && !matches!(self.flat.names.decls[decl].kind, DeclKind::State(_) | DeclKind::Input(_))
+                    && !self.flat.names.decls[decl].kind.is_known_before()
                 {
                     found.push((decl, path.span));
                 }
@@ -254,6 +263,7 @@ impl<'a> Builder<'a, '_> {
         match d.kind {
             DeclKind::Parameter { value, constant } => self.parameter(decl, value, constant),
             DeclKind::Input(value) => self.input_default(decl, value),
+            DeclKind::Discrete(value) => self.discrete(decl, value),
             DeclKind::Let(value) => self.named(decl, value, false),
             DeclKind::Output(value) => self.named(decl, value, true),
             DeclKind::Function(f) => self.function(decl, f),
@@ -328,6 +338,7 @@ impl<'a> Builder<'a, '_> {
         let kind = match self.meaning(other) {
             Some(Meaning::Time) => "time",
             Some(Meaning::Input(_)) => "an input",
+            Some(Meaning::Held(id)) if self.held[id].kind.is_discrete() => "a discrete variable",
             Some(Meaning::Signal(_) | Meaning::Held(_)) => "a signal",
             _ if self.role(other) == Some(Role::Reaction) => "a variable of a constraint",
             _ => "a variable of an element",
@@ -370,6 +381,22 @@ impl<'a> Builder<'a, '_> {
             return;
         }
         self.inputs[id].default = Some(self.with_unit(value, d.unit, e.span).expr);
+    }
+
+    /// The value of a discrete variable at the start.
+    fn discrete(&mut self, decl: DeclId, value: Option<&'a ast::Expr>) {
+        let Some(own) = self.values[decl].clone() else { return };
+        let Node::Symbol(symbol) = *self.exprs.node(own.expr) else { return };
+        let Some(Meaning::Held(id)) = self.meaning(symbol) else { return };
+        let Some(e) = value else { return self.missing_value(decl) };
+        let d = &self.flat.names.decls[decl];
+        let Some(value) = self.number(&d.reading(), e) else { return };
+        if !self.only_parameters(value.expr, e.span, "the start value of a discrete variable") {
+            return;
+        }
+        let value = self.with_unit(value, d.unit, e.span);
+        self.equal(&value.quantity, &own.quantity, e.span, "the start value and the variable");
+        self.held[id].source = Some(value.expr);
     }
 
     fn input_of(&self, value: Expr) -> Option<InputId> {

@@ -12,7 +12,7 @@ use super::names::{self, Name};
 use super::overrides::{self, Override};
 use super::uses::Uses;
 use super::wire::{Wiring, wire};
-use super::{BondGraph, Kind, verify};
+use super::{BondGraph, Clause, Kind, verify};
 use crate::algebra::{Expr, Symbol};
 use crate::ast::Ast;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
@@ -100,6 +100,7 @@ fn build(
     let kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
     b.later = later;
     let guesses = b.guesses();
+    let clauses = b.clauses();
     b.settle_units();
     b.finish_blocks();
     let asked = Asked {
@@ -123,7 +124,7 @@ fn build(
     b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
     let faults = faults.into_list();
-    Built { graph: finished(b, title, kinds, asked, &relations, &rates), faults, uses }
+    Built { graph: finished(b, title, kinds, (asked, clauses), &relations, &rates), faults, uses }
 }
 
 /// The graph of what has been read without a fault; `None` if something is missing nevertheless.
@@ -131,7 +132,7 @@ fn finished(
     mut b: Builder<'_, '_>,
     title: &Title,
     kinds: Vec<Option<Kind>>,
-    asked: Asked,
+    (asked, clauses): (Asked, Vec<Clause>),
     relations: &[Relation],
     rates: &BTreeMap<Symbol, Expr>,
 ) -> Option<BondGraph> {
@@ -141,7 +142,7 @@ fn finished(
     let held = b.whole_held()?;
     let (lets, outputs) = (std::mem::take(&mut b.lets), std::mem::take(&mut b.outputs));
     let (lets, outputs) = (b.whole_named(lets), b.whole_named(outputs));
-    let laws = Laws { structure, signals, held, lets, outputs, constraints };
+    let laws = Laws { structure, signals, held, lets, outputs, constraints, clauses };
     b.assemble(title, asked, laws, [rates, &repeated])
 }
 

@@ -1,6 +1,6 @@
 //! The expressions of a graph, visited always in the same order.
 
-use super::{BondGraph, Kind, ResistorLaw, Storage, StorageLaw};
+use super::{BondGraph, Clause, Kind, ResistorLaw, Storage, StorageLaw, Trigger};
 use crate::algebra::Expr;
 
 impl BondGraph {
@@ -9,10 +9,25 @@ impl BondGraph {
         let mut all: Vec<Expr> = self.elements.values().flat_map(|e| e.kind.expressions()).collect();
         all.extend(self.signals.values().flat_map(|s| std::iter::once(s.rate).chain(s.initial)));
         all.extend(self.held.values().map(|h| h.source));
+        all.extend(self.clauses.iter().flat_map(Clause::expressions));
         all.extend(self.lets.iter().chain(&self.outputs).map(|n| n.value));
         all.extend(self.constraints.iter().flat_map(|c| [c.expr, c.multiplier]));
         all.extend(self.guesses.iter().flat_map(|g| [g.what, g.value]));
         all
+    }
+}
+
+impl Clause {
+    /// The expressions of the clause: its trigger, then the new values.
+    pub(super) fn expressions(&self) -> impl Iterator<Item = Expr> + '_ {
+        std::iter::once(self.trigger.expr()).chain(self.actions.iter().map(|a| a.value))
+    }
+
+    /// Visits every expression of the clause.
+    pub(super) fn for_each_expr(&mut self, visit: &mut dyn FnMut(&mut Expr)) {
+        let (Trigger::Becomes(e) | Trigger::Every(e)) = &mut self.trigger;
+        visit(e);
+        self.actions.iter_mut().for_each(|a| visit(&mut a.value));
     }
 }
 

@@ -240,6 +240,7 @@ impl<'a> Repeats<'a> {
         let what = match d.kind {
             DeclKind::Input(_) => "this is an input",
             DeclKind::State(_) => "this is a state",
+            DeclKind::Discrete(_) => "this is a discrete variable",
             DeclKind::Function(_) => "this is a function",
             DeclKind::Output(_) => "this is an output",
             _ if d.unit.is_some() => "this has a unit",

@@ -132,6 +132,16 @@ pub(super) struct Held<'a> {
     pub span: Span,
 }
 
+/// A `when`.
+pub(super) struct Clause<'a> {
+    /// Where it belongs.
+    pub here: Here,
+    /// As written.
+    pub ast: &'a ast::When,
+    /// The whole statement.
+    pub span: Span,
+}
+
 /// A bond as drawn, perhaps ending at ports of components.
 pub(super) struct Drawn {
     /// Where it starts.
@@ -182,6 +192,7 @@ pub(super) struct Flat<'a> {
     pub strokes: Vec<(Here, &'a ast::ForcedStroke, Span)>,
     pub guesses: Vec<(Here, &'a ast::Guess)>,
     pub constraints: Vec<Held<'a>>,
+    pub clauses: Vec<Clause<'a>>,
     pub faults: Faults,
     /// Where names are used that say what there is and how it is joined.
     pub uses: Uses,
@@ -275,6 +286,8 @@ impl<'a> Flat<'a> {
                 StatementKind::State(_) => "a state",
                 StatementKind::Constraint(_) => "a constraint",
                 StatementKind::Guess(_) => "a guess",
+                StatementKind::Discrete(_) => "a discrete variable",
+                StatementKind::When(_) => "an event",
                 StatementKind::Prefer(_) | StatementKind::Causality(_) | StatementKind::Stroke(_) => "causality",
                 StatementKind::Domain(d) => {
                     self.refuse_in_import(&d.body);
@@ -338,7 +351,10 @@ impl<'a> Flat<'a> {
                 StatementKind::Constraint(c) => self.constraint(here, c, statement.span),
                 StatementKind::Chain(chain) => self.chain(here, chain, pseudo),
                 StatementKind::Import(_) | StatementKind::Component(_) => {}
-                StatementKind::When(_) => {}
+                StatementKind::Discrete(list) => {
+                    list.iter().for_each(|d| self.declare_whole(here, here, d, DeclKind::Discrete(d.value.as_ref())));
+                }
+                StatementKind::When(w) => self.clauses.push(Clause { here, ast: w, span: statement.span }),
             }
         }
     }

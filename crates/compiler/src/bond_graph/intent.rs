@@ -30,7 +30,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// A dotted name as it stands in results.
-    fn written(&mut self, here: Here, path: &'a ast::Path) -> String {
+    pub fn written(&mut self, here: Here, path: &'a ast::Path) -> String {
         let mut parts: Vec<String> = Vec::with_capacity(path.parts.len());
         for part in &path.parts {
             let indices = self.repeats.indices(&self.flat.names, here, &part.indices).unwrap_or_default();

@@ -436,6 +436,12 @@ impl<'a> Builder<'a, '_> {
                     _ => self.pairs[wire].flow,
                 }
             }
+            Role::Known(Meaning::Held(id)) if self.held[id].kind.is_discrete() => {
+                let title = "a discrete variable has no rate";
+                let fault = Diagnostic::error(codes::L004, title, span, "differentiated here");
+                self.fault(fault.hint("it jumps at events and stays as it is between them"));
+                return None;
+            }
             Role::Known(Meaning::Held(_)) => {
                 self.fault(
                     Diagnostic::error(

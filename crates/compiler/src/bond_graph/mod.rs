@@ -19,6 +19,7 @@ mod dimension;
 mod elaborate;
 mod elements;
 mod ends;
+mod events;
 mod expressions;
 mod families;
 mod faults;
@@ -88,7 +89,7 @@ id!(
     CellId
 );
 id!(
-    /// A signal held from earlier times (`delay`, `sample`).
+    /// A signal held from earlier times (`delay`, `sample`, `discrete`).
     HeldId
 );
 
@@ -119,8 +120,10 @@ pub struct BondGraph {
     pub inputs: Table<InputId, Input>,
     /// Integrated signals.
     pub signals: Table<SignalId, IntegratedSignal>,
-    /// Delayed and sampled signals.
+    /// Delayed and sampled signals, discrete variables.
     pub held: Table<HeldId, HeldSignal>,
+    /// What happens at events (`when`), in the order of the text.
+    pub clauses: Vec<Clause>,
     /// Named expressions (`let` values), in order, fully expanded.
     pub lets: Vec<Named>,
     /// Outputs, in order, fully expanded.
@@ -185,7 +188,7 @@ pub enum Meaning {
     Input(InputId),
     /// An integrated signal.
     Signal(SignalId),
-    /// A delayed or sampled signal.
+    /// A delayed or sampled signal, a discrete variable.
     Held(HeldId),
     /// Effort of a bond.
     Effort(BondId),
@@ -440,12 +443,14 @@ pub struct HeldSignal {
     pub name: String,
     /// Its symbol.
     pub symbol: Symbol,
-    /// The signal that is delayed or sampled.
+    /// The signal that is delayed or sampled; the start value of a discrete variable, in parameters.
     pub source: Expr,
-    /// Delay or sampling period in s, in parameters; above 0.
+    /// Delay or sampling period in s, in parameters; above 0. Of a discrete variable nothing: 1.
     pub time: Expr,
-    /// Which of the two.
+    /// What it is.
     pub kind: HeldKind,
+    /// Unit as written.
+    pub unit: Option<Unit>,
     /// Where it stands.
     pub span: Span,
 }
@@ -457,6 +462,62 @@ pub enum HeldKind {
     Delay,
     /// `sample(u, T)`: the value at the last multiple of `T`.
     Sample,
+    /// `discrete n = 0`: what an event has set last.
+    Discrete,
+    /// What the last `reset` of something took, 0 before: `ball.impulse`.
+    Impulse,
+}
+
+impl HeldKind {
+    /// Whether events alone change it.
+    pub fn is_discrete(self) -> bool {
+        matches!(self, HeldKind::Discrete | HeldKind::Impulse)
+    }
+}
+
+/// A `when`: what happens at an event, all at once, from the values before it.
+#[derive(Debug, Clone)]
+pub struct Clause {
+    /// As it begins in the text, with the instance that it stands in: `when ball.q < 0`.
+    pub name: String,
+    /// When it happens.
+    pub trigger: Trigger,
+    /// What changes.
+    pub actions: Vec<Action>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// When an event happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trigger {
+    /// Where a condition becomes true.
+    Becomes(Expr),
+    /// At every multiple of a period in s, in parameters; above 0.
+    Every(Expr),
+}
+
+impl Trigger {
+    /// The condition or the period.
+    pub fn expr(self) -> Expr {
+        let (Trigger::Becomes(e) | Trigger::Every(e)) = self;
+        e
+    }
+}
+
+/// What changes at an event.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// The variable as written, with the instance that it stands in: `ball.f`.
+    pub name: String,
+    /// A discrete variable, an integrated signal, a stored quantity, an effort or a flow.
+    pub target: Symbol,
+    /// Its new value, in values before the event.
+    pub value: Expr,
+    /// What tells the impulse that brings storages to it; none for discrete variables and integrated signals.
+    pub impulse: Option<Symbol>,
+    /// Where it stands.
+    pub span: Span,
 }
 
 /// A named expression.
@@ -566,6 +627,7 @@ impl BondGraph {
             inputs: self.inputs.clone(),
             signals: self.signals.clone(),
             held: self.held.clone(),
+            clauses: self.clauses.clone(),
             lets: self.lets.clone(),
             outputs: self.outputs.clone(),
             preferences: self.preferences.clone(),

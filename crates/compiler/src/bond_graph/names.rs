@@ -29,6 +29,8 @@ pub enum NameKind {
     Input,
     /// A signal that is integrated.
     State,
+    /// A variable that events alone change.
+    Discrete,
     /// A named expression.
     Let,
     /// An output.
@@ -61,6 +63,7 @@ impl NameKind {
             NameKind::Constant => "constant",
             NameKind::Input => "input",
             NameKind::State => "state",
+            NameKind::Discrete => "discrete",
             NameKind::Let => "let",
             NameKind::Output => "output",
             NameKind::Function => "function",
@@ -76,8 +79,8 @@ impl NameKind {
     /// Whether expressions name it bare; what has parts or variables is named with a dot behind it. One name may be declared
     /// once as either.
     pub fn is_value(self) -> bool {
-        use NameKind::{Constant, Function, Input, Let, Output, Parameter, State};
-        matches!(self, Parameter | Constant | Input | State | Let | Output | Function)
+        use NameKind::{Constant, Discrete, Function, Input, Let, Output, Parameter, State};
+        matches!(self, Parameter | Constant | Input | State | Discrete | Let | Output | Function)
     }
 }
 
@@ -179,6 +182,7 @@ fn kind_of(decl: &Decl<'_>) -> NameKind {
         DeclKind::Let(_) => NameKind::Let,
         DeclKind::Output(_) => NameKind::Output,
         DeclKind::State(_) => NameKind::State,
+        DeclKind::Discrete(_) => NameKind::Discrete,
         DeclKind::Function(_) => NameKind::Function,
     }
 }

@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::{BondGraph, Element, HeldKind, Initial, Kind, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw};
+use super::{
+    BondGraph, Element, HeldKind, Initial, Kind, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw, Trigger,
+};
 use crate::algebra::{Expr, PlainNames, Symbol, ascii};
 use crate::ids::Id;
 use crate::unit::Unit;
@@ -147,8 +149,26 @@ impl BondGraph {
             writeln!(f, "  {}' = {}{start}{}", s.name, self.text(s.rate), unit(s.unit.as_ref()))?;
         }
         for h in self.held.values() {
-            let what = if h.kind == HeldKind::Delay { "delay" } else { "sample" };
-            writeln!(f, "  {} = {what}({}, {})", h.name, self.text(h.source), self.text(h.time))?;
+            let (source, time, unit) = (self.text(h.source), self.text(h.time), unit(h.unit.as_ref()));
+            match h.kind {
+                HeldKind::Delay => writeln!(f, "  {} = delay({source}, {time})", h.name)?,
+                HeldKind::Sample => writeln!(f, "  {} = sample({source}, {time})", h.name)?,
+                HeldKind::Discrete => writeln!(f, "  discrete {} from {source}{unit}", h.name)?,
+                HeldKind::Impulse => writeln!(f, "  {}, of resets", h.name)?,
+            }
+        }
+        if !self.clauses.is_empty() {
+            writeln!(f, "\nevents")?;
+        }
+        for clause in &self.clauses {
+            match clause.trigger {
+                Trigger::Becomes(condition) => writeln!(f, "  when {}", self.text(condition))?,
+                Trigger::Every(period) => writeln!(f, "  every {}", self.text(period))?,
+            }
+            for action in &clause.actions {
+                let word = if action.impulse.is_some() { "reset " } else { "" };
+                writeln!(f, "    {word}{} = {}", self.exprs.name(action.target), self.text(action.value))?;
+            }
         }
         for (title, list) in [("lets", &self.lets), ("outputs", &self.outputs)] {
             if !list.is_empty() {

@@ -24,7 +24,8 @@ impl Builder<'_, '_> {
         for (at, SignalDraft { name, symbol, rate, initial, unit, span }) in signals {
             let written = rate?;
             let rate = self.exprs.substitute(written, rates);
-            match self.repeated(structure, rate, initial) {
+            let own_way = self.reset.contains(&symbol);
+            match if own_way { None } else { self.repeated(structure, rate, initial) } {
                 Some(value) => {
                     replaced.insert(symbol, value);
                     self.roles[symbol.0 as usize] = None;
@@ -46,6 +47,9 @@ impl Builder<'_, '_> {
         let Node::Symbol(symbol) = self.exprs.node(rate) else { return None };
         let (port, storage) = self.storage_with_rate(structure, *symbol)?;
         let stored = storage.stored[port.port as usize];
+        if self.reset.contains(&stored) {
+            return None;
+        }
         let z = structure.co_energy(port)?;
         let own = storage.initial.iter().find(|i| i.symbol == stored).map(|i| i.value);
         let other = storage.initial.iter().any(|i| i.symbol == z);

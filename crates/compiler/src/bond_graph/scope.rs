@@ -162,6 +162,8 @@ pub(super) enum DeclKind<'a> {
     Output(Option<&'a ast::Expr>),
     /// `state`.
     State(&'a ast::State),
+    /// `discrete`, with its value at the start.
+    Discrete(Option<&'a ast::Expr>),
     /// `let f(x) = …`.
     Function(&'a ast::Function),
 }
@@ -171,9 +173,14 @@ impl<'a> DeclKind<'a> {
     pub fn value(&self) -> Option<&'a ast::Expr> {
         match *self {
             DeclKind::Parameter { value, .. } | DeclKind::Input(value) => value,
-            DeclKind::Let(value) | DeclKind::Output(value) => value,
+            DeclKind::Let(value) | DeclKind::Output(value) | DeclKind::Discrete(value) => value,
             DeclKind::State(_) | DeclKind::Function(_) => None,
         }
+    }
+
+    /// Whether it has its symbol before anything is read.
+    pub fn is_known_before(&self) -> bool {
+        matches!(self, DeclKind::State(_) | DeclKind::Input(_) | DeclKind::Discrete(_))
     }
 }
 

@@ -55,7 +55,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// Reads a truth value.
-    fn truth(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
+    pub fn truth(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
         let value = self.read(cx, e)?;
         if !value.truth {
             self.fault(

@@ -47,6 +47,10 @@ fn isolated_parts(graph: &BondGraph) -> Vec<Diagnostic> {
     for (id, held) in graph.held.iter() {
         reads.by(elements + graph.signals.len() + id.index(), held.source);
     }
+    for clause in &graph.clauses {
+        clause.expressions().for_each(|e| reads.beside_each_other(e));
+        clause.actions.iter().for_each(|a| reads.both(a.target, a.value));
+    }
     graph.outputs.iter().for_each(|output| reads.beside_each_other(output.value));
     let mut sets = reads.sets;
     let mut seen: BTreeMap<usize, &Element> = BTreeMap::new();
@@ -92,6 +96,12 @@ impl Reads<'_> {
         let read = self.graph.exprs.symbols_of(expr);
         let places: Vec<usize> = read.iter().filter_map(|&s| self.place(s)).collect();
         places.windows(2).for_each(|pair| self.sets.join(pair[0], pair[1]));
+    }
+
+    /// What an event changes, and what it reads for that.
+    fn both(&mut self, target: Symbol, value: Expr) {
+        let Some(place) = self.place(target) else { return };
+        self.by(place, value);
     }
 
     /// Where a variable belongs.

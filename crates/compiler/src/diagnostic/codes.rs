@@ -46,6 +46,7 @@ codes! {
     C009 "a preferred variable that does not stay independent (warning)";
     E001 "an equation needs the time derivative of an input";
     E002 "a loop of variables has no unique solution";
+    E003 "something that an event cannot change or read";
     U001 "an unknown unit";
     U002 "a unit that cannot be read";
     U003 "units that do not agree";
@@ -96,6 +97,9 @@ codes! {
     L008 "a value of zero that is divided by";
     L009 "a matrix of the wrong shape";
     L010 "a signal block that cannot be";
+    L011 "a condition that never becomes true as time goes on";
+    L012 "a variable that no event can change";
+    L013 "a variable that one event changes twice";
     I001 "a start value of the wrong kind";
     I002 "a start value or a guess given twice";
     I003 "start values that contradict each other or a constraint";

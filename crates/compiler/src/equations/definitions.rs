@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Unavailable;
 use crate::algebra::{Expr, Exprs, Symbol};
-use crate::bond_graph::{BondGraph, Meaning};
+use crate::bond_graph::{BondGraph, HeldKind, Meaning};
 use crate::ids::Map;
 
 /// How a symbol gets its value.
@@ -158,8 +158,8 @@ impl<'a> Definitions<'a> {
             }
             Some(Meaning::Signal(signal)) => return Ok(self.graph.signals[signal].rate),
             Some(Meaning::Held(held)) => match self.graph.held[held].kind {
-                crate::bond_graph::HeldKind::Sample => return Ok(self.x.int(0)),
-                crate::bond_graph::HeldKind::Delay => {
+                HeldKind::Sample | HeldKind::Discrete | HeldKind::Impulse => return Ok(self.x.int(0)),
+                HeldKind::Delay => {
                     return Err(Unavailable::NeedsRateOf(self.graph.held[held].name.clone()));
                 }
             },

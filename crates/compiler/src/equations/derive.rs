@@ -8,6 +8,7 @@ use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::freedom::{self, Sum};
+use super::jumps::readable;
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::stiff::parameters;
@@ -155,6 +156,7 @@ fn order_equations(
     let graph = &causal.graph;
     let UnorderedEquations { mut assembled, constraints, conserved, relations, breaks } = unordered;
     let momenta = assembled.momenta(truth);
+    let jumps = assembled.jumps(truth, form)?;
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
@@ -210,6 +212,9 @@ fn order_equations(
         .collect();
     let (algebraic, mut residuals) = unknowns(&d, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
+    // Forms with constraints left in them go by the minimal one at events.
+    let jumps = jumps.filter(|_| residuals.is_empty());
+    readable(&mut d, jumps.as_ref())?;
     let observed = observed::observed(&mut d, &states);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
@@ -258,6 +263,7 @@ fn order_equations(
         breaks,
         tracked,
         momenta,
+        jumps,
         free_rates,
         certificate: None,
         dof,

@@ -596,6 +596,10 @@ impl Assembled<'_> {
     fn repeated(&mut self, signal: &IntegratedSignal) -> Option<Expr> {
         let &Node::Symbol(rate) = self.d.x.node(signal.rate) else { return None };
         let (&stored, _) = self.d.stored.iter().find(|(_, r)| **r == rate)?;
+        let reset = |s| self.d.graph.clauses.iter().flat_map(|c| &c.actions).any(|a| a.target == s);
+        if reset(stored) || reset(signal.symbol) {
+            return None;
+        }
         let own = self.d.x.sym(stored);
         let Some(start) = signal.initial else { return Some(own) };
         let Some(Meaning::Stored(port)) = self.d.meaning(stored) else { return None };

@@ -14,6 +14,7 @@ mod forms;
 mod freedom;
 mod independent_rows;
 mod index;
+mod jumps;
 mod minimal;
 mod momenta;
 mod observed;
@@ -40,6 +41,7 @@ pub(crate) use definitions::Definitions;
 pub use derive::derive_equations;
 pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
+pub use jumps::{Impulse, Jumps};
 pub use momenta::Momentum;
 pub use relations::{Moved, Relations};
 pub use verify::verify;
@@ -100,6 +102,8 @@ pub struct Equations {
     pub tracked: Vec<Symbol>,
     /// Sums of stored quantities that no jump of a source changes; speeds as [`tracked`](Equations::tracked) names them.
     pub momenta: Vec<Momentum>,
+    /// How storages change at events; none where no event changes them, and in forms that go by the minimal one there.
+    pub jumps: Option<Jumps>,
     /// Rates that nothing defines.
     pub free_rates: BTreeSet<Symbol>,
     /// How few break variables open all loops, where the form has any.

@@ -8,7 +8,7 @@ use rustc_hash::FxBuildHasher;
 use super::definitions::Definitions;
 use super::{Guess, InitialCondition, Observed, ObservedKind, State, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol, SymbolKind};
-use crate::bond_graph::{BondGraph, Kind, Meaning};
+use crate::bond_graph::{BondGraph, HeldKind, Kind, Meaning};
 use crate::unit::Unit;
 
 /// The name of a state: its variable, or the output or `let` that says the same.
@@ -60,6 +60,11 @@ pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
         let value = value_of(d, e);
         add(signal.name.clone(), value, signal.unit.clone(), ObservedKind::Signal, false);
     }
+    for held in graph.held.values().filter(|h| h.kind.is_discrete()) {
+        let e = d.x.sym(held.symbol);
+        let unit = graph.variables.get(&held.symbol).and_then(|v| v.unit.clone());
+        add(held.name.clone(), Ok(e), unit, ObservedKind::Signal, held.kind == HeldKind::Discrete);
+    }
     for input in graph.inputs.values() {
         let e = d.x.sym(input.symbol);
         add(input.name.clone(), Ok(e), input.unit.clone(), ObservedKind::Input, false);
@@ -92,7 +97,7 @@ fn stored_kind(storage: &Kind) -> ObservedKind {
 }
 
 /// An expression as something to evaluate, or the reason why it has no value.
-fn value_of(d: &Definitions, e: Expr) -> Result<Expr, Unavailable> {
+pub fn value_of(d: &Definitions, e: Expr) -> Result<Expr, Unavailable> {
     for symbol in d.x.symbols_of(e) {
         if let Some(reason) = d.missing.get(&symbol) {
             return Err(reason.clone());

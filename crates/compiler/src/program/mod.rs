@@ -22,6 +22,7 @@ mod dataflow;
 mod dependence;
 mod derive;
 pub mod elimination;
+mod events;
 mod jacobian;
 mod kept;
 mod lower;
@@ -35,6 +36,7 @@ mod triggers;
 mod values;
 mod verify;
 
+pub use events::{Action, Clause, Impulse, Jumps, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
@@ -54,6 +56,7 @@ use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::sparse::{SparseMatrix, SymbolicFactors};
 use crate::unit::Unit;
+use dataflow::Dataflow;
 
 id!(
     /// A value: an entry of [`Program::values`].
@@ -90,6 +93,10 @@ pub struct Program {
     pub inputs: Vec<Input>,
     /// Signals held from earlier times.
     pub held: Vec<HeldSignal>,
+    /// What happens at events.
+    pub clauses: Vec<Clause>,
+    /// How storages change at events, where they do and another form does not tell.
+    pub jumps: Option<Jumps>,
     /// States; in implicit form all unknowns, states before algebraic ones.
     pub states: Vec<State>,
     /// What the equations are if they are no explicit rates.
@@ -154,16 +161,16 @@ pub struct Input {
     pub deduced: Option<Unit>,
 }
 
-/// A delayed or sampled signal.
+/// A delayed or sampled signal, a discrete variable.
 #[derive(Debug, Clone)]
 pub struct HeldSignal {
     /// Its name.
     pub name: String,
-    /// The signal that is delayed or sampled.
+    /// The signal that is delayed or sampled; the start value of a discrete variable.
     pub source: Value,
     /// Delay or period in s, in parameters.
     pub time: Value,
-    /// Which of the two.
+    /// What it is.
     pub kind: HeldKind,
 }
 

@@ -1,7 +1,7 @@
 //! A program as text: `%1` is a value of a routine, `$1` one of parameters alone, `.1` one within a Newton block, `?1` the
 //! guess of an unknown there.
 
-use super::{Arg, Block, Code, EventTrigger, Method, Op, Program, Routine, Solve, Step, Value};
+use super::{Arg, Block, Code, EventTrigger, Method, Op, Program, Routine, Solve, Step, Trigger, Value};
 use crate::algebra::dotted;
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
@@ -28,6 +28,7 @@ impl fmt::Display for Program {
         let told: Vec<String> = self.states.iter().enumerate().map(told).collect();
         self.print_routine(f, what, &self.guarded_routine(&rates), &names, &told)?;
         self.print_conditions(f)?;
+        self.print_events(f, &names)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
         let told: Vec<String> = shown.iter().map(|(o, _)| o.name.clone()).collect();
@@ -127,6 +128,26 @@ impl Program {
             writeln!(f, "    c{}: {:?}, {trigger}", id.index(), condition.kind)?;
         }
         Ok(())
+    }
+
+    fn print_events(&self, f: &mut fmt::Formatter<'_>, names: &Names) -> fmt::Result {
+        for clause in &self.clauses {
+            let (wanted, told): (Vec<Value>, Vec<String>) = match clause.trigger {
+                Trigger::Becomes(condition) => (vec![condition], vec!["it happens where this becomes 1".into()]),
+                Trigger::Every(period) => (vec![period], vec!["it happens at multiples of".into()]),
+            };
+            let targets = clause.actions.iter().map(|a| (a.value, format!("{}+", a.name)));
+            let (wanted, told): (Vec<Value>, Vec<String>) = wanted.into_iter().zip(told).chain(targets).unzip();
+            self.print_routine(f, &clause.name, &self.routine(&wanted), names, &told)?;
+        }
+        let Some(jumps) = &self.jumps else { return Ok(()) };
+        let tell = |(k, factor): &(u32, Value)| (*factor, format!("factor of the storage {}", k + 1));
+        let stored = jumps.stored.iter().zip(1..).map(|(&v, k)| (v, format!("stored {k}")));
+        let balances = jumps.balances.iter().zip(1..);
+        let factors =
+            balances.flat_map(|(row, b)| row.iter().map(move |t| (t.1, format!("balance {b}, {}", tell(t).1))));
+        let (wanted, told): (Vec<Value>, Vec<String>) = stored.chain(factors).unzip();
+        self.print_routine(f, "impulse balance at events", &self.routine(&wanted), names, &told)
     }
 
     fn print_code(&self, f: &mut fmt::Formatter<'_>, code: &Code, names: &Within) -> fmt::Result {

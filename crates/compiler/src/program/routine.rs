@@ -215,6 +215,8 @@ impl Program {
         wanted.extend(self.start.iter().flat_map(|c| [c.residual, c.asked]));
         wanted.extend(self.guesses.iter().flat_map(|g| [g.residual, g.asked]));
         wanted.extend(self.held.iter().flat_map(|h| [h.source, h.time]));
+        wanted.extend(self.clauses.iter().flat_map(|c| c.values()));
+        wanted.extend(self.jumps.iter().flat_map(|j| j.values()));
         wanted.extend(self.momenta.values());
         wanted.extend(self.inputs.iter().map(|i| i.default));
         wanted.extend(self.parameters.iter().map(|p| p.default));

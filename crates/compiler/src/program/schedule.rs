@@ -12,7 +12,7 @@ use super::start::place_guesses;
 use super::values::Reads;
 use super::{
     Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Program,
-    Relations, StartCondition, StartGuess, State, Value, triggers, verify,
+    Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
@@ -262,6 +262,8 @@ impl Schedule<'_> {
         let momenta = equations.momenta.iter().map(|m| (m.speed, self.lower.value(m.sum))).collect();
         let inputs = self.inputs();
         let held = self.held();
+        let clauses = events::clauses(&mut self.lower, equations);
+        let jumps = events::jumps(&mut self.lower, equations);
         let observed = self.observed(equations);
         let conditions = self.start_conditions(equations);
         let guesses = self.start_guesses(equations);
@@ -278,10 +280,13 @@ impl Schedule<'_> {
         let residuals = conditions.iter().chain(&guesses).map(|vanishing| vanishing.residual);
         let wanted: Vec<Value> = rates.iter().copied().chain(residuals).collect();
         let dependence = Dependence::new(flow, states.len() as u32, &wanted);
-        let integrated = rates.iter().copied().chain(held.iter().map(|h| h.source)).collect();
+        let becomes = clauses.iter().filter(|c| matches!(c.trigger, Trigger::Becomes(_))).map(|c| c.trigger.value());
+        let integrated = rates.iter().copied().chain(held.iter().map(|h| h.source)).chain(becomes).collect();
         let program = Program {
             name: graph.name.clone(),
             kept: kept(flow, equations, &momenta),
+            jumps: jumps.map(|jumps| events::with_unknowns(jumps, flow, equations)),
+            clauses,
             start: start(equations, &conditions, &dependence),
             guesses: placed(equations, &guesses, &dependence),
             conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),

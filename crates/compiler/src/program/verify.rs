@@ -2,7 +2,9 @@
 
 use super::op::Op;
 use super::values::Reads;
-use super::{Arg, Block, BlockId, Code, ConditionKind, EventTrigger, Method, Program, Solve, Step, Value};
+use super::{
+    Arg, Block, BlockId, Code, ConditionKind, EventTrigger, Method, Program, Solve, Step, Target, Trigger, Value,
+};
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeSet;
@@ -160,8 +162,27 @@ fn tables_of_states(p: &Program) -> Result<(), String> {
     })
 }
 
+/// What events change is there, and there are as many balances as unknowns.
+fn events(p: &Program) -> Result<(), String> {
+    let impulses = p.jumps.as_ref().map_or(0, |j| j.impulses.len());
+    for action in p.clauses.iter().flat_map(|c| &c.actions) {
+        let fine = match action.target {
+            Target::Discrete(i) => p.held.get(i as usize).is_some_and(|h| h.kind.is_discrete()),
+            Target::Signal(i) => (i as usize) < p.states.len(),
+            Target::Moved { impulse, .. } => (impulse as usize) < impulses,
+        };
+        all(fine, || format!("an event changes {:?}, which there is not", action.target))?;
+    }
+    let Some(jumps) = &p.jumps else { return Ok(()) };
+    let (rows, unknowns) = (jumps.balances.len(), jumps.unknowns.len());
+    all(rows == unknowns, || format!("{rows} balances at events for {unknowns} unknowns"))?;
+    let inside = jumps.balances.iter().flatten().all(|t| (t.0 as usize) < jumps.stored.len());
+    all(inside, || "a balance is about storages that there are not".into())
+}
+
 /// What is read from outside reads no guess, and what must be known before a run reads parameters alone.
 fn outside(p: &Program) -> Result<(), String> {
+    events(p)?;
     let known = |v: Value| v.index() < p.values.len();
     for value in p.wanted_anywhere() {
         let fine = known(value) && !p.values.reads(value).includes(Reads::GUESS);
@@ -173,7 +194,8 @@ fn outside(p: &Program) -> Result<(), String> {
         all(known(value), || format!("{value:?} is told and no value"))?;
     }
     let parameters = p.parameters.iter().map(|p| p.default).chain(p.inputs.iter().map(|i| i.default));
-    let parameters = parameters.chain(p.held.iter().map(|h| h.time));
+    let periods = p.clauses.iter().filter(|c| matches!(c.trigger, Trigger::Every(_))).map(|c| c.trigger.value());
+    let parameters = parameters.chain(p.held.iter().map(|h| h.time)).chain(periods);
     let mut parameters = parameters.chain(p.assumptions.iter().flat_map(|a| [a.value, a.scale]));
     match parameters.find(|&v| p.values.reads(v) != Reads::PARAMETERS) {
         Some(v) => Err(format!("{v:?} varies where parameters alone may be read")),

@@ -10,6 +10,6 @@ mod text;
 pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
 pub use only::only;
 pub use text::{
-    Style, print, print_certificate, print_definitions, print_dependent, print_expr, print_form, print_meanings,
-    print_sides, print_symbol,
+    Style, print, print_certificate, print_definitions, print_dependent, print_events, print_expr, print_form,
+    print_meanings, print_sides, print_symbol,
 };

@@ -9,7 +9,7 @@ use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, latex_owner, mathml, mathml_name,
     mathml_owner, unicode, unicode_name,
 };
-use crate::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning};
+use crate::bond_graph::{Action, BondGraph, Clause, Element, ElementId, Kind, Meaning, Trigger};
 use crate::causal_paths::Refusal;
 use crate::equations::{AlgebraicRole, EquationStep};
 
@@ -59,6 +59,33 @@ pub fn print_definitions(shown: &Shown, style: Style) -> Vec<String> {
     definitions(shown, false, style)
 }
 
+/// What happens at events, one a line: `when f_v < 0:  f_ball⁺ = -e f_ball`. A variable with a plus is that after the event,
+/// all others are those before it.
+pub fn print_events(shown: &Shown, style: Style) -> Vec<String> {
+    let names = Written::of(shown);
+    let graph = &shown.equations.graph;
+    let after = |action: &Action| {
+        let (own, value) = (name(action.target, &names, style), expression(action.value, &names, style));
+        match style {
+            Style::Ascii => format!("{own}+ = {value}"),
+            Style::Unicode => format!("{own}⁺ = {value}"),
+            Style::Latex => format!("{{{own}}}^{{+}} = {value}"),
+            Style::MathMl => format!("<msup><mrow>{own}</mrow><mo>+</mo></msup><mo>=</mo>{value}"),
+        }
+    };
+    let line = |clause: &Clause| {
+        let when = expression(clause.trigger.expr(), &names, style);
+        let word = if matches!(clause.trigger, Trigger::Every(_)) { "every" } else { "when" };
+        let changes: Vec<String> = clause.actions.iter().map(after).collect();
+        match style {
+            Style::Ascii | Style::Unicode => format!("{word} {when}: {}", changes.join(", ")),
+            Style::Latex => format!("\\text{{{word} }} {when}: \\quad {}", changes.join(", \\; ")),
+            Style::MathMl => format!("<mtext>{word}&#xa0;</mtext>{when}<mo>:</mo>{}", changes.join("<mo>,</mo>")),
+        }
+    };
+    graph.clauses.iter().map(line).collect()
+}
+
 /// The dependent storages, each with its row of `S`, one a line, and behind them the names that only they read.
 pub fn print_dependent(shown: &Shown, style: Style) -> Vec<String> {
     let names = Written::of(shown);
@@ -98,6 +125,11 @@ pub fn print_form(shown: &Shown) -> String {
     text += "\nequations\n";
     print(shown, Style::Unicode).iter().for_each(|line| text += &format!("  {line}\n"));
     print_meanings(shown, Style::Unicode).iter().for_each(|line| text += &format!("  where {line}\n"));
+    let events = print_events(shown, Style::Unicode);
+    if !events.is_empty() {
+        text += "\nevents\n";
+    }
+    events.iter().for_each(|line| text += &format!("  {line}\n"));
     let certificate = print_certificate(shown);
     if !certificate.is_empty() {
         text += "\ncertificate\n";
@@ -299,6 +331,12 @@ impl Display for Shown {
         }
         for line in print_dependent(self, Style::Unicode) {
             writeln!(f, "  dependent {line}")?;
+        }
+        for (i, line) in print_events(self, Style::Unicode).into_iter().enumerate() {
+            if i == 0 {
+                writeln!(f, "\nevents")?;
+            }
+            writeln!(f, "  {line}")?;
         }
         writeln!(f, "\nsteps")?;
         for step in &equations.steps {

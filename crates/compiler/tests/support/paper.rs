@@ -66,6 +66,7 @@ pub fn empty(name: &str) -> BondGraph {
         inputs: Table::new(),
         signals: Table::new(),
         held: Table::new(),
+        clauses: Vec::new(),
         lets: Vec::new(),
         outputs: Vec::new(),
         preferences: Vec::new(),

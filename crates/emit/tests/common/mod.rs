@@ -39,13 +39,15 @@ pub struct Exported {
 /// Time and outputs at each step.
 pub type Rows = Vec<Vec<f64>>;
 
-/// All models of the repository, and those of these tests.
+/// All models of the repository that can be exported, and those of these tests.
 pub fn models() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folders = fs::read_dir(root.join("../../models")).expect("models/");
     let mut all: Vec<PathBuf> = folders.map(|e| e.unwrap().path().join("model.bond")).filter(|p| p.is_file()).collect();
     let own = fs::read_dir(root.join("tests/models")).expect("models of the tests");
     all.extend(own.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "bond")));
+    // What happens at events is not exported.
+    all.retain(|path| !fs::read_to_string(path).expect("a model").contains("\nwhen "));
     all.sort();
     all
 }

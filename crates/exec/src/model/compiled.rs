@@ -1,8 +1,11 @@
 //! What of a model never changes: its programs and the code made of them, shared by everything that runs it.
 
+use super::clauses::Clauses;
 use super::clock::Clock;
+use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
+use super::positions::PositionConstraints;
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
 use halfarrow_sim::Sparsity;
@@ -78,6 +81,11 @@ pub(super) struct Mode {
     pub sources: Routine,
     /// States that jump with a source, if there are any.
     pub kept: Option<ConservedSums>,
+    pub clauses: Clauses,
+    /// How storages change at events, where they do.
+    pub impulses: Option<ImpulseBalance>,
+    /// Constraints that events may break.
+    pub positions: Option<PositionConstraints>,
 }
 
 impl Mode {
@@ -103,6 +111,9 @@ impl Mode {
             clock: Clock::new(&program, &layout),
             sources: layout.routine(&program, &sources),
             kept: ConservedSums::of(&program, &layout),
+            clauses: Clauses::of(&program, &layout),
+            impulses: ImpulseBalance::of(&program, &layout),
+            positions: PositionConstraints::of(&program, &layout),
             layout,
             program,
         }
@@ -116,7 +127,10 @@ impl Mode {
             .as_ref()
             .map(|j| &j.routine)
             .into_iter()
-            .chain(self.kept.as_ref().map(ConservedSums::routine));
+            .chain(self.kept.as_ref().map(ConservedSums::routine))
+            .chain(self.clauses.routines())
+            .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
+            .chain(self.positions.as_ref().map(PositionConstraints::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

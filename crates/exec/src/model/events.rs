@@ -1,5 +1,6 @@
 //! Events of a model: what is held between them, and what happens where one is handled.
 
+use super::clause_memory::ClauseMemory;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, SolveError};
@@ -52,6 +53,7 @@ impl Model {
                 match &mut self.run.delays_and_samples[i] {
                     DelayOrSample::Delay(delay) => delay.begin(t, value, slope),
                     DelayOrSample::Sample(sample) => sample.begin(t, value),
+                    DelayOrSample::Discrete(own) => *own = value,
                 }
             }
         }
@@ -75,7 +77,7 @@ impl Model {
         Ok(())
     }
 
-    fn take_signs(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+    pub(super) fn take_signs(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         self.place(t, x);
         if self.code.switching.is_empty() {
             self.frame.conditions.state = Hold::Keep;
@@ -92,37 +94,8 @@ impl Model {
         run.map_err(|error| self.failure(t, error))
     }
 
-    pub(super) fn has_delays(&self) -> bool {
-        self.run.delays_and_samples.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
-    }
-}
-
-impl Events for Model {
-    fn next_time_event(&mut self, t: f64) -> Option<f64> {
-        let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
-        let held = self.run.delays_and_samples.iter().filter_map(|held| match held {
-            DelayOrSample::Delay(delay) => delay.next_time_event(t),
-            DelayOrSample::Sample(sample) => Some(sample.next_time()),
-        });
-        inputs.chain(held).chain(self.run.clock_event).filter(|&next| next > t).reduce(f64::min)
-    }
-
-    fn is_corner(&mut self, t: f64) -> bool {
-        let held = self.run.delays_and_samples.iter().any(|held| match held {
-            DelayOrSample::Delay(delay) => delay.next_time_event(self.run.crossed) == Some(t),
-            DelayOrSample::Sample(sample) => sample.is_due(t),
-        });
-        !held && self.run.clock_event != Some(t) && !self.inputs().iter().any(|signal| signal.jumps_at(t))
-    }
-
-    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
-        match self.frame.passed_pole() {
-            Some(block) => Err(self.failure(t, SolveError::Singular { block })),
-            None => Ok(()),
-        }
-    }
-
-    fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+    /// Handles an event. `told` says of some clauses that they happen, of those that another form of the model has seen.
+    pub(super) fn handle(&mut self, t: f64, x: &mut [f64], told: &[bool]) -> Result<(), Failure> {
         self.frame.forget_orientations();
         if t < self.run.crossed {
             self.restart();
@@ -143,6 +116,7 @@ impl Events for Model {
             self.begin_delays_and_samples(t, x)?;
             self.run.begun = true;
             self.take_signs(t, x)?;
+            self.begin_clauses(t, x)?;
         } else {
             self.conserve_sums(t, x, &sums)?;
             self.take_samples(t, x)?;
@@ -151,7 +125,9 @@ impl Events for Model {
             if self.conserve_sums(t, x, &sums)? {
                 self.take_signs(t, x)?;
             }
+            self.find_fired(t, x, told)?;
         }
+        self.run_clauses(t, x)?;
         if self.has_delays() {
             self.run_sources(t, x)?;
             for i in 0..self.run.delays_and_samples.len() {
@@ -162,6 +138,47 @@ impl Events for Model {
             }
         }
         self.follow_solutions(t, x)
+    }
+
+    pub(super) fn has_delays(&self) -> bool {
+        self.run.delays_and_samples.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
+    }
+}
+
+impl Events for Model {
+    fn next_time_event(&mut self, t: f64) -> Option<f64> {
+        let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
+        let held = self.run.delays_and_samples.iter().filter_map(|held| match held {
+            DelayOrSample::Delay(delay) => delay.next_time_event(t),
+            DelayOrSample::Sample(sample) => Some(sample.next_time()),
+            DelayOrSample::Discrete(_) => None,
+        });
+        let periods = self.run.clauses.iter().filter_map(ClauseMemory::next_time);
+        inputs.chain(held).chain(periods).chain(self.run.clock_event).filter(|&next| next > t).reduce(f64::min)
+    }
+
+    fn is_corner(&mut self, t: f64) -> bool {
+        let held = self.run.delays_and_samples.iter().any(|held| match held {
+            DelayOrSample::Delay(delay) => delay.next_time_event(self.run.crossed) == Some(t),
+            DelayOrSample::Sample(sample) => sample.is_due(t),
+            DelayOrSample::Discrete(_) => false,
+        }) || self.run.clauses.iter().any(|c| c.is_due(t));
+        !held && self.run.clock_event != Some(t) && !self.inputs().iter().any(|signal| signal.jumps_at(t))
+    }
+
+    fn passed_pole(&mut self, t: f64) -> Result<(), Failure> {
+        match self.frame.passed_pole() {
+            Some(block) => Err(self.failure(t, SolveError::Singular { block })),
+            None => Ok(()),
+        }
+    }
+
+    fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        self.handle(t, x, &[])
+    }
+
+    fn resolve_times(&mut self, step: f64) {
+        self.run.resolution = step;
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {

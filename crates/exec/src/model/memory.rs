@@ -1,6 +1,7 @@
 //! What a run remembers.
 
 use super::Model;
+use super::clause_memory::ClauseMemory;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
@@ -44,15 +45,21 @@ pub(super) struct Remembered {
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
     pub delays_and_samples: Vec<DelayOrSample>,
+    /// How finely the run tells times apart, in s.
+    pub resolution: f64,
+    /// Of each clause of the program.
+    pub clauses: Vec<ClauseMemory>,
     /// The piece of each input that holds.
     pub pieces: Vec<Option<PointRange>>,
 }
 
-/// The memory of a delay or a sample.
+/// The memory of a signal that is held from earlier times.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum DelayOrSample {
     Delay(Delay),
     Sample(Sample),
+    /// What an event has set last.
+    Discrete(f64),
 }
 
 impl Model {
@@ -99,15 +106,20 @@ impl Model {
         self.frame.solvers[block].newton.previous.len() > i
     }
 
-    /// Delays and samples as they are before a run.
+    /// Delays, samples and discrete variables as they are before a run.
     pub(super) fn empty_delays_and_samples(&self) -> Vec<DelayOrSample> {
         let code = &self.code;
         let time = |i: usize| code.layout.registers.get(&code.program.held[i].time).map(|&r| self.frame.r[r as usize]);
+        let start = |i: usize| {
+            let register = code.layout.registers.get(&code.program.held[i].source);
+            register.map_or(0.0, |&register| self.frame.r[register as usize])
+        };
         let held = code.program.held.iter().enumerate().map(|(i, h)| {
             let time = time(i).unwrap_or(f64::NAN);
             match h.kind {
                 HeldKind::Delay => DelayOrSample::Delay(Delay::new(time)),
                 HeldKind::Sample => DelayOrSample::Sample(Sample::new(time)),
+                HeldKind::Discrete | HeldKind::Impulse => DelayOrSample::Discrete(start(i)),
             }
         });
         held.collect()

@@ -1,6 +1,8 @@
 //! A model that runs: what never changes of it ([`Compiled`]), what is set ([`Setup`]), what a run remembers ([`Memory`]), and
 //! the registers on which all of it is computed.
 
+mod clause_memory;
+mod clauses;
 mod clock;
 mod compiled;
 mod equilibrium;
@@ -9,6 +11,7 @@ mod events;
 mod explain;
 mod history;
 mod implicit;
+mod impulses;
 mod inputs;
 mod jacobian;
 mod jumps;
@@ -17,6 +20,7 @@ mod machine;
 mod memory;
 mod minimum_norm;
 mod operations;
+mod positions;
 mod recorded;
 mod setup;
 mod start;
@@ -35,6 +39,7 @@ pub use setup::Setup;
 pub use wide::WideModel;
 
 use crate::bytecode::{FULL_AT_MOST, Frame, Hold, SolveError};
+use clauses::EventWork;
 use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
@@ -58,6 +63,10 @@ pub struct Model {
     setup: Setup,
     run: Remembered,
     frame: Frame,
+    /// What is computed at events.
+    events: EventWork,
+    /// Whether another form of the model tells what happens at events.
+    led: bool,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
     scaled: bool,
     dx: Vec<f64>,
@@ -107,6 +116,8 @@ impl Model {
             conserved: vec![0.0; code.program.conserved.len()],
             scales: vec![0.0; n],
             delays_and_samples: Vec::new(),
+            resolution: 0.0,
+            clauses: Vec::new(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -115,6 +126,8 @@ impl Model {
             setup: Setup::new(&compiled),
             run,
             frame,
+            events: EventWork::of(&code),
+            led: false,
             scaled: true,
             dx: vec![0.0; n],
             beside: vec![0.0; n],
@@ -252,6 +265,7 @@ impl Model {
         self.place_constant_inputs();
         self.forget_solutions();
         self.run.delays_and_samples = self.empty_delays_and_samples();
+        self.run.clauses = self.clauses_at_rest();
     }
 
     fn follow(&mut self) {
@@ -324,6 +338,7 @@ impl Model {
             frame.r[layout.held as usize + i] = match held {
                 DelayOrSample::Delay(delay) => delay.at(t, run.crossed).0,
                 DelayOrSample::Sample(sample) => sample.value,
+                DelayOrSample::Discrete(value) => *value,
             };
         }
     }

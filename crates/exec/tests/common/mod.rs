@@ -87,7 +87,7 @@ impl Sketch {
     pub fn held(&mut self, name: &str, kind: HeldKind, source: Expr, time: f64) -> Expr {
         let (symbol, e) = self.symbol(name);
         let time = self.number(time);
-        self.held.push(HeldSignal { name: name.into(), symbol, source, time, kind, span: Span::default() });
+        self.held.push(HeldSignal { name: name.into(), symbol, source, time, kind, unit: None, span: Span::default() });
         e
     }
     pub fn element(&mut self, name: &str) -> ElementId {
@@ -172,6 +172,7 @@ impl Sketch {
             inputs: self.inputs.into_iter().collect(),
             signals: Table::new(),
             held: self.held.into_iter().collect(),
+            clauses: Vec::new(),
             lets: Vec::new(),
             outputs: Vec::new(),
             preferences: Vec::new(),
@@ -194,6 +195,7 @@ impl Sketch {
             conserved: self.conserved,
             relations: Default::default(),
             momenta: Vec::new(),
+            jumps: None,
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,

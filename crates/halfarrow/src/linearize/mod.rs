@@ -7,7 +7,7 @@ mod structure;
 mod symbolic;
 mod zeros;
 
-use halfarrow_compiler::bond_graph::{self, BondGraph, InputId, Kind, Meaning, Variable};
+use halfarrow_compiler::bond_graph::{self, BondGraph, HeldKind, InputId, Kind, Meaning, Variable};
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
@@ -150,9 +150,7 @@ impl Model {
     /// The model has errors, an input or output does not exist, there is no such point, or the model holds a delay, which
     /// has no matrices.
     pub fn linearize(&self, wanted: &Linearize) -> Result<LinearizeReport, Error> {
-        if let Some(delayed) =
-            self.graph.held.values().find(|h| h.kind == halfarrow_compiler::bond_graph::HeldKind::Delay)
-        {
+        if let Some(delayed) = self.graph.held.values().find(|h| h.kind == HeldKind::Delay) {
             return Err(Problem::NoMatrices { reason: delay(&delayed.name) }.into());
         }
         let (names, model) = self.with_inputs(wanted.inputs.as_deref())?;
@@ -295,7 +293,10 @@ impl Model {
                 system.indicators()
             ));
         }
-        if !program.held.is_empty() {
+        if !program.clauses.is_empty() {
+            notes.push("discrete variables keep their value: the matrices hold between two events".into());
+        }
+        if program.held.iter().any(|h| h.kind == HeldKind::Sample) {
             notes.push("sampled signals keep their value: the matrices hold between two samples".into());
         }
         notes

@@ -9,7 +9,7 @@ use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::equations::{AlgebraicRole, Form, StateKind};
 use halfarrow_compiler::textbook::{
-    Style, print_certificate, print_dependent, print_meanings, print_sides, print_symbol, show,
+    Style, print_certificate, print_dependent, print_events, print_meanings, print_sides, print_symbol, show,
 };
 use halfarrow_draw::DrawOptions;
 
@@ -204,7 +204,8 @@ impl Model {
         let mut remarks = Vec::new();
         let content = self.equations_in(form).map_err(|error| crate::compare::short(&error)).map(|equations| {
             let shown = show(equations);
-            remarks = print_certificate(&shown);
+            remarks = print_events(&shown, Style::Unicode);
+            remarks.extend(print_certificate(&shown));
             let equations = &shown.equations;
             let counts = equations.counts;
             let storage = |kind| if kind == StateKind::Signal { "integrated signal" } else { "storage" };

@@ -16,7 +16,7 @@ pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 use std::ops::ControlFlow;
 
 use crate::events::{Chatter, Events, Signs};
-use crate::{Failure, Options};
+use crate::{Failure, Method, Options};
 use recording::Samples;
 
 /// Why the driver looks up at the end of a step.
@@ -93,6 +93,8 @@ impl<'a> Run<'a> {
 
     /// The start counts as an event.
     pub(crate) fn start(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
+        let fixed = matches!(self.options.method, Method::Fixed(_));
+        events.resolve_times(self.options.step.filter(|_| fixed).unwrap_or(0.0));
         self.handle(events, point)?;
         self.accept(events, point)?;
         self.settle(events, point)

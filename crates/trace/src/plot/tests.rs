@@ -50,6 +50,14 @@ fn one_panel_a_unit_and_one_curve_a_column() {
 }
 
 #[test]
+fn events_are_marked_where_a_time_is_given_twice() {
+    let mut jumping = trace(&[("a.e", "N", &[0.0, 1.0, 2.0, 3.0])]);
+    assert!(!plot(&jumping, "T").contains("class=\"events\""));
+    jumping.times = vec![0.0, 1.0, 1.0, 2.0];
+    assert!(plot(&jumping, "T").contains("<path class=\"events\" d=\"M320 0v5\""));
+}
+
+#[test]
 fn names_cannot_break_the_markup() {
     let svg = plot(&trace(&[("a<b>&\"", "1", &[0.0, 1.0])]), "<script>");
     assert!(!svg.contains("<script>") && svg.contains("a&lt;b&gt;&amp;&quot;"));

@@ -47,11 +47,12 @@ const MAX_NESTING: usize = 120;
 pub(super) const RESERVED: [&str; 6] = ["and", "else", "if", "not", "or", "then"];
 
 /// Words that begin a statement.
-pub(super) const KEYWORDS: [&str; 16] = [
+pub(super) const KEYWORDS: [&str; 17] = [
     "causality",
     "component",
     "const",
     "constraint",
+    "discrete",
     "domain",
     "for",
     "guess",

@@ -1,6 +1,5 @@
 //! Statements.
 
-use super::expressions::reserved;
 use super::*;
 
 /// Whether a declaration in a list has a value, and which word is used for it.
@@ -160,7 +159,8 @@ impl Parser<'_> {
             "stroke" => StatementKind::Stroke(Box::new(self.stroke()?)),
             "constraint" => StatementKind::Constraint(Box::new(self.constraint()?)),
             "domain" => StatementKind::Domain(Box::new(self.domain()?)),
-            "when" => StatementKind::When(Box::new(self.when(start))),
+            "discrete" => StatementKind::Discrete(self.declarations(Value::Needed)),
+            "when" => StatementKind::When(Box::new(self.when()?)),
             "for" => StatementKind::For(Box::new(self.for_loop()?)),
             _ => {
                 let hint = "put the other model into a file of its own, or make it a `component`";
@@ -506,30 +506,39 @@ impl Parser<'_> {
         Some(DomainBlock { name, pseudo, doc, body })
     }
 
-    fn when(&mut self, start: Span) -> When {
-        let cond = self.expr();
-        self.remark(reserved(
-            self.since(start),
-            "`when`",
-            "write a law with `if ... then ... else` where that suffices",
-        ));
-        let resets = self.resets();
-        When { cond, resets }
+    fn when(&mut self) -> Option<When> {
+        let trigger = match self.period_follows() {
+            true => {
+                self.bump();
+                Trigger::Every(self.expr())
+            }
+            false => Trigger::Becomes(self.expr()),
+        };
+        Some(When { trigger, actions: self.nested(Self::actions)? })
     }
 
-    /// `{ reset m.p = expr ... }`.
-    fn resets(&mut self) -> Vec<Reset> {
-        let mut resets = Vec::new();
+    /// Whether `every` with a period comes, and no condition on something that is called so.
+    fn period_follows(&self) -> bool {
+        let next = self.ahead(1);
+        let begins = matches!(next.kind, TokenKind::Number | TokenKind::Ident);
+        self.is_word("every") && begins && next.newlines == 0 && !RESERVED.contains(&self.text_of(next))
+    }
+
+    /// `{ reset m.p = expr ... n = expr ... }`.
+    fn actions(&mut self) -> Vec<Action> {
+        let mut actions = Vec::new();
         if !self.expect(TokenKind::LBrace, "`{`") {
-            return resets;
+            return actions;
         }
         let open = self.span_before();
         while !matches!(self.kind(), TokenKind::End | TokenKind::RBrace) {
             let before = self.pos;
             self.tokens[self.pos].newlines = 0;
             self.quiet = false;
-            resets.extend(self.reset());
-            self.end_statement();
+            actions.extend(self.action());
+            if !self.eat(TokenKind::Semicolon) {
+                self.end_statement();
+            }
             if self.pos == before {
                 self.bump();
             }
@@ -541,16 +550,37 @@ impl Parser<'_> {
                 .also(self.gap(), "the text ends here");
             self.report(fault);
         }
-        resets
+        actions
     }
 
-    fn reset(&mut self) -> Option<Reset> {
-        if !self.expect_word("reset") {
+    /// `reset m.p = expr` or `n = expr`.
+    fn action(&mut self) -> Option<Action> {
+        let start = self.span();
+        let word = self.text_of(self.token());
+        if matches!(word, "for" | "if" | "when") {
+            let title = format!("`{word}` has no place in what happens at an event");
+            let hint = match word {
+                "if" => "write `n = if ... then ... else n`, or another `when`",
+                _ => "put it around the `when`, or beside it: what happens at one instant happens at once",
+            };
+            self.report(Diagnostic::error(codes::S013, title, start, "here").hint(hint));
+            self.skip_to_brace();
+            if self.kind() == TokenKind::LBrace {
+                self.nested(Self::actions);
+            }
             return None;
         }
-        let target = self.element_path("the variable that is reset")?;
-        self.expect(TokenKind::Assign, "`= value`");
-        Some(Reset { target, value: self.expr() })
+        let reset = self.is_word("reset") && self.ahead(1).kind == TokenKind::Ident;
+        if reset {
+            self.bump();
+        }
+        let what = if reset { "the variable that is reset" } else { "`reset` or a discrete variable" };
+        let target = self.element_path(what)?;
+        if !self.expect(TokenKind::Assign, "`= value`") {
+            return None;
+        }
+        let value = self.expr();
+        Some(Action { reset, target, value, span: self.since(start) })
     }
 
     fn for_loop(&mut self) -> Option<For> {

@@ -45,6 +45,7 @@ impl ImplicitModel {
     pub fn new(mut program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
         without_rates_of_inputs(&mut program, reference.program());
         let mut form = Model::new(program)?;
+        form.led = form.code.program.implicit.is_some();
         let map = Arc::new(StateMap::new(&mut form, &mut reference));
         let x = vec![0.0; reference.states()];
         form.restart();
@@ -211,6 +212,10 @@ impl ImplicitModel {
         self.guess(t)?;
         self.take_over(t, &mut y)?;
         self.form.handle_event(t, &mut y)?;
+        if self.form.take_discretes(&self.reference) {
+            self.take_over(t, &mut y)?;
+            self.form.handle_event(t, &mut y)?;
+        }
         self.take_rates(t, &y, &mut yp)?;
         self.settle(t, &mut y, &mut yp)?;
         self.begun = true;

@@ -3,6 +3,17 @@
 use super::ImplicitModel;
 use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System as _, halves, halves_mut};
 
+impl ImplicitModel {
+    /// Of the clauses that happen, those that rounding leaves before their border in the reference. Where no state moves, they
+    /// have happened nevertheless.
+    fn late(&mut self, t: f64, told: &[bool]) -> Result<Vec<bool>, Failure> {
+        let x = std::mem::take(&mut self.x);
+        let seen = self.reference.becoming(t, &x);
+        self.x = x;
+        Ok(told.iter().zip(seen?).map(|(told, seen)| *told && !seen).collect())
+    }
+}
+
 impl ImplicitSystem for ImplicitModel {
     fn unknowns(&self) -> usize {
         self.form.code.program.states.len()
@@ -119,16 +130,29 @@ impl Events for ImplicitModel {
                 return self.take_rates(t, y, yp);
             }
             self.reference.handle_event(t, &mut self.x)?;
+            self.form.take_discretes(&self.reference);
         } else {
             // What is sampled at an event, and the sign of a condition, are those of the unknowns after it.
             self.follow_back(t, y, yp)?;
-            self.reference.handle_event(t, &mut self.x)?;
+            let told = self.form.becoming(t, y)?;
+            let late = self.late(t, &told)?;
+            let before = self.x.clone();
+            self.reference.handle(t, &mut self.x, &told)?;
+            self.form.take_discretes(&self.reference);
             self.take_over(t, y)?;
             self.form.handle_event(t, y)?;
+            if self.x == before {
+                [&mut self.reference, &mut self.form].into_iter().for_each(|model| model.let_hold(&late));
+            }
         }
         self.take_over(t, y)?;
         self.take_rates(t, y, yp)?;
         self.settle(t, y, yp)
+    }
+
+    fn resolve_times(&mut self, step: f64) {
+        self.reference.resolve_times(step);
+        self.form.resolve_times(step);
     }
 
     fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {

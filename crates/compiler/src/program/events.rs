@@ -1,0 +1,176 @@
+//! What happens at events: when, and what changes then.
+
+use super::dependence::Dependence;
+use super::lower::Lowering;
+use super::{Dataflow, Value};
+use crate::algebra::Symbol;
+use crate::bond_graph::{self, BondGraph, Meaning};
+use crate::equations::{self, Equations, StateKind};
+use crate::ids::Id;
+use crate::span::Span;
+
+/// What happens at an event, all at once, from the values before it.
+#[derive(Debug, Clone)]
+pub struct Clause {
+    /// As it begins in the text: `when ball.q < 0`.
+    pub name: String,
+    /// When it happens.
+    pub trigger: Trigger,
+    /// What changes.
+    pub actions: Vec<Action>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// When an event happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trigger {
+    /// Where this truth value becomes 1.
+    Becomes(Value),
+    /// At every multiple of this period in s, in parameters.
+    Every(Value),
+}
+
+impl Trigger {
+    /// The truth value or the period.
+    pub fn value(self) -> Value {
+        let (Trigger::Becomes(value) | Trigger::Every(value)) = self;
+        value
+    }
+}
+
+/// What changes at an event.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// Its name, for messages.
+    pub name: String,
+    /// What changes.
+    pub target: Target,
+    /// The new value.
+    pub value: Value,
+}
+
+/// What an event can change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A discrete variable: an entry of [`Program::held`](super::Program).
+    Discrete(u32),
+    /// A state that is an integrated signal.
+    Signal(u32),
+    /// A value that follows from what storages keep, brought about by an impulse, an entry of [`Jumps::impulses`].
+    Moved {
+        /// What gets the new value.
+        what: Value,
+        /// The impulse.
+        impulse: u32,
+    },
+}
+
+/// How storages change at events: `Σ factor · (X⁺ - X⁻) = Σ along · P` for each independent variable, all factors as they
+/// are after the event.
+#[derive(Debug, Clone, Default)]
+pub struct Jumps {
+    /// What storages keep, `X`.
+    pub stored: Vec<Value>,
+    /// For each independent variable places in `stored`, with their factors.
+    pub balances: Vec<Vec<(u32, Value)>>,
+    /// The states by which storages tell what they keep and, after all states, conserved constants, ascending.
+    pub unknowns: Vec<u32>,
+    /// The impulses `P`.
+    pub impulses: Vec<Impulse>,
+}
+
+/// The impulse of a reset.
+#[derive(Debug, Clone)]
+pub struct Impulse {
+    /// What tells it: an entry of [`Program::held`](super::Program).
+    pub held: u32,
+    /// The balances in which it stands, with factors.
+    pub along: Vec<(u32, Value)>,
+}
+
+impl Jumps {
+    /// Everything that is evaluated.
+    pub fn values(&self) -> impl Iterator<Item = Value> + '_ {
+        let factors = self.balances.iter().flatten().chain(self.impulses.iter().flat_map(|i| &i.along));
+        self.stored.iter().copied().chain(factors.map(|t| t.1))
+    }
+}
+
+impl Clause {
+    /// Everything that is evaluated.
+    pub fn values(&self) -> impl Iterator<Item = Value> + '_ {
+        let of = |a: &Action| match a.target {
+            Target::Moved { what, .. } => [Some(a.value), Some(what)],
+            _ => [Some(a.value), None],
+        };
+        std::iter::once(self.trigger.value()).chain(self.actions.iter().flat_map(of).flatten())
+    }
+}
+
+/// The events of a form. Resets are left out where the form has no [`Jumps`] of its own: another one makes them.
+pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause> {
+    let graph = &equations.graph;
+    let mut clauses = Vec::new();
+    for clause in &graph.clauses {
+        let trigger = match clause.trigger {
+            bond_graph::Trigger::Becomes(condition) => Trigger::Becomes(lower.value(condition)),
+            bond_graph::Trigger::Every(period) => Trigger::Every(lower.value(period)),
+        };
+        let mut actions = Vec::new();
+        for action in &clause.actions {
+            let Some(target) = target(lower, equations, action) else { continue };
+            actions.push(Action { name: action.name.clone(), target, value: lower.value(action.value) });
+        }
+        clauses.push(Clause { name: clause.name.clone(), trigger, actions, span: clause.span });
+    }
+    clauses
+}
+
+fn target(lower: &mut Lowering, equations: &Equations, action: &bond_graph::Action) -> Option<Target> {
+    let state = |s: Symbol| equations.states.iter().position(|state| state.symbol == s).map(|i| i as u32);
+    match meaning(&equations.graph, action.target) {
+        Some(Meaning::Held(id)) => Some(Target::Discrete(id.index() as u32)),
+        Some(Meaning::Signal(_)) => state(action.target).map(Target::Signal),
+        _ => {
+            let of = |i: &equations::Impulse| Some(i.symbol) == action.impulse;
+            let impulse = equations.jumps.as_ref()?.impulses.iter().position(of)? as u32;
+            Some(Target::Moved { what: lower.defined(action.target)?, impulse })
+        }
+    }
+}
+
+fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {
+    graph.variables.get(&symbol).map(|v| v.meaning)
+}
+
+/// The balances as values; which unknowns they have is told by [`with_unknowns`].
+pub(super) fn jumps(lower: &mut Lowering, equations: &Equations) -> Option<Jumps> {
+    let jumps = equations.jumps.as_ref()?;
+    let stored = jumps.stored.iter().map(|&s| lower.defined(s).expect("what storages keep is defined")).collect();
+    let mut row = |row: &[(usize, crate::algebra::Expr)]| -> Vec<(u32, Value)> {
+        row.iter().map(|&(k, factor)| (k as u32, lower.value(factor))).collect()
+    };
+    let balances = jumps.balances.iter().map(|b| row(b)).collect();
+    let impulse = |i: &equations::Impulse| {
+        let held = match meaning(&equations.graph, i.symbol) {
+            Some(Meaning::Held(id)) => id.index() as u32,
+            _ => panic!("an impulse is a held signal"),
+        };
+        Impulse { held, along: row(&i.along) }
+    };
+    let impulses = jumps.impulses.iter().map(impulse).collect();
+    Some(Jumps { stored, balances, unknowns: Vec::new(), impulses })
+}
+
+/// The same with the states and constants by which storages tell what they keep.
+pub(super) fn with_unknowns(jumps: Jumps, flow: Dataflow<'_>, equations: &Equations) -> Jumps {
+    let states = equations.states.len() + equations.algebraic.len();
+    let dependence = Dependence::new(flow, states as u32, &jumps.stored);
+    let signal = |u: &u32| equations.states.get(*u as usize).is_some_and(|s| s.kind == StateKind::Signal);
+    let mut unknowns: Vec<u32> =
+        jumps.stored.iter().flat_map(|&s| dependence.unknowns_of(s)).copied().filter(|u| !signal(u)).collect();
+    unknowns.sort_unstable();
+    unknowns.dedup();
+    Jumps { unknowns, ..jumps }
+}

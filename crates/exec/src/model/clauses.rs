@@ -1,0 +1,292 @@
+//! What happens at events (`when`): which clauses happen, and what they change.
+//!
+//! All that happens at one instant happens in rounds. The clauses of a round read what there is before it and change it at
+//! once, so that their order says nothing; a clause whose condition becomes true by that happens in the next round.
+
+use super::clause_memory::{ClauseMemory, Condition};
+use super::compiled::Mode;
+use super::{DelayOrSample, Model};
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Program, Target, Trigger, Value};
+use halfarrow_sim::{Affected, Failure};
+
+/// Rounds at one instant at most.
+const MOST_ROUNDS: usize = 200;
+/// The clauses of a program as code.
+#[derive(Debug, Clone)]
+pub(super) struct Clauses {
+    /// Those with conditions, and the routine that computes these.
+    pub conditional: Vec<usize>,
+    becomes: Routine,
+    /// The registers of the periods of the others.
+    periods: Vec<Option<u32>>,
+    /// The new values of each.
+    values: Vec<Routine>,
+    /// Where those of each begin among all.
+    first: Vec<usize>,
+}
+
+impl Clauses {
+    pub fn of(program: &Program, layout: &Layout) -> Clauses {
+        let conditions = program.clauses.iter().enumerate().filter_map(|(i, c)| match c.trigger {
+            Trigger::Becomes(condition) => Some((i, condition)),
+            Trigger::Every(_) => None,
+        });
+        let (conditional, conditions): (Vec<usize>, Vec<Value>) = conditions.unzip();
+        let period = |trigger| match trigger {
+            Trigger::Becomes(_) => None,
+            Trigger::Every(period) => layout.registers.get(&period).copied(),
+        };
+        let values = |c: &halfarrow_compiler::program::Clause| {
+            layout.routine(program, &c.actions.iter().map(|a| a.value).collect::<Vec<_>>())
+        };
+        let lengths = program.clauses.iter().map(|c| c.actions.len());
+        let first = lengths.scan(0, |sum, n| {
+            *sum += n;
+            Some(*sum - n)
+        });
+        Clauses {
+            conditional,
+            becomes: layout.routine(program, &conditions),
+            periods: program.clauses.iter().map(|c| period(c.trigger)).collect(),
+            values: program.clauses.iter().map(values).collect(),
+            first: first.collect(),
+        }
+    }
+
+    pub fn routines(&self) -> impl Iterator<Item = &Routine> {
+        std::iter::once(&self.becomes).chain(&self.values)
+    }
+}
+
+/// Room for what is computed at events.
+#[derive(Debug, Clone, Default)]
+pub(super) struct EventWork {
+    /// Which clauses happen in this round.
+    pub fired: Vec<bool>,
+    /// The new values of all actions, clause by clause.
+    pub values: Vec<f64>,
+    /// What storages keep before the round.
+    pub stored: Vec<f64>,
+}
+
+impl EventWork {
+    pub fn of(mode: &Mode) -> EventWork {
+        let clauses = &mode.program.clauses;
+        EventWork {
+            fired: vec![false; clauses.len()],
+            values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
+            stored: vec![0.0; mode.program.jumps.as_ref().map_or(0, |j| j.stored.len())],
+        }
+    }
+}
+
+impl Model {
+    /// Clauses before a run.
+    pub(super) fn clauses_at_rest(&self) -> Vec<ClauseMemory> {
+        let memory = |register: &Option<u32>| match register {
+            Some(register) => ClauseMemory::Every { period: self.frame.r[*register as usize], next: f64::INFINITY },
+            None => ClauseMemory::Becomes(Condition::begin(false, 0.0)),
+        };
+        self.code.clauses.periods.iter().map(memory).collect()
+    }
+
+    /// A run begins: conditions that hold have not become true, multiples of periods count from time 0.
+    pub(super) fn begin_clauses(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.run.clauses.is_empty() {
+            return Ok(());
+        }
+        self.find_fired(t, x, &[])?;
+        for (memory, fired) in self.run.clauses.iter_mut().zip(&mut self.events.fired) {
+            match memory {
+                ClauseMemory::Becomes(condition) => {
+                    (*condition, *fired) = (Condition::begin(condition.holds, t), false)
+                }
+                ClauseMemory::Every { period, next } => {
+                    *next = (t / *period).floor();
+                    *next += f64::from(u8::from(*next * *period < t));
+                    *fired = t >= *next * *period;
+                    *next += f64::from(u8::from(*fired));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Which conditions hold at `(t, x)`, as held, and which clauses happen: conditions that have become true, periods that
+    /// are over, and those that are told.
+    pub(super) fn find_fired(&mut self, t: f64, x: &[f64], told: &[bool]) -> Result<(), Failure> {
+        if self.run.clauses.is_empty() {
+            return Ok(());
+        }
+        self.place(t, x);
+        let code = self.code.clone();
+        self.frame.run(&code.clauses.becomes).map_err(|error| self.failure(t, error))?;
+        let Model { run, events, frame, .. } = self;
+        events.fired.fill(false);
+        for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
+            let ClauseMemory::Becomes(condition) = &mut run.clauses[clause] else { continue };
+            let seen = told.get(clause).copied().unwrap_or(false);
+            let holds = frame.r[register as usize] != 0.0 || seen;
+            events.fired[clause] = holds && !condition.holds;
+            condition.holds = holds;
+        }
+        for (memory, fired) in run.clauses.iter_mut().zip(&mut events.fired) {
+            if let ClauseMemory::Every { period, next } = memory {
+                while t >= *next * *period {
+                    (*fired, *next) = (true, *next + 1.0);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Which conditions become true at `(t, x)`, without taking notice of it.
+    pub(super) fn becoming(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
+        let code = self.code.clone();
+        let mut becoming = vec![false; code.program.clauses.len()];
+        if code.clauses.conditional.is_empty() {
+            return Ok(becoming);
+        }
+        self.place(t, x);
+        let held = std::mem::replace(&mut self.frame.conditions.state, crate::bytecode::Hold::Follow);
+        let run = self.frame.run(&code.clauses.becomes);
+        self.frame.conditions.state = held;
+        run.map_err(|error| self.failure(t, error))?;
+        for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
+            let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
+            becoming[clause] = self.frame.r[register as usize] != 0.0 && !condition.holds;
+        }
+        Ok(becoming)
+    }
+
+    /// Lets happen what has been found to happen, and what follows from that at the same instant.
+    pub(super) fn run_clauses(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        if self.led {
+            self.events.fired.fill(false);
+        }
+        for round in 0..MOST_ROUNDS {
+            if !self.events.fired.contains(&true) {
+                return Ok(());
+            }
+            self.notice(t)?;
+            self.new_values(t, x)?;
+            self.refuse_conflicts(t)?;
+            self.change(t, x, round == 0)?;
+            self.leave_solutions();
+            self.take_signs(t, x)?;
+            self.find_fired(t, x, &[])?;
+        }
+        let fired = self.code.program.clauses.iter().zip(&self.events.fired).filter(|(_, fired)| **fired);
+        let what: Vec<String> = fired.map(|(c, _)| format!("`{}`", c.name)).collect();
+        Err(Failure::Livelock { time: t, what: what.join(", ") })
+    }
+
+    /// These conditions hold, whatever rounding says.
+    pub(super) fn let_hold(&mut self, which: &[bool]) {
+        for (memory, _) in self.run.clauses.iter_mut().zip(which).filter(|(_, holds)| **holds) {
+            if let ClauseMemory::Becomes(condition) = memory {
+                condition.holds = true;
+            }
+        }
+    }
+
+    /// Takes over discrete variables from another form of the model; whether any differs.
+    pub(super) fn take_discretes(&mut self, from: &Model) -> bool {
+        let mut differ = false;
+        for (own, other) in self.run.delays_and_samples.iter_mut().zip(&from.run.delays_and_samples) {
+            if matches!(other, DelayOrSample::Discrete(_)) && own != other {
+                own.clone_from(other);
+                differ = true;
+            }
+        }
+        differ
+    }
+
+    /// Looks whether events accumulate.
+    fn notice(&mut self, t: f64) -> Result<(), Failure> {
+        let Model { run, events, code, .. } = self;
+        let state = |target| !matches!(target, Target::Discrete(_));
+        let resets = |i: usize| code.program.clauses[i].actions.iter().any(|a| state(a.target));
+        for (i, memory) in run.clauses.iter_mut().enumerate().filter(|(i, _)| events.fired[*i]) {
+            if let ClauseMemory::Becomes(condition) = memory
+                && let Some((interval, end)) = condition.happens(t, run.resolution, resets(i))
+            {
+                let what = code.program.clauses[i].name.clone();
+                return Err(Failure::Accumulation { time: t, what, interval, end });
+            }
+        }
+        Ok(())
+    }
+
+    /// The new values of the clauses of the round, from what there is before it.
+    fn new_values(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        self.place(t, x);
+        for (i, routine) in code.clauses.values.iter().enumerate() {
+            if !self.events.fired[i] {
+                continue;
+            }
+            self.frame.run(routine).map_err(|error| self.failure(t, error))?;
+            for (k, &register) in routine.outputs.iter().enumerate() {
+                let value = self.frame.r[register as usize];
+                if !value.is_finite() {
+                    let clause = &code.program.clauses[i];
+                    let what = format!("the value that `{}` gives {}", clause.name, clause.actions[k].name);
+                    return Err(Failure::NotFinite { time: t, what: Affected::Other(what) });
+                }
+                self.events.values[code.clauses.first[i] + k] = value;
+            }
+        }
+        Ok(())
+    }
+
+    /// The actions of the round, with their clause and the place of their new value.
+    pub(super) fn actions<'m>(
+        code: &'m Mode,
+        work: &'m EventWork,
+    ) -> impl Iterator<Item = (usize, usize, &'m halfarrow_compiler::program::Action)> + 'm {
+        let clauses = code.program.clauses.iter().enumerate().filter(|(i, _)| work.fired[*i]);
+        clauses
+            .flat_map(move |(i, c)| c.actions.iter().enumerate().map(move |(k, a)| (i, code.clauses.first[i] + k, a)))
+    }
+
+    /// Two clauses may change one thing if they give it one value.
+    fn refuse_conflicts(&self, t: f64) -> Result<(), Failure> {
+        let (code, work) = (&*self.code, &self.events);
+        for (i, at, action) in Model::actions(code, work) {
+            for (j, other, earlier) in Model::actions(code, work).take_while(|(j, ..)| *j < i) {
+                if earlier.target == action.target && work.values[other] != work.values[at] {
+                    let name = |clause: usize| code.program.clauses[clause].name.clone();
+                    let by = Box::new([(name(j), work.values[other]), (name(i), work.values[at])]);
+                    return Err(Failure::Conflict { time: t, what: action.name.clone(), by });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes what the round changes: discrete variables and signals, then what storages keep.
+    fn change(&mut self, t: f64, x: &mut [f64], first: bool) -> Result<(), Failure> {
+        let code = self.code.clone();
+        self.take_stored(t, x)?;
+        let positions = self.position_misses(t, x)?;
+        let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
+        let work = std::mem::take(&mut self.events);
+        for (_, at, action) in Model::actions(&code, &work) {
+            match action.target {
+                Target::Discrete(i) => {
+                    self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at])
+                }
+                Target::Signal(i) => x[i as usize] = work.values[at],
+                Target::Moved { .. } => {}
+            }
+        }
+        self.events = work;
+        match code.impulses {
+            Some(_) => self.balance_impulses(t, x, first)?,
+            None => _ = self.conserve_sums(t, x, &sums)?,
+        }
+        self.refuse_broken_positions(t, x, &positions)
+    }
+}

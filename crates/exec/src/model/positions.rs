@@ -1,0 +1,79 @@
+//! Constraints on displacements, which hold after an event as before it.
+
+use super::Model;
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Program, Value};
+use halfarrow_sim::Failure;
+
+/// How far a constraint may be missed after an event, as part of its terms, if it was not before.
+const MISSED: f64 = 1e-9;
+
+/// The constraints on displacements as code: what vanishes.
+#[derive(Debug, Clone)]
+pub(super) struct PositionConstraints {
+    residuals: Routine,
+    names: Vec<String>,
+    /// The states that each reads.
+    reads: Vec<Vec<u32>>,
+}
+
+impl PositionConstraints {
+    /// `None` where there are none, or no event that could move a position.
+    pub fn of(program: &Program, layout: &Layout) -> Option<PositionConstraints> {
+        let firm: Vec<_> = program.start.iter().filter(|c| c.firm).collect();
+        let residuals: Vec<Value> = firm.iter().map(|c| c.residual).collect();
+        let moved = program.clauses.iter().any(|c| !c.actions.is_empty());
+        let states = program.states.len() as u32;
+        let reads = |reads: &[u32]| reads.iter().copied().filter(|u| *u < states).collect();
+        (moved && !firm.is_empty()).then(|| PositionConstraints {
+            residuals: layout.routine(program, &residuals),
+            names: firm.iter().map(|c| c.name.clone()).collect(),
+            reads: firm.iter().map(|c| reads(&c.reads)).collect(),
+        })
+    }
+
+    pub fn routine(&self) -> &Routine {
+        &self.residuals
+    }
+}
+
+impl Model {
+    /// By how much each constraint on displacements is missed.
+    pub(super) fn position_misses(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {
+        let code = self.code.clone();
+        let Some(constraints) = &code.positions else { return Ok(Vec::new()) };
+        self.place(t, x);
+        self.frame.run(&constraints.residuals).map_err(|error| self.failure(t, error))?;
+        Ok(constraints.residuals.outputs.iter().map(|&r| self.frame.r[r as usize].abs()).collect())
+    }
+
+    /// Refuses new positions that a constraint does not allow.
+    pub(super) fn refuse_broken_positions(&mut self, t: f64, x: &[f64], before: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(constraints) = &code.positions else { return Ok(()) };
+        let after = self.position_misses(t, x)?;
+        let fits = |after: f64, before: f64, size: f64| after <= 2.0 * before + MISSED * size;
+        for (i, (after, &before)) in after.into_iter().zip(before).enumerate() {
+            if fits(after, before, 0.0) {
+                continue;
+            }
+            let mut size = 0.0;
+            for &state in &constraints.reads[i] {
+                self.place(t, x);
+                self.still();
+                self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
+                self.frame.run_along(&constraints.residuals).map_err(|error| self.failure(t, error))?;
+                size += (self.frame.d[constraints.residuals.outputs[i] as usize] * x[state as usize]).abs();
+            }
+            if !fits(after, before, size) {
+                let name = &constraints.names[i];
+                let reason = format!(
+                    "the constraint {name} is missed by {after:.3e} then; reset all positions that it reads, so that they fit \
+                     each other"
+                );
+                return Err(Failure::Reset { time: t, what: self.what_is_reset(), reason });
+            }
+        }
+        Ok(())
+    }
+}
