@@ -4,10 +4,6 @@
 const IN_A_ROW: u32 = 8;
 /// What is left until events accumulate, as part of the time that has passed, from which on they do.
 const NEAR: f64 = 1e-10;
-/// Steps of fixed length between two events that are too few to follow what happens between them, where they have got
-/// fewer by a factor.
-const STEPS: f64 = 8.0;
-const SHRUNK: f64 = 4.0;
 /// What passes between two events that is no time, in the same measure.
 const NO_TIME: f64 = 1e-13;
 
@@ -36,8 +32,6 @@ pub(super) struct Condition {
     /// What passed between the last two times, in s, and how many times in a row that was less than before, or nothing.
     interval: f64,
     faster: u32,
-    /// The widest interval, of clauses that reset nothing that since intervals do not get wider, in s.
-    widest: f64,
 }
 
 impl ClauseMemory {
@@ -56,12 +50,12 @@ impl ClauseMemory {
 
 impl Condition {
     pub fn begin(holds: bool, t: f64) -> Condition {
-        Condition { holds, start: t, last: f64::NEG_INFINITY, interval: f64::INFINITY, faster: 0, widest: 0.0 }
+        Condition { holds, start: t, last: f64::NEG_INFINITY, interval: f64::INFINITY, faster: 0 }
     }
 
-    /// Takes notice that the clause happens at `t`, times being told apart by `resolution`, and whether it resets states. Gives what has passed since the last
-    /// time and where its events accumulate, if they do.
-    pub fn happens(&mut self, t: f64, resolution: f64, resets: bool) -> Option<(f64, f64)> {
+    /// Takes notice that the clause happens at `t`. Gives what has passed since the last time and where its events accumulate,
+    /// if they do.
+    pub fn happens(&mut self, t: f64) -> Option<(f64, f64)> {
         if t <= self.last {
             return None;
         }
@@ -72,10 +66,7 @@ impl Condition {
         let ratio = interval / before;
         let left = if ratio < 1.0 { interval * ratio / (1.0 - ratio) } else { 0.0 };
         let near = left <= NEAR * passed && interval <= NEAR * passed;
-        let wider = !resets && interval > before + 1.5 * resolution;
-        self.widest = if wider || before.is_infinite() { interval } else { self.widest.max(interval) };
-        let unresolved = interval <= STEPS * resolution && self.widest >= SHRUNK * interval;
-        (near && self.faster >= IN_A_ROW || unresolved).then_some((interval, t + left))
+        (near && self.faster >= IN_A_ROW).then_some((interval, t + left))
     }
 }
 
@@ -88,7 +79,7 @@ mod tests {
         let mut condition = Condition::begin(false, 0.0);
         let (mut time, mut interval) = (1.0, 0.5);
         for count in 0..100_000 {
-            if let Some((_, end)) = condition.happens(time, 0.0, true) {
+            if let Some((_, end)) = condition.happens(time) {
                 return Some((count, end));
             }
             (time, interval) = (time + interval, interval * factor);
@@ -102,23 +93,6 @@ mod tests {
             let (_, end) = accumulated(factor).expect("it accumulates");
             assert!((end - (1.0 + 0.5 / (1.0 - factor))).abs() < 1e-8, "{factor}: {end}");
         }
-    }
-
-    #[test]
-    fn with_a_fixed_step_it_is_told_before_steps_are_too_long_for_it() {
-        for (factor, most) in [(0.1, 3), (0.5, 10), (0.9, 60)] {
-            let mut condition = Condition::begin(false, 0.0);
-            let (mut time, mut interval) = (1.0f64, 0.5);
-            let told = (0..200).find(|_| {
-                let on_step = (time * 1e3).ceil() * 1e-3;
-                (time, interval) = (time + interval, interval * factor);
-                condition.happens(on_step, 1e-3, true).is_some()
-            });
-            assert!(told.is_some_and(|count| count <= most), "{factor}: {told:?}");
-        }
-        // Evenly, with seven and eight steps in turn.
-        let mut condition = Condition::begin(false, 0.0);
-        assert!((0..10_000).all(|i| condition.happens((f64::from(i) * 7.5).ceil() * 1e-3, 1e-3, true).is_none()));
     }
 
     #[test]

@@ -206,11 +206,9 @@ impl Model {
     /// Looks whether events accumulate.
     fn notice(&mut self, t: f64) -> Result<(), Failure> {
         let Model { run, events, code, .. } = self;
-        let state = |target| !matches!(target, Target::Discrete(_));
-        let resets = |i: usize| code.program.clauses[i].actions.iter().any(|a| state(a.target));
         for (i, memory) in run.clauses.iter_mut().enumerate().filter(|(i, _)| events.fired[*i]) {
             if let ClauseMemory::Becomes(condition) = memory
-                && let Some((interval, end)) = condition.happens(t, run.resolution, resets(i))
+                && let Some((interval, end)) = condition.happens(t)
             {
                 let what = code.program.clauses[i].name.clone();
                 return Err(Failure::Accumulation { time: t, what, interval, end });

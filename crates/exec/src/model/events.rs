@@ -177,8 +177,8 @@ impl Events for Model {
         self.handle(t, x, &[])
     }
 
-    fn resolve_times(&mut self, step: f64) {
-        self.run.resolution = step;
+    fn locates_crossings(&self) -> bool {
+        !self.code.clauses.conditional.is_empty()
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {

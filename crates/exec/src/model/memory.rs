@@ -45,8 +45,6 @@ pub(super) struct Remembered {
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
     pub delays_and_samples: Vec<DelayOrSample>,
-    /// How finely the run tells times apart, in s.
-    pub resolution: f64,
     /// Of each clause of the program.
     pub clauses: Vec<ClauseMemory>,
     /// The piece of each input that holds.

@@ -116,7 +116,6 @@ impl Model {
             conserved: vec![0.0; code.program.conserved.len()],
             scales: vec![0.0; n],
             delays_and_samples: Vec::new(),
-            resolution: 0.0,
             clauses: Vec::new(),
             pieces: vec![None; code.program.inputs.len()],
         };

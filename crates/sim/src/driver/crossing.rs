@@ -2,7 +2,7 @@
 
 use super::{Run, Stepper};
 use crate::Failure;
-use crate::events::{Events, FINEST, first_crossing};
+use crate::events::{Events, FINEST, Signs, first_crossing};
 
 /// Parts of a step by which it is made to go beyond a zero crossing.
 const MARGINS: [f64; 2] = [1e-3, 1e-6];
@@ -16,6 +16,10 @@ impl Run<'_> {
         end: f64,
         point: &mut [f64],
     ) -> Result<(f64, bool), Failure> {
+        let handled = std::mem::take(&mut self.handled);
+        if !S::DENSE && stepper.events().locates_crossings() {
+            return self.accept_by_shorter_steps(stepper, end, point, handled);
+        }
         if !S::DENSE {
             stepper.accept(end, point);
             let crossed = self.signs.crossed(&mut *stepper.events(), end, point)?;
@@ -36,6 +40,41 @@ impl Run<'_> {
                 Ok((time, true))
             }
         }
+    }
+
+    /// The same where there is no dense output, by steps from the same start that end sooner. After an event the inside of the
+    /// step is looked at as well: what has been changed there may come back at once.
+    fn accept_by_shorter_steps<S: Stepper>(
+        &mut self,
+        stepper: &mut S,
+        end: f64,
+        point: &mut [f64],
+        handled: bool,
+    ) -> Result<(f64, bool), Failure> {
+        let Run { signs, inside, time, .. } = self;
+        inside.resize(point.len(), 0.0);
+        let mut crossed = |signs: &mut Signs, t: f64| {
+            match t > *time {
+                true => {
+                    stepper.again(*time, t, point)?;
+                    stepper.accept(t, inside);
+                }
+                false => inside.copy_from_slice(point),
+            }
+            signs.crossed(&mut *stepper.events(), t, inside)
+        };
+        let crossing = match handled || crossed(signs, end)?.is_some() {
+            true => first_crossing(signs, *time, end, &mut crossed)?,
+            false => None,
+        };
+        let (end, indicator) = crossing.map_or((end, None), |(time, indicator)| (time, Some(indicator)));
+        crossed(signs, end)?;
+        point.copy_from_slice(inside);
+        if let Some(indicator) = indicator.filter(|_| self.chatter.is_one(end)) {
+            let what = stepper.events().indicator_name(indicator);
+            return Err(Failure::Chattering { time: end, what });
+        }
+        Ok((end, indicator.is_some()))
     }
 
     /// The first zero crossing in the step that ends at `end`, which it is, and where the step ends now: where its end is

@@ -54,6 +54,8 @@ pub(crate) struct Run<'a> {
     values: Vec<f64>,
     /// A point inside a step.
     inside: Vec<f64>,
+    /// Whether an event has been handled where the run stands.
+    handled: bool,
 }
 
 impl<'a> Run<'a> {
@@ -73,6 +75,7 @@ impl<'a> Run<'a> {
             samples: options.every.map_or(Samples::EveryStep, |every| Samples::Grid(Grid::new(options.from, every))),
             values: vec![0.0; events.observed()],
             inside: Vec::new(),
+            handled: false,
         }
     }
 
@@ -83,7 +86,23 @@ impl<'a> Run<'a> {
         let (values, inside) = (Vec::new(), Vec::new());
         let (samples, watched, seen) = (Samples::Nowhere, false, None);
         let to = options.to;
-        Run { options, time, to, counts, signs, chatter, ticking, sink, watched, seen, samples, values, inside }
+        let handled = true;
+        Run {
+            options,
+            time,
+            to,
+            counts,
+            signs,
+            chatter,
+            ticking,
+            sink,
+            watched,
+            seen,
+            samples,
+            values,
+            inside,
+            handled,
+        }
     }
 
     /// Where it stands.
@@ -93,8 +112,6 @@ impl<'a> Run<'a> {
 
     /// The start counts as an event.
     pub(crate) fn start(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
-        let fixed = matches!(self.options.method, Method::Fixed(_));
-        events.resolve_times(self.options.step.filter(|_| fixed).unwrap_or(0.0));
         self.handle(events, point)?;
         self.accept(events, point)?;
         self.settle(events, point)
@@ -209,6 +226,7 @@ impl<'a> Run<'a> {
 
     fn handle(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
         events.handle_event(self.time, point)?;
+        self.handled = true;
         self.show(events, point)?;
         self.signs.take(events, self.time, point)
     }

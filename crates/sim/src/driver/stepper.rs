@@ -31,7 +31,8 @@ pub(crate) enum Flow {
 /// time event, and `supervise`.
 pub(crate) trait Stepper {
     /// Whether the solution is known inside a step. Then zero crossings are located and samples are taken there. Without it
-    /// a step ends at the next sample, and a zero crossing counts from the end of the step in which it lies.
+    /// a step ends at the next sample, and a zero crossing counts from the end of the step in which it lies, unless
+    /// [`Events::locates_crossings`] asks for shorter steps up to it.
     const DENSE: bool;
 
     /// The events of the system that is stepped, to be given back before the stepper is asked for anything else.
@@ -74,6 +75,15 @@ pub(crate) trait Stepper {
     fn shorten(&mut self, t: f64) -> bool {
         let _ = t;
         false
+    }
+
+    /// Makes the step from `(from, point)` again, without dense output, so that it ends at `end`.
+    ///
+    /// # Errors
+    /// What the system reports.
+    fn again(&mut self, from: f64, end: f64, point: &[f64]) -> Result<(), Failure> {
+        let _ = (from, end, point);
+        Ok(())
     }
 
     /// The step ended at a time event, which is handled next; `corner` as [`Events::is_corner`] tells.

@@ -69,10 +69,10 @@ pub trait Events {
     /// As [`event_indicators`](Events::event_indicators).
     fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure>;
 
-    /// How finely the run that begins tells times apart, in s: the step of a method of fixed step, at whose end a zero crossing
-    /// counts; 0 where they are located.
-    fn resolve_times(&mut self, step: f64) {
-        let _ = step;
+    /// Whether methods of fixed step locate zero crossings too, by shorter steps: what happens there may depend on their
+    /// times. Else they count from the end of the step.
+    fn locates_crossings(&self) -> bool {
+        false
     }
 
     /// The step that ends at `(t, point)` is accepted, or the run starts there: Newton starting points and delay buffers,

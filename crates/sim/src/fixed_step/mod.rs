@@ -1,8 +1,9 @@
 //! Methods with a step of fixed length, for reproducible runs and real time. A step only computes.
 //!
-//! Time events are met exactly, by a shorter step. Zero crossings are not located: the step in which one lies is finished in
-//! the old mode, and the new one holds from its end on. That costs at most an error of the order of the step where the rates
-//! jump, of its square where they only bend.
+//! Time events are met exactly, by a shorter step. Zero crossings of laws are not located: the step in which one lies is
+//! finished in the old mode, and the new one holds from its end on. That costs at most an error of the order of the step where
+//! the rates jump, of its square where they only bend. Where a crossing changes states or discrete variables it is located, by
+//! shorter steps from the same start, in a number of them that is bounded.
 
 mod implicit_midpoint;
 mod matrix;

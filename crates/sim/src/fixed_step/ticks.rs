@@ -51,6 +51,9 @@ impl Stepper for Ticks<'_, '_> {
         self.method.advance(&mut self.system, from, end - from, x)?;
         Ok(end)
     }
+    fn again(&mut self, from: f64, end: f64, x: &[f64]) -> Result<(), Failure> {
+        self.method.advance(&mut self.system, from, end - from, x)
+    }
     fn accept(&mut self, _: f64, x: &mut [f64]) {
         x.copy_from_slice(self.method.advanced());
     }

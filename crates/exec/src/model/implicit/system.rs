@@ -150,9 +150,8 @@ impl Events for ImplicitModel {
         self.settle(t, y, yp)
     }
 
-    fn resolve_times(&mut self, step: f64) {
-        self.reference.resolve_times(step);
-        self.form.resolve_times(step);
+    fn locates_crossings(&self) -> bool {
+        self.reference.locates_crossings()
     }
 
     fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
