@@ -1,4 +1,5 @@
 //! The components that come with the program: each against a closed form, and what is told about them.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;

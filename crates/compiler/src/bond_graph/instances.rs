@@ -68,7 +68,7 @@ impl<'a> Flat<'a> {
         let d = match (usual_name(&kind.text).map(plain), self.offered(&kind.text)) {
             (Some(plain), None) => d.hint(plain),
             (Some(plain), Some(library)) => {
-                d.hint(format!("{plain}; or write `import {library}` above, which has a `{}`", kind.text))
+                d.hint(format!("{plain}; or write `import {library}` above, which has a component of this name"))
             }
             (None, Some(library)) => d.hint(format!("write `import {library}` above, which has it")),
             (None, None) => match near {
