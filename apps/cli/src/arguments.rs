@@ -39,6 +39,13 @@ Examples:
   halfarrow fmt --write car.bond     rewrites the file
   halfarrow fmt --check car.bond     exit status 1 if the layout differs")]
     Fmt(Fmt),
+    /// List the components that come with the program, or show one
+    #[command(after_help = "\
+Examples:
+  halfarrow library                        all, by the library that has them
+  halfarrow library hydraulic              those of std.hydraulic
+  halfarrow library electrical.DCMotor     its law, ports, parameters and text")]
+    Library(Library),
     /// Print what a stage of the compiler makes of a model
     #[command(after_help = "Example:\n  halfarrow show causal_graph car.bond")]
     Show(Show),
@@ -178,6 +185,18 @@ pub struct Fmt {
     /// Print nothing; exit status 1 if the layout differs
     #[arg(long)]
     pub check: bool,
+}
+
+/// `library`.
+#[derive(Debug, Args)]
+pub struct Library {
+    /// A library or a component
+    pub name: Option<String>,
+    #[command(flatten)]
+    pub page: PageArguments,
+    /// Print one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `show`.

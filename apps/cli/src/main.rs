@@ -25,6 +25,7 @@ fn main() -> ExitCode {
         Command::New(a) => commands::new(&a),
         Command::Check(a) => commands::check(&a),
         Command::Fmt(a) => commands::fmt(&a),
+        Command::Library(a) => commands::library(&a),
         Command::Show(a) => commands::show(&a),
         Command::Loops(a) => commands::loops(&a),
         Command::Equations(a) => commands::equations(&a),

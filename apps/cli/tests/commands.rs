@@ -378,7 +378,7 @@ fn drawings_are_svg_or_png() {
 
 #[test]
 fn help_has_an_example_for_every_command() {
-    for command in ["new", "check", "fmt", "show", "loops", "equations", "simulate", "draw"] {
+    for command in ["new", "check", "fmt", "library", "show", "loops", "equations", "simulate", "draw"] {
         let help = stdout(&halfarrow(Path::new("."), &[command, "--help"]));
         assert!(help.contains("Example") && help.contains(&format!("halfarrow {command} ")), "{command}: {help}");
     }

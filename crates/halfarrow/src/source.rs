@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles};
 
+use crate::components::WithLibraries;
 use crate::error::Problem;
 use crate::model::{read_text, utf8};
 
@@ -32,7 +33,7 @@ pub struct Source {
 impl Source {
     /// A text that stands alone. `name` is for messages, and the place beside which files are looked for.
     pub fn text(name: impl Into<String>, text: impl Into<String>) -> Source {
-        Source { name: name.into(), text: text.into(), files: Arc::new(NoFiles) }
+        Source { name: name.into(), text: text.into(), files: Arc::new(WithLibraries(NoFiles)) }
     }
 
     /// A file; what it imports lies in its folder or below.
@@ -57,7 +58,7 @@ impl Source {
     /// The same text with other files: a map from paths to texts, a [`Disk`], or what implements [`Files`].
     #[must_use]
     pub fn with_files(self, files: impl Files + Send + Sync + 'static) -> Source {
-        Source { files: Arc::new(files), ..self }
+        Source { files: Arc::new(WithLibraries(files)), ..self }
     }
 
     /// Its name.
@@ -189,5 +190,13 @@ impl Files for Remembered {
     fn read(&self, path: &str) -> Result<String, FileError> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.entry(path.to_string()).or_insert_with(|| self.files.read(path)).clone()
+    }
+
+    fn library(&self, name: &str) -> Option<String> {
+        self.files.library(name)
+    }
+
+    fn libraries(&self) -> Vec<String> {
+        self.files.libraries()
     }
 }

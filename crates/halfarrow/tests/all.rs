@@ -36,6 +36,8 @@ mod faults_strokes;
 mod forms;
 #[path = "growth.rs"]
 mod growth;
+#[path = "library_std.rs"]
+mod library_std;
 #[path = "linearize.rs"]
 mod linearize;
 #[path = "names.rs"]

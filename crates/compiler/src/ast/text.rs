@@ -40,6 +40,7 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
         StatementKind::Let(list) => write_declarations(out, "let", list),
         StatementKind::Function(f) => write_function(out, f),
         StatementKind::State(s) => write_state(out, s),
+        StatementKind::Import(i) if i.library => *out += &format!("import {}", i.path.text),
         StatementKind::Import(i) => *out += &format!("import {:?}", i.path.text),
         StatementKind::Component(c) => write_component(out, c, level),
         StatementKind::Prefer(paths) => {

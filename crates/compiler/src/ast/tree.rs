@@ -81,7 +81,7 @@ pub enum StatementKind {
     Function(Box<Function>),
     /// `state x' = rate from start`.
     State(Box<State>),
-    /// `import "file.bond"`.
+    /// `import "file.bond"`, `import std.electrical`.
     Import(Import),
     /// `component Name(...) { ... }`.
     Component(Box<Component>),
@@ -174,11 +174,13 @@ pub struct State {
     pub doc: Option<Doc>,
 }
 
-/// `import "file.bond"`.
+/// `import "file.bond"`, or `import std.electrical`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Import {
-    /// The path as written.
+    /// The path, or the name of the library, as written.
     pub path: Doc,
+    /// Whether it is a library.
+    pub library: bool,
 }
 
 /// `component Name(param a, b = 1; port p, q; in u; out y) "doc" { ... }`.

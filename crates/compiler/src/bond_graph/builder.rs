@@ -269,6 +269,9 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// Says of the faults since `before` in which turn of a repetition they were found.
     pub fn met_in(&mut self, here: Here, before: usize) {
+        if let Some(instance) = self.flat.names.outermost(here.scope) {
+            self.faults.in_instance(before, instance);
+        }
         let turn = self.flat.names.turn_around(here);
         if turn != 0 {
             self.faults.in_turn(before, || self.repeats.words(turn));

@@ -49,7 +49,7 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     let Loaded { files: trees, imports, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
     let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
-    let mut flat = flatten::flatten(&trees, &given);
+    let mut flat = flatten::flatten(&trees, &given, files);
     faults.extend(std::mem::take(&mut flat.faults).into_list());
     overrides::refuse_idle(&given, &flat, &mut faults);
     let Built { graph, faults: more, uses } = match flat.lost {

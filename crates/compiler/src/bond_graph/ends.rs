@@ -26,11 +26,11 @@ impl<'a> Flat<'a> {
         if chain.bonds.is_empty() {
             return self.lone_node(&chain.first);
         }
-        let mut from = self.end(here, &chain.first);
+        let mut from = &chain.first;
         for bond in &chain.bonds {
-            let to = self.end(here, &bond.to);
-            self.drawn_bond(here, from, to, bond, pseudo);
-            from = to;
+            let (start, end) = (self.end(here, from, false), self.end(here, &bond.to, true));
+            self.drawn_bond(here, start, end, bond, pseudo);
+            from = &bond.to;
         }
     }
 
@@ -56,8 +56,8 @@ impl<'a> Flat<'a> {
         self.drawn.push(Drawn { from, to, name, here, pseudo, span: from.span.to(to.span) });
     }
 
-    /// What a node of a chain stands for as the end of a bond.
-    fn end(&mut self, here: Here, node: &'a ast::Node) -> End {
+    /// What a node of a chain stands for as the end of a bond, which points at it or not.
+    fn end(&mut self, here: Here, node: &'a ast::Node, pointed_at: bool) -> End {
         match node {
             ast::Node::Missing(span) => End { at: At::Broken, span: *span },
             ast::Node::Declared(element) => {
@@ -67,13 +67,13 @@ impl<'a> Flat<'a> {
                     }
                     Some((Node::Part(part), span)) if span == element.name.span => At::Part(part, None),
                     Some((Node::Instance(inner), span)) if span == element.name.span => {
-                        self.only_port(inner, element.span)
+                        self.usual_port(inner, element.span, pointed_at)
                     }
                     _ => At::Broken,
                 };
                 End { at, span: element.span }
             }
-            ast::Node::Named(path) => End { at: self.named_end(here, path), span: path.span },
+            ast::Node::Named(path) => End { at: self.named_end(here, path, pointed_at), span: path.span },
         }
     }
 
@@ -103,15 +103,23 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// A component with one port can be written as a node; otherwise the port must be named.
-    fn only_port(&mut self, inner: ScopeId, span: Span) -> At {
+    /// A component with one port can be written as a node, and one with two as a `TF`: the bond that points at it ends at
+    /// the first, the other starts at the second. Otherwise the port must be named.
+    fn usual_port(&mut self, inner: ScopeId, span: Span, pointed_at: bool) -> At {
         let Some((component, _)) = self.names.scopes[inner].instance else { return At::Broken };
-        match component.ports.as_slice() {
-            [port] if port.indices.is_empty() => match self.names.scopes[inner].nodes.get(port.name.text.as_str()) {
-                Some(&(Node::Joint(joint), _)) => At::Outside(joint),
-                _ => At::Broken,
-            },
-            ports => {
+        let usual = match component.ports.as_slice() {
+            [port] => Some(port),
+            [first, second] => Some(if pointed_at { first } else { second }),
+            _ => None,
+        };
+        match (usual, component.ports.as_slice()) {
+            (Some(port), ports) if ports.iter().all(|p| p.indices.is_empty()) => {
+                match self.names.scopes[inner].nodes.get(port.name.text.as_str()) {
+                    Some(&(Node::Joint(joint), _)) => At::Outside(joint),
+                    _ => At::Broken,
+                }
+            }
+            (_, ports) => {
                 let list: Vec<&str> = ports.iter().map(|p| p.name.text.as_str()).collect();
                 let title = format!("which port of `{}`?", component.name.text);
                 let name = self.names.scopes[inner].prefix.clone();
@@ -128,7 +136,7 @@ impl<'a> Flat<'a> {
     }
 
     /// What a path stands for as the end of a bond.
-    fn named_end(&mut self, here: Here, path: &'a ast::Path) -> At {
+    fn named_end(&mut self, here: Here, path: &'a ast::Path, pointed_at: bool) -> At {
         let uses = &mut self.uses;
         let visit = &mut |node, span| uses.add(Used::Node(node), span);
         let (node, used) = match self.names.walk(&mut self.repeats, here, path, visit) {
@@ -146,7 +154,7 @@ impl<'a> Flat<'a> {
         match (node, rest) {
             (Node::Part(part), []) => At::Part(part, None),
             (Node::Part(part), [port]) => self.named_port(part, &port.name),
-            (Node::Instance(inner), []) => self.only_port(inner, path.span),
+            (Node::Instance(inner), []) => self.usual_port(inner, path.span, pointed_at),
             (Node::Joint(joint), []) if used == 1 => At::Inside(joint),
             (Node::Joint(joint), []) => At::Outside(joint),
             (Node::Broken, _) => At::Broken,

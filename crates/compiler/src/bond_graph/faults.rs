@@ -62,6 +62,23 @@ impl Faults {
         self.told = self.list.len();
     }
 
+    /// Says of the faults since `before` that lie in another file than the instance in which they were met, where that
+    /// stands. Of several instances with the same fault the first is told.
+    pub fn in_instance(&mut self, before: usize, instance: Span) {
+        for fault in self.list.split_off(before.min(self.list.len())) {
+            let places = std::iter::once(&fault.primary).chain(&fault.others);
+            if places.map(|label| label.span.file).any(|file| file == instance.file) {
+                self.list.push(fault);
+                continue;
+            }
+            let same = |f: &Diagnostic| f.primary == fault.primary && f.code == fault.code && f.title == fault.title;
+            if !self.list.iter().any(same) {
+                self.list.push(fault.also(instance, "met in this instance"));
+            }
+        }
+        self.told = self.told.min(self.list.len());
+    }
+
     /// All faults.
     pub fn into_list(mut self) -> Vec<Diagnostic> {
         for fault in &mut self.list {

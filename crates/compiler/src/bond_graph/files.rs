@@ -10,6 +10,16 @@ pub trait Files {
     /// # Errors
     /// Why it cannot be read.
     fn read(&self, path: &str) -> Result<String, FileError>;
+
+    /// The text of a library, by its name as in `import std.electrical`.
+    fn library(&self, _name: &str) -> Option<String> {
+        None
+    }
+
+    /// The names of the libraries that there are.
+    fn libraries(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Why a file cannot be read.

@@ -4,6 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::families::{Indices, spell};
 use super::faults::Faults;
+use super::files::Files;
 use super::overrides::Given;
 use super::repeat::{MAX_TURNS, Repeats};
 use super::scope::{DeclKind, Here, Names, Node, Scope, ScopeId};
@@ -202,11 +203,13 @@ pub(super) struct Flat<'a> {
     pub lost: bool,
     pub chains: Vec<(Here, &'a ast::Chain, bool)>,
     pub full: bool,
+    /// Where libraries come from.
+    pub files: Option<&'a dyn Files>,
 }
 
 /// Flattens the files of a model, the main one first, with new values of parameters.
-pub(super) fn flatten<'a>(files: &'a [ast::Ast], given: &'a [Given]) -> Flat<'a> {
-    let mut flat = Flat::default();
+pub(super) fn flatten<'a>(trees: &'a [ast::Ast], given: &'a [Given], files: &'a dyn Files) -> Flat<'a> {
+    let mut flat = Flat { files: Some(files), ..Flat::default() };
     flat.names.overrides = given.iter().map(|g| (g.name.as_str(), &g.value)).collect();
     flat.names.scopes.push(Scope {
         prefix: String::new(),
@@ -218,10 +221,10 @@ pub(super) fn flatten<'a>(files: &'a [ast::Ast], given: &'a [Given]) -> Flat<'a>
         nodes: FxHashMap::default(),
         components: FxHashMap::default(),
     });
-    for file in files {
+    for file in trees {
         flat.components(0, &file.statements);
     }
-    for (i, file) in files.iter().enumerate() {
+    for (i, file) in trees.iter().enumerate() {
         if i > 0 {
             flat.refuse_in_import(&file.statements);
         }
@@ -239,6 +242,19 @@ pub(super) fn full_name(prefix: &str, name: &str, indices: &[i64]) -> String {
     full.push_str(prefix);
     spell(&mut full, name, indices);
     full
+}
+
+/// Two components of one name. Of different files, the one that imports is told.
+fn declared_twice(first: &ast::Name, again: &ast::Name) -> Diagnostic {
+    let title = format!("component `{}` is declared twice", first.text);
+    match first.span.file == again.span.file {
+        true => Diagnostic::error(codes::N002, title, again.span, "again")
+            .also(first.span, "declared first")
+            .hint("give one of them another name"),
+        false => Diagnostic::error(codes::N002, title, first.span, "declared here")
+            .also(again.span, "and here, which is imported")
+            .hint("give this one another name, or leave the import out"),
+    }
 }
 
 impl<'a> Flat<'a> {
@@ -264,11 +280,7 @@ impl<'a> Flat<'a> {
             self.faults.push(Diagnostic::error(codes::N003, title, c.name.span, "here").hint("use another name"));
         }
         match self.names.scopes[scope].components.get(name) {
-            Some(&first) => self.faults.push(
-                Diagnostic::error(codes::N002, format!("component `{name}` is declared twice"), c.name.span, "again")
-                    .also(self.names.components[first].1.name.span, "declared first")
-                    .hint("give one of them another name"),
-            ),
+            Some(&first) => self.faults.push(declared_twice(&self.names.components[first].1.name, &c.name)),
             None => {
                 self.names.scopes[scope].components.insert(name, self.names.components.len());
                 self.names.components.push((scope, c));

@@ -8,10 +8,10 @@ use super::flatten::{Flat, Joint, WORDS, full_name};
 use super::repeat::MAX_TURNS;
 use super::scope::{DeclKind, Here, Node, Scope, ScopeId};
 use super::uses::Used;
-use crate::ast;
+use crate::ast::{self, StatementKind};
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
-use crate::span::Span;
+use crate::span::{FileId, Span};
 
 /// The greatest number of components inside one another.
 const MAX_DEPTH: usize = 64;
@@ -63,18 +63,33 @@ impl<'a> Flat<'a> {
         let known = WORDS.iter().map(|w| w.0).chain(self.names.visible_components(scope));
         let title = format!("there is no kind of element `{}`", kind.text);
         let d = Diagnostic::error(codes::N005, title, kind.span, "neither a kind nor a component");
-        let d = match nearest(&kind.text, known) {
-            _ if usual_name(&kind.text).is_some() => {
-                let (word, what) = usual_name(&kind.text).unwrap_or_default();
-                d.hint(format!("write `{word}:{}(…)`: {what}", element.name.text))
+        let near = nearest(&kind.text, known);
+        let plain = |(word, what): (&str, &str)| format!("write `{word}:{}(…)`: {what}", element.name.text);
+        let d = match (usual_name(&kind.text).map(plain), self.offered(&kind.text)) {
+            (Some(plain), None) => d.hint(plain),
+            (Some(plain), Some(library)) => {
+                d.hint(format!("{plain}; or write `import {library}` above, which has a component of this name"))
             }
-            Some(near) => d.hint(format!("did you mean `{near}`?")),
-            None => {
-                d.hint("kinds are 0 1 Se Sf I C R TF GY ZC rSe rSf De Df, and components that are declared or imported")
-            }
+            (None, Some(library)) => d.hint(format!("write `import {library}` above, which has it")),
+            (None, None) => match near {
+                Some(near) => d.hint(format!("did you mean `{near}`?")),
+                None => d.hint(
+                    "kinds are 0 1 Se Sf I C R TF GY ZC rSe rSf De Df, and components that are declared or imported",
+                ),
+            },
         };
         self.faults.push(d);
         self.place(scope, &element.name, indices, Node::Broken);
+    }
+
+    /// The library that has a component of this name.
+    fn offered(&self, component: &str) -> Option<String> {
+        let files = self.files?;
+        files.libraries().into_iter().find(|name| {
+            let parsed = files.library(name).map(|text| ast::parse(&text, FileId(0)));
+            let statements = parsed.map(|p| p.ast.statements).unwrap_or_default();
+            statements.iter().any(|s| matches!(&s.kind, StatementKind::Component(c) if c.name.text == component))
+        })
     }
 
     /// Whether a component contains itself, or components are nested too deeply.

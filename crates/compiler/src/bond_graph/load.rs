@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::files::{FileError, Files, read_beside};
 use crate::ast::{self, Ast, StatementKind};
-use crate::diagnostic::{Diagnostic, Sources, codes};
+use crate::diagnostic::{Diagnostic, Sources, codes, nearest};
 use crate::span::{FileId, Span};
 
 /// The greatest number of files of a model.
@@ -33,7 +33,7 @@ pub(super) fn load(main: Ast, sources: &mut Sources, files: &dyn Files) -> Loade
         faults: Vec::new(),
     };
     let name = loader.sources.name(loader.trees[0].file).to_string();
-    loader.known.insert(name, 0);
+    loader.known.insert((false, name), 0);
     loader.imports_of(0);
     Loaded { files: loader.trees, imports: loader.imports, faults: loader.faults }
 }
@@ -41,8 +41,8 @@ pub(super) fn load(main: Ast, sources: &mut Sources, files: &dyn Files) -> Loade
 struct Loader<'f> {
     files: &'f dyn Files,
     sources: &'f mut Sources,
-    /// Index of the tree of every path that was read, or `None` if it could not be.
-    known: FxHashMap<String, usize>,
+    /// Index of the tree of every library (true) and file that was read, by its name or path.
+    known: FxHashMap<(bool, String), usize>,
     /// Whether the imports of the tree are being followed.
     open: Vec<bool>,
     /// The import that brought the tree, and the tree that it stands in.
@@ -63,8 +63,8 @@ impl Loader<'_> {
                     self.open[tree] = false;
                     stack.pop();
                 }
-                Some((path, span)) => {
-                    if let Some(new) = self.import(tree, &path, span) {
+                Some(import) => {
+                    if let Some(new) = self.import(tree, &import) {
                         stack.push((new, imports(&self.trees[new]).into_iter()));
                     }
                 }
@@ -73,10 +73,12 @@ impl Loader<'_> {
     }
 
     /// Reads one import; gives its tree if it is new.
-    fn import(&mut self, from: usize, path: &str, span: Span) -> Option<usize> {
+    fn import(&mut self, from: usize, import: &ast::Import) -> Option<usize> {
+        let (path, span, library) = (import.path.text.as_str(), import.path.span, import.library);
         let name = self.sources.name(self.trees[from].file).to_string();
-        let near = super::files::beside(&name, path);
-        if let Some(&tree) = self.known.get(&near).or_else(|| self.known.get(path)) {
+        let near = if library { path.to_string() } else { super::files::beside(&name, path) };
+        let known = |path: &str| self.known.get(&(library, path.to_string()));
+        if let Some(&tree) = known(&near).or_else(|| known(path)) {
             self.imports.push((self.trees[tree].file, span));
             self.check_circle(tree, from, span);
             return None;
@@ -86,9 +88,13 @@ impl Loader<'_> {
             self.faults.push(Diagnostic::error(codes::N013, title, span, "this one is too many"));
             return None;
         }
-        match read_beside(self.files, &name, path) {
-            Err(why) => {
-                self.faults.push(unreadable(path, &near, &why, span));
+        let read = match library {
+            true => self.files.library(path).map(|text| (near, text)).ok_or_else(|| self.no_library(path, span)),
+            false => read_beside(self.files, &name, path).map_err(|why| unreadable(path, &near, &why, span)),
+        };
+        match read {
+            Err(fault) => {
+                self.faults.push(fault);
                 None
             }
             Ok((found, text)) => {
@@ -101,9 +107,19 @@ impl Loader<'_> {
                 self.imported_at.push(Some((from, span)));
                 let tree = self.trees.len() - 1;
                 self.imports.push((file, span));
-                self.known.insert(found, tree);
+                self.known.insert((library, found), tree);
                 Some(tree)
             }
+        }
+    }
+
+    fn no_library(&self, name: &str, span: Span) -> Diagnostic {
+        let all = self.files.libraries();
+        let d = Diagnostic::error(codes::N010, format!("there is no library `{name}`"), span, "not known");
+        let d = if all.is_empty() { d } else { d.note(format!("there are {}", all.join(", "))) };
+        match nearest(name, all.iter().map(String::as_str)) {
+            Some(near) => d.hint(format!("did you mean `{near}`?")),
+            None => d.hint("a file is imported by its path, in quotes: `import \"file.bond\"`"),
         }
     }
 
@@ -129,9 +145,9 @@ impl Loader<'_> {
 }
 
 /// The imports of a file.
-fn imports(tree: &Ast) -> Vec<(String, Span)> {
+fn imports(tree: &Ast) -> Vec<ast::Import> {
     let list = tree.statements.iter().filter_map(|s| match &s.kind {
-        StatementKind::Import(i) => Some((i.path.text.clone(), i.path.span)),
+        StatementKind::Import(i) => Some(i.clone()),
         _ => None,
     });
     list.collect()

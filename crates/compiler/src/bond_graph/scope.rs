@@ -224,6 +224,15 @@ impl<'a> Names<'a> {
         here.turn
     }
 
+    /// Where the outermost instance stands in which a scope lies; nothing for that of the model.
+    pub fn outermost(&self, mut scope: ScopeId) -> Option<Span> {
+        let mut found = None;
+        while let Some((_, span)) = self.scopes[scope].instance {
+            (found, scope) = (Some(span), self.scopes[scope].user.scope);
+        }
+        found
+    }
+
     /// A scope and those in which its component is written, from within.
     pub fn around(&self, from: ScopeId) -> impl Iterator<Item = ScopeId> + '_ {
         std::iter::successors(Some(from), |s| self.scopes[*s].parent)

@@ -311,11 +311,16 @@ impl Parser<'_> {
     }
 
     fn import(&mut self) -> Option<Import> {
-        if !self.is(TokenKind::Text) {
-            self.expected("the name of a file, in quotes,");
+        if self.is(TokenKind::Text) {
+            return Some(Import { path: self.quoted(), library: false });
+        }
+        if !self.is(TokenKind::Ident) {
+            self.expected("the name of a file, in quotes, or of a library");
             return None;
         }
-        Some(Import { path: self.quoted() })
+        let span = self.path().span;
+        let text = self.text[span.start as usize..span.end as usize].to_string();
+        Some(Import { path: Doc { text, span }, library: true })
     }
 
     fn component(&mut self) -> Option<Component> {
