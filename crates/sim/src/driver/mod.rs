@@ -16,7 +16,7 @@ pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 use std::ops::ControlFlow;
 
 use crate::events::{Chatter, Events, Signs};
-use crate::{Failure, Method, Options};
+use crate::{Failure, Options};
 use recording::Samples;
 
 /// Why the driver looks up at the end of a step.
