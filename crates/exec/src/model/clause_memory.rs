@@ -2,6 +2,9 @@
 
 /// Times in a row that a clause has to happen faster, or within no time, to accumulate.
 const IN_A_ROW: u32 = 8;
+/// The same where each interval is at most this part of the one before: after a few more it is below rounding.
+const STEEPLY_IN_A_ROW: u32 = 3;
+const STEEP: f64 = 0.1;
 /// What is left until events accumulate, as part of the time that has passed, from which on they do.
 const NEAR: f64 = 1e-10;
 /// What passes between two events that is no time, in the same measure.
@@ -66,7 +69,8 @@ impl Condition {
         let ratio = interval / before;
         let left = if ratio < 1.0 { interval * ratio / (1.0 - ratio) } else { 0.0 };
         let near = left <= NEAR * passed && interval <= NEAR * passed;
-        (near && self.faster >= IN_A_ROW).then_some((interval, t + left))
+        let in_a_row = if ratio <= STEEP { STEEPLY_IN_A_ROW } else { IN_A_ROW };
+        (near && self.faster >= in_a_row).then_some((interval, t + left))
     }
 }
 
@@ -89,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_geometric_series_is_told_with_its_end() {
-        for factor in [0.1, 0.5, 0.8, 0.99] {
+        for factor in [1e-4, 0.01, 0.1, 0.5, 0.8, 0.99] {
             let (_, end) = accumulated(factor).expect("it accumulates");
             assert!((end - (1.0 + 0.5 / (1.0 - factor))).abs() < 1e-8, "{factor}: {end}");
         }
