@@ -58,7 +58,9 @@ fn difference(one: &Exported, found: &Rows, wanted: &Rows) -> (f64, String) {
     let column = |rows: &Rows, k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
     let of = |k: usize| {
         let (found, wanted) = (column(found, k), column(wanted, k));
-        let scale = wanted.iter().fold(0.0_f64, |most, v| most.max(v.abs())).max(f64::MIN_POSITIVE);
+        // Below this a `float` loses digits on the way: the far end of a line that nothing has reached yet.
+        let least = f64::from(f32::MIN_POSITIVE / f32::EPSILON);
+        let scale = wanted.iter().fold(0.0_f64, |most, v| most.max(v.abs())).max(least);
         let off =
             |(a, b): (&f64, &f64)| if (a - b).abs() <= f64::INFINITY { (a - b).abs() / scale } else { f64::INFINITY };
         found.iter().zip(&wanted).map(off).fold(0.0, f64::max)
