@@ -60,7 +60,7 @@ fn values(equations: &Equations, (first, step): (f64, f64)) -> BTreeMap<Symbol, 
             }
             // What is shown holds for any value of what stays implicit.
             EquationStep::Newton { unknowns, body, .. } => {
-                known.extend(unknowns.iter().map(|&u| (u, 0.17)));
+                known.extend(unknowns.iter().enumerate().map(|(i, &u)| (u, 0.17 + 0.31 * i as f64)));
                 for &(symbol, value) in body {
                     let value = at(x, value, &known);
                     known.insert(symbol, value);

@@ -130,6 +130,8 @@ pub struct Start {
     pub states: Vec<f64>,
     /// Its conserved constants.
     pub conserved: Vec<f64>,
+    /// Its positions that iterations determine.
+    pub positions: Vec<f64>,
     /// Typical magnitudes of its states, 0 where unknown.
     pub scales: Vec<f64>,
     /// Magnitudes to which its states grow in a run, 0 where unknown: told to importers of FMUs where `scales` knows none.

@@ -289,6 +289,7 @@ fn start(system: &exec::Model, states: Vec<f64>) -> Result<emit::Start, halfarro
     Ok(emit::Start {
         states,
         conserved: system.conserved().to_vec(),
+        positions: system.positions().to_vec(),
         scales: system.scales().to_vec(),
         grown: Vec::new(),
         times: p.held.iter().map(|h| system.constant(h.time).unwrap_or(f64::NAN)).collect(),

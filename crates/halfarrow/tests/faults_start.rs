@@ -43,8 +43,10 @@ fn near(what: &str, found: f64, wanted: f64) {
 
 fn rests_at(report: &LinearizeReport, wanted: &[(&str, f64)]) {
     for &(name, value) in wanted {
-        let state = report.states.iter().find(|s| s.name == name).unwrap_or_else(|| panic!("no state {name}"));
-        near(name, state.value, value);
+        let states = report.states.iter().map(|s| (&s.name, s.value));
+        let mut all = states.chain(report.positions.iter().map(|p| (&p.name, p.value)));
+        let (_, found) = all.find(|v| v.0 == name).unwrap_or_else(|| panic!("nothing called {name}"));
+        near(name, found, value);
     }
     assert!(report.states.iter().all(|s| s.rate.abs() < 1e-9), "{:?}", report.states);
 }

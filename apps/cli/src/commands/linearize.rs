@@ -58,6 +58,10 @@ fn text(report: &LinearizeReport, page: Page) -> String {
     let unit = |u: &Option<String>| u.clone().unwrap_or_default();
     let states = report.states.iter().map(|s| [s.name.clone(), unit(&s.unit), short(s.value), short(s.rate)]);
     text += &page.table(["state", "unit", "value", "rate"], states);
+    if !report.positions.is_empty() {
+        let positions = report.positions.iter().map(|p| [p.name.clone(), unit(&p.unit), short(p.value)]);
+        text += &page.table(["follows", "unit", "value"], positions);
+    }
     let (inputs, outputs): (Vec<&str>, Vec<&str>) = (
         report.inputs.iter().map(|t| t.name.as_str()).collect(),
         report.outputs.iter().map(|t| t.name.as_str()).collect(),

@@ -128,7 +128,10 @@ fn block(
         });
     }
     let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
-    let Some((named, rows)) = linear(&mut d.x, &torn, &body, &residuals) else {
+    // A matrix that closes positions may be singular anywhere, and the start is to find its own way around that.
+    let positions = torn.iter().any(|s| d.computed.contains(s));
+    let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
+    let Some((named, rows)) = forms else {
         let inner = body.clone();
         ordered.steps.push(EquationStep::Newton { unknowns: torn, body: inner, residuals, elements });
         ordered.assign(body);

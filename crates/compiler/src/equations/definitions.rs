@@ -41,6 +41,10 @@ pub struct Definitions<'a> {
     pub stored: Map<Symbol, Symbol>,
     /// Conserved constants.
     pub constants: BTreeSet<Symbol>,
+    /// Positions that constraints on displacements determine.
+    pub computed: BTreeSet<Symbol>,
+    /// Those of them that are defined by an iteration; at the start they are unknowns.
+    pub positions: BTreeSet<Symbol>,
     /// Unknowns that nothing defines: algebraic ones and free rates of states.
     pub free: BTreeSet<Symbol>,
     /// What algebraic laws give and take: loops are torn there rather than at variables of junctions.
@@ -61,6 +65,8 @@ impl<'a> Definitions<'a> {
             states: Map::new(),
             stored: Map::new(),
             constants: BTreeSet::new(),
+            computed: BTreeSet::new(),
+            positions: BTreeSet::new(),
             free: BTreeSet::new(),
             of_laws: BTreeSet::new(),
             missing: BTreeMap::new(),

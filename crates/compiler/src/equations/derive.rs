@@ -11,11 +11,12 @@ use super::freedom::{self, Sum};
 use super::jumps::readable;
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
+use super::positions::{self, Computed, found_by_iteration};
 use super::stiff::parameters;
 use super::verify::verify;
 use super::{
-    Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Relations, State, StateKind, Unavailable,
-    conserved, domains, expansion, index, observed, relations,
+    Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Position, Relations, State, StateKind,
+    Unavailable, conserved, domains, expansion, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -48,11 +49,13 @@ fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let momenta = form == Form::Minimal;
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
+    let positions = positions::eliminate(&mut assembled, causal);
     let conserved = if momenta { conserved::eliminate(&mut assembled) } else { Vec::new() };
     let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
     assembled.d.x.forget_unwatched(&before);
-    let unordered = UnorderedEquations { conserved, relations, ..UnorderedEquations::of(assembled, Vec::new()) };
+    let unordered =
+        UnorderedEquations { conserved, positions, relations, ..UnorderedEquations::of(assembled, Vec::new()) };
     order_equations(causal, causal, form, unordered)
 }
 
@@ -129,6 +132,7 @@ struct UnorderedEquations<'a> {
     assembled: Assembled<'a>,
     constraints: Vec<AlgebraicConstraint>,
     conserved: Vec<Conserved>,
+    positions: Vec<Computed>,
     relations: Relations,
     breaks: BreakBound,
 }
@@ -140,6 +144,7 @@ impl<'a> UnorderedEquations<'a> {
             assembled,
             constraints,
             conserved: Vec::new(),
+            positions: Vec::new(),
             relations: Relations::default(),
             breaks: BreakBound::default(),
         }
@@ -154,7 +159,7 @@ fn order_equations(
     unordered: UnorderedEquations,
 ) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
-    let UnorderedEquations { mut assembled, constraints, conserved, relations, breaks } = unordered;
+    let UnorderedEquations { mut assembled, constraints, conserved, positions, relations, breaks } = unordered;
     let momenta = assembled.momenta(truth);
     let jumps = assembled.jumps(truth, form)?;
     let Assembled { mut d, states, .. } = assembled;
@@ -181,6 +186,7 @@ fn order_equations(
     let given: BTreeSet<Symbol> = causal.ports.ports.iter().filter(|p| is_law(p.role)).map(|p| p.input).collect();
     let mut ordered = sort(&mut d, &roots, &rates, &given).map_err(|insoluble| no_solution(&d, &insoluble))?;
     ordered.named.iter().for_each(|&(symbol, value)| d.set(symbol, value));
+    d.positions = found_by_iteration(&positions, &ordered.steps);
     if let Some(lost) = lost_in_itself(&d) {
         return Err(through_itself(graph, &d.x, lost));
     }
@@ -210,15 +216,16 @@ fn order_equations(
             span: span_of(graph, s.symbol, s.kind),
         })
         .collect();
+    let positions: Vec<Position> = positions.iter().map(|computed| position(&d, computed)).collect();
     let (algebraic, mut residuals) = unknowns(&d, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, jumps.as_ref())?;
-    let observed = observed::observed(&mut d, &states);
+    let observed = observed::observed(&mut d, &states, &positions);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
-    let mut conditions = if own_start { observed::conditions(&mut d) } else { Vec::new() };
+    let mut conditions = if own_start { observed::conditions(&mut d, &positions) } else { Vec::new() };
     if own_start {
         let free = freedom::conditions(&mut d, causal, &sums, &conditions);
         conditions.extend(free);
@@ -243,6 +250,7 @@ fn order_equations(
         form,
         graph: graph.with_exprs(d.x),
         states,
+        positions,
         algebraic,
         residuals,
         conserved,
@@ -275,6 +283,20 @@ fn order_equations(
 /// The variable of the bond that two elements share, for the one that the second of them has of its own.
 fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
     d.x.untwinned(symbol)
+}
+
+/// A position that constraints determine.
+fn position(d: &Definitions, computed: &Computed) -> Position {
+    let Computed { position, constraint } = computed;
+    let symbol = position.symbol;
+    Position {
+        symbol,
+        name: d.x.name(symbol).to_string(),
+        constraint: *constraint,
+        by_iteration: d.positions.contains(&symbol),
+        unit: unit_of(d.graph, symbol),
+        span: span_of(d.graph, symbol, position.kind),
+    }
 }
 
 /// The algebraic unknowns, and what vanishes: for free rates first, then for these.

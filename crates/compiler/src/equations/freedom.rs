@@ -227,9 +227,9 @@ impl Freedom {
     }
 }
 
-/// A state or a constant.
+/// A state, a constant, or a position that is found by iteration.
 fn is_unknown(d: &Definitions, s: Symbol) -> bool {
-    d.constants.contains(&s) || (d.states.contains_key(&s) && !d.of.contains_key(&s))
+    d.constants.contains(&s) || d.positions.contains(&s) || (d.states.contains_key(&s) && !d.of.contains_key(&s))
 }
 
 /// What an expression reads, through definitions.

@@ -41,7 +41,10 @@ impl Assembled<'_> {
     /// How storages change at the events of a graph; `None` if none can. `truth` is the graph with its exact ports.
     pub(super) fn jumps(&mut self, truth: &CausalGraph, form: Form) -> Result<Option<Jumps>, Diagnostics> {
         let graph = self.d.graph;
-        let ports: Vec<StoragePort> = truth.ports.ports.iter().filter_map(|s| self.storage_port(truth, s)).collect();
+        let mut ports: Vec<StoragePort> =
+            truth.ports.ports.iter().filter_map(|s| self.storage_port(truth, s)).collect();
+        // A spring whose displacement follows from others keeps nothing by itself.
+        ports.retain(|p| !self.d.computed.contains(&p.stored));
         let actions = || graph.clauses.iter().flat_map(|c| &c.actions);
         let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);

@@ -18,6 +18,7 @@ mod jumps;
 mod minimal;
 mod momenta;
 mod observed;
+mod positions;
 mod relations;
 mod rows;
 mod stiff;
@@ -64,6 +65,8 @@ pub struct Equations {
     pub graph: BondGraph,
     /// The states, in order.
     pub states: Vec<State>,
+    /// Positions that constraints on displacements determine: computed, not integrated.
+    pub positions: Vec<Position>,
     /// Unknowns without a rate, in order.
     pub algebraic: Vec<Algebraic>,
     /// What vanishes: one expression for each state whose rate is free, then one for each algebraic unknown.
@@ -154,6 +157,23 @@ pub struct State {
     pub name: String,
     /// Whether it belongs to the graph or to a signal.
     pub kind: StateKind,
+    /// SI unit, where known.
+    pub unit: Option<Unit>,
+    /// Where it comes from.
+    pub span: Span,
+}
+
+/// A position that a constraint on displacements determines: in place of a state.
+#[derive(Debug, Clone)]
+pub struct Position {
+    /// Its symbol, which a step defines.
+    pub symbol: Symbol,
+    /// Its name: `spring.q`, `phi`.
+    pub name: String,
+    /// The constraint that defines it, by its place among those of the graph.
+    pub constraint: usize,
+    /// Whether an iteration finds it, which follows one of several solutions: that which the start has chosen.
+    pub by_iteration: bool,
     /// SI unit, where known.
     pub unit: Option<Unit>,
     /// Where it comes from.

@@ -1,12 +1,13 @@
 //! What can be recorded, and what the start has to satisfy.
 
+use std::collections::BTreeSet;
 use std::hash::BuildHasher;
 
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
 use super::definitions::Definitions;
-use super::{Guess, InitialCondition, Observed, ObservedKind, State, StateKind, Unavailable};
+use super::{Guess, InitialCondition, Observed, ObservedKind, Position, State, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol, SymbolKind};
 use crate::bond_graph::{BondGraph, HeldKind, Kind, Meaning};
 use crate::unit::Unit;
@@ -18,8 +19,8 @@ pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> Str
     same.map_or_else(|| own.to_string(), |n| n.name.clone())
 }
 
-/// Every variable that can be recorded, states and outputs first.
-pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
+/// Every variable that can be recorded, states, computed positions and outputs first.
+pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -> Vec<Observed> {
     let mut all: Vec<Observed> = Vec::new();
     let mut taken: HashTable<usize> = HashTable::new();
     let hash = |name: &str| FxBuildHasher.hash_one(name);
@@ -33,6 +34,14 @@ pub fn observed(d: &mut Definitions, states: &[State]) -> Vec<Observed> {
     for state in states {
         let value = d.x.sym(state.symbol);
         add(state.name.clone(), Ok(value), state.unit.clone(), kind_of(d, state), true);
+    }
+    for position in positions {
+        let value = d.x.sym(position.symbol);
+        let kind = match d.meaning(position.symbol) {
+            Some(Meaning::Stored(_)) => ObservedKind::Displacement,
+            _ => ObservedKind::Signal,
+        };
+        add(position.name.clone(), Ok(value), position.unit.clone(), kind, true);
     }
     let graph = d.graph;
     for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
@@ -165,8 +174,8 @@ pub fn guesses(d: &mut Definitions) -> Vec<Guess> {
     all
 }
 
-/// Start values of storages and signals, and constraints on displacements.
-pub fn conditions(d: &mut Definitions) -> Vec<InitialCondition> {
+/// Start values of storages and signals, and constraints on displacements but for those that hold by definition.
+pub fn conditions(d: &mut Definitions, positions: &[Position]) -> Vec<InitialCondition> {
     let graph = d.graph;
     let mut all = Vec::new();
     let mut add = |d: &mut Definitions, symbol: Symbol, value: Expr, span| {
@@ -187,7 +196,9 @@ pub fn conditions(d: &mut Definitions) -> Vec<InitialCondition> {
             add(d, signal.symbol, value, signal.span);
         }
     }
-    for constraint in graph.constraints.iter().filter(|c| c.holonomic) {
+    let written: BTreeSet<usize> = positions.iter().filter(|p| !p.by_iteration).map(|p| p.constraint).collect();
+    let constraints = graph.constraints.iter().enumerate().filter(|(c, _)| !written.contains(c)).map(|(_, c)| c);
+    for constraint in constraints.filter(|c| c.holonomic) {
         let zero = d.x.int(0);
         all.push(InitialCondition {
             residual: constraint.expr,

@@ -4,6 +4,7 @@ use super::op::Op;
 use super::values::{Reads, Values};
 use super::{Block, BlockId, Parameter, Program, Value};
 use crate::ids::{Id, Table};
+use rustc_hash::FxHashSet;
 
 /// Values with what their operations stand for: solutions of blocks, parameters.
 #[derive(Clone, Copy)]
@@ -23,10 +24,16 @@ impl Program {
 impl<'a> Dataflow<'a> {
     /// Marks what the wanted values read, themselves included; with what parameters alone determine if `deep`.
     pub fn live(self, wanted: &[Value], deep: bool) -> Vec<bool> {
+        self.live_but_for(wanted, deep, &FxHashSet::default())
+    }
+
+    /// The same where some values are given, so that what they read is not.
+    pub fn live_but_for(self, wanted: &[Value], deep: bool, given: &FxHashSet<Value>) -> Vec<bool> {
         let mut live = vec![false; self.values.len()];
         wanted.iter().for_each(|v| live[v.index()] = true);
         for (value, op) in self.values.iter().rev() {
-            if !live[value.index()] || (!deep && self.values.reads(value) == Reads::PARAMETERS) {
+            let ends = (!deep && self.values.reads(value) == Reads::PARAMETERS) || given.contains(&value);
+            if !live[value.index()] || ends {
                 continue;
             }
             match op {

@@ -1,15 +1,17 @@
 //! Which states a value reads.
 
-use super::Value;
 use super::dataflow::Dataflow;
 use super::op::Op;
 use super::values::Reads;
+use super::{Position, Value};
 use crate::ids::Id;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 type Set = Rc<[u32]>;
 
-/// The states, and after them the conserved constants, that values read; what only moves a condition does not count.
+/// The states, and after them the conserved constants and positions that are found by iteration, that values read; what only
+/// moves a condition does not count.
 pub(super) struct Dependence {
     /// By value; none for those that were not wanted and that one other value reads.
     sets: Vec<Option<Set>>,
@@ -17,12 +19,13 @@ pub(super) struct Dependence {
 }
 
 impl Dependence {
-    /// What the wanted values read, of this many states.
-    pub fn new(flow: Dataflow<'_>, states: u32, wanted: &[Value]) -> Dependence {
-        Dependence { sets: flow.state_sets(states, wanted), states }
+    /// What the wanted values read, of this many states. Positions count as unknowns, the first of them with the number
+    /// `positions.0`; where none are named, as what they follow from.
+    pub fn new(flow: Dataflow<'_>, states: u32, positions: (u32, &[Position]), wanted: &[Value]) -> Dependence {
+        Dependence { sets: flow.state_sets(states, positions, wanted), states }
     }
 
-    /// What a wanted value reads, ascending: states by their index, and after them conserved constants.
+    /// What a wanted value reads, ascending: states by their index, and after them conserved constants and positions.
     pub fn unknowns_of(&self, value: Value) -> &[u32] {
         self.sets[value.index()].as_ref().expect("what is wanted has its set")
     }
@@ -37,8 +40,9 @@ impl Dependence {
 impl Dataflow<'_> {
     /// The states, and after them the conserved constants, that each value reads; of values that one other value reads
     /// the set is not kept, so that a long sum has one set.
-    fn state_sets(self, states: u32, wanted: &[Value]) -> Vec<Option<Set>> {
+    fn state_sets(self, states: u32, (first, positions): (u32, &[Position]), wanted: &[Value]) -> Vec<Option<Set>> {
         let none: Set = Rc::from([]);
+        let positions: BTreeMap<Value, u32> = positions.iter().map(|p| p.value).zip(first..).collect();
         let readers = self.readers(wanted);
         let mut sets: Vec<Option<Set>> = Vec::with_capacity(self.values.len());
         let mut blocks: Vec<Option<Set>> = vec![None; self.blocks.len()];
@@ -46,6 +50,7 @@ impl Dataflow<'_> {
             let set = match op {
                 Op::State(i) | Op::Rate(i) => Some(Rc::from([i])),
                 Op::Conserved(i) => Some(Rc::from([states + i])),
+                Op::Solution(..) if positions.contains_key(&value) => Some(Rc::from([positions[&value]])),
                 Op::Sign(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
                 Op::Solution(block, _) => {
                     let all = || self.gathered(&sets, self.blocks[block].reads().collect());

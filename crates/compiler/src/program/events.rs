@@ -166,7 +166,7 @@ pub(super) fn jumps(lower: &mut Lowering, equations: &Equations) -> Option<Jumps
 /// The same with the states and constants by which storages tell what they keep.
 pub(super) fn with_unknowns(jumps: Jumps, flow: Dataflow<'_>, equations: &Equations) -> Jumps {
     let states = equations.states.len() + equations.algebraic.len();
-    let dependence = Dependence::new(flow, states as u32, &jumps.stored);
+    let dependence = Dependence::new(flow, states as u32, (0, &[]), &jumps.stored);
     let signal = |u: &u32| equations.states.get(*u as usize).is_some_and(|s| s.kind == StateKind::Signal);
     let mut unknowns: Vec<u32> =
         jumps.stored.iter().flat_map(|&s| dependence.unknowns_of(s)).copied().filter(|u| !signal(u)).collect();

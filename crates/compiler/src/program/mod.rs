@@ -99,6 +99,9 @@ pub struct Program {
     pub jumps: Option<Jumps>,
     /// States; in implicit form all unknowns, states before algebraic ones.
     pub states: Vec<State>,
+    /// Positions that constraints on displacements determine by an iteration. At the start of a run they are unknowns
+    /// beside the states; from there on each iteration follows the solution that the start has found.
+    pub positions: Vec<Position>,
     /// What the equations are if they are no explicit rates.
     pub implicit: Option<Implicit>,
     /// The value of each variable of the bond graph that has one, by its symbol: the same in all forms of a graph.
@@ -227,6 +230,19 @@ impl Relations {
     }
 }
 
+/// A position that an iteration determines.
+#[derive(Debug, Clone)]
+pub struct Position {
+    /// Its name.
+    pub name: String,
+    /// Its value: a solution of a Newton block, all of whose unknowns are positions.
+    pub value: Value,
+    /// The block.
+    pub block: BlockId,
+    /// Its place among the unknowns of the block.
+    pub unknown: u32,
+}
+
 /// A variable that can be recorded.
 #[derive(Debug, Clone)]
 pub struct Observed {
@@ -243,6 +259,11 @@ pub struct Observed {
 }
 
 impl Program {
+    /// Number of unknowns of the start: states, then conserved constants, then positions.
+    pub fn start_unknowns(&self) -> usize {
+        self.states.len() + self.conserved.len() + self.positions.len()
+    }
+
     /// The parameter that is this, by its number, if there is one.
     pub fn parameter_of(&self, kind: ParameterKind) -> Option<usize> {
         self.parameters.iter().position(|p| p.kind == kind)
@@ -262,7 +283,7 @@ pub struct StartCondition {
     pub firm: bool,
     /// It is about freedom that remains, and gives way to what is given. Such conditions stand last.
     pub weak: bool,
-    /// States (by index) and, after them, conserved constants that the residual reads, ascending.
+    /// States (by index) and, after them, conserved constants and positions that the residual reads, ascending.
     pub reads: Vec<u32>,
     /// Where it stands.
     pub span: Span,
@@ -277,9 +298,9 @@ pub struct StartGuess {
     pub asked: Value,
     /// What vanishes.
     pub residual: Value,
-    /// The state (by index) or, after them, conserved constant that is placed.
+    /// The state (by index) or, after them, conserved constant or position that is placed.
     pub unknown: u32,
-    /// States and, after them, conserved constants that the residual reads, ascending.
+    /// States and, after them, conserved constants and positions that the residual reads, ascending.
     pub reads: Vec<u32>,
     /// Where it stands.
     pub span: Span,

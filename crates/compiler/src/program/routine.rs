@@ -190,6 +190,12 @@ impl Program {
         Builder::new(self, false).build(wanted, &[])
     }
 
+    /// The same at the start of a run, where positions are unknowns like the states: they stand before the routine runs.
+    pub fn start_routine(&self, wanted: &[Value]) -> Routine {
+        let positions = self.positions.iter().map(|p| p.value).collect();
+        Builder { positions, ..Builder::new(self, false) }.build(wanted, &[])
+    }
+
     /// The same, with all divisors guarded that vary.
     pub fn guarded_routine(&self, wanted: &[Value]) -> Routine {
         Builder::new(self, false).build(wanted, &self.watches_of(false))
@@ -233,6 +239,8 @@ impl Program {
 struct Builder<'a> {
     program: &'a Program,
     preamble: bool,
+    /// Positions that are given.
+    positions: FxHashSet<Value>,
     local: FxHashMap<Value, Local>,
     code: Code,
     /// The Newton block that is open.
@@ -261,14 +269,14 @@ enum Item {
 impl<'a> Builder<'a> {
     fn new(program: &'a Program, preamble: bool) -> Self {
         let (local, code, inner) = (FxHashMap::default(), Code::default(), Inner::default());
-        Builder { program, preamble, local, code, inner }
+        Builder { program, preamble, positions: FxHashSet::default(), local, code, inner }
     }
 
     fn build(mut self, wanted: &[Value], pivot_guards: &[u32]) -> Routine {
         let mut roots = wanted.to_vec();
         let guarded = |w: &u32| &self.program.pivot_guards[*w as usize];
         roots.extend(pivot_guards.iter().map(guarded).flat_map(|w| [w.pivot, w.scale]));
-        let live = self.program.dataflow().live(&roots, self.preamble);
+        let live = self.program.dataflow().live_but_for(&roots, self.preamble, &self.positions);
         self.order(&live, pivot_guards).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
         debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);
@@ -280,7 +288,7 @@ impl<'a> Builder<'a> {
         let op = self.program.values.op(v);
         match self.preamble {
             true => op.is_given() && !matches!(op, Op::Parameter(_)),
-            false => op.is_given() || self.program.values.reads(v) == Reads::PARAMETERS,
+            false => op.is_given() || self.program.values.reads(v) == Reads::PARAMETERS || self.positions.contains(&v),
         }
     }
 

@@ -11,8 +11,8 @@ use super::sharing::share;
 use super::start::place_guesses;
 use super::values::Reads;
 use super::{
-    Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Program,
-    Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
+    Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Position,
+    Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
@@ -38,6 +38,7 @@ pub fn schedule(equations: &Equations) -> Program {
         blocks: Table::new(),
         pivot_guards: Vec::new(),
         nonsmooth: Vec::new(),
+        positions: equations.positions.iter().map(|p| p.symbol).collect(),
     };
     let parameters = schedule.parameters();
     schedule.givens(equations);
@@ -90,6 +91,8 @@ struct Schedule<'a> {
     pivot_guards: Vec<PivotGuard>,
     /// Conditions inside Newton blocks, as seen from outside.
     nonsmooth: Vec<ConditionId>,
+    /// Positions that are computed.
+    positions: FxHashSet<Symbol>,
 }
 
 impl Schedule<'_> {
@@ -226,7 +229,10 @@ impl Schedule<'_> {
 
     fn solved(&mut self, block: BlockId, unknowns: &[Symbol]) {
         let values = &self.lower.values;
-        let reads = self.blocks[block].reads().fold(Reads::PARAMETERS, |all, v| all.with(values.reads(v)));
+        // Which of several positions it is does not follow from parameters alone.
+        let from_start = unknowns.iter().any(|s| self.positions.contains(s));
+        let least = if from_start { Reads::STATE } else { Reads::PARAMETERS };
+        let reads = self.blocks[block].reads().fold(least, |all, v| all.with(values.reads(v)));
         for (i, &symbol) in unknowns.iter().enumerate() {
             let value = self.lower.values.add(Op::Solution(block, i as u32), reads.without(Reads::GUESS));
             self.lower.define(symbol, value);
@@ -272,6 +278,7 @@ impl Schedule<'_> {
         let assumed = equations.assumptions.iter();
         let assumptions = assumed.filter_map(|a| assumption(lower, graph, &self.pivot_guards, a)).collect();
         let relations = relations(lower, graph, &equations.relations);
+        let positions = positions(lower, equations);
         let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
 
         let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
@@ -279,7 +286,10 @@ impl Schedule<'_> {
         let rates: Vec<Value> = states.iter().map(|s| s.rate).collect();
         let residuals = conditions.iter().chain(&guesses).map(|vanishing| vanishing.residual);
         let wanted: Vec<Value> = rates.iter().copied().chain(residuals).collect();
-        let dependence = Dependence::new(flow, states.len() as u32, &wanted);
+        let count = states.len() as u32;
+        let first_position = count + equations.conserved.len() as u32;
+        let at_start = Dependence::new(flow, count, (first_position, &positions), &wanted);
+        let dependence = Dependence::new(flow, count, (first_position, &[]), &rates);
         let becomes = clauses.iter().filter(|c| matches!(c.trigger, Trigger::Becomes(_))).map(|c| c.trigger.value());
         let integrated = rates.iter().copied().chain(held.iter().map(|h| h.source)).chain(becomes).collect();
         let program = Program {
@@ -287,13 +297,14 @@ impl Schedule<'_> {
             kept: kept(flow, equations, &momenta),
             jumps: jumps.map(|jumps| events::with_unknowns(jumps, flow, equations)),
             clauses,
-            start: start(equations, &conditions, &dependence),
-            guesses: placed(equations, &guesses, &dependence),
+            start: start(equations, &conditions, &at_start),
+            guesses: placed(equations, &guesses, &at_start),
             conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),
             dependence: rates.iter().map(|&rate| dependence.states_of(rate)).collect(),
             tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
             conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
             states,
+            positions,
             implicit,
             variables,
             momenta,
@@ -432,6 +443,16 @@ fn implicit(lower: &Lowering, equations: &Equations) -> Option<Implicit> {
         indices: equations.indices.clone(),
         carried: carried.collect(),
     })
+}
+
+/// The positions that iterations determine.
+fn positions(lower: &Lowering, equations: &Equations) -> Vec<Position> {
+    let position = |p: &equations::Position| {
+        let value = lower.defined(p.symbol).expect("a step defines every position");
+        let Op::Solution(block, unknown) = lower.values.op(value) else { unreachable!("it is found by an iteration") };
+        Position { name: p.name.clone(), value, block, unknown }
+    };
+    equations.positions.iter().filter(|p| p.by_iteration).map(position).collect()
 }
 
 /// The rows of which all is evaluated.

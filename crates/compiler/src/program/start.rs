@@ -9,14 +9,14 @@ use super::Program;
 pub struct StartGroup {
     /// Indices into [`Program::start`], ascending.
     pub conditions: Vec<usize>,
-    /// Indices of states and, after them, of conserved constants, ascending.
+    /// Indices of states and, after them, of conserved constants and of positions, ascending.
     pub unknowns: Vec<u32>,
 }
 
 impl Program {
     /// Start conditions in groups that share no unknown: first those that read none, then by the least unknown.
     pub fn start_groups(&self) -> Vec<StartGroup> {
-        let n = self.states.len() + self.conserved.len();
+        let n = self.start_unknowns();
         let mut leader: Vec<u32> = (0..n as u32).collect();
         for pair in self.start.iter().flat_map(|c| c.reads.windows(2)) {
             let (a, b) = (find(&mut leader, pair[0]), find(&mut leader, pair[1]));

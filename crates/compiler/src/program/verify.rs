@@ -21,6 +21,7 @@ pub fn verify(program: &Program) -> Result<(), String> {
     program.blocks.ids().try_for_each(|block| square(program, block))?;
     conditions(program)?;
     tables_of_states(program)?;
+    positions(program)?;
     outside(program)
 }
 
@@ -42,6 +43,9 @@ fn values(p: &Program) -> Result<(), String> {
             all(block.index() < p.blocks.len(), || format!("{value:?} is an unknown of no block"))?;
             p.blocks[block].reads().for_each(&mut visit);
             reads = reads.without(Reads::GUESS);
+            if p.positions.iter().any(|position| position.block == block) {
+                reads = reads.with(Reads::STATE);
+            }
         }
         all(before, || format!("{value:?} reads what comes after it"))?;
         all(names_something(p, op), || format!("{value:?} is {op:?}, which there is not"))?;
@@ -148,7 +152,7 @@ fn tables_of_states(p: &Program) -> Result<(), String> {
         reads.windows(2).all(|pair| pair[0] < pair[1]) && reads.last().is_none_or(|&last| (last as usize) < most)
     };
     all(p.dependence.iter().all(|reads| ascending(reads, n)), || "rates read states that there are not".into())?;
-    let unknowns = n + p.conserved.len();
+    let unknowns = p.start_unknowns();
     let reads = p.start.iter().map(|c| &c.reads).chain(p.guesses.iter().map(|g| &g.reads));
     all(reads.into_iter().all(|r| ascending(r, unknowns)), || "starts read unknowns that there are not".into())?;
     let placed = p.guesses.iter().all(|g| g.reads.contains(&g.unknown));
@@ -160,6 +164,20 @@ fn tables_of_states(p: &Program) -> Result<(), String> {
         let lengths = [of.explicit.len(), of.differential.len(), of.indices.len()];
         all(lengths == [n; 3], || format!("{lengths:?} are told of {n} unknowns"))
     })
+}
+
+/// Positions are the solutions of Newton blocks, all of each.
+fn positions(p: &Program) -> Result<(), String> {
+    for position in &p.positions {
+        let newton = matches!(p.blocks[position.block], Block::Newton { .. });
+        let told = p.values.op(position.value) == Op::Solution(position.block, position.unknown);
+        all(newton && told, || format!("{} is no solution of an iteration", position.name))?;
+        let count = p.positions.iter().filter(|other| other.block == position.block).count();
+        all(count == p.blocks[position.block].size(), || {
+            format!("{} has unknowns that are no positions", position.name)
+        })?;
+    }
+    Ok(())
 }
 
 /// What events change is there, and there are as many balances as unknowns.

@@ -31,6 +31,10 @@ flags! {
     parameters
     outputs
     conserved
+    /// Positions that iterations determine.
+    positions
+    /// Such as are sought while running.
+    sought_positions
     tables
     conditions
     sign_conditions

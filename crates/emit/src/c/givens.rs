@@ -9,13 +9,16 @@ use super::write::{Moving, TimeRate};
 use super::written::{Written, written};
 use crate::Real;
 
-/// The places of givens: parameters, what follows from them, time, inputs, held signals, conserved constants, states.
+/// The places of givens: parameters, what follows from them, time, inputs, held signals, conserved constants, states,
+/// positions at the start.
 #[derive(Debug, Clone)]
 pub(super) struct Givens<'a> {
     program: &'a Program,
     real: Real,
     /// The place in `m->c` of each that is computed from parameters.
     derived: FxHashMap<Value, usize>,
+    /// The place in `m->positions` of each that is given at the start.
+    positions: FxHashMap<Value, usize>,
     /// The place of each of them that is read in double precision.
     exact: RefCell<FxHashMap<Value, usize>>,
 }
@@ -25,7 +28,8 @@ impl<'a> Givens<'a> {
         let determined = program.determined(&[]);
         let computed = determined.iter().filter(|v| !program.values.op(**v).is_given());
         let derived = computed.enumerate().map(|(place, &v)| (v, place)).collect();
-        Givens { program, real, derived, exact: RefCell::default() }
+        let positions = program.positions.iter().enumerate().map(|(k, p)| (p.value, k)).collect();
+        Givens { program, real, derived, positions, exact: RefCell::default() }
     }
 
     /// How many values are computed from parameters.
@@ -63,6 +67,9 @@ impl<'a> Givens<'a> {
             Op::Held(i) => written!("m->z[{}]", i),
             Op::Conserved(i) => written!("m->k[{}]", i),
             Op::State(i) => written!("x[{}]", i),
+            Op::Solution(..) if self.positions.contains_key(&value) => {
+                written!("m->positions[{}]", self.positions[&value])
+            }
             _ => written!("m->c[{}]", self.derived[&value]),
         }
     }
@@ -85,24 +92,26 @@ impl<'a> Givens<'a> {
 
     /// Its place in directions of derivatives; none if it is of parameters alone.
     pub fn direction(&self, value: Value) -> Option<usize> {
-        let [_, held, conserved, states, _] = self.directions();
+        let [_, held, conserved, states, positions, _] = self.directions();
         match self.program.values.op(value) {
             Op::Time => Some(0),
             Op::Input(i) => Some(1 + i as usize),
             Op::Held(i) => Some(held + i as usize),
             Op::Conserved(i) => Some(conserved + i as usize),
             Op::State(i) => Some(states + i as usize),
-            _ => None,
+            _ => self.positions.get(&value).map(|k| positions + k),
         }
     }
 
-    /// First places of inputs, held signals, conserved constants and states in directions, and their number of places.
-    pub fn directions(&self) -> [usize; 5] {
+    /// First places of inputs, held signals, conserved constants, states and positions in directions, and their number of
+    /// places.
+    pub fn directions(&self) -> [usize; 6] {
         let p = self.program;
         let held = 1 + p.inputs.len();
         let conserved = held + p.held.len();
         let states = conserved + p.conserved.len();
-        [1, held, conserved, states, states + p.states.len()]
+        let positions = states + p.states.len();
+        [1, held, conserved, states, positions, positions + p.positions.len()]
     }
 
     /// Its derivative in C, if it moves.

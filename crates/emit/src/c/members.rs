@@ -121,6 +121,7 @@ fn of_parameters(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Real, &["rest", "trial_rest"], p.states.len(), about);
     }
     list.arrays(Kind::Real, &["k"], p.conserved.len(), "conserved constants");
+    list.some(Kind::Real, &["positions"], p.positions.len(), "positions at the start of the run");
     list.arrays(Kind::Real, &["z"], p.held.len(), "held signals");
     list.arrays(Kind::Byte, &["set"], p.parameters.len(), "which parameters are set");
     list.one(Kind::Int, &["changed"], "whether any is set");

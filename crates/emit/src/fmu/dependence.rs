@@ -14,6 +14,8 @@ pub(super) struct Knowns {
     pub inputs: BTreeSet<u32>,
     pub parameters: BTreeSet<u32>,
     pub conserved: BTreeSet<u32>,
+    /// Positions that iterations determine: which of several they are follows from the start.
+    pub positions: BTreeSet<usize>,
 }
 
 impl Knowns {
@@ -23,6 +25,7 @@ impl Knowns {
         self.inputs.extend(&other.inputs);
         self.parameters.extend(&other.parameters);
         self.conserved.extend(&other.conserved);
+        self.positions.extend(&other.positions);
     }
 }
 
@@ -51,7 +54,10 @@ pub(super) fn knowns_of(p: &Program, wanted: &[Value]) -> Knowns {
                 open.push(p.parameters[i as usize].default);
             }
             Op::Held(i) => knowns.time |= p.held[i as usize].kind == HeldKind::Delay,
-            Op::Solution(block, _) => open.extend(p.blocks[block].reads()),
+            Op::Solution(block, _) => {
+                knowns.positions.extend(p.positions.iter().position(|position| position.value == v));
+                open.extend(p.blocks[block].reads());
+            }
             Op::Guess(..) | Op::Constant(_) | Op::Rate(_) => {}
             op => op.for_each_operand(|v| open.push(v)),
         }
@@ -59,10 +65,10 @@ pub(super) fn knowns_of(p: &Program, wanted: &[Value]) -> Knowns {
     knowns
 }
 
-/// What each unknown of the start (states, then conserved constants) follows from: the start conditions, and guesses, that
-/// it shares with others.
+/// What each unknown of the start (states, then conserved constants, then positions) follows from: the start conditions,
+/// and guesses, that it shares with others.
 pub(super) fn starts(p: &Program) -> Vec<Knowns> {
-    let n = p.states.len() + p.conserved.len();
+    let n = p.start_unknowns();
     let mut leader: Vec<usize> = (0..n).collect();
     fn find(leader: &[usize], mut u: usize) -> usize {
         while leader[u] != u {
@@ -94,7 +100,7 @@ pub(super) fn starts(p: &Program) -> Vec<Knowns> {
     }
     let at_start = |u: usize| {
         let mut knowns = groups[find(&leader, u)].clone();
-        (knowns.states, knowns.conserved) = Default::default();
+        (knowns.states, knowns.conserved, knowns.positions) = Default::default();
         knowns
     };
     (0..n).map(at_start).collect()
@@ -110,7 +116,9 @@ pub(super) fn at_start(p: &Program, starts: &[Knowns], wanted: &[Value]) -> Know
     }
     let (states, conserved) = (std::mem::take(&mut knowns.states), std::mem::take(&mut knowns.conserved));
     let first = p.states.len();
-    for u in states.iter().map(|&i| i as usize).chain(conserved.iter().map(|&i| first + i as usize)) {
+    let positions = std::mem::take(&mut knowns.positions).into_iter().map(|k| first + p.conserved.len() + k);
+    let conserved = conserved.iter().map(|&i| first + i as usize);
+    for u in states.iter().map(|&i| i as usize).chain(conserved).chain(positions) {
         knowns.add(&starts[u]);
     }
     knowns

@@ -109,6 +109,7 @@ pub fn export_as(
     let start = Start {
         states: x.clone(),
         conserved: model.conserved().to_vec(),
+        positions: model.positions().to_vec(),
         scales: model.scales().to_vec(),
         grown: Vec::new(),
         times: program.held.iter().map(|h| model.constant(h.time).unwrap_or(f64::NAN)).collect(),

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// Registers that keep their contents between routines: parameters, constants and what is computed from them; time,
-/// inputs, held signals, conserved constants, states, each group in order.
+/// inputs, held signals, conserved constants, states, positions at the start, each group in order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Layout {
     /// The register of each value that has a fixed one.
@@ -29,6 +29,8 @@ pub(crate) struct Layout {
     pub states: Register,
     /// First register of their rates; there are some only in implicit form.
     pub rates: Register,
+    /// First register of the positions that are unknowns at the start.
+    pub positions: Register,
     /// Number of fixed registers.
     pub size: u32,
     /// The values of parameters alone, in order.
@@ -55,7 +57,9 @@ impl Layout {
         layout.conserved = layout.held + program.held.len() as u32;
         layout.states = layout.conserved + program.conserved.len() as u32;
         layout.rates = layout.states + program.states.len() as u32;
-        layout.size = layout.rates + if program.implicit.is_some() { program.states.len() as u32 } else { 0 };
+        layout.positions = layout.rates + if program.implicit.is_some() { program.states.len() as u32 } else { 0 };
+        layout.size = layout.positions + program.positions.len() as u32;
+        layout.registers.extend(program.positions.iter().map(|p| p.value).zip(layout.positions..));
         for (value, op) in program.values.iter() {
             let register = match op {
                 Op::Parameter(i) => layout.parameters + i,
@@ -87,6 +91,11 @@ impl Layout {
     /// The code that computes the wanted values from the fixed registers.
     pub fn routine(&self, program: &Program, wanted: &[Value]) -> Routine {
         Allocator::new(self, &FxHashMap::default()).routine(program.routine(wanted).code)
+    }
+
+    /// The same at the start of a run, where positions stand in fixed registers.
+    pub fn start_routine(&self, program: &Program, wanted: &[Value]) -> Routine {
+        Allocator::new(self, &FxHashMap::default()).routine(program.start_routine(wanted).code)
     }
 
     /// The same, with all divisors guarded that vary.

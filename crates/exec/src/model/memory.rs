@@ -42,6 +42,8 @@ pub(super) struct Remembered {
     pub clock_event: Option<f64>,
     /// Values of the conserved constants.
     pub conserved: Vec<f64>,
+    /// Values of the positions that iterations determine, as the last start has found them.
+    pub positions: Vec<f64>,
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
     pub delays_and_samples: Vec<DelayOrSample>,
@@ -89,9 +91,19 @@ impl Model {
         self.frame.solvers.iter_mut().for_each(|s| s.newton.leave());
     }
 
-    /// Forgets the solutions of laws.
+    /// Forgets the solutions of laws; positions are sought from where the start has found them.
     pub(super) fn forget_solutions(&mut self) {
         self.frame.solvers.iter_mut().for_each(|s| s.newton.forget());
+        self.start_at_positions();
+    }
+
+    /// Positions are sought from where the start has found them.
+    pub(super) fn start_at_positions(&mut self) {
+        let Model { run, frame, code, .. } = self;
+        for (position, &value) in code.program.positions.iter().zip(&run.positions) {
+            let newton = &mut frame.solvers[position.block.0 as usize].newton;
+            newton.start_at(position.unknown as usize, value);
+        }
     }
 
     /// The next solution of a block of laws starts where its unknown `i` has this value.

@@ -114,6 +114,7 @@ impl Model {
             signs_taken: None,
             clock_event: None,
             conserved: vec![0.0; code.program.conserved.len()],
+            positions: vec![0.0; code.program.positions.len()],
             scales: vec![0.0; n],
             delays_and_samples: Vec::new(),
             clauses: Vec::new(),
@@ -205,6 +206,11 @@ impl Model {
     /// Values of the conserved constants, as the last start has fixed them.
     pub fn conserved(&self) -> &[f64] {
         &self.run.conserved
+    }
+
+    /// Values of the positions that iterations determine, as the last start has found them.
+    pub fn positions(&self) -> &[f64] {
+        &self.run.positions
     }
 
     /// What a value of parameters alone comes to: a delay, the default of an input.

@@ -3,8 +3,8 @@
 
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
-use crate::bytecode::Routine;
-use halfarrow_compiler::program::{StartGroup, Value};
+use crate::bytecode::{Layout, Routine};
+use halfarrow_compiler::program::{Program, StartGroup, Value};
 use halfarrow_sim::{Affected, Failure};
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ const FAR: f64 = 1e3;
 /// Models with more states are not linearised to estimate typical magnitudes.
 const MOST_LINEARISED: usize = 200;
 
-/// The unknowns of the start: states, then conserved constants.
+/// The unknowns of the start: states, then conserved constants, then positions that iterations determine later on.
 #[derive(Clone)]
 struct Unknowns {
     /// Their values; of those that are not known the first guesses.
@@ -56,7 +56,8 @@ pub(super) struct ConstraintResidual {
 
 impl Model {
     /// The state at the start of a run at `t`, which meets all start conditions; unknowns that they leave free are as
-    /// near to zero, or to what is guessed, as they allow. Fixes the conserved constants. The run starts anew.
+    /// near to zero, or to what is guessed, as they allow. Fixes the conserved constants, and the positions from which
+    /// iterations go on. The run starts anew.
     ///
     /// # Errors
     /// Start values that contradict each other, with fitting ones.
@@ -66,8 +67,16 @@ impl Model {
             return Err(StartError::Failure(failure));
         }
         self.check_asked()?;
+        let x = self.search_start(t)?;
+        if self.scaled {
+            self.run.scales = self.magnitudes(t, &x);
+        }
+        Ok(x)
+    }
+
+    fn search_start(&mut self, t: f64) -> Result<Vec<f64>, StartError> {
         let states = self.code.program.states.len();
-        let n = states + self.run.conserved.len();
+        let n = self.code.program.start_unknowns();
         let mut z = vec![0.0; n];
         for _ in 0..20 {
             let mut unknowns = self.begin_search(t, n);
@@ -75,7 +84,8 @@ impl Model {
             self.solve_groups(t, &mut unknowns)?;
             let settled = z == unknowns.z;
             z = unknowns.z;
-            self.run.conserved.copy_from_slice(&z[states..]);
+            self.give(&z);
+            self.start_at_positions();
             if self.run.delays_and_samples.is_empty() || settled {
                 break;
             }
@@ -83,10 +93,30 @@ impl Model {
             self.begin_delays_and_samples(t, &z[..states]).map_err(StartError::Failure)?;
         }
         z.truncate(states);
-        if self.scaled {
-            self.run.scales = self.magnitudes(t, &z);
-        }
         Ok(z)
+    }
+
+    /// Puts constants and positions of the start where they are read.
+    fn give(&mut self, z: &[f64]) {
+        let (conserved, positions) = z[self.code.program.states.len()..].split_at(self.run.conserved.len());
+        self.run.conserved.copy_from_slice(conserved);
+        self.run.positions.copy_from_slice(positions);
+        let first = self.code.layout.positions as usize;
+        self.frame.r[first..][..positions.len()].copy_from_slice(positions);
+    }
+
+    /// The positions found last with the rates are those from which a start goes on.
+    pub(super) fn keep_positions(&mut self) {
+        let Model { run, frame, code, .. } = self;
+        let solved: Vec<u32> = code.rates.solves.iter().map(|solve| solve.block.0).collect();
+        for (position, kept) in code.program.positions.iter().zip(&mut run.positions) {
+            if !solved.contains(&position.block.0) {
+                continue;
+            }
+            let newton = &mut frame.solvers[position.block.0 as usize].newton;
+            *kept = newton.x[position.unknown as usize];
+        }
+        self.start_at_positions();
     }
 
     /// The unknowns at their first guesses, none of them known.
@@ -95,7 +125,7 @@ impl Model {
         let mut guessed = vec![false; n];
         for guess in self.code.program.guesses.clone() {
             let unknown = guess.unknown as usize;
-            let routine = self.routine_for(&[guess.residual]);
+            let routine = self.start_routine(&[guess.residual]);
             guessed[unknown] = true;
             if self.residuals(t, &routine, &z, Some(&[unknown])).is_err() {
                 continue;
@@ -172,7 +202,7 @@ impl Model {
     /// Scalar Newton iteration for each chosen pair of unknown and condition; marks the solved ones known, gives their number.
     fn solve_each(&mut self, t: f64, unknowns: &mut Unknowns, chosen: &BTreeMap<u32, usize>) -> usize {
         let wanted: Vec<Value> = chosen.values().map(|&c| self.code.program.start[c].residual).collect();
-        let routine = self.routine_for(&wanted);
+        let routine = self.start_routine(&wanted);
         let targets: Vec<usize> = chosen.keys().map(|&u| u as usize).collect();
         let begin: Vec<f64> = targets.iter().map(|&u| unknowns.z[u]).collect();
         let mut best: Vec<(f64, f64)> = targets.iter().map(|&u| (f64::INFINITY, unknowns.z[u])).collect();
@@ -218,7 +248,7 @@ impl Model {
                 continue;
             }
             let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
-            let routine = self.routine_for(&wanted);
+            let routine = self.start_routine(&wanted);
             let known = group.unknowns.iter().all(|&u| unknowns.known[u as usize]);
             if known && self.is_met(t, &routine, &group, &unknowns.z) {
                 continue;
@@ -266,7 +296,7 @@ impl Model {
 
     fn solve_part(&mut self, t: f64, group: &StartGroup, unknowns: &mut Unknowns) -> Result<(), StartError> {
         let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
-        let routine = self.routine_for(&wanted);
+        let routine = self.start_routine(&wanted);
         self.solve_group(t, &routine, group, unknowns)
     }
 
@@ -369,11 +399,12 @@ impl Model {
         })
     }
 
-    /// The names of unknowns: states, then conserved constants.
+    /// The names of unknowns: states, then conserved constants, then positions.
     fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
-        let (states, conserved) = (&self.code.program.states, &self.code.program.conserved);
-        let name = |u: usize| states.get(u).map_or_else(|| &conserved[u - states.len()], |s| &s.name).clone();
-        unknowns.map(|u| name(u as usize)).collect()
+        let Program { states, conserved, positions, .. } = &self.code.program;
+        let names = states.iter().map(|s| &s.name).chain(conserved).chain(positions.iter().map(|p| &p.name));
+        let names: Vec<&String> = names.collect();
+        unknowns.map(|u| names[u as usize].clone()).collect()
     }
 
     /// The limit of damped minimum-norm steps in the movable unknowns.
@@ -462,9 +493,11 @@ impl Model {
         Some(involved.iter().map(|&i| self.start_value(t, group.conditions[i], z, residual[i])).collect())
     }
 
-    /// The holonomic constraints.
+    /// The constraints on displacements that states may miss: those that read computed positions hold by these.
     pub(super) fn constraints(&mut self) -> Vec<ConstraintResidual> {
-        let firm = |c: &usize| self.code.program.start[*c].firm;
+        let Program { start, states, conserved, .. } = &self.code.program;
+        let unknowns = (states.len() + conserved.len()) as u32;
+        let firm = |c: &usize| start[*c].firm && start[*c].reads.iter().all(|&u| u < unknowns);
         let firm: Vec<usize> = (0..self.code.program.start.len()).filter(firm).collect();
         firm.into_iter()
             .map(|c| ConstraintResidual {
@@ -505,7 +538,7 @@ impl Model {
             self.code.program.observed.iter().find(|o| o.name == start.name).and_then(|o| o.value.clone().ok());
         let mut wanted = vec![start.asked];
         wanted.extend(observed);
-        let routine = self.routine_for(&wanted);
+        let routine = self.start_routine(&wanted);
         let run = self.residuals(t, &routine, z, None);
         let value = |i: usize| routine.outputs.get(i).map(|&out| self.frame.r[out as usize]);
         let asked = value(0).unwrap_or(f64::NAN);
@@ -534,21 +567,36 @@ impl Model {
     /// Runs a routine at the start, with directional derivatives along the given unknowns.
     fn residuals(&mut self, t: f64, routine: &Routine, z: &[f64], along: Option<&[usize]>) -> Result<(), Failure> {
         let states = self.code.program.states.len();
-        self.run.conserved.copy_from_slice(&z[states..]);
+        let constants = states + self.run.conserved.len();
+        if z.len() > constants || self.code.program.positions.is_empty() {
+            self.give(z);
+        } else {
+            self.run.conserved.copy_from_slice(&z[states..]);
+        }
         self.place(t, &z[..states]);
         let run = match along {
             None => self.frame.run(routine),
             Some(unknowns) => {
                 self.still();
+                let Layout { states: first, conserved, positions, .. } = self.code.layout;
                 for &u in unknowns {
-                    let base =
-                        if u < states { self.code.layout.states as usize } else { self.code.layout.conserved as usize };
-                    self.frame.d[base + if u < states { u } else { u - states }] = 1.0;
+                    let register = match u {
+                        _ if u < states => first as usize + u,
+                        _ if u < constants => conserved as usize + u - states,
+                        _ => positions as usize + u - constants,
+                    };
+                    self.frame.d[register] = 1.0;
                 }
                 self.frame.run_along(routine)
             }
         };
         run.map_err(|error| self.failure(t, error))
+    }
+
+    fn start_routine(&mut self, wanted: &[Value]) -> Routine {
+        let routine = self.code.layout.start_routine(&self.code.program, wanted);
+        self.frame.reserve(&routine);
+        routine
     }
 
     pub(super) fn routine_for(&mut self, wanted: &[Value]) -> Routine {

@@ -193,6 +193,7 @@ impl Sketch {
             certificate: None,
             states: self.states,
             conserved: self.conserved,
+            positions: Vec::new(),
             relations: Default::default(),
             momenta: Vec::new(),
             jumps: None,

@@ -8,10 +8,10 @@ mod symbolic;
 mod zeros;
 
 use halfarrow_compiler::bond_graph::{self, BondGraph, HeldKind, InputId, Kind, Meaning, Variable};
-use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::equations::{Equations, Form, Position};
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
-use halfarrow_sim::{Events as _, Nobody, Options, simulate};
+use halfarrow_sim::{Events as _, Failure, Nobody, Options, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
@@ -75,6 +75,8 @@ pub struct LinearizeReport {
     pub t: f64,
     /// States, with their values and rates at the point.
     pub states: Vec<StateAt>,
+    /// Positions that constraints compute from these, with their values at the point.
+    pub positions: Vec<PositionAt>,
     /// Inputs.
     pub inputs: Vec<Terminal>,
     /// Outputs.
@@ -117,6 +119,17 @@ pub struct StateAt {
     pub value: f64,
     /// Its rate.
     pub rate: f64,
+    /// SI unit, where known.
+    pub unit: Option<String>,
+}
+
+/// A computed position at the point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PositionAt {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
     /// SI unit, where known.
     pub unit: Option<String>,
 }
@@ -203,6 +216,7 @@ impl Model {
         notes.extend(self.what_holds(&system, &linear, at));
         let symbolic =
             if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
+        let positions = positions(&mut system, &equations, t, &x).map_err(|failure| self.stopped(failure))?;
         let program = system.program();
         let (controllability, observability) = self.reaches(&linear, inputs, &outputs)?;
         Ok(LinearizeReport {
@@ -210,6 +224,7 @@ impl Model {
             at,
             t,
             states: states(program, &x, &linear.rates),
+            positions,
             inputs: inputs.iter().map(|name| terminal(name, input_unit(program, name))).collect(),
             outputs: outputs
                 .iter()
@@ -386,6 +401,21 @@ fn states(program: &Program, x: &[f64], rates: &[f64]) -> Vec<StateAt> {
         unit: unit(&state.unit),
     };
     program.states.iter().zip(x).zip(rates).map(state).collect()
+}
+
+/// The values of computed positions, which from now on are what is recorded.
+fn positions(
+    system: &mut halfarrow_exec::Model,
+    equations: &Equations,
+    t: f64,
+    x: &[f64],
+) -> Result<Vec<PositionAt>, Failure> {
+    let names: Vec<&str> = equations.positions.iter().map(|p| p.name.as_str()).collect();
+    system.record(&names).expect("positions have names and values");
+    let mut values = vec![0.0; names.len()];
+    system.observe(t, x, &mut values)?;
+    let position = |(p, value): (&Position, f64)| PositionAt { name: p.name.clone(), value, unit: unit(&p.unit) };
+    Ok(equations.positions.iter().zip(values).map(position).collect())
 }
 
 fn modes(poles: &[Complex]) -> Vec<Mode> {

@@ -73,8 +73,9 @@ pub(super) struct Sizes {
     pub factors: usize,
     pub factors_order: usize,
     pub factored: usize,
-    /// First places in directions of inputs, held signals, conserved constants and states, and the number of places.
-    pub directions: [usize; 5],
+    /// First places in directions of inputs, held signals, conserved constants, states and positions, and the number of
+    /// places.
+    pub directions: [usize; 6],
     pub indicators: usize,
 }
 

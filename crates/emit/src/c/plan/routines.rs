@@ -31,7 +31,7 @@ impl Routines {
         let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
         let guesses = p.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
         let start = |(kind, number, wanted): (&str, usize, Vec<Value>)| {
-            (format!("ha_start_{kind}_{number}"), p.routine(&wanted))
+            (format!("ha_start_{kind}_{number}"), p.start_routine(&wanted))
         };
         Routines {
             preamble: p.preamble(&p.determined(&[])),

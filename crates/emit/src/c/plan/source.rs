@@ -97,6 +97,8 @@ impl Plan<'_> {
             parameters: !p.parameters.is_empty(),
             outputs: !export.recorded.is_empty(),
             conserved: !p.conserved.is_empty(),
+            positions: !p.positions.is_empty(),
+            sought_positions: !self.sought_positions().is_empty(),
             tables: !p.tables.is_empty(),
             conditions: !p.conditions.is_empty(),
             sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),

@@ -46,7 +46,9 @@ impl Plan<'_> {
         let constants = program.parameters.iter().map(|p| u8::from(p.constant).to_string()).collect();
         let most =
             |of: &dyn Fn(&Group) -> usize| self.groups.iter().filter(|g| g.together).map(of).max().unwrap_or(1).max(1);
-        let [_, held, conserved, states, direction] = self.sizes.directions.map(|place| place.to_string());
+        let [_, held, conserved, states, positions, direction] = self.sizes.directions.map(|place| place.to_string());
+        let (sought, memory): (Vec<String>, Vec<String>) =
+            self.sought_positions().into_iter().map(|(k, place)| (k.to_string(), place.to_string())).unzip();
         let words: Vec<(&str, String)> = vec![
             ("KINDS", lines(self.kinds().map(|k| kind(k).to_string()).collect())),
             ("CLOCK_CONDITIONS", lines(numbers_of(&self.clocks))),
@@ -90,6 +92,10 @@ impl Plan<'_> {
             ("STEP_LENGTH", Real::Double.number(self.export.step)),
             ("START_STATES", real.numbers(&self.export.start.states)),
             ("START_CONSERVED", real.numbers(&self.export.start.conserved)),
+            ("START_POSITIONS", real.numbers(&self.export.start.positions)),
+            ("SOUGHT_COUNT", sought.len().to_string()),
+            ("SOUGHT", sought.join(", ")),
+            ("SOUGHT_PLACES", memory.join(", ")),
             ("CONSTANT_PARAMETERS", lines(constants)),
             ("START_CONDITIONS", program.start.len().to_string()),
             ("START_GROUPS", self.groups.len().to_string()),
@@ -102,8 +108,10 @@ impl Plan<'_> {
             ("LAYOUT_HELD", held),
             ("LAYOUT_CONSERVED", conserved),
             ("LAYOUT_STATES", states),
+            ("LAYOUT_POSITIONS", positions),
             ("COUNT_HELD", program.held.len().to_string()),
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
+            ("COUNT_POSITIONS", program.positions.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
         ];
         let ints = |values: Vec<u32>| lines(values.iter().map(u32::to_string).collect());
@@ -151,6 +159,19 @@ impl Plan<'_> {
         text + &list + "};"
     }
 
+    /// The positions that are sought while running, by number, and where the memory of the model has their last values.
+    pub(super) fn sought_positions(&self) -> Vec<(usize, usize)> {
+        let mut memory = 0;
+        let mut first = std::collections::BTreeMap::new();
+        for (block, reads) in self.newton.iter().zip(&self.reads) {
+            let of = &self.program.blocks[*block];
+            first.insert(*block, memory);
+            memory += 2 * (of.size() + reads + of.matrix().values.pattern().len());
+        }
+        let positions = self.program.positions.iter().enumerate();
+        positions.filter_map(|(k, p)| Some((k, first.get(&p.block)? + p.unknown as usize))).collect()
+    }
+
     fn block_table(&self) -> Written {
         let mut notes = Notes::default();
         let mut text = String::new();
@@ -176,7 +197,7 @@ impl Plan<'_> {
             return String::new();
         }
         let guessed = |u: usize| program.guesses.iter().any(|g| g.unknown as usize == u);
-        let guessed = (0..program.states.len() + program.conserved.len()).map(|u| u8::from(guessed(u)).to_string());
+        let guessed = (0..program.start_unknowns()).map(|u| u8::from(guessed(u)).to_string());
         let mut text = "static const ha_guess ha_guesses[] = {\n".to_string();
         for (i, guess) in program.guesses.iter().enumerate() {
             let row = written!("    {{{}, {}}},\n", guess.unknown, Needed(format!("ha_start_guess_{i}").into()));

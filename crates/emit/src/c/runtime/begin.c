@@ -14,6 +14,9 @@ static int ha_start_values(ha_model *m, double t)
 //if conserved
         $ha_copy(m->k, $ha_start_conserved, HA_NK);
 //end
+//if positions
+        $ha_copy(m->positions, $ha_start_positions, HA_NQ);
+//end
         return $MODEL_OK;
     }
 //if solves_start

@@ -12,7 +12,27 @@ static const $real ha_start_conserved[] = {
 $START_CONSERVED
 };
 //end
+//if positions
+//item ha_start_positions
+static const $real ha_start_positions[] = {
+$START_POSITIONS
+};
+//end
 
+//if sought_positions
+//item ha_seek_positions
+/* Of several positions that fit, the one of the start comes next. */
+static void ha_seek_positions(ha_model *m)
+{
+    static const int sought[] = {$SOUGHT};
+    static const int places[] = {$SOUGHT_PLACES};
+    int i;
+    for (i = 0; i < $SOUGHT_COUNT; ++i) {
+        m->memory[places[i]] = m->positions[sought[i]];
+    }
+}
+
+//end
 //item ha_parameters
 /* What was kept for other parameters is forgotten. */
 static int ha_parameters(ha_model *m)
@@ -30,6 +50,9 @@ static int ha_parameters(ha_model *m)
     }
     if (!m->begun) {
         $ha_fill(m->memory, $0.0, $MEMORY);
+//if sought_positions
+        $ha_seek_positions(m);
+//end
     }
 //end
     status = $ha_preamble_code(m);
@@ -83,6 +106,9 @@ static void ha_restart(ha_model *m)
             m->following[i] = 0;
         }
         $ha_fill(m->memory, $0.0, $MEMORY);
+//if sought_positions
+        $ha_seek_positions(m);
+//end
     }
 //end
 //if held
@@ -125,6 +151,9 @@ int $model_reset($model *m)
     m->step = $STEP_LENGTH;
 //if newton
     m->most_evaluations = 2000;
+//end
+//if positions
+    $ha_copy(m->positions, $ha_start_positions, HA_NQ);
 //end
     return $ha_parameters(m);
 }

@@ -31,7 +31,7 @@ typedef struct {
 //always
 $START_TABLES
 
-enum { HA_START_UNKNOWNS = HA_NX + HA_NK, HA_MOST_AT_ONCE = $MOST_AT_ONCE, HA_MOST_ROWS = $MOST_ROWS, HA_MOST_COLUMNS = $MOST_COLUMNS };
+enum { HA_START_UNKNOWNS = HA_NX + HA_NK + HA_NQ, HA_MOST_AT_ONCE = $MOST_AT_ONCE, HA_MOST_ROWS = $MOST_ROWS, HA_MOST_COLUMNS = $MOST_COLUMNS };
 
 //item ha_start_residuals
 /* Residuals at z and their derivatives along the direction in m->along. */
@@ -39,6 +39,9 @@ static int ha_start_residuals(ha_model *m, double t, ha_start_code code, const $
 {
 //if conserved
     $ha_copy(m->k, z + HA_NX, HA_NK);
+//end
+//if positions
+    $ha_copy(m->positions, z + HA_NX + HA_NK, HA_NQ);
 //end
 //if held
     $ha_place(m, t);
@@ -49,6 +52,11 @@ static int ha_start_residuals(ha_model *m, double t, ha_start_code code, const $
 //item ha_along_unknown
 static $real *ha_along_unknown(ha_model *m, int unknown)
 {
+//if positions
+    if (unknown >= HA_NX + HA_NK) {
+        return &m->along[HA_POSITIONS_AT + unknown - HA_NX - HA_NK];
+    }
+//end
     return &m->along[unknown < HA_NX ? HA_STATES_AT + unknown : HA_CONSERVED_AT + unknown - HA_NX];
 }
 
@@ -557,6 +565,9 @@ static int ha_solve_start_once(ha_model *m, double t, $real *z)
     $ha_copy(m->x, z, HA_NX);
 //if conserved
     $ha_copy(m->k, z + HA_NX, HA_NK);
+//end
+//if positions
+    $ha_copy(m->positions, z + HA_NX + HA_NK, HA_NQ);
 //end
     m->failure.code = $MODEL_OK;
     return $MODEL_OK;

@@ -24,11 +24,13 @@ enum {
     HA_NY = $MODEL_OUTPUTS,
     HA_NZ = $COUNT_HELD,
     HA_NK = $COUNT_CONSERVED,
+    HA_NQ = $COUNT_POSITIONS,
     HA_NG = $COUNT_INDICATORS,
-    /* A direction: time, inputs, held signals, conserved constants, states. */
+    /* A direction: time, inputs, held signals, conserved constants, states, positions at the start. */
     HA_DIRECTION = $LAYOUT_DIRECTION,
     HA_HELD_AT = $LAYOUT_HELD,
     HA_CONSERVED_AT = $LAYOUT_CONSERVED,
-    HA_STATES_AT = $LAYOUT_STATES
+    HA_STATES_AT = $LAYOUT_STATES,
+    HA_POSITIONS_AT = $LAYOUT_POSITIONS
 };
 

@@ -68,6 +68,16 @@ impl Model {
             return Err(EquilibriumError::Relations);
         }
         self.restart();
+        let before = self.run.positions.clone();
+        let found = self.search_equilibrium(t, x);
+        if found.is_err() {
+            self.run.positions = before;
+            self.start_at_positions();
+        }
+        found
+    }
+
+    fn search_equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let leaf = self.leaf(t, x);
         let leaf = leaf.as_ref();
         let refused = match self.settle(leaf, t, x).and_then(|found| self.audited(leaf, t, found)) {

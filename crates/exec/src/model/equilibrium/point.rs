@@ -122,6 +122,7 @@ impl Model {
         x: Vec<f64>,
     ) -> Result<LinearisedPoint, Failure> {
         self.rates_at(t, &x)?;
+        self.keep_positions();
         let rates = self.dx.clone();
         let mut entries = Vec::with_capacity(self.code.sparsity.nonzeros());
         jacobian.visit(self, t, &x, |row, column, _, value| entries.push((row, column, value)))?;
