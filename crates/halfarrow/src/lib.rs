@@ -22,6 +22,7 @@
 #![forbid(unsafe_code)]
 
 mod advice;
+mod alternatives;
 mod audited;
 mod check;
 mod clock;

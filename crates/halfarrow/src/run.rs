@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{Element, Kind, ParameterKind, PortRef, Storage};
@@ -18,6 +19,7 @@ use halfarrow_trace::Trace;
 use serde::Serialize;
 
 use crate::advice::{advice, off_step};
+use crate::alternatives::Alternatives;
 use crate::audited::{AuditReport, Audited};
 use crate::clock::Moment;
 use crate::compiled::Ready;
@@ -133,6 +135,8 @@ pub struct RunReport {
     pub corners: usize,
     /// Switching conditions that changed their side.
     pub switches: usize,
+    /// How often other variables became independent, near positions where the first ones do not tell the motion.
+    pub exchanges: usize,
     /// Whether the stiff method took over.
     pub stiff: bool,
     /// What ran as machine code, and why.
@@ -420,6 +424,7 @@ impl Model {
             jumps: summary.jumps,
             corners: summary.corners,
             switches: summary.crossings,
+            exchanges: summary.exchanges,
             stiff: summary.stiff,
             execution: Vec::new(),
             audit,
@@ -431,7 +436,9 @@ impl Model {
 
     pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
         let program = self.program_of(equations);
-        self.watch.time("code", || exec::Model::new(program)).map_err(|failure| self.stopped(failure))
+        let alternatives = Arc::new(Alternatives { graph: self.graph.clone() });
+        let code = || exec::Model::of(Arc::new(exec::Compiled::new(program).with_alternatives(alternatives)));
+        self.watch.time("code", code).map_err(|failure| self.stopped(failure))
     }
 
     /// Says of a value that is not finite at the start which stored quantity it comes from, if that starts at 0 since nothing

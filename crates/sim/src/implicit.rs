@@ -107,7 +107,7 @@ fn by_bdf(
     let end = {
         let shared = Shared::semi_explicit(&mut states, differential);
         let end = checked.and_then(|()| crate::variable_step::run(&mut run, &shared, y));
-        counted_in(run.ended(end), &shared.system())
+        counted_in(run.ended(end), shared.system().work())
     };
     yp.copy_from_slice(states.last_rates());
     end

@@ -69,15 +69,35 @@ impl<'a> Shared<'a> {
 /// A system whose evaluations are counted.
 pub(crate) struct Counted<'a> {
     system: &'a mut dyn HybridSystem,
+    work: Work,
+}
+
+/// What was evaluated.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Work {
     pub(crate) rates: usize,
     pub(crate) tangents: usize,
     /// Where the rates had no finite value last.
     pub(crate) without_rates: Option<(f64, Vec<f64>)>,
 }
 
+impl Work {
+    /// Both, one after the other.
+    pub(crate) fn add(&mut self, later: Work) {
+        self.rates += later.rates;
+        self.tangents += later.tangents;
+        self.without_rates = later.without_rates.or_else(|| self.without_rates.take());
+    }
+}
+
 impl<'a> Counted<'a> {
     pub(crate) fn new(system: &'a mut dyn HybridSystem) -> Counted<'a> {
-        Counted { system, rates: 0, tangents: 0, without_rates: None }
+        Counted { system, work: Work::default() }
+    }
+
+    /// What was evaluated so far.
+    pub(crate) fn work(&self) -> Work {
+        self.work.clone()
     }
 
     pub(crate) fn events(&mut self) -> &mut (dyn Events + 'a) {
@@ -96,15 +116,15 @@ impl System for Counted<'_> {
         self.system.scales()
     }
     fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
-        self.rates += 1;
+        self.work.rates += 1;
         let done = self.system.rates(t, x, dx);
         if matches!(done, Err(Failure::NotFinite { .. })) {
-            self.without_rates = Some((t, x.to_vec()));
+            self.work.without_rates = Some((t, x.to_vec()));
         }
         done
     }
     fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
-        self.tangents += 1;
+        self.work.tangents += 1;
         self.system.directional_derivative(t, x, v, jv)
     }
     fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {

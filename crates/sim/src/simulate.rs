@@ -1,8 +1,8 @@
 //! A whole run of an explicit system.
 
-use crate::driver::{Run, Sink, Stopped, Summary};
-use crate::fixed_step::{FixedStep, Ticks};
-use crate::shared::{Counted, Shared};
+use crate::driver::{Flow, Run, Sink, Stopped, Summary};
+use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
+use crate::shared::{Counted, Shared, Work};
 use crate::{Affected, Failure, HybridSystem, Method, Options, System};
 
 /// Integrates `system` from the state `x` at `options.from` to `options.to`, and leaves the last state reached in `x`.
@@ -22,31 +22,45 @@ pub fn simulate(
     }
     match (options.method, options.step) {
         (Method::Fixed(method), Some(step)) => {
-            let mut method = FixedStep::new(method, system.sparsity());
-            let mut ticks = Ticks::new(&mut method, Counted::new(system), (options.from, step));
-            let end = fixed(&mut run, &mut ticks, x);
-            counted_in(run.ended(end), ticks.system())
+            let mut work = Work::default();
+            let end = run.start(system, x).and_then(|()| fixed(&mut run, system, (method, step), x, &mut work));
+            counted_in(run.ended(end), work)
         }
         _ => {
             let shared = Shared::new(system);
             let end = crate::variable_step::run(&mut run, &shared, x);
-            counted_in(run.ended(end), &shared.system())
+            let work = shared.system().work();
+            counted_in(run.ended(end), work)
         }
     }
 }
 
-fn fixed(run: &mut Run<'_>, ticks: &mut Ticks<'_, '_>, x: &mut [f64]) -> Result<(), Failure> {
-    run.start(ticks.system().events(), x)?;
-    run.drive(ticks, x).map(|_| ())
+fn fixed(
+    run: &mut Run<'_>,
+    system: &mut dyn HybridSystem,
+    (method, step): (FixedMethod, f64),
+    x: &mut [f64],
+    work: &mut Work,
+) -> Result<(), Failure> {
+    loop {
+        let mut method = FixedStep::new(method, system.sparsity());
+        let mut ticks = Ticks::new(&mut method, Counted::new(system), (run.options.from, step));
+        let end = run.drive(&mut ticks, x);
+        work.add(ticks.system().work());
+        // Where it hands over, its states are others.
+        if end? == Flow::GoOn {
+            return Ok(());
+        }
+    }
 }
 
 /// What came of a run, with what was evaluated.
 #[allow(clippy::result_large_err, reason = "a run fails once")]
-pub(crate) fn counted_in(end: Result<Summary, Stopped>, system: &Counted<'_>) -> Result<Summary, Stopped> {
-    let counted = |summary| Summary { rates: system.rates, tangents: system.tangents, ..summary };
+pub(crate) fn counted_in(end: Result<Summary, Stopped>, work: Work) -> Result<Summary, Stopped> {
+    let counted = |summary| Summary { rates: work.rates, tangents: work.tangents, ..summary };
     let stopped = |stopped: Stopped| Stopped {
         summary: counted(stopped.summary),
-        without_rates: system.without_rates.clone(),
+        without_rates: work.without_rates.clone(),
         ..stopped
     };
     end.map(counted).map_err(stopped)

@@ -1,6 +1,6 @@
 //! A run that the caller takes from one time to the next.
 
-use crate::driver::{Nobody, Position, Run};
+use crate::driver::{Flow, Nobody, Position, Run};
 use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
 use crate::shared::Counted;
 use crate::simulate::check_start;
@@ -44,9 +44,14 @@ impl Stepwise {
     /// What the system reports: the run has stopped there, and `x` holds the last state reached.
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     pub fn advance(&mut self, system: &mut dyn HybridSystem, to: f64, x: &mut [f64]) -> Result<(), Stopped> {
+        let Method::Fixed(kind) = self.options.method else { unreachable!("it is made with one") };
         self.run(|run, method| {
             run.to = to;
-            run.drive(&mut Ticks::one(method, Counted::new(system)), x).map(|_| ())
+            // Where it hands over, the states of the system are others.
+            while run.drive(&mut Ticks::one(method, Counted::new(system)), x)? == Flow::HandOver {
+                *method = FixedStep::new(kind, system.sparsity());
+            }
+            Ok(())
         })
     }
 

@@ -260,6 +260,9 @@ fn summary(report: &RunReport) -> String {
     if report.jumps + report.switches > 0 {
         text += &format!(", {} jumps and {} switches met", report.jumps, report.switches);
     }
+    if report.exchanges > 0 {
+        text += &format!(", {} exchanges of independent variables", report.exchanges);
+    }
     if report.corners > 0 {
         text += &format!(", {} corners of inputs", report.corners);
     }

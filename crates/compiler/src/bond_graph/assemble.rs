@@ -120,6 +120,7 @@ impl Builder<'_, '_> {
             clauses: laws.clauses,
             lets: laws.lets,
             outputs: laws.outputs,
+            point: None,
             preferences: asked.preferences,
             forced_causality: asked.forced_causality,
             forced_strokes: asked.forced_strokes,

@@ -128,6 +128,8 @@ pub struct BondGraph {
     pub lets: Vec<Named>,
     /// Outputs, in order, fully expanded.
     pub outputs: Vec<Named>,
+    /// Values of variables at which it is decided what stays independent; those of the start where there are none.
+    pub point: Option<Map<Symbol, f64>>,
     /// `prefer`, in order.
     pub preferences: Vec<Preference>,
     /// `causality`.
@@ -630,6 +632,7 @@ impl BondGraph {
             clauses: self.clauses.clone(),
             lets: self.lets.clone(),
             outputs: self.outputs.clone(),
+            point: self.point.clone(),
             preferences: self.preferences.clone(),
             forced_causality: self.forced_causality.clone(),
             forced_strokes: self.forced_strokes.clone(),

@@ -56,6 +56,11 @@ pub(super) fn slope(x: &Exprs, graph: &BondGraph, point: &NumericPoint, port: Po
     (size.is_finite() && size > 0.0).then_some(Slope { size, straight })
 }
 
+/// The magnitude of the slope of a port's law at a point, as [`slope`] has it.
+pub(crate) fn magnitude_of_slope(x: &Exprs, graph: &BondGraph, point: &NumericPoint, port: PortRef) -> Option<f64> {
+    slope(x, graph, point, port).map(|slope| slope.size)
+}
+
 /// The growth factor of rounding errors in a part with this causality; infinite where a divisor vanishes.
 pub(super) fn cost(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut NumericPoint) -> f64 {
     if solved.watched.iter().any(|&divisor| vanishes(x, divisor, point)) {

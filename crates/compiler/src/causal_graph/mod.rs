@@ -29,6 +29,7 @@ use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
 pub use contradiction::warnings;
+pub(crate) use digits::magnitude_of_slope;
 pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};
 pub use ports::Virtual;
 pub(crate) use ports::{circuits, imposes_effort, rank_given};

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::algebra::{Expr, Exprs, NumericPoint, Symbol};
-use crate::bond_graph::{BondGraph, Kind, Meaning, Storage, StorageLaw};
+use crate::algebra::{Expr, Exprs, Node, NumericPoint, Symbol};
+use crate::bond_graph::{BondGraph, Guess, Kind, Meaning, Storage, StorageLaw};
 use crate::ids::Map;
 
 /// Values of all variables of a graph at the start: given positions, and for the others a solution of the constraints.
@@ -33,7 +33,10 @@ pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
         values.insert(symbol, read(&values, e));
         open.remove(&symbol);
     }
-    close(x, graph, &open, &mut values);
+    match &graph.point {
+        Some(point) => values.extend(point.iter().map(|(&s, &v)| (s, v))),
+        None => close(x, graph, &open, &mut values),
+    }
     for held in graph.held.values() {
         values.insert(held.symbol, read(&values, held.source));
     }
@@ -83,8 +86,15 @@ fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map
     let slopes: Vec<Vec<Expr>> =
         constraints.iter().map(|&e| unknowns.iter().map(|&s| x.derivative(e, s)).collect()).collect();
     let mut best: Option<(f64, Vec<f64>)> = None;
+    let read = |values: &Map<Symbol, f64>, e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
+    let guessed = |g: &Guess| match x.node(g.what) {
+        &Node::Symbol(symbol) => Some((symbol, read(values, g.value))),
+        _ => None,
+    };
+    let guessed: Vec<(Symbol, f64)> = graph.guesses.iter().filter_map(guessed).collect();
     for beginning in BEGINNINGS {
         unknowns.iter().for_each(|&s| _ = values.insert(s, beginning));
+        values.extend(guessed.iter().filter(|(s, _)| unknowns.contains(s)).copied());
         let missed = approach(&x, &constraints, &slopes, &unknowns, values);
         if best.as_ref().is_none_or(|(known, _)| missed < *known) {
             best = Some((missed, unknowns.iter().map(|s| values[s]).collect()));

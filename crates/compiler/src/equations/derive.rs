@@ -7,6 +7,7 @@ use super::assumptions::assumptions;
 use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
+use super::exchanges::{Exchanges, exchanges};
 use super::freedom::{self, Sum};
 use super::jumps::readable;
 use super::minimal::{Assembled, assemble};
@@ -162,6 +163,10 @@ fn order_equations(
     let UnorderedEquations { mut assembled, constraints, conserved, positions, relations, breaks } = unordered;
     let momenta = assembled.momenta(truth);
     let jumps = assembled.jumps(truth, form)?;
+    let exchanges = match form {
+        Form::Minimal => exchanges(&mut assembled, truth),
+        _ => Exchanges::default(),
+    };
     let Assembled { mut d, states, .. } = assembled;
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
@@ -271,6 +276,7 @@ fn order_equations(
         breaks,
         tracked,
         momenta,
+        exchanges,
         jumps,
         free_rates,
         certificate: None,

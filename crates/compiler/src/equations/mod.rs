@@ -8,6 +8,7 @@ mod conserved;
 mod definitions;
 mod derive;
 mod domains;
+mod exchanges;
 mod expansion;
 mod form;
 mod forms;
@@ -40,6 +41,7 @@ pub(crate) use blocks::{Ordered, substituted};
 pub use definitions::Definition;
 pub(crate) use definitions::Definitions;
 pub use derive::derive_equations;
+pub use exchanges::{Exchanged, Exchanges};
 pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
 pub use jumps::{Impulse, Jumps};
@@ -105,6 +107,8 @@ pub struct Equations {
     pub tracked: Vec<Symbol>,
     /// Sums of stored quantities that no jump of a source changes; speeds as [`tracked`](Equations::tracked) names them.
     pub momenta: Vec<Momentum>,
+    /// Which variables could be independent in place of others, where divisors may vanish while running.
+    pub exchanges: Exchanges,
     /// How storages change at events; none where no event changes them, and in forms that go by the minimal one there.
     pub jumps: Option<Jumps>,
     /// Rates that nothing defines.

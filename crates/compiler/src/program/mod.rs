@@ -51,7 +51,7 @@ use std::sync::Arc;
 pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::{HeldKind, ParameterKind};
-pub use crate::equations::{DomainKind, ObservedKind, Unavailable};
+pub use crate::equations::{DomainKind, Exchanged, Exchanges, ObservedKind, Unavailable};
 use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::sparse::{SparseMatrix, SymbolicFactors};
@@ -116,6 +116,10 @@ pub struct Program {
     pub kept: Vec<(u32, Value)>,
     /// Constants fixed by the start values.
     pub conserved: Vec<String>,
+    /// For each of them the variable that follows from it in place of a state.
+    pub replaced: Vec<Symbol>,
+    /// Which variables could be independent in place of others, where divisors may vanish while running.
+    pub exchanges: Exchanges,
     /// How states move together whatever laws say.
     pub relations: Relations,
     /// What can be recorded.
@@ -235,6 +239,8 @@ impl Relations {
 pub struct Position {
     /// Its name.
     pub name: String,
+    /// The variable of the bond graph that it is.
+    pub symbol: Symbol,
     /// Its value: a solution of a Newton block, all of whose unknowns are positions.
     pub value: Value,
     /// The block.

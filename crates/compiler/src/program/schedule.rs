@@ -303,6 +303,8 @@ impl Schedule<'_> {
             dependence: rates.iter().map(|&rate| dependence.states_of(rate)).collect(),
             tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
             conserved: equations.conserved.iter().map(|c| c.name.clone()).collect(),
+            replaced: equations.conserved.iter().map(|c| c.replaced).collect(),
+            exchanges: equations.exchanges.clone(),
             states,
             positions,
             implicit,
@@ -450,7 +452,7 @@ fn positions(lower: &Lowering, equations: &Equations) -> Vec<Position> {
     let position = |p: &equations::Position| {
         let value = lower.defined(p.symbol).expect("a step defines every position");
         let Op::Solution(block, unknown) = lower.values.op(value) else { unreachable!("it is found by an iteration") };
-        Position { name: p.name.clone(), value, block, unknown }
+        Position { name: p.name.clone(), symbol: p.symbol, value, block, unknown }
     };
     equations.positions.iter().filter(|p| p.by_iteration).map(position).collect()
 }

@@ -2,58 +2,120 @@
 
 use super::clauses::Clauses;
 use super::clock::Clock;
+use super::exchanges::Ratios;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
 use super::positions::PositionConstraints;
 use crate::bytecode::{BlockBatches, Layout, Routine};
+use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
 use halfarrow_sim::Sparsity;
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The number of a mode: of one structure of a model among those that its events lead to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ModeId(pub u32);
 
+/// Makes programs of a model in which other variables stay independent.
+pub trait Alternatives: std::fmt::Debug + Send + Sync {
+    /// The program in which these stay independent, as far as they can, decided at these values of the variables of the
+    /// graph. `None` if there is none.
+    fn program(&self, independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
+}
+
 /// A model as code: the same for all threads, lanes and runs, whatever their parameters, inputs and states.
 ///
-/// It has a list of modes, one so far. [`Setup`](super::Setup) and [`Memory`](super::Memory) say which of its modes they
-/// belong to.
+/// It has a list of modes: the one in which runs begin, and those to which they change where its independent variables do
+/// not serve any longer, each made when it is first met. [`Memory`](super::Memory) says which of them it belongs to.
 #[derive(Debug)]
 pub struct Compiled {
+    first: Arc<Mode>,
+    alternatives: Option<Arc<dyn Alternatives>>,
+    others: Mutex<Others>,
+}
+
+/// Modes besides the first.
+#[derive(Debug, Default)]
+struct Others {
     modes: Vec<Arc<Mode>>,
+    /// The mode in which these stay independent; `None` where there is none.
+    of: BTreeMap<Vec<Symbol>, Option<ModeId>>,
 }
 
 impl Compiled {
     /// The code of a program. Derivatives of the rates come from directions, a group of columns at a time.
     pub fn new(program: Program) -> Compiled {
-        Compiled { modes: vec![Arc::new(Mode::new(program, None))] }
+        Compiled::of(Mode::new(program, None))
     }
 
     /// The same with the code of all derivatives of the rates by the states at once:
     /// [`System::jacobian`](halfarrow_sim::System) has them.
     pub fn with_jacobian(program: Program) -> Compiled {
         let differentiated = program.jacobian();
-        Compiled { modes: vec![Arc::new(Mode::new(differentiated.program, Some(differentiated.entries)))] }
+        Compiled::of(Mode::new(differentiated.program, Some(differentiated.entries)))
+    }
+
+    fn of(first: Mode) -> Compiled {
+        Compiled { first: Arc::new(first), alternatives: None, others: Mutex::default() }
+    }
+
+    /// The same code with that of all derivatives of the rates at once.
+    pub(super) fn with_all_derivatives(&self) -> Compiled {
+        let alternatives = self.alternatives.clone();
+        Compiled { alternatives, ..Compiled::with_jacobian(self.first.program.clone()) }
+    }
+
+    /// The same where runs may change to other independent variables.
+    #[must_use]
+    pub fn with_alternatives(self, alternatives: Arc<dyn Alternatives>) -> Compiled {
+        Compiled { alternatives: Some(alternatives), ..self }
+    }
+
+    /// Whether runs may change to other independent variables.
+    pub(super) fn has_alternatives(&self) -> bool {
+        self.alternatives.is_some()
     }
 
     /// The mode in which a run begins.
-    pub fn first(&self) -> ModeId {
-        ModeId::default()
+    pub(super) fn first(&self) -> &Arc<Mode> {
+        &self.first
     }
 
-    /// The program of a mode.
-    pub fn program(&self, mode: ModeId) -> &Program {
-        &self.mode(mode).program
+    pub(super) fn mode(&self, mode: ModeId) -> Arc<Mode> {
+        match mode.0 {
+            0 => self.first.clone(),
+            number => self.others().modes[number as usize - 1].clone(),
+        }
     }
 
-    pub(super) fn mode(&self, mode: ModeId) -> &Arc<Mode> {
-        &self.modes[mode.0 as usize]
+    /// The mode in which these variables stay independent, made at a point if it is not there yet.
+    pub(super) fn with_independent(&self, wanted: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
+        if let Some(known) = self.others().of.get(wanted) {
+            return *known;
+        }
+        let program = self.alternatives.as_ref()?.program(wanted, point);
+        let program = program.filter(|p| p.states.len() == self.first.program.states.len());
+        let mode = program.map(|program| match self.first.jacobian {
+            None => Mode::new(program, None),
+            Some(_) => {
+                let differentiated = program.jacobian();
+                Mode::new(differentiated.program, Some(differentiated.entries))
+            }
+        });
+        let mut others = self.others();
+        let id = mode.map(|mode| {
+            others.modes.push(Arc::new(mode));
+            ModeId(others.modes.len() as u32)
+        });
+        others.of.insert(wanted.to_vec(), id);
+        id
     }
 
-    /// All of them, in order.
-    pub(super) fn modes(&self) -> impl Iterator<Item = &Mode> {
-        self.modes.iter().map(Arc::as_ref)
+    fn others(&self) -> std::sync::MutexGuard<'_, Others> {
+        // What is in it is whole at any time.
+        self.others.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -86,6 +148,8 @@ pub(super) struct Mode {
     pub impulses: Option<ImpulseBalance>,
     /// Constraints that events may break.
     pub positions: Option<PositionConstraints>,
+    /// Variables that could be independent in place of others, where some could.
+    pub exchanges: Option<Ratios>,
 }
 
 impl Mode {
@@ -114,6 +178,7 @@ impl Mode {
             clauses: Clauses::of(&program, &layout),
             impulses: ImpulseBalance::of(&program, &layout),
             positions: PositionConstraints::of(&program, &layout),
+            exchanges: Ratios::of(&program, &layout),
             layout,
             program,
         }
@@ -130,7 +195,8 @@ impl Mode {
             .chain(self.kept.as_ref().map(ConservedSums::routine))
             .chain(self.clauses.routines())
             .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
-            .chain(self.positions.as_ref().map(PositionConstraints::routine));
+            .chain(self.positions.as_ref().map(PositionConstraints::routine))
+            .chain(self.exchanges.as_ref().map(Ratios::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

@@ -8,7 +8,7 @@ use halfarrow_sim::{Affected, Events, Failure};
 
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
-    fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+    pub(super) fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
             let states = &self.frame.r[self.code.layout.states as usize..][..x.len()];
             if self.rated != Some(t) || states != x {
@@ -106,7 +106,7 @@ impl Model {
         let sums = if self.run.begun { self.sums(t, x)? } else { Vec::new() };
         self.run.crossed = t;
         self.rated = None;
-        let inputs = &self.setup.given(self.run.mode).inputs;
+        let inputs = &self.setup.inputs;
         self.run.pieces.iter_mut().zip(inputs).for_each(|(piece, signal)| *piece = signal.piece(t));
         self.frame.conditions.state = Hold::Follow;
         // Solutions of nonlinear laws may jump at an event.
@@ -175,6 +175,10 @@ impl Events for Model {
 
     fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.handle(t, x, &[])
+    }
+
+    fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        self.exchange(t, x, failed)
     }
 
     fn locates_crossings(&self) -> bool {

@@ -5,6 +5,7 @@ use super::{Model, Operations};
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{JacobianEntry, Program, Value};
 use halfarrow_sim::{Affected, Failure, Sparsity, System};
+use std::sync::Arc;
 
 /// The code of the derivatives, and where in the pattern each of them stands.
 #[derive(Debug, Clone)]
@@ -39,7 +40,7 @@ impl Model {
         if self.code.jacobian.is_some() || directions <= FEW_DIRECTIONS {
             return Ok(());
         }
-        let mut other = Model::with_jacobian(self.code.program.clone())?;
+        let mut other = Model::of(Arc::new(self.compiled.with_all_derivatives()))?;
         let along = ALONG * directions * self.operations().total();
         if other
             .code

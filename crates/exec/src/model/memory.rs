@@ -77,8 +77,10 @@ impl Model {
     /// # Panics
     /// If it is the memory of another model.
     pub fn restore(&mut self, memory: &Memory) {
-        let same = self.run.mode == memory.run.mode && self.frame.solvers.len() == memory.solutions.len();
-        assert!(same, "the memory of another model");
+        if self.run.mode != memory.run.mode {
+            self.enter(memory.run.mode).expect("the mode has run with these parameters");
+        }
+        assert!(self.frame.solvers.len() == memory.solutions.len(), "the memory of another model");
         self.run.clone_from(&memory.run);
         self.frame.conditions.hold_again(&memory.conditions);
         self.frame.solvers.iter_mut().zip(&memory.solutions).for_each(|(solver, from)| solver.newton.follow_from(from));

@@ -8,6 +8,7 @@ mod compiled;
 mod equilibrium;
 mod errors;
 mod events;
+mod exchanges;
 mod explain;
 mod history;
 mod implicit;
@@ -27,7 +28,7 @@ mod start;
 mod system;
 mod wide;
 
-pub use compiled::{Compiled, ModeId};
+pub use compiled::{Alternatives, Compiled, ModeId};
 pub use equilibrium::Equilibrium;
 pub use errors::{EquilibriumError, InputError, ParameterError, RecordError, StartConflict, StartError, StartValue};
 pub use implicit::{ImplicitMemory, ImplicitModel};
@@ -102,13 +103,12 @@ impl Model {
     /// # Errors
     /// As [`Model::new`].
     pub fn of(compiled: Arc<Compiled>) -> Result<Model, Failure> {
-        let mode = compiled.first();
-        let code = compiled.mode(mode).clone();
+        let code = compiled.first().clone();
         let mut frame = Frame::new(&code.program, &code.layout, code.layout.size);
         code.routines().for_each(|routine| frame.reserve(routine));
         let n = code.program.states.len();
         let run = Remembered {
-            mode,
+            mode: ModeId::default(),
             begun: false,
             crossed: f64::NEG_INFINITY,
             signs_taken: None,
@@ -238,7 +238,7 @@ impl Model {
     /// Sets an input to which nothing is connected, by its number in the program, in SI units: from now on it has this
     /// value. For runs in real time, between steps; takes no memory.
     pub fn set_input(&mut self, input: usize, value: f64) {
-        self.setup.given_mut(self.run.mode).inputs[input].set_default(value);
+        self.setup.inputs[input].set_default(value);
         self.place_constant_inputs();
     }
 
@@ -262,6 +262,9 @@ impl Model {
 
     /// Forgets a run: the next event is its start. Parameters, inputs and conserved constants stay.
     pub fn restart(&mut self) {
+        if self.run.mode != ModeId::default() && self.enter(ModeId::default()).is_err() {
+            self.broken = Some(0);
+        }
         self.run.begun = false;
         self.run.crossed = f64::NEG_INFINITY;
         self.run.signs_taken = None;
@@ -280,7 +283,7 @@ impl Model {
     }
 
     fn parameters_changed(&mut self) -> Result<(), Failure> {
-        self.frame.set.clone_from(&self.setup.given(self.run.mode).parameters);
+        self.frame.set.clone_from(&self.setup.parameters);
         self.frame.parameters_changed();
         self.forget_solutions();
         let run = self.frame.run(&self.code.preamble);
@@ -289,7 +292,7 @@ impl Model {
         if let Some(failure) = self.violated_always() {
             return Err(failure);
         }
-        let inputs = &mut self.setup.given_mut(self.run.mode).inputs;
+        let inputs = &mut self.setup.inputs;
         for (signal, input) in inputs.iter_mut().zip(&self.code.program.inputs) {
             if let Some(&register) = self.code.layout.registers.get(&input.default) {
                 signal.set_default(self.frame.r[register as usize]);
@@ -321,13 +324,13 @@ impl Model {
 
     /// What is connected to the inputs.
     fn inputs(&self) -> &[InputSignal] {
-        &self.setup.given(self.run.mode).inputs
+        &self.setup.inputs
     }
 
     /// Inputs to which nothing is connected stand in their registers all the time.
     fn place_constant_inputs(&mut self) {
         let first = self.code.layout.inputs as usize;
-        let inputs = self.setup.given(self.run.mode).inputs.iter().enumerate();
+        let inputs = self.setup.inputs.iter().enumerate();
         inputs.filter(|(_, signal)| !signal.moves()).for_each(|(i, s)| self.frame.r[first + i] = s.at(0.0, None).0);
     }
 
@@ -336,7 +339,7 @@ impl Model {
         let Model { frame, code, setup, run, .. } = self;
         let layout = &code.layout;
         frame.r[layout.time as usize] = t;
-        for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
+        for (i, (signal, piece)) in setup.inputs.iter().zip(&run.pieces).enumerate() {
             frame.r[layout.inputs as usize + i] = signal.at(t, *piece).0;
         }
         for (i, held) in run.delays_and_samples.iter().enumerate() {

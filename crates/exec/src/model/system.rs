@@ -74,7 +74,7 @@ impl Model {
         let Model { frame, code, setup, run, .. } = self;
         let layout = &code.layout;
         frame.d[layout.time as usize] = 1.0;
-        for (i, (signal, piece)) in setup.given(run.mode).inputs.iter().zip(&run.pieces).enumerate() {
+        for (i, (signal, piece)) in setup.inputs.iter().zip(&run.pieces).enumerate() {
             frame.d[layout.inputs as usize + i] = signal.at(t, *piece).1;
         }
         for (i, held) in run.delays_and_samples.iter().enumerate() {

@@ -197,6 +197,7 @@ impl Sketch {
             relations: Default::default(),
             momenta: Vec::new(),
             jumps: None,
+            exchanges: Default::default(),
             steps: self.steps,
             observed: self.observed,
             conditions: self.conditions,

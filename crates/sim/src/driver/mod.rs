@@ -31,6 +31,8 @@ pub(crate) enum StopReason {
     },
     /// The sign of an event indicator has changed, with or without a time event.
     ZeroCrossing,
+    /// The system goes on in other variables.
+    Exchange,
 }
 
 /// A run on its way: where it stands, the signs of its event indicators, what it has taken so far.
@@ -152,6 +154,7 @@ impl<'a> Run<'a> {
         while self.time < stop.time {
             match self.step(stepper, stop, point)? {
                 StopReason::ZeroCrossing => break,
+                StopReason::Exchange => return Ok(Flow::HandOver),
                 _ => {
                     if stepper.supervise(self, stop.time, point)? == Flow::HandOver {
                         return Ok(Flow::HandOver);
@@ -164,7 +167,11 @@ impl<'a> Run<'a> {
 
     /// One step, with what happens at its end.
     fn step<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<StopReason, Failure> {
-        let end = stepper.step(self.time, self.next_sample(), stop.time, point)?;
+        let end = match stepper.step(self.time, self.next_sample(), stop.time, point) {
+            Ok(end) => end,
+            Err(_) if self.exchange(&mut *stepper.events(), point, true)? => return Ok(StopReason::Exchange),
+            Err(failure) => return Err(failure),
+        };
         self.counts.steps += 1;
         let (end, crossed) = self.accept_step(stepper, end, point)?;
         let reason = self.arrive(&mut *stepper.events(), end, stop, crossed, point)?;
@@ -179,7 +186,19 @@ impl<'a> Run<'a> {
         if let StopReason::TimeEvent { corner } = reason {
             stepper.after_event(corner, point);
         }
-        Ok(reason)
+        let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
+        Ok(if exchanged { StopReason::Exchange } else { reason })
+    }
+
+    /// Goes on in other variables if these tell the motion better.
+    fn exchange(&mut self, events: &mut dyn Events, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        let exchanged = events.exchange_independent(self.time, point, failed)?;
+        if exchanged {
+            self.counts.exchanges += 1;
+            self.signs = Signs::new(events.indicators());
+            self.signs.take(events, self.time, point)?;
+        }
+        Ok(exchanged)
     }
 
     /// A step to `(end, point)` is accepted; what happens there.

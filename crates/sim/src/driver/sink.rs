@@ -86,6 +86,8 @@ pub struct Summary {
     pub corners: usize,
     /// Zero crossings of event indicators.
     pub crossings: usize,
+    /// How often other variables have become independent.
+    pub exchanges: usize,
     /// Whether `auto` changed to the stiff method.
     pub stiff: bool,
 }

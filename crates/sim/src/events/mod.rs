@@ -69,6 +69,17 @@ pub trait Events {
     /// As [`event_indicators`](Events::event_indicators).
     fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure>;
 
+    /// Looks, where a step has ended or one from `(t, point)` has failed, whether other variables tell the motion better from
+    /// here on. If so the system goes on in these: the point is the same in them, of the same length; names and scales of
+    /// its states, the sparsity and the event indicators may be others. `true` if it has changed.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators).
+    fn exchange_independent(&mut self, t: f64, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        let _ = (t, point, failed);
+        Ok(false)
+    }
+
     /// Whether methods of fixed step locate zero crossings too, by shorter steps: what happens there may depend on their
     /// times. Else they count from the end of the step.
     fn locates_crossings(&self) -> bool {

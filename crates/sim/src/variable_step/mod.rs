@@ -86,9 +86,13 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
     let mut stiff = method == Method::Bdf && !x.is_empty();
     // A step to go on with where only the tolerances have changed.
     let mut step = None;
+    let mut told = false;
     loop {
         let atol = tolerances.clone();
-        run.report_tolerances(atol.magnitudes(), &atol.absolute(1.0));
+        // They are told of the states with which the run begins.
+        if !told {
+            run.report_tolerances(atol.magnitudes(), &atol.absolute(1.0));
+        }
         let kept = step.take();
         let mut drive = |integrator: &mut dyn Integrator, first, stiffness| {
             let mut stepper = Controlled::new(run, shared, integrator, &mut tolerances, stiffness).from(first);
@@ -105,7 +109,13 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
             library::with_explicit(shared, &atol, |integrator| drive(integrator, kept, watch))
         };
         match end {
-            Ok((Flow::GoOn, _) | (_, None)) => return Ok(()),
+            Ok((Flow::GoOn, _)) => return Ok(()),
+            // Its states are others.
+            Ok((Flow::HandOver, None)) => {
+                *shared.kept_factors().borrow_mut() = None;
+                tolerances = Tolerances::new(run.options, &*shared.system(), x);
+                told = true;
+            }
             Ok((_, Some(HandOver::Grown))) => {
                 let end = run.next_stop(&mut *shared.events()).time;
                 tolerances.grow(&mut *shared.system(), run.time, x, end - run.time);

@@ -139,6 +139,11 @@ impl Newton {
         (self.evaluation_limit, self.fresh) = (most, false);
     }
 
+    /// Evaluations at most while following.
+    pub fn most(&self) -> usize {
+        self.evaluation_limit
+    }
+
     /// The solution found last becomes the previous one, and is followed.
     pub fn accept(&mut self) {
         self.version += 1;

@@ -265,6 +265,10 @@ impl ImplicitModel {
         for (&k, &register) in self.map.states.iter().zip(&self.map.of_states.outputs) {
             self.x[k] = self.form.frame.r[register as usize];
         }
+        self.form.frame.run(&self.map.of_positions).map_err(|error| self.form.failure(t, error))?;
+        for (&(block, i), &register) in self.map.positions.iter().zip(&self.map.of_positions.outputs) {
+            self.reference.start_solution(block, i, self.form.frame.r[register as usize]);
+        }
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use super::super::Model;
 use crate::bytecode::Routine;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Implicit, Op, Program, Unavailable, Value};
+use halfarrow_compiler::program::{Implicit, Op, Position, Program, Unavailable, Value};
 use halfarrow_sim::Sparsity;
 use std::collections::BTreeMap;
 
@@ -18,6 +18,9 @@ pub(super) struct StateMap {
     /// States of the reference that the form can tell, and what they are there: variables, and sums of stored quantities.
     pub states: Vec<usize>,
     pub of_states: Routine,
+    /// Computed positions of the reference, as unknowns of its blocks, and what they are in the form.
+    pub positions: Vec<(usize, usize)>,
+    pub of_positions: Routine,
     /// Unknowns as the reference has them, with the routine that computes these.
     pub known: Vec<usize>,
     pub of_known: Routine,
@@ -78,6 +81,9 @@ impl StateMap {
         let guessed = own.variables.iter().filter_map(solution).filter(newton);
         let (guesses, guessed): (Vec<(usize, usize)>, Vec<Value>) = guessed.unzip();
         let seen: Vec<Value> = pairs.iter().map(|p| p.1).collect();
+        let position = |p: &Position| Some(((p.block.0 as usize, p.unknown as usize), *own.variables.get(&p.symbol)?));
+        let (positions, of_positions): (Vec<(usize, usize)>, Vec<Value>) =
+            other.positions.iter().filter_map(position).unzip();
         let carried_here: Vec<Value> = carried.iter().map(|c| c.1).collect();
         let carried_there: Vec<Value> = carried.iter().map(|c| c.2).collect();
         let sparsity = sparsity_of(own, &equations);
@@ -92,6 +98,8 @@ impl StateMap {
             all_told,
             uncontrolled: (0..n).filter(|i| all_told && algebraic(i)).collect(),
             of_states: form.routine_for(&seen),
+            positions,
+            of_positions: form.routine_for(&of_positions),
             states: pairs.iter().map(|p| p.0).collect(),
             of_known: reference.routine_for(&told),
             common: form.routine_for(&common),

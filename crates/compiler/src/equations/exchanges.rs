@@ -1,0 +1,83 @@
+//! Speeds (and efforts) of which others could stay independent in place of those that do: where a mechanism comes near a
+//! position in which the present ones no longer tell how it moves, some are exchanged. Source: `method.md`, 5.8.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::minimal::{Assembled, rows_of};
+use crate::algebra::{Node, Symbol};
+use crate::bond_graph::Meaning;
+use crate::causal_graph::start_point::start_point;
+use crate::causal_graph::{CausalGraph, Role, magnitude_of_slope};
+
+/// Larger tables of ratios are not looked at.
+const MOST: usize = 20_000;
+
+/// Which variables depend on which by ratios that vary.
+#[derive(Debug, Clone, Default)]
+pub struct Exchanges {
+    /// Those that stay independent.
+    pub independent: Vec<Exchanged>,
+    /// Those that follow from them.
+    pub dependent: Vec<Exchanged>,
+}
+
+/// A variable that may be independent or not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exchanged {
+    /// The effort or flow.
+    pub symbol: Symbol,
+    /// By what it is multiplied to be compared with others: the root of the slope of its storage. `None` without one.
+    pub weight: Option<f64>,
+}
+
+/// The exchanges among what depends on each other by divisors that may vanish while running.
+pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph) -> Exchanges {
+    let d = &mut assembled.d;
+    let ports = &causal.ports;
+    if ports.watched.iter().all(|&divisor| d.is_constant(divisor)) {
+        return Exchanges::default();
+    }
+    let mut rows = rows_of(d, causal);
+    let storages = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
+    let independent: BTreeSet<Symbol> = storages.chain(ports.virtual_speeds.iter().map(|v| v.speed)).collect();
+    let rates = d.computed.iter().filter_map(|&s| match d.meaning(s)? {
+        Meaning::Signal(signal) => match *d.x.node(d.graph.signals[signal].rate) {
+            Node::Symbol(rate) => Some(rate),
+            _ => None,
+        },
+        _ => d.stored.get(&s).copied(),
+    });
+    let storages = ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output);
+    let dependent: BTreeSet<Symbol> = storages.chain(rates).filter(|s| !independent.contains(s)).collect();
+    let mut found = Exchanges::default();
+    let mut read: BTreeSet<Symbol> = BTreeSet::new();
+    let mut seen: BTreeSet<Symbol> = BTreeSet::new();
+    let weights = weights(d, causal);
+    let of = |symbol: Symbol| Exchanged { symbol, weight: weights.get(&symbol).copied() };
+    for symbol in dependent {
+        if found.dependent.len() * independent.len() > MOST {
+            return Exchanges::default();
+        }
+        let Some(row) = rows.of(&mut d.x, symbol).cloned() else { continue };
+        let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0)).collect();
+        if ratios.iter().all(|t| d.is_constant(t.1)) || !seen.insert(d.x.untwinned(symbol)) {
+            continue;
+        }
+        read.extend(ratios.iter().map(|t| t.0));
+        found.dependent.push(of(symbol));
+    }
+    found.independent.extend(read.into_iter().map(of));
+    found
+}
+
+/// The roots of the slopes `X/z` of storages, at the start.
+fn weights(d: &super::Definitions, causal: &CausalGraph) -> BTreeMap<Symbol, f64> {
+    let point = start_point(&d.x, d.graph);
+    let storages = causal.ports.ports.iter().filter_map(|p| match p.role {
+        Role::Independent => Some((p.input, p.port)),
+        Role::Dependent => Some((p.output, p.port)),
+        _ => None,
+    });
+    let weight = |(symbol, port)| Some((symbol, magnitude_of_slope(&d.x, d.graph, &point, port)?.sqrt()));
+    storages.filter_map(weight).collect()
+}

@@ -1,0 +1,328 @@
+//! Exchanges of independent variables: where one moves many times as fast as another that stays independent, as near a
+//! dead centre, the two change places. Source: `method.md`, 5.8.
+
+use super::compiled::ModeId;
+use super::machine::Tiers;
+use super::minimum_norm;
+use super::recorded::Recorded;
+use super::{Model, clauses::EventWork};
+use crate::bytecode::{Frame, Hold, Layout, Routine};
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Value};
+use halfarrow_sim::Failure;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Variables are exchanged where one moves so many times as fast as the one that stays independent,
+const FAR: f64 = 10.0;
+/// or where a step has failed and it moves so many times as fast,
+const AFTER_FAILURE: f64 = 1.2;
+/// and then until none moves so many times as fast.
+const NEAR: f64 = 1.1;
+/// What varies less than by this part of the greatest is rounding.
+const ROUNDING: f64 = 1e-12;
+const ITERATIONS: usize = 20;
+
+/// The ratios between variables that could be independent and those that are.
+#[derive(Debug, Clone)]
+pub(super) struct Ratios {
+    independent: Vec<Exchanged>,
+    dependent: Vec<Exchanged>,
+    /// The states that tell the independent ones.
+    states: Vec<u32>,
+    /// Independent ones, then the dependent ones.
+    routine: Routine,
+}
+
+impl Ratios {
+    pub fn of(program: &Program, layout: &Layout) -> Option<Ratios> {
+        let value = |e: &Exchanged| program.variables.get(&e.symbol).copied();
+        let state = |e: &Exchanged| program.tracked.iter().position(|s| *s == e.symbol);
+        let known = program.exchanges.independent.iter().filter_map(|e| Some((*e, value(e)?, state(e)? as u32)));
+        let known: Vec<(Exchanged, Value, u32)> = known.collect();
+        let others = program.exchanges.dependent.iter().filter_map(|e| Some((*e, value(e)?)));
+        let others: Vec<(Exchanged, Value)> = others.collect();
+        // All of them, or the rest would be looked at as if it stood still.
+        let all = known.len() == program.exchanges.independent.len();
+        let wanted: Vec<Value> = known.iter().map(|k| k.1).chain(others.iter().map(|o| o.1)).collect();
+        (all && !known.is_empty() && !others.is_empty()).then(|| Ratios {
+            states: known.iter().map(|k| k.2).collect(),
+            independent: known.into_iter().map(|k| k.0).collect(),
+            dependent: others.into_iter().map(|o| o.0).collect(),
+            routine: layout.routine(program, &wanted),
+        })
+    }
+
+    pub fn routine(&self) -> &Routine {
+        &self.routine
+    }
+}
+
+impl Model {
+    /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
+    /// position and motion in the new ones. `failed`: a step from here has failed.
+    pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        let code = self.code.clone();
+        let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else {
+            return Ok(false);
+        };
+        let Some(wanted) = self.better(ratios, t, x, if failed { AFTER_FAILURE } else { FAR }) else {
+            return Ok(false);
+        };
+        let values = self.values_of_all(t, x)?;
+        let Some(mode) = self.compiled.with_independent(&wanted, &values) else { return Ok(false) };
+        let before = self.clone();
+        let changed = self.enter_at(mode, t, x, &values, before.recorded.chosen.len());
+        match changed {
+            Ok(true) => Ok(true),
+            // Nothing has changed then.
+            Ok(false) | Err(_) => {
+                *self = before;
+                Ok(false)
+            }
+        }
+    }
+
+    /// The variables that should be independent instead of those that are, if some should.
+    fn better(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> Option<Vec<Symbol>> {
+        let (n, m) = (ratios.independent.len(), ratios.dependent.len());
+        // Column by column: how all of them move with each state.
+        let mut columns = Vec::with_capacity(n);
+        for &state in &ratios.states {
+            self.place(t, x);
+            self.still();
+            self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
+            self.frame.run_along(&ratios.routine).ok()?;
+            let column: Vec<f64> = ratios.routine.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
+            columns.push(column);
+        }
+        let mut table = Table::new(&columns, n, m)?;
+        // Without a storage a variable counts as those do that it moves with.
+        let light = |k: usize| ratios.independent.iter().chain(&ratios.dependent).nth(k).and_then(|e| e.weight);
+        let weights: Vec<f64> = (0..n + m).map(|k| light(k).unwrap_or(1.0)).collect();
+        table.weigh(&weights);
+        if table.greatest().is_none_or(|(_, _, ratio)| ratio <= most) {
+            return None;
+        }
+        let mut inside: Vec<usize> = (0..n).collect();
+        let mut outside: Vec<usize> = (n..n + m).collect();
+        for _ in 0..4 * (n + m) {
+            match table.greatest() {
+                Some((row, column, ratio)) if ratio > NEAR => {
+                    table.exchange(row, column);
+                    std::mem::swap(&mut outside[row], &mut inside[column]);
+                }
+                _ => break,
+            }
+        }
+        let symbol = |k: usize| {
+            let all = ratios.independent.iter().chain(&ratios.dependent);
+            all.map(|e| e.symbol).nth(k).expect("one of them")
+        };
+        let mut wanted: Vec<Symbol> = inside.into_iter().map(symbol).collect();
+        wanted.sort_unstable();
+        Some(wanted)
+    }
+
+    /// All variables of the graph at `(t, x)`.
+    fn values_of_all(&mut self, t: f64, x: &[f64]) -> Result<BTreeMap<Symbol, f64>, Failure> {
+        let code = self.code.clone();
+        let (symbols, wanted): (Vec<Symbol>, Vec<Value>) = code.program.variables.iter().map(|(s, v)| (*s, *v)).unzip();
+        let routine = self.routine_for(&wanted);
+        self.place(t, x);
+        self.frame.run(&routine).map_err(|error| self.failure(t, error))?;
+        let values = routine.outputs.iter().map(|&r| self.frame.r[r as usize]);
+        Ok(symbols.into_iter().zip(values).collect())
+    }
+
+    /// Changes the mode: code and registers, with parameters and inputs as they are set.
+    pub(super) fn enter(&mut self, mode: ModeId) -> Result<(), Failure> {
+        let code = self.compiled.mode(mode);
+        let names: Vec<&str> =
+            self.recorded.chosen.iter().map(|&i| self.code.program.observed[i].name.as_str()).collect();
+        let observed = &code.program.observed;
+        let chosen = names.iter().filter_map(|name| observed.iter().position(|o| o.name == *name && o.value.is_ok()));
+        let recorded = Arc::new(Recorded::new(&code, chosen.collect()));
+        let bounds = self.frame.solvers.iter().map(|s| s.newton.most()).min();
+        let mut frame = Frame::new(&code.program, &code.layout, code.layout.size);
+        code.routines().for_each(|routine| frame.reserve(routine));
+        self.run.mode = mode;
+        self.run.conserved = vec![0.0; code.program.conserved.len()];
+        self.run.positions = vec![0.0; code.program.positions.len()];
+        self.run.scales = vec![0.0; code.program.states.len()];
+        self.events = EventWork::of(&code);
+        self.tiers = Tiers::default();
+        (self.frame, self.recorded, self.code) = (frame, recorded, code);
+        self.rated = None;
+        self.reserve_recorded();
+        if let Some(most) = bounds {
+            self.bound_iterations(most);
+        }
+        self.frame.set.clone_from(&self.setup.parameters);
+        let run = self.frame.run(&self.code.preamble.clone());
+        run.map_err(|error| self.failure(f64::NAN, error))?;
+        self.broken = self.first_broken().map_err(|error| self.failure(f64::NAN, error))?;
+        self.place_constant_inputs();
+        Ok(())
+    }
+
+    /// Goes on in another mode where the variables of the graph have these values. `false` if it cannot tell the same.
+    fn enter_at(
+        &mut self,
+        mode: ModeId,
+        t: f64,
+        x: &mut [f64],
+        values: &BTreeMap<Symbol, f64>,
+        recorded: usize,
+    ) -> Result<bool, Failure> {
+        self.enter(mode)?;
+        if self.broken.is_some() || self.recorded.chosen.len() != recorded {
+            return Ok(false);
+        }
+        self.frame.conditions.clock = Hold::Follow;
+        self.frame.conditions.state = Hold::Follow;
+        self.code.clock.handle_time_event(&mut self.frame, self.run.crossed, &mut self.run.clock_event);
+        self.start_solutions_at(values);
+        if !self.take_values(t, x, values)? {
+            return Ok(false);
+        }
+        self.take_signs(t, x)?;
+        self.follow_solutions(t, x)?;
+        self.run.scales = self.magnitudes(t, x);
+        self.follow_solutions(t, x)?;
+        Ok(true)
+    }
+
+    /// Solutions of laws, and positions, are sought from where they are.
+    fn start_solutions_at(&mut self, values: &BTreeMap<Symbol, f64>) {
+        let code = self.code.clone();
+        for (symbol, &value) in &code.program.variables {
+            let (Op::Solution(block, i), Some(&found)) = (code.program.values.op(value), values.get(symbol)) else {
+                continue;
+            };
+            if matches!(code.program.blocks[block], Block::Newton { .. }) && found.is_finite() {
+                self.start_solution(block.0 as usize, i as usize, found);
+            }
+        }
+        for (kept, position) in self.run.positions.iter_mut().zip(&code.program.positions) {
+            *kept = values.get(&position.symbol).copied().unwrap_or(0.0);
+        }
+    }
+
+    /// States and constants at which the variables of the graph have these values: those that are variables themselves, then
+    /// the others by Newton's method. `false` if there are none.
+    fn take_values(&mut self, t: f64, x: &mut [f64], values: &BTreeMap<Symbol, f64>) -> Result<bool, Failure> {
+        let code = self.code.clone();
+        let (program, layout) = (&code.program, &code.layout);
+        let mut open: Vec<(u32, Value, f64)> = Vec::new();
+        let told = program.tracked.iter().chain(&program.replaced);
+        let registers = (layout.states..).take(x.len()).chain(layout.conserved..);
+        for (k, (symbol, register)) in told.zip(registers).enumerate() {
+            let (Some(&value), Some(&known)) = (program.variables.get(symbol), values.get(symbol)) else {
+                return Ok(false);
+            };
+            match layout.registers.get(&value) {
+                Some(&own) if own == register && k < x.len() => x[k] = known,
+                _ => open.push((register, value, known)),
+            }
+        }
+        let wanted: Vec<Value> = open.iter().map(|o| o.1).collect();
+        let routine = self.routine_for(&wanted);
+        let n = open.len();
+        for _ in 0..ITERATIONS {
+            let mut matrix = vec![0.0; n * n];
+            let mut missed = vec![0.0; n];
+            for column in 0..n {
+                self.place(t, x);
+                self.still();
+                self.frame.d[open[column].0 as usize] = 1.0;
+                self.frame.run_along(&routine).map_err(|error| self.failure(t, error))?;
+                for (row, &out) in routine.outputs.iter().enumerate() {
+                    matrix[row * n + column] = self.frame.d[out as usize];
+                    missed[row] = self.frame.r[out as usize] - open[row].2;
+                }
+            }
+            if missed.iter().zip(&open).all(|(m, o)| m.abs() <= 4.0 * f64::EPSILON * o.2.abs()) {
+                return Ok(true);
+            }
+            let Some(step) = minimum_norm::step(&matrix, &missed, n) else { return Ok(false) };
+            let mut moved = false;
+            for (step, &(register, ..)) in step.step.iter().zip(&open) {
+                let conserved = layout.conserved;
+                let place = match register >= layout.states {
+                    true => &mut x[(register - layout.states) as usize],
+                    false => &mut self.run.conserved[(register - conserved) as usize],
+                };
+                moved |= step.abs() > 4.0 * f64::EPSILON * place.abs();
+                *place += step;
+            }
+            if !moved {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// How variables move with others: dependent ones by row, independent ones by column.
+struct Table {
+    columns: usize,
+    ratios: Vec<f64>,
+}
+
+impl Table {
+    /// From how both move with states: columns over the `n` independent ones and the `m` others.
+    fn new(columns: &[Vec<f64>], n: usize, m: usize) -> Option<Table> {
+        // others = R · independent: solved row by row with the transposed matrix of the independent ones.
+        let transposed: Vec<f64> = columns.iter().flat_map(|c| c[..n].to_vec()).collect();
+        let mut ratios = Vec::with_capacity(n * m);
+        for row in n..n + m {
+            let right: Vec<f64> = columns.iter().map(|c| c[row]).collect();
+            if right.iter().all(|v| *v == 0.0) {
+                ratios.extend(std::iter::repeat_n(0.0, n));
+                continue;
+            }
+            let solved = minimum_norm::step(&transposed, &right, n)?;
+            ratios.extend(solved.step.iter().map(|s| -s));
+        }
+        ratios.iter().all(|r| r.is_finite()).then_some(Table { columns: n, ratios })
+    }
+
+    /// Multiplies each variable by its weight.
+    fn weigh(&mut self, weights: &[f64]) {
+        let n = self.columns;
+        for (k, ratio) in self.ratios.iter_mut().enumerate() {
+            *ratio *= weights[n + k / n] / weights[k % n];
+        }
+    }
+
+    /// The greatest ratio: row, column, magnitude.
+    fn greatest(&self) -> Option<(usize, usize, f64)> {
+        let all = self.ratios.iter().enumerate().map(|(k, r)| (k / self.columns, k % self.columns, r.abs()));
+        all.fold(
+            None,
+            |most: Option<(usize, usize, f64)>, one| if most.is_none_or(|m| one.2 > m.2) { Some(one) } else { most },
+        )
+    }
+
+    /// The variables of a row and a column change places.
+    fn exchange(&mut self, row: usize, column: usize) {
+        let n = self.columns;
+        let pivot = self.ratios[row * n + column];
+        let pivot_row: Vec<f64> = self.ratios[row * n..][..n].to_vec();
+        let others = self.ratios.chunks_mut(n).enumerate().filter(|(r, _)| *r != row);
+        for ratios in others.map(|(_, ratios)| ratios) {
+            let factor = ratios[column] / pivot;
+            for (k, ratio) in ratios.iter_mut().enumerate() {
+                let size = ratio.abs();
+                *ratio = if k == column { factor } else { *ratio - factor * pivot_row[k] };
+                if k != column && ratio.abs() <= ROUNDING * size {
+                    *ratio = 0.0;
+                }
+            }
+        }
+        for (k, ratio) in self.ratios[row * n..][..n].iter_mut().enumerate() {
+            *ratio = if k == column { 1.0 / pivot } else { -pivot_row[k] / pivot };
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! The same model with other variables independent, derived while it runs.
+
+use std::collections::BTreeMap;
+
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::bond_graph::{BondGraph, Preference};
+use halfarrow_compiler::causal_graph::assign_causality;
+use halfarrow_compiler::equations::{Form, derive_equations};
+use halfarrow_compiler::ids::Map;
+use halfarrow_compiler::program::{Program, schedule};
+use halfarrow_compiler::span::Span;
+use halfarrow_exec as exec;
+
+/// The bond graph of which programs are made.
+#[derive(Debug)]
+pub(crate) struct Alternatives {
+    pub graph: BondGraph,
+}
+
+impl exec::Alternatives for Alternatives {
+    fn program(&self, independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
+        let mut graph = self.graph.clone();
+        let wanted = independent.iter().map(|&symbol| Preference {
+            name: graph.exprs.name(symbol).to_string(),
+            symbol: graph.exprs.untwinned(symbol),
+            span: Span::default(),
+        });
+        // What the modeller prefers is next.
+        graph.preferences = wanted.chain(graph.preferences.iter().cloned()).collect();
+        graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
+        let causal = assign_causality(&graph).ok()?;
+        let equations = derive_equations(&causal, Form::Minimal).ok()?;
+        Some(schedule(&equations))
+    }
+}
