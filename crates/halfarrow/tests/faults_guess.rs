@@ -149,7 +149,8 @@ constraint too: q.th^2 = 9
 fn a_start_that_is_not_found_offers_a_guess() {
     let never = ROOTS.replace("x*x = y", "x*x + y*y = -1").replace(" from 2", "");
     let said = start_of(&model(&never, &[]), Form::Minimal).expect_err("no start");
-    assert!((said.contains("I003") || said.contains("I004")) && said.contains("`guess x = 0.4`"), "{said}");
+    let offered = said.contains("`guess x = 0.4`") || said.contains("`guess y = 0.4`");
+    assert!((said.contains("I003") || said.contains("I004")) && offered, "{said}");
     let far = four_bar().replace("from 0.6 rad", "from 0.6 rad\nparam far = 2 m").replace("= d + c", "= far + c");
     let said = start_of(&model(&far, &[]), Form::Minimal).expect_err("too far");
     assert!(said.contains("`guess th2 = 0.4`"), "{said}");

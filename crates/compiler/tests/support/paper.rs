@@ -69,6 +69,7 @@ pub fn empty(name: &str) -> BondGraph {
         clauses: Vec::new(),
         lets: Vec::new(),
         outputs: Vec::new(),
+        point: None,
         preferences: Vec::new(),
         forced_causality: Vec::new(),
         forced_strokes: Vec::new(),

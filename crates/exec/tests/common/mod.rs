@@ -175,6 +175,7 @@ impl Sketch {
             clauses: Vec::new(),
             lets: Vec::new(),
             outputs: Vec::new(),
+            point: None,
             preferences: Vec::new(),
             forced_causality: Vec::new(),
             forced_strokes: Vec::new(),
