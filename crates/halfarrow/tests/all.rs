@@ -40,6 +40,8 @@ mod growth;
 mod library_std;
 #[path = "linearize.rs"]
 mod linearize;
+#[path = "mechanisms.rs"]
+mod mechanisms;
 #[path = "names.rs"]
 mod names;
 #[path = "repeated.rs"]

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::by_size::solve_part_by_size;
 use super::ports::{CausalityPreferences, Solved, Virtual, is_imposed, solve_part};
+use super::repeated::without_repeated;
 use super::signals::{NodeId, signal_graph};
 use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
@@ -19,6 +20,8 @@ use crate::ids::{Id, Map, Table};
 /// Errors: sources, constraints or forced strokes that cannot hold together, with the smallest set that cannot.
 /// Source: `method.md`, section 2 and 5.1.
 pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
+    let (graph, repeated) = without_repeated(graph);
+    let graph = &graph;
     let mut x = graph.exprs.clone();
     let wanted = StoragePreferences::of(&mut x, graph);
     let mut strokes = Strokes::new(graph);
@@ -46,6 +49,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
+    ports.repeated = repeated;
     ports.unmet = wanted.unmet(&x, &ports);
     ports.kept = wanted.why;
     ports.ports.sort_by_key(|p| p.port);

@@ -228,6 +228,19 @@ fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>)
             .hint(format!("leave {} out", element.name)),
         );
     }
+    for &constraint in &causal.ports.repeated {
+        let constraint = &graph.constraints[constraint];
+        all.push(
+            Diagnostic::warning(
+                codes::C004,
+                format!("the constraint {} is kept by the others wherever the machine can be", constraint.name),
+                constraint.span,
+                "it takes nothing of the motion",
+            )
+            .note("how they share the reaction is not determined: the others carry all of it, this one nothing")
+            .hint("leave it out, or let something give way where the reaction is asked for"),
+        );
+    }
 }
 
 fn fixed_storages(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>) {

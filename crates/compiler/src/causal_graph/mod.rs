@@ -13,6 +13,7 @@ mod local;
 mod matched;
 mod ports;
 mod rank;
+mod repeated;
 mod roles;
 mod rules;
 pub mod signals;
@@ -77,6 +78,8 @@ pub struct Ports {
     pub degenerate: Vec<Expr>,
     /// Variables (bond efforts or flows) that the junction structure leaves undetermined.
     pub undetermined: Vec<Symbol>,
+    /// Constraints on displacements that others keep wherever the machine can be, by their numbers: they carry nothing.
+    pub repeated: Vec<usize>,
     /// Independent variables that sit on no storage, `method.md`, 5.2.
     pub virtual_speeds: Vec<Virtual>,
     /// Why variables have priority as independent ones over the order of the model.

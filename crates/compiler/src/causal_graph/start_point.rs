@@ -10,6 +10,11 @@ use crate::ids::Map;
 /// Values of all variables of a graph at the start: given positions, and for the others a solution of the constraints.
 /// Efforts and flows without a start value are taken as 1: they are not known yet, and no choice may depend on their being 0.
 pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
+    NumericPoint::new(start_values(x, graph))
+}
+
+/// The same by symbol.
+pub(super) fn start_values(x: &Exprs, graph: &BondGraph) -> Map<Symbol, f64> {
     let mut values: Map<Symbol, f64> = Map::new();
     for parameter in graph.parameters.values() {
         values.insert(parameter.symbol, x.given_value(parameter.value).unwrap_or(1.0));
@@ -43,7 +48,7 @@ pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
     for (symbol, displacement) in known_displacements(graph) {
         values.insert(symbol, read(&values, displacement));
     }
-    NumericPoint::new(values)
+    values
 }
 
 /// Start values as they stand in the model.
@@ -148,7 +153,7 @@ fn size(residual: &[f64]) -> f64 {
 
 /// The minimum-norm solution of `jacobian · step = residual`: `Jᵀ (J Jᵀ)⁻¹ residual`, regularised by a small multiple of the
 /// unit matrix where equations are redundant.
-fn least_step(jacobian: &[Vec<f64>], residual: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn least_step(jacobian: &[Vec<f64>], residual: &[f64]) -> Option<Vec<f64>> {
     let n = jacobian.len();
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut gram: Vec<Vec<f64>> =

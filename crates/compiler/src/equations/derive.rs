@@ -221,7 +221,7 @@ fn order_equations(
             span: span_of(graph, s.symbol, s.kind),
         })
         .collect();
-    let positions: Vec<Position> = positions.iter().map(|computed| position(&d, computed)).collect();
+    let positions: Vec<Position> = positions.iter().map(|computed| position(&mut d, computed)).collect();
     let (algebraic, mut residuals) = unknowns(&d, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     // Forms with constraints left in them go by the minimal one at events.
@@ -292,13 +292,17 @@ fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
 }
 
 /// A position that constraints determine.
-fn position(d: &Definitions, computed: &Computed) -> Position {
+fn position(d: &mut Definitions, computed: &Computed) -> Position {
     let Computed { position, constraint } = computed;
     let symbol = position.symbol;
     Position {
         symbol,
         name: d.x.name(symbol).to_string(),
         constraint: *constraint,
+        rate: match d.meaning(symbol) {
+            Some(Meaning::Signal(signal)) => d.graph.signals[signal].rate,
+            _ => d.x.sym(d.stored[&symbol]),
+        },
         by_iteration: d.positions.contains(&symbol),
         unit: unit_of(d.graph, symbol),
         span: span_of(d.graph, symbol, position.kind),

@@ -176,6 +176,8 @@ pub struct Position {
     pub name: String,
     /// The constraint that defines it, by its place among those of the graph.
     pub constraint: usize,
+    /// Its rate.
+    pub rate: Expr,
     /// Whether an iteration finds it, which follows one of several solutions: that which the start has chosen.
     pub by_iteration: bool,
     /// SI unit, where known.

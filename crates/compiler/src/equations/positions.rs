@@ -86,7 +86,8 @@ pub(super) fn found_by_iteration(computed: &[Computed], steps: &[EquationStep]) 
 /// Whether a constraint on displacements acts: one that repeats others says nothing new.
 fn holds(causal: &CausalGraph, constraint: &Constraint) -> bool {
     let acts = |p: &&crate::causal_graph::PortState| p.port.element == constraint.element;
-    constraint.holonomic && causal.ports.ports.iter().find(acts).is_some_and(|p| p.role == Role::Source)
+    let held = matches!(causal.graph.elements[constraint.element].kind, Kind::ZeroCompliance { .. });
+    constraint.holonomic && held && causal.ports.ports.iter().find(acts).is_some_and(|p| p.role == Role::Source)
 }
 
 /// States that are positions and that no event sets.

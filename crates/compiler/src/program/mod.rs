@@ -241,6 +241,8 @@ pub struct Position {
     pub name: String,
     /// The variable of the bond graph that it is.
     pub symbol: Symbol,
+    /// Its rate, where that has a value.
+    pub rate: Option<Value>,
     /// Its value: a solution of a Newton block, all of whose unknowns are positions.
     pub value: Value,
     /// The block.

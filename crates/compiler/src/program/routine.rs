@@ -224,6 +224,7 @@ impl Program {
         wanted.extend(self.clauses.iter().flat_map(|c| c.values()));
         wanted.extend(self.jumps.iter().flat_map(|j| j.values()));
         wanted.extend(self.momenta.values());
+        wanted.extend(self.positions.iter().filter_map(|p| p.rate));
         wanted.extend(self.inputs.iter().map(|i| i.default));
         wanted.extend(self.parameters.iter().map(|p| p.default));
         wanted.extend(self.pivot_guards.iter().flat_map(|w| [w.pivot, w.scale]));

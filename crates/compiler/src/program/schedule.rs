@@ -448,11 +448,14 @@ fn implicit(lower: &Lowering, equations: &Equations) -> Option<Implicit> {
 }
 
 /// The positions that iterations determine.
-fn positions(lower: &Lowering, equations: &Equations) -> Vec<Position> {
+fn positions(lower: &mut Lowering, equations: &Equations) -> Vec<Position> {
+    let x = &equations.graph.exprs;
     let position = |p: &equations::Position| {
         let value = lower.defined(p.symbol).expect("a step defines every position");
         let Op::Solution(block, unknown) = lower.values.op(value) else { unreachable!("it is found by an iteration") };
-        Position { name: p.name.clone(), symbol: p.symbol, value, block, unknown }
+        let known = x.symbols_of(p.rate).iter().all(|&s| lower.defined(s).is_some());
+        let rate = known.then(|| lower.value(p.rate));
+        Position { name: p.name.clone(), symbol: p.symbol, rate, value, block, unknown }
     };
     equations.positions.iter().filter(|p| p.by_iteration).map(position).collect()
 }

@@ -55,7 +55,7 @@ pub(crate) struct Frame {
     /// Set values of parameters.
     pub set: Vec<Option<f64>>,
     pub tables: Vec<Table1d>,
-    time: u32,
+    pub(super) time: u32,
     /// The code of the Newton block that is being solved, where it is not to be interpreted.
     pub inner: Option<Arc<dyn InnerCode>>,
     /// Newton blocks of the routine that runs which are solved in batches.

@@ -6,7 +6,7 @@ use super::exchanges::Ratios;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
-use super::positions::PositionConstraints;
+use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
@@ -148,6 +148,8 @@ pub(super) struct Mode {
     pub impulses: Option<ImpulseBalance>,
     /// Constraints that events may break.
     pub positions: Option<PositionConstraints>,
+    /// How computed positions move.
+    pub motion: Option<Motion>,
     /// Variables that could be independent in place of others, where some could.
     pub exchanges: Option<Ratios>,
 }
@@ -178,6 +180,7 @@ impl Mode {
             clauses: Clauses::of(&program, &layout),
             impulses: ImpulseBalance::of(&program, &layout),
             positions: PositionConstraints::of(&program, &layout),
+            motion: Motion::of(&program, &layout),
             exchanges: Ratios::of(&program, &layout),
             layout,
             program,
@@ -196,6 +199,7 @@ impl Mode {
             .chain(self.clauses.routines())
             .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
             .chain(self.positions.as_ref().map(PositionConstraints::routine))
+            .chain(self.motion.as_ref().map(|motion| &motion.rates))
             .chain(self.exchanges.as_ref().map(Ratios::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }

@@ -3,7 +3,7 @@
 use super::clause_memory::ClauseMemory;
 use super::system::What;
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Hold, SolveError};
+use crate::bytecode::{Hold, Moving, SolveError};
 use halfarrow_sim::{Affected, Events, Failure};
 
 impl Model {
@@ -17,12 +17,30 @@ impl Model {
             self.rated = None;
             let blocks = self.code.rates.solves.iter().map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+            self.follow_motion(t, x)?;
         }
         if !self.recorded.blocks.is_empty() {
             self.place(t, x);
             self.evaluate(What::Recorded, false, t)?;
             let blocks = self.recorded.blocks.iter();
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+        }
+        Ok(())
+    }
+
+    /// Notes how computed positions move at `(t, x)`.
+    fn follow_motion(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(motion) = &code.motion else { return Ok(()) };
+        self.place(t, x);
+        self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
+        for (&(block, i), &register) in motion.unknowns.iter().zip(&motion.rates.outputs) {
+            let rate = self.frame.r[register as usize];
+            let newton = &mut self.frame.solvers[block].newton;
+            let moving =
+                newton.moving.get_or_insert_with(|| Moving { time: t, rates: vec![0.0; newton.previous.len()] });
+            moving.time = t;
+            moving.rates[i] = if rate.is_finite() { rate } else { 0.0 };
         }
         Ok(())
     }

@@ -59,6 +59,11 @@ impl Ratios {
 }
 
 impl Model {
+    /// Whether a run may go on in other independent variables.
+    pub fn may_exchange(&self) -> bool {
+        self.compiled.has_alternatives() && self.compiled.first().exchanges.is_some()
+    }
+
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
     /// position and motion in the new ones. `failed`: a step from here has failed.
     pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {

@@ -40,6 +40,24 @@ impl PositionConstraints {
     }
 }
 
+/// How computed positions move.
+#[derive(Debug, Clone)]
+pub(super) struct Motion {
+    /// They are these unknowns of these blocks.
+    pub unknowns: Vec<(usize, usize)>,
+    pub rates: Routine,
+}
+
+impl Motion {
+    /// `None` where there are none whose rates are known.
+    pub fn of(program: &Program, layout: &Layout) -> Option<Motion> {
+        let rates: Option<Vec<Value>> = program.positions.iter().map(|p| p.rate).collect();
+        let rates = rates.filter(|rates| !rates.is_empty())?;
+        let unknowns = program.positions.iter().map(|p| (p.block.0 as usize, p.unknown as usize)).collect();
+        Some(Motion { unknowns, rates: layout.routine(program, &rates) })
+    }
+}
+
 impl Model {
     /// By how much each constraint on displacements is missed.
     pub(super) fn position_misses(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {

@@ -34,7 +34,7 @@ mod search;
 mod workspace;
 
 pub(super) use damped::{CONTRACTION, CONVERGED};
-pub(crate) use workspace::{Followed, Newton};
+pub(crate) use workspace::{Followed, Moving, Newton};
 
 /// A correction below this part of the unknowns that no longer gets shorter is rounding.
 pub(in crate::bytecode) const CLOSE_TO_ROUNDING: f64 = 1e-9;

@@ -8,6 +8,9 @@ use crate::bytecode::instruction::Solve;
 /// First guesses after the previous solution and zero, at the start and after events.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 
+/// Positions go on smoothly if they come this near, by the way gone, to where they were expected.
+const STRAYED: f64 = 0.25;
+
 /// Why the continuation of the previous solution was not found.
 #[derive(Debug, Clone, Copy)]
 enum NoContinuation {
@@ -114,10 +117,16 @@ impl Frame {
         let newton = self.newton_of(solve);
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
-        if first.is_ok()
-            && (self.is_continuation(solve) || self.newton_of(solve).following && self.is_unique_near_path(solve))
-            || self.previous_is_root(solve)
-            || self.solve_rank_deficient(solve)
+        let near = first.is_ok() && self.is_continuation(solve);
+        // Positions go on as they move: of several motions from one place the smooth one.
+        let is_position = self.newton_of(solve).moving.is_some();
+        if near || is_position && self.continue_motion(solve) {
+            return Ok(());
+        }
+        if !is_position
+            && (first.is_ok() && self.newton_of(solve).following && self.is_unique_near_path(solve)
+                || self.previous_is_root(solve)
+                || self.solve_rank_deficient(solve))
         {
             return Ok(());
         }
@@ -131,6 +140,26 @@ impl Frame {
             Err(failed) => NoContinuation::NotConverged(failed),
         };
         if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
+    }
+
+    /// The root near where the motion of the previous solution leads.
+    fn continue_motion(&mut self, solve: &Solve) -> bool {
+        let t = self.r[self.time as usize];
+        let newton = self.newton_of(solve);
+        let Some(moving) = newton.moving.as_ref().filter(|_| newton.following) else { return false };
+        let span = t - moving.time;
+        for ((start, previous), rate) in newton.start.iter_mut().zip(&newton.previous).zip(&moving.rates) {
+            *start = previous + span * rate;
+        }
+        let expected = newton.start.clone();
+        if self.iterate(solve, Globalization::Damped).is_err() {
+            return false;
+        }
+        let newton = self.newton_of(solve);
+        let moved = |(a, b): (&f64, &f64)| (a - b) * (a - b);
+        let away: f64 = newton.x.iter().zip(&expected).map(moved).sum();
+        let gone: f64 = expected.iter().zip(&newton.previous).map(moved).sum();
+        away <= STRAYED * STRAYED * gone
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never

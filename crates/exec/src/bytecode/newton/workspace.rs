@@ -56,15 +56,27 @@ pub(crate) struct Newton {
     pub(in crate::bytecode) magnitude: Vec<f64>,
     /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
     pub(super) contracts: bool,
+    /// Of positions: when the previous solution was, and how fast it moved.
+    pub moving: Option<Moving>,
     /// Whether the laws had a value where an iteration began, since a root is sought.
     pub(super) valued: bool,
     /// Unknowns that no equation determines.
     pub floating: Floating,
 }
 
+/// How positions move.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Moving {
+    /// When, in s.
+    pub time: f64,
+    /// Their rates.
+    pub rates: Vec<f64>,
+}
+
 /// The state of a Newton block in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Followed {
+    moving: Option<Moving>,
     previous: Vec<f64>,
     following: bool,
     /// What the block read at the accepted solution, and its Jacobian there.
@@ -103,6 +115,7 @@ impl Newton {
             first_right: line.clone(),
             magnitude: line,
             start_jacobian: matrix,
+            moving: None,
             contracts: false,
             valued: false,
             floating: Floating::new(size, sparse),
@@ -118,6 +131,7 @@ impl Newton {
     /// Forgets the run.
     pub fn forget(&mut self) {
         self.previous.fill(0.0);
+        self.moving = None;
         self.version += 1;
         self.floating.ever.fill(false);
         self.leave();
@@ -157,6 +171,7 @@ impl Newton {
     /// The state, to be restored.
     pub fn followed(&self) -> Followed {
         Followed {
+            moving: self.moving.clone(),
             previous: self.previous.clone(),
             following: self.following,
             outer: self.previous_outer.clone(),
@@ -168,6 +183,7 @@ impl Newton {
     /// Restores a state.
     pub fn follow_from(&mut self, from: &Followed) {
         self.version += 1;
+        self.moving.clone_from(&from.moving);
         self.previous.copy_from_slice(&from.previous);
         self.previous_outer.copy_from_slice(&from.outer);
         self.previous_jacobian.copy_from_slice(&from.jacobian);

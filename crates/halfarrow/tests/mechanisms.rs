@@ -1,0 +1,149 @@
+//! Closed loops: positions that follow from others, and runs past positions where one set of variables does not do.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
+use halfarrow::{FixedMethod, Form, Method, Model, Record, Run, Simulated};
+
+fn model(text: &str) -> Model {
+    Model::from_text("test.bond", text, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn run(text: &str, run: &Run) -> Simulated {
+    let run = Run { record: Record::All, ..run.clone() };
+    model(text).simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn column<'a>(done: &'a Simulated, name: &str) -> &'a [f64] {
+    let found = done.trace.columns.iter().find(|c| c.name == name);
+    &found.unwrap_or_else(|| panic!("nothing called {name}")).values
+}
+
+fn last(done: &Simulated, name: &str) -> f64 {
+    *column(done, name).last().expect("there are samples")
+}
+
+fn greatest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, v| v.abs().max(most))
+}
+
+/// The names of the states of the minimal form.
+fn states(text: &str) -> Vec<String> {
+    let report = model(text).equations(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    report.states.into_iter().map(|s| s.name).collect()
+}
+
+const OVER: &str = "model Over
+param m = 1 kg, g = 9.81 m/s2
+1:u -> I:mx(m, f0 = 7)
+Se:w(-m*g) -> 1:v -> I:my(m)
+state x' = u.f from 0
+state y' = v.f from -1
+constraint rod: x^2 + y^2 - 1 = 0
+output E = 0.5*m*(u.f^2 + v.f^2) + m*g*y : J
+";
+
+/// The same pendulum by its angle.
+const ANGLE: &str = "model Angle
+state phi' = w.f from 0
+1:w -> I:J(1, f0 = 7)
+Se:weight(-9.81*sin(phi)) -> w
+";
+
+/// Neither `x` nor `y` tells the motion everywhere: each takes over from the other, whatever the method.
+#[test]
+fn a_pendulum_by_x_and_y_alone_turns_over() {
+    assert_eq!(states(OVER), ["mx.f", "x"]);
+    let exact = Run { to: 5.0, rtol: 1e-12, every: Some(0.1), ..Run::default() };
+    let angle = run(ANGLE, &exact);
+    let turns = last(&angle, "phi") / std::f64::consts::TAU;
+    assert!(turns > 3.0, "{turns}");
+    for (method, step, error) in [
+        (Method::Explicit, None, 1e-9),
+        (Method::Bdf, None, 1e-7),
+        (Method::Radau, None, 1e-9),
+        (Method::Fixed(FixedMethod::Rk4), Some(1e-4), 1e-8),
+    ] {
+        let over = run(OVER, &Run { method, step, ..exact.clone() });
+        assert!(over.report.exchanges > 10, "{method:?}: {}", over.report.exchanges);
+        for (k, phi) in column(&angle, "phi").iter().enumerate() {
+            let (x, y) = (column(&over, "x")[k], column(&over, "y")[k]);
+            assert!((x - phi.sin()).abs() < error && (y + phi.cos()).abs() < error, "{method:?} {k}: {x} {y} {phi}");
+            // The rod carries the weight and turns the motion: with its gradient 2 x, 2 y.
+            let speed = column(&angle, "J.f")[k];
+            let wanted = -0.5 * (speed * speed + 9.81 * phi.cos());
+            let force = column(&over, "rod.e")[k];
+            assert!((force - wanted).abs() < 1e3 * error, "{method:?} {k}: {force} {wanted}");
+        }
+        assert!(greatest(column(&over, "rod.drift")) < 1e-14, "{method:?}");
+    }
+}
+
+const SLIDER: &str = "model Slider
+param r = 0.1 m, l = 0.3 m, speed = 100 rad/s
+state theta' = w.f from 0.3 rad
+state x' = slide.f
+guess x = 0.4 m
+";
+
+/// A thousand turns past both dead centres: no drift.
+#[test]
+fn a_driven_slider_crank_keeps_its_rod() {
+    let text = format!(
+        "{SLIDER}Sf:drive(speed) -> 1:w\n1:slide -> I:slider(0.5 kg)\nconstraint rod: (x - r*cos(theta))^2 + (r*sin(theta))^2 - l^2 = 0\n"
+    );
+    let turns = 1000.0 * std::f64::consts::TAU / 100.0;
+    let done = run(&text, &Run { to: turns, rtol: 1e-8, every: Some(turns / 1999.0), ..Run::default() });
+    for (theta, x) in column(&done, "theta").iter().zip(column(&done, "x")) {
+        let wanted = 0.1 * theta.cos() + (0.09 - 0.01 * theta.sin() * theta.sin()).sqrt();
+        assert!((x - wanted).abs() < 1e-14, "{theta}: {x} {wanted}");
+    }
+}
+
+/// A free one without friction keeps its energy through its turns.
+#[test]
+fn a_free_slider_crank_keeps_its_energy() {
+    let text = format!(
+        "{SLIDER}1:w -> I:crank(0.002 kg.m2, f0 = 30 rad/s)\n1:slide -> I:slider(0.5 kg)\nconstraint rod: (x - r*cos(theta))^2 + (r*sin(theta))^2 - l^2 = 0\noutput E = 0.001*w.f^2 + 0.25*slide.f^2\n"
+    );
+    assert_eq!(states(&text), ["crank.f", "theta"]);
+    let done = run(&text, &Run { to: 10.0, rtol: 1e-12, every: Some(0.01), ..Run::default() });
+    let energy = column(&done, "E");
+    assert!(last(&done, "theta") > 100.0, "it turns");
+    let drift = energy.iter().map(|e| (e / energy[0] - 1.0).abs()).fold(0.0, f64::max);
+    assert!(drift < 1e-9, "{drift}");
+}
+
+const ROCKERS: &str = "model Rockers
+param a = 0.4 m, b = 0.2 m, c = 0.4 m, d = 0.5 m
+state th1' = crank.f from 1.2 rad
+state th2' = coupler.f
+state th3' = rocker.f
+1:crank -> I:I1(0.01 kg.m2, f0 = 6)
+1:coupler -> I:I2(0.002 kg.m2)
+1:rocker -> I:I3(0.01 kg.m2)
+constraint along: a*cos(th1) + b*cos(th2) = d + c*cos(th3)
+constraint across: a*sin(th1) + b*sin(th2) = c*sin(th3)
+guess th2 = 0.5 rad, th3 = 1.5 rad
+output E = 0.005*crank.f^2 + 0.001*coupler.f^2 + 0.005*rocker.f^2 : J
+";
+
+/// The coupler alone turns over: by its angle the motion is regular everywhere, by that of the crank it ends at the limits.
+#[test]
+fn a_double_rocker_passes_the_limits_of_its_cranks() {
+    let exact = Run { to: 5.0, rtol: 1e-12, every: Some(0.05), ..Run::default() };
+    let wanted = run(&format!("{ROCKERS}prefer coupler.f\n"), &exact);
+    assert_eq!(wanted.report.exchanges, 0);
+    let done = run(ROCKERS, &exact);
+    assert!(done.report.exchanges > 20, "{}", done.report.exchanges);
+    assert!(last(&done, "th2").abs() > 8.0 * std::f64::consts::TAU, "it turns over");
+    for name in ["th1", "th2", "th3", "crank.f", "rocker.f"] {
+        for (k, (a, b)) in column(&done, name).iter().zip(column(&wanted, name)).enumerate() {
+            assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{name} {k}: {a} {b}");
+        }
+    }
+    let energy = column(&done, "E");
+    let drift = energy.iter().map(|e| (e / energy[0] - 1.0).abs()).fold(0.0, f64::max);
+    assert!(drift < 1e-9, "{drift}");
+    for drift in ["along.drift", "across.drift"] {
+        assert!(greatest(column(&done, drift)) < 1e-13, "{drift}");
+    }
+}
