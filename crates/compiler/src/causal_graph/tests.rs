@@ -7,7 +7,7 @@ use super::assign::{is_triangular, kept_variable, outer_ports};
 use super::ports::{CausalityPreferences, Net, Solved, Virtual};
 use super::strokes::parts;
 use super::{Combination, Ports};
-use crate::algebra::{Expr, Exprs, PlainNames, Symbol, ascii};
+use crate::algebra::{Expr, Exprs, Node, PlainNames, Symbol, ascii};
 use crate::ast::parse;
 use crate::bond_graph::{BondGraph, ElementId, Kind, NoFiles, PortCausality, elaborate};
 use crate::diagnostic::Sources;
@@ -16,10 +16,11 @@ use crate::ids::Map;
 #[allow(dead_code, reason = "only the text of graphs is needed")]
 #[path = "../../../exec/tests/random_graphs/graph.rs"]
 mod plain;
+#[allow(clippy::disallowed_methods, reason = "values of parameters")]
 #[path = "../../../halfarrow/tests/wild/graph.rs"]
 mod wild;
 
-use plain::{Family, Random, random_graph};
+use plain::{Family, Random, composed, random_graph};
 
 /// How many parts were compared, and how many of them are divided by something that is watched.
 #[derive(Debug, Default)]
@@ -70,12 +71,17 @@ fn random_preferences(
 }
 
 /// Both ways of solving every part tell the same.
-fn compare(text: &str, seed: u64, seen: &mut Seen) -> Result<(), String> {
+fn compare(
+    text: &str,
+    seed: u64,
+    seen: &mut Seen,
+    preferences: impl Fn(&mut Exprs, &BondGraph, &[ElementId], &mut Random) -> CausalityPreferences,
+) -> Result<(), String> {
     let Some(graph) = graph_of(text) else { return Ok(()) };
     let dice = &mut Random::new(seed);
     for members in parts(&graph) {
         let mut x = graph.exprs.clone();
-        let preferences = random_preferences(&mut x, &graph, &members, dice);
+        let preferences = preferences(&mut x, &graph, &members, dice);
         let net = Net::new(&mut x, &graph, &members, &preferences);
         let before = x.assumed();
         let by_roles = net.solved_by_roles(&mut x, &preferences);
@@ -89,7 +95,9 @@ fn compare(text: &str, seed: u64, seen: &mut Seen) -> Result<(), String> {
         let exposed =
             by_roles.definitions.iter().flat_map(|d| &d.1.0).find_map(|t| unwatched(&mut x, t.1, &by_roles.watched));
         if let Some(e) = exposed {
-            return Err(format!("`{}` divides, and nobody watches it", ascii(&x, e, &PlainNames(&x))));
+            let text = |&e: &Expr| ascii(&x, e, &PlainNames(&x));
+            let watched: Vec<String> = by_roles.watched.iter().map(text).collect();
+            return Err(format!("`{}` divides, watched are only {watched:?}", text(&e)));
         }
         x.suppose(before.clone());
         let exact = net.solved_exactly(&mut x, &preferences, before);
@@ -98,16 +106,25 @@ fn compare(text: &str, seed: u64, seen: &mut Seen) -> Result<(), String> {
     Ok(())
 }
 
-/// A factor of the denominator that may be zero, and is no factor of what is watched.
+/// Something that is divided by, that may be zero, and that is no factor of what is watched.
 fn unwatched(x: &mut Exprs, e: Expr, watched: &[Expr]) -> Option<Expr> {
-    let below = x.lowest_terms(e)?.below;
-    below.into_iter().map(|(factor, _)| factor).find(|&factor| {
-        let divides = |x: &mut Exprs, e: Expr| {
-            let quotient = x.div(e, factor);
-            x.lowest_terms(quotient).is_some_and(|quotient| quotient.below.is_empty())
-        };
-        !x.is_known_nonzero(factor) && !watched.iter().any(|&e| divides(x, e))
-    })
+    let mut open = vec![e];
+    while let Some(e) = open.pop() {
+        if let Node::Pow(base, n) = *x.node(e)
+            && x.is_number(n).is_some_and(|n| *n < 0.into())
+            && !x.is_known_nonzero(base)
+            && !watched.iter().any(|&e| divides(x, base, e))
+        {
+            return Some(base);
+        }
+        x.node(e).for_each_child(|child| open.push(child));
+    }
+    None
+}
+
+fn divides(x: &mut Exprs, factor: Expr, e: Expr) -> bool {
+    let quotient = x.div(e, factor);
+    x.lowest_terms(quotient).is_some_and(|quotient| quotient.below.is_empty())
 }
 
 fn same(x: &mut Exprs, net: &Net, by_roles: &Solved, exact: &Solved) -> Result<(), String> {
@@ -118,7 +135,7 @@ fn same(x: &mut Exprs, net: &Net, by_roles: &Solved, exact: &Solved) -> Result<(
     if speeds(by_roles) != speeds(exact) {
         return Err("other junctions keep their variables".into());
     }
-    if !exact.undetermined.is_empty() || !exact.degenerate.is_empty() || !exact.demands.is_empty() {
+    if !exact.undetermined.is_empty() || !exact.demands.is_empty() {
         return Err("by roles it is regular".into());
     }
     if !is_triangular(&by_roles.definitions) {
@@ -130,14 +147,15 @@ fn same(x: &mut Exprs, net: &Net, by_roles: &Solved, exact: &Solved) -> Result<(
     });
     for &symbol in &net.symbols {
         let [one, other] = resolved.each_mut().map(|(ports, known)| ports.resolve(x, symbol, known));
-        differing(x, &one, &other)
+        differing(x, &one, &other, exact.degenerate.is_empty())
             .map_or(Ok(()), |input| Err(format!("{} takes different parts of {}", x.label(symbol), x.label(input))))?;
     }
     Ok(())
 }
 
-/// The first symbol whose coefficients differ.
-fn differing(x: &mut Exprs, one: &Combination, other: &Combination) -> Option<Symbol> {
+/// The first symbol whose coefficients differ, `always` or at the given parameters: elimination of expressions may have
+/// met what vanishes there only, where another order of elimination does not.
+fn differing(x: &mut Exprs, one: &Combination, other: &Combination, always: bool) -> Option<Symbol> {
     let minus = x.int(-1);
     let mut terms = one.0.clone();
     terms.extend(other.0.iter().map(|&(s, e)| (s, x.mul(&[minus, e]))));
@@ -145,14 +163,15 @@ fn differing(x: &mut Exprs, one: &Combination, other: &Combination) -> Option<Sy
     terms.into_iter().for_each(|(s, e)| sums.entry(s).or_default().push(e));
     sums.into_iter().find_map(|(s, terms)| {
         let sum = x.add(&terms);
-        (!x.is_zero(sum)).then_some(s)
+        let zero = if always { x.is_zero(sum) } else { x.is_zero_given(sum) };
+        (!zero).then_some(s)
     })
 }
 
-fn holds(from: u64, count: u64) {
+fn holds(seeds: impl Iterator<Item = u64>) -> Seen {
     let mut seen = Seen::default();
     let mut failed = String::new();
-    for seed in from..from + count {
+    for seed in seeds {
         let dice = &mut Random::new(seed);
         let text = match seed % 5 {
             4 => wild::Wild::new(seed).text(),
@@ -161,18 +180,50 @@ fn holds(from: u64, count: u64) {
                 random_graph(dice, family).text()
             }
         };
-        if let Err(why) = compare(&text, seed, &mut seen) {
+        if let Err(why) = compare(&text, seed, &mut seen, random_preferences) {
             let _ = writeln!(failed, "--- seed {seed}: {why}\n{text}");
         }
     }
     println!("{seen:?}");
     assert!(failed.is_empty(), "{failed}");
-    assert!(seen.by_roles * 10 > seen.parts, "a tenth of the parts must be solved by roles: {seen:?}");
+    seen
 }
 
 #[test]
 fn roles_are_those_of_elimination() {
-    holds(1, 500);
+    let seen = holds(1..501);
+    assert!(2 * seen.by_roles > seen.parts, "half of the parts must be solved by roles: {seen:?}");
+}
+
+/// Graphs on which it went wrong: a block divided by a pivot that another block had taken and that nobody watched.
+#[test]
+fn pivots_of_one_block_are_not_known_to_others() {
+    holds([1_026_447].into_iter());
+}
+
+/// Whether every part is solved by its roles.
+fn is_solved_by_roles(text: &str) -> bool {
+    graph_of(text).is_some_and(|graph| {
+        parts(&graph).iter().all(|members| {
+            let mut x = graph.exprs.clone();
+            let preferences = CausalityPreferences::default();
+            Net::new(&mut x, &graph, members, &preferences).solved_by_roles(&mut x, &preferences).is_some()
+        })
+    })
+}
+
+#[test]
+fn roles_of_large_parts_are_those_of_elimination() {
+    let mut seen = Seen::default();
+    for seed in 1..4 {
+        let families = [Family::Linear, Family::Nonlinear, Family::Varying, Family::Sensing];
+        let sound = |pair: &plain::Graph| is_solved_by_roles(&pair.text());
+        let graph = composed(&mut Random::new(seed), &families, 700, sound);
+        let text = graph.text();
+        compare(&text, seed, &mut seen, |_, _, _, _| CausalityPreferences::default())
+            .unwrap_or_else(|why| panic!("seed {seed}: {why}\n{text}"));
+    }
+    assert_eq!((seen.parts, seen.by_roles), (3, 3));
 }
 
 /// `GRAPHS=100000 FROM=1 cargo test --workspace --lib -- causal_graph::tests::many --ignored --nocapture`
@@ -180,5 +231,6 @@ fn roles_are_those_of_elimination() {
 #[ignore = "takes hours; its figures stand in docs/TESTING.md"]
 fn many() {
     let number = |name: &str, default| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
-    holds(number("FROM", 1_000_000), number("GRAPHS", 20_000));
+    let from = number("FROM", 1_000_000);
+    holds(from..from + number("GRAPHS", 20_000));
 }
