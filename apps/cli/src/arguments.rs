@@ -316,7 +316,7 @@ pub enum Exec {
     Auto,
     /// Bytecode
     Bytecode,
-    /// Machine code, which there is for x86-64
+    /// Machine code, of x86-64 and AArch64
     Machine,
 }
 

@@ -102,6 +102,7 @@ impl ConnectedPart<'_> {
         let (_, preferences) = self.solve(&Strokes::new(graph), false);
         self.x.suppose(before);
         let by_size = solve_part_by_size(self.x, graph, members, &preferences, point);
+        let by_size = by_size.filter(|found| found.tells_as_much_as(&solved));
         let Some(by_size) = by_size.filter(|found| digits::cost(self.x, graph, found, point) < cost) else {
             self.x.suppose(with_solved);
             return Ok(solved);
@@ -385,7 +386,7 @@ impl StoragePreferences {
 
 /// The common variable of a junction that stays independent, and its conjugate; as its twin where the graph has the variable
 /// already.
-fn kept_variable(x: &mut Exprs, graph: &BondGraph, junction: ElementId, flow: bool) -> (Symbol, Symbol) {
+pub(super) fn kept_variable(x: &mut Exprs, graph: &BondGraph, junction: ElementId, flow: bool) -> (Symbol, Symbol) {
     let element = &graph.elements[junction];
     let (own, conjugate) = if flow { ("f", "e") } else { ("e", "f") };
     let name = format!("{}.{own}", element.name);
@@ -537,7 +538,7 @@ impl ConnectedPart<'_> {
     }
 }
 
-fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
+pub(super) fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
     let outer = members.iter().filter(|&&m| !graph.elements[m].kind.is_inner());
     outer
         .flat_map(|&element| (0..graph.elements[element].ports.len() as u32).map(move |port| PortRef { element, port }))
@@ -620,7 +621,7 @@ fn whole_truth(
 }
 
 /// Whether the definitions are acyclic.
-fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
+pub(super) fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
     let index: BTreeMap<Symbol, usize> = definitions.iter().enumerate().map(|(i, d)| (d.0, i)).collect();
     let mut waits = vec![0usize; definitions.len()];
     let mut readers: Vec<Vec<usize>> = vec![Vec::new(); definitions.len()];

@@ -71,12 +71,18 @@ pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination, 
     for mut columns in blocks {
         columns.sort_unstable();
         let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
+        let before = (columns.len() > 1).then(|| x.assumed());
         let own = eliminate(x, own, &[columns.clone()]);
         if own.pivots.len() < columns.len() || !own.degenerate.is_empty() {
             return None;
         }
-        match x.if_found(|x| regular_rows(x, &own)) {
-            Some(regular) => {
+        // A single pivot is no quotient.
+        let regular = before.and_then(|before| Some((x.if_found(|x| regular_rows(x, &own))?, before)));
+        match regular {
+            Some((regular, before)) => {
+                // Of the pivots only the product is watched: another block may not take them as known.
+                x.forget_unwatched(&before);
+                x.assume_nonzero(regular.determinant);
                 found.add(x, regular.determinant);
                 found.rows.extend(own.pivots.iter().zip(regular.rows).map(|(pivot, row)| (pivot.column, row.0)));
             }

@@ -256,3 +256,6 @@ pub(crate) fn magnitude(x: &Exprs, e: Expr) -> f64 {
     }
     x.eval(e, &mut |s| value(x, s)).abs()
 }
+
+#[cfg(test)]
+mod tests;

@@ -58,6 +58,18 @@ pub struct Solved {
     pub undetermined: Vec<Symbol>,
 }
 
+impl Solved {
+    /// Whether no fewer variables are determined than by another solution, and no fewer are independent. At a point where
+    /// a modulus vanishes one that is chosen there may have less.
+    pub fn tells_as_much_as(&self, other: &Solved) -> bool {
+        let independent = |solved: &Solved| {
+            let storages = solved.ports.iter().filter(|p| p.role == Role::Independent).count();
+            storages + solved.virtual_speeds.len()
+        };
+        self.undetermined.len() <= other.undetermined.len() && independent(self) >= independent(other)
+    }
+}
+
 /// Which of effort and flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Which {
@@ -137,8 +149,7 @@ pub fn solve_part(
     {
         return solved;
     }
-    let (done, outputs) = net.eliminated(x, preferences);
-    net.solved(x, done, &outputs, preferences, Way::Short(before))
+    net.solved_exactly(x, preferences, before)
 }
 
 /// The same, with definitions as elimination leaves them: by fewer variables, and longer.
@@ -427,6 +438,17 @@ impl Net {
 }
 
 impl Net {
+    /// The part solved by elimination of expressions; `before`: what was assumed before it.
+    pub(super) fn solved_exactly(
+        &self,
+        x: &mut Exprs,
+        preferences: &CausalityPreferences,
+        before: Assumptions,
+    ) -> Solved {
+        let (done, outputs) = self.eliminated(x, preferences);
+        self.solved(x, done, &outputs, preferences, Way::Short(before))
+    }
+
     /// The rows with one variable of every port eliminated; the roles of ports, by their numbers.
     fn eliminated(&self, x: &mut Exprs, preferences: &CausalityPreferences) -> (Elimination, BTreeMap<usize, Role>) {
         let causality = |x: &Exprs, port: &NetPort, divisors: [Option<Expr>; 2]| {

@@ -47,8 +47,24 @@ impl CodeBuffer {
     pub fn seal(self) -> std::io::Result<ExecutablePages> {
         let mut pages = MmapMut::map_anon(self.0.len().max(1))?;
         pages[..self.0.len()].copy_from_slice(&self.0);
-        Ok(ExecutablePages(Arc::new(pages.make_exec()?)))
+        let pages = pages.make_exec()?;
+        fetch_anew(&pages)?;
+        Ok(ExecutablePages(Arc::new(pages)))
     }
+}
+
+/// Cores that keep instructions apart from data read these anew.
+#[cfg(not(target_arch = "x86_64"))]
+fn fetch_anew(pages: &Mmap) -> std::io::Result<()> {
+    use wasmtime_internal_jit_icache_coherence::{clear_cache, pipeline_flush_mt};
+    // SAFETY: the pages are mapped, all of them.
+    unsafe { clear_cache(pages.as_ptr().cast(), pages.len()) }.map_err(std::io::Error::other)?;
+    pipeline_flush_mt().map_err(std::io::Error::other)
+}
+
+#[cfg(target_arch = "x86_64")]
+fn fetch_anew(_: &Mmap) -> std::io::Result<()> {
+    Ok(())
 }
 
 #[cfg(target_arch = "x86_64")]

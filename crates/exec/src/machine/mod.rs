@@ -38,7 +38,7 @@ const INLINE: usize = 48;
 /// Why there is no machine code; the bytecode runs all the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum MachineError {
-    /// It is made for x86-64 only.
+    /// It is made for x86-64 and AArch64 only.
     Processor(String),
     /// The code generator refuses.
     Generator(String),
@@ -67,7 +67,7 @@ impl Generator {
     /// # Errors
     /// The processor is none that code is made for.
     pub fn new() -> Result<Generator, MachineError> {
-        if !cfg!(target_arch = "x86_64") {
+        if !cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) {
             return Err(MachineError::Processor(std::env::consts::ARCH.to_string()));
         }
         let mut flags = settings::builder();

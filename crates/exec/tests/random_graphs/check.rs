@@ -130,7 +130,36 @@ fn build(text: &str, constant: bool) -> Result<Outcome, Fault> {
 
 /// Checks a graph. Panics become faults.
 pub fn check(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
-    let run = catch_unwind(AssertUnwindSafe(|| check_all(graph, seed, seen)));
+    caught(|| check_all(graph, seed, seen))
+}
+
+/// Checks a graph of linear or cubic laws that is too large to be counted in exact numbers, and whose sources hold together:
+/// all equations at a random point and along a short run.
+pub fn check_large(graph: &Graph, seed: u64, seen: &mut Seen) -> Result<(), Fault> {
+    caught(|| {
+        let mut random = Random::new(seed ^ 0xabcd);
+        let mut built = match build(&graph.text(), true)? {
+            Outcome::Built(built) => built,
+            Outcome::Refused { faults, .. } => return fault("refused", faults.to_string()),
+            Outcome::Without => return fault("no value", "of constant moduli"),
+        };
+        let Some((t, x)) = random_point(graph, &mut built, &mut random, seen)? else { return Ok(()) };
+        check_point(graph, &mut built.model, t, &x, seen)?;
+        check_run(graph, &mut built.model, &x, seen)?;
+        seen.ran += 1;
+        seen.states += built.states;
+        Ok(())
+    })
+}
+
+/// Whether all is determined, and nothing is contradicted or repeated.
+pub fn is_regular(graph: &Graph, seed: u64) -> bool {
+    let count = exact::count(graph, &mut Random::new(seed));
+    count.consistent && count.regular && count.determined.iter().all(|&both| both == (true, true))
+}
+
+fn caught(run: impl FnOnce() -> Result<(), Fault>) -> Result<(), Fault> {
+    let run = catch_unwind(AssertUnwindSafe(run));
     run.unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
         let text = text.or_else(|| panic.downcast_ref::<&str>().map(|s| s.to_string()));

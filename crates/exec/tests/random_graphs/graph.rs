@@ -154,6 +154,45 @@ impl Graph {
         self.bonds.push(Bond { from, to });
     }
 
+    fn junctions(&self) -> Vec<usize> {
+        let junction = |&n: &usize| matches!(self.nodes[n].kind, Kind::Zero | Kind::One);
+        (0..self.nodes.len()).filter(junction).collect()
+    }
+
+    /// Adds another graph; by how much the numbers of its nodes are greater here.
+    fn append(&mut self, other: Graph) -> usize {
+        let by = self.nodes.len();
+        let modulus = |m: &mut Modulus| {
+            if let Modulus::Varying { of: Reading::Stored(n) | Reading::Integral(n), .. } = m {
+                *n += by;
+            }
+        };
+        self.nodes.extend(other.nodes.into_iter().map(|mut node| {
+            match &mut node.kind {
+                Kind::Transformer(m) | Kind::Gyrator(m) => modulus(m),
+                Kind::Effort(Signal::Sensed(_, _, n)) | Kind::Flow(Signal::Sensed(_, _, n)) => *n += by,
+                _ => {}
+            }
+            node
+        }));
+        self.bonds.extend(other.bonds.iter().map(|b| Bond { from: b.from + by, to: b.to + by }));
+        self.preferred.extend(other.preferred.iter().map(|n| n + by));
+        by
+    }
+
+    /// Whether every node with a bond is joined to every other.
+    fn is_connected(&self) -> bool {
+        let mut reached = vec![false; self.nodes.len()];
+        let mut open = vec![self.bonds[0].from];
+        while let Some(node) = open.pop() {
+            if !std::mem::replace(&mut reached[node], true) {
+                let at = self.bonds.iter().filter(|b| b.from == node || b.to == node);
+                open.extend(at.map(|b| b.from + b.to - node));
+            }
+        }
+        (0..self.nodes.len()).all(|n| reached[n] || !self.is_used(n))
+    }
+
     pub fn is_used(&self, node: usize) -> bool {
         self.bonds.iter().any(|b| b.from == node || b.to == node)
     }
@@ -458,6 +497,51 @@ pub fn random_graph(random: &mut Random, family: Family) -> Graph {
         }
     }
     graph
+}
+
+/// A connected graph of more than so many nodes: pairs of random graphs that are linked stiffly and are `sound` then, in a
+/// row with storages between one and the next.
+pub fn composed(random: &mut Random, families: &[Family], nodes: usize, sound: impl Fn(&Graph) -> bool) -> Graph {
+    let mut whole = Graph::default();
+    let mut last = None;
+    while whole.nodes.len() <= nodes {
+        let [mut pair, other] = std::array::from_fn(|_| {
+            let family = random.of(families);
+            random_graph(random, family)
+        });
+        let (before, after) = (random.of(&pair.junctions()), random.of(&other.junctions()));
+        let offset = pair.append(other);
+        link(random, &mut pair, before, after + offset);
+        if !(pair.is_connected() && sound(&pair)) {
+            continue;
+        }
+        let (first, next) = (random.of(&pair.junctions()), random.of(&pair.junctions()));
+        let offset = whole.append(pair);
+        if let Some(last) = last {
+            couple(random, &mut whole, last, first + offset);
+        }
+        last = Some(next + offset);
+    }
+    whole
+}
+
+/// Two junctions moved by one inertance, a 1-junction by way of a compliance: that holds whatever each of them is given.
+fn couple(random: &mut Random, graph: &mut Graph, a: usize, b: usize) {
+    let mut storing = || Storing { size: positive(random), cubic: None };
+    let [a, b] = [a, b].map(|junction| match graph.nodes[junction].kind {
+        Kind::Zero => junction,
+        _ => {
+            let between = graph.add(Kind::Zero);
+            let compliance = graph.add(Kind::Compliance(storing()));
+            graph.bond(junction, between);
+            graph.bond(between, compliance);
+            between
+        }
+    });
+    let (between, inertance) = (graph.add(Kind::One), graph.add(Kind::Inertance(storing())));
+    graph.bond(a, between);
+    graph.bond(between, b);
+    graph.bond(between, inertance);
 }
 
 fn positive(random: &mut Random) -> Number {
