@@ -32,15 +32,17 @@ impl Model {
     fn follow_motion(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
         let Some(motion) = &code.motion else { return Ok(()) };
+        for &(block, _) in &motion.unknowns {
+            let newton = &mut self.frame.solvers[block].newton;
+            newton.moving.get_or_insert_with(|| Moving { time: t, rates: vec![0.0; newton.previous.len()] }).time = t;
+        }
         self.place(t, x);
         self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
         for (&(block, i), &register) in motion.unknowns.iter().zip(&motion.rates.outputs) {
             let rate = self.frame.r[register as usize];
-            let newton = &mut self.frame.solvers[block].newton;
-            let moving =
-                newton.moving.get_or_insert_with(|| Moving { time: t, rates: vec![0.0; newton.previous.len()] });
-            moving.time = t;
-            moving.rates[i] = if rate.is_finite() { rate } else { 0.0 };
+            if let Some(moving) = &mut self.frame.solvers[block].newton.moving {
+                moving.rates[i] = if rate.is_finite() { rate } else { 0.0 };
+            }
         }
         Ok(())
     }

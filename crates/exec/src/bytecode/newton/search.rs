@@ -118,9 +118,8 @@ impl Frame {
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
         let near = first.is_ok() && self.is_continuation(solve);
-        // Positions go on as they move: of several motions from one place the smooth one.
         let is_position = self.newton_of(solve).moving.is_some();
-        if near || is_position && self.continue_motion(solve) {
+        if near && !is_position || is_position && self.is_on_motion(solve, near) {
             return Ok(());
         }
         if !is_position
@@ -142,24 +141,32 @@ impl Frame {
         if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
     }
 
-    /// The root near where the motion of the previous solution leads.
-    fn continue_motion(&mut self, solve: &Solve) -> bool {
+    /// Whether the root found, if it is `near`, is where the motion of the previous solution leads; or another one is, which
+    /// is taken then: of several motions from one place the smooth one.
+    fn is_on_motion(&mut self, solve: &Solve, near: bool) -> bool {
         let t = self.r[self.time as usize];
         let newton = self.newton_of(solve);
-        let Some(moving) = newton.moving.as_ref().filter(|_| newton.following) else { return false };
+        let Some(moving) = newton.moving.as_ref().filter(|m| newton.following && m.time != t) else { return near };
         let span = t - moving.time;
-        for ((start, previous), rate) in newton.start.iter_mut().zip(&newton.previous).zip(&moving.rates) {
-            *start = previous + span * rate;
+        let lead = |(previous, rate): (&f64, &f64)| previous + span * rate;
+        let expected: Vec<f64> = newton.previous.iter().zip(&moving.rates).map(lead).collect();
+        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+        let gone = distance(&expected, &newton.previous);
+        let first = newton.x.clone();
+        if near && distance(&first, &expected) <= STRAYED * gone {
+            return true;
         }
-        let expected = newton.start.clone();
+        newton.start.copy_from_slice(&expected);
         if self.iterate(solve, Globalization::Damped).is_err() {
             return false;
         }
         let newton = self.newton_of(solve);
-        let moved = |(a, b): (&f64, &f64)| (a - b) * (a - b);
-        let away: f64 = newton.x.iter().zip(&expected).map(moved).sum();
-        let gone: f64 = expected.iter().zip(&newton.previous).map(moved).sum();
-        away <= STRAYED * STRAYED * gone
+        if near && distance(&newton.x, &first) <= STRAYED * distance(&first, &newton.previous) {
+            // Both ways lead there: where the motion turns back it is not where it was led to.
+            newton.start_at_previous();
+            return self.iterate(solve, Globalization::Damped).is_ok();
+        }
+        distance(&newton.x, &expected) <= STRAYED * gone
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
