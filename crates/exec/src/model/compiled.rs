@@ -165,6 +165,7 @@ impl Mode {
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);
+        let motion = Motion::of(&program, &layout, &rates);
         Mode {
             preamble: layout.preamble(&program),
             assumed: layout.routine(&program, &assumed),
@@ -180,7 +181,7 @@ impl Mode {
             clauses: Clauses::of(&program, &layout),
             impulses: ImpulseBalance::of(&program, &layout),
             positions: PositionConstraints::of(&program, &layout),
-            motion: Motion::of(&program, &layout),
+            motion,
             exchanges: Ratios::of(&program, &layout),
             layout,
             program,

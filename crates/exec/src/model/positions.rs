@@ -2,7 +2,7 @@
 
 use super::Model;
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Program, Value};
+use halfarrow_compiler::program::{Position, Program, Value};
 use halfarrow_sim::Failure;
 
 /// How far a constraint may be missed after an event, as part of its terms, if it was not before.
@@ -40,7 +40,7 @@ impl PositionConstraints {
     }
 }
 
-/// How computed positions move.
+/// How the computed positions move that rates read: their steps are short enough to follow them.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     /// They are these unknowns of these blocks.
@@ -50,10 +50,12 @@ pub(super) struct Motion {
 
 impl Motion {
     /// `None` where there are none whose rates are known.
-    pub fn of(program: &Program, layout: &Layout) -> Option<Motion> {
-        let rates: Option<Vec<Value>> = program.positions.iter().map(|p| p.rate).collect();
+    pub fn of(program: &Program, layout: &Layout, of_rates: &Routine) -> Option<Motion> {
+        let read = |p: &&Position| of_rates.solves.iter().any(|solve| solve.block == p.block);
+        let positions: Vec<&Position> = program.positions.iter().filter(read).collect();
+        let rates: Option<Vec<Value>> = positions.iter().map(|p| p.rate).collect();
         let rates = rates.filter(|rates| !rates.is_empty())?;
-        let unknowns = program.positions.iter().map(|p| (p.block.0 as usize, p.unknown as usize)).collect();
+        let unknowns = positions.iter().map(|p| (p.block.0 as usize, p.unknown as usize)).collect();
         Some(Motion { unknowns, rates: layout.routine(program, &rates) })
     }
 }

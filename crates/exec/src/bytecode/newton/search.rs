@@ -10,6 +10,9 @@ const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 
 /// Positions go on smoothly if they come this near, by the way gone, to where they were expected.
 const STRAYED: f64 = 0.25;
+/// In one step they go at most this part of their size, which counts from the least one to 1, in their own unit.
+const MOST_MOVED: f64 = 0.5;
+const LEAST_SIZE: f64 = 0.05;
 
 /// Why the continuation of the previous solution was not found.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +69,8 @@ impl Frame {
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh, newton.valued) = (0, false, false);
         newton.floating.now.fill(false);
-        newton.floor.fill(0.0);
+        // A position that is 0 is so against its size.
+        newton.floor.fill(if newton.moving.is_some() { LEAST_SIZE } else { 0.0 });
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
         if let Err(why) = self.continue_root(solve)
             && (self.newton_of(solve).following || !self.search(solve))
@@ -118,14 +122,21 @@ impl Frame {
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
         let near = first.is_ok() && self.is_continuation(solve);
-        let is_position = self.newton_of(solve).moving.is_some();
-        if near && !is_position || is_position && self.is_on_motion(solve, near) {
-            return Ok(());
+        if let Some((expected, ahead)) = self.expected(solve) {
+            if self.is_on_motion(solve, near, &expected) {
+                return Ok(());
+            }
+            if ahead {
+                return Err(self.off_motion(solve, &expected));
+            }
+            // Inside a step that has been made.
+            self.newton_of(solve).start_at_previous();
+            _ = self.iterate(solve, Globalization::Damped);
         }
-        if !is_position
-            && (first.is_ok() && self.newton_of(solve).following && self.is_unique_near_path(solve)
-                || self.previous_is_root(solve)
-                || self.solve_rank_deficient(solve))
+        if near
+            || first.is_ok() && self.newton_of(solve).following && self.is_unique_near_path(solve)
+            || self.previous_is_root(solve)
+            || self.solve_rank_deficient(solve)
         {
             return Ok(());
         }
@@ -141,22 +152,30 @@ impl Frame {
         if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
     }
 
-    /// Whether the root found, if it is `near`, is where the motion of the previous solution leads; or another one is, which
-    /// is taken then: of several motions from one place the smooth one.
-    fn is_on_motion(&mut self, solve: &Solve, near: bool) -> bool {
+    /// Where the motion of the previous solution leads, of positions, and whether that is ahead.
+    fn expected(&mut self, solve: &Solve) -> Option<(Vec<f64>, bool)> {
         let t = self.r[self.time as usize];
         let newton = self.newton_of(solve);
-        let Some(moving) = newton.moving.as_ref().filter(|m| newton.following && m.time != t) else { return near };
-        let span = t - moving.time;
-        let lead = |(previous, rate): (&f64, &f64)| previous + span * rate;
-        let expected: Vec<f64> = newton.previous.iter().zip(&moving.rates).map(lead).collect();
+        let moving = newton.moving.as_ref().filter(|m| newton.following && m.time != t)?;
+        let lead = |(previous, rate): (&f64, &f64)| previous + (t - moving.time) * rate;
+        Some((newton.previous.iter().zip(&moving.rates).map(lead).collect(), t > moving.time))
+    }
+
+    /// Whether the root found, if it is `near`, is where the motion leads; or another one is, which is taken then: of several
+    /// motions from one place the smooth one. Not where the motion is so long that this says nothing.
+    fn is_on_motion(&mut self, solve: &Solve, near: bool, expected: &[f64]) -> bool {
+        let newton = self.newton_of(solve);
+        let is_short = |(e, p): (&f64, &f64)| (e - p).abs() <= MOST_MOVED * p.abs().clamp(LEAST_SIZE, 1.0);
+        if !expected.iter().zip(&newton.previous).all(is_short) {
+            return false;
+        }
         let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
-        let gone = distance(&expected, &newton.previous);
+        let gone = distance(expected, &newton.previous);
         let first = newton.x.clone();
-        if near && distance(&first, &expected) <= STRAYED * gone {
+        if near && distance(&first, expected) <= STRAYED * gone {
             return true;
         }
-        newton.start.copy_from_slice(&expected);
+        newton.start.copy_from_slice(expected);
         if self.iterate(solve, Globalization::Damped).is_err() {
             return false;
         }
@@ -166,7 +185,15 @@ impl Frame {
             newton.start_at_previous();
             return self.iterate(solve, Globalization::Damped).is_ok();
         }
-        distance(&newton.x, &expected) <= STRAYED * gone
+        distance(&newton.x, expected) <= STRAYED * gone
+    }
+
+    /// The motion cannot be followed as far as this.
+    fn off_motion(&mut self, solve: &Solve, expected: &[f64]) -> NoContinuation {
+        let newton = self.newton_of(solve);
+        let leap = |i: usize| (expected[i] - newton.previous[i]).abs();
+        let unknown = (0..expected.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
+        NoContinuation::OtherRoot { unknown, root: expected[unknown] }
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
