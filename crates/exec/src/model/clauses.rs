@@ -5,6 +5,7 @@
 
 use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::Mode;
+use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Program, Target, Trigger, Value};
@@ -66,8 +67,7 @@ pub(super) struct EventWork {
     pub fired: Vec<bool>,
     /// The new values of all actions, clause by clause.
     pub values: Vec<f64>,
-    /// What storages keep before the round.
-    pub stored: Vec<f64>,
+    pub impulses: ImpulseWork,
 }
 
 impl EventWork {
@@ -76,7 +76,7 @@ impl EventWork {
         EventWork {
             fired: vec![false; clauses.len()],
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
-            stored: vec![0.0; mode.program.jumps.as_ref().map_or(0, |j| j.stored.len())],
+            impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),
         }
     }
 }

@@ -11,6 +11,7 @@ mod events;
 mod explain;
 mod history;
 mod implicit;
+mod impulse_elimination;
 mod impulses;
 mod inputs;
 mod jacobian;
