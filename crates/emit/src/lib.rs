@@ -153,8 +153,6 @@ pub enum EmitError {
     Implicit,
     /// States that a jump of a source changes: their names.
     Jumps(Vec<String>),
-    /// What happens at events (`when`), which code that is exported does not do yet: as they begin in the model.
-    Events(Vec<String>),
     /// The step is not a finite number above zero.
     Step(f64),
     /// A value does not fit real numbers of single precision: what it is, and the value.
@@ -171,12 +169,6 @@ impl fmt::Display for EmitError {
                 f,
                 "a source that jumps changes {}, which are states of this form: export the form minimal, whose states do not jump",
                 states.join(", ")
-            ),
-            EmitError::Events(clauses) => write!(
-                f,
-                "exported code does not act at events yet: `{}`; simulate the model here, or write what it sets as a law with \
-                 `if ... then ... else` or `sample`, which are exported",
-                clauses.join("`, `")
             ),
             EmitError::Step(step) => write!(f, "the step is {step}: it has to be a finite number above zero"),
             EmitError::Range(what, value) => write!(

@@ -47,6 +47,10 @@ fn c_follows_parameters_and_inputs() {
         (own("closure"), "coupler0", 1.0),
         (own("working_point"), "k", 0.4),
         (own("freedom"), "v", -1.5),
+        (own("when_bounce"), "e", 0.9),
+        (own("when_beam"), "ratio", 0.4),
+        (own("when_sampled"), "period", 6e-3),
+        (own("when_four_bar"), "b", 0.52),
     ];
     let all: Vec<Exported> = cases.iter().map(|(path, ..)| export(path, Method::Heun, 1e-3)).collect();
     let of = |one: &Exported| {
@@ -129,6 +133,15 @@ fn unknowns_that_are_rounding_hide_no_solution() {
 fn c_is_clean() {
     let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh", "net", "net_cubic"]
         .iter()
+        .chain(&[
+            "when_beam",
+            "when_four_bar",
+            "when_gears",
+            "when_order",
+            "when_relay",
+            "when_sampled",
+            "when_springs",
+        ])
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
         .collect();
     let driver = driver(&all, &|_| (-1, 0.0));

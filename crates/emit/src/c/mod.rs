@@ -86,16 +86,10 @@ pub struct Names {
 /// Writes a program.
 ///
 /// # Errors
-/// The program is implicit or has events that change something, the step makes no sense, a delay is too long for it, or a value does not fit the real numbers.
+/// The program is implicit or has states that jump, the step makes no sense, a delay is too long for it, or a value does not fit the real numbers.
 pub fn write(export: &Export) -> Result<Written, EmitError> {
     if export.program.implicit.is_some() {
         return Err(EmitError::Implicit);
-    }
-    let mut events: Vec<String> = export.program.clauses.iter().map(|c| c.name.clone()).collect();
-    let discrete = export.program.held.iter().filter(|h| h.kind.is_discrete());
-    events.extend(discrete.map(|h| format!("discrete {}", h.name)));
-    if !events.is_empty() {
-        return Err(EmitError::Events(events));
     }
     if !export.program.kept.is_empty() {
         let name = |k: &(u32, _)| export.program.states[k.0 as usize].name.clone();

@@ -46,8 +46,6 @@ pub fn models() -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = folders.map(|e| e.unwrap().path().join("model.bond")).filter(|p| p.is_file()).collect();
     let own = fs::read_dir(root.join("tests/models")).expect("models of the tests");
     all.extend(own.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "bond")));
-    // What happens at events is not exported.
-    all.retain(|path| !fs::read_to_string(path).expect("a model").contains("\nwhen "));
     all.sort();
     all
 }
