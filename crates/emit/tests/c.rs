@@ -93,6 +93,56 @@ fn c_says_what_fails() {
     }
 }
 
+/// What goes wrong at events stops the run where it stops in the interpreter, and says why.
+#[test]
+fn c_says_what_fails_at_events() {
+    let moving = "1:v -> I:m(1, f0 = 1)\nstate x' = v.f from 0\ndiscrete n = 0\n";
+    let four_bar = std::fs::read_to_string(own("when_four_bar")).expect("a model");
+    let four_bar = four_bar.split("when").next().and_then(|text| text.split_once('\n')).expect("a head").1;
+    let cases = [
+        (moving, "when x > 0.1 { n = 1 }\nwhen x > 0.1 { n = 2 }", "two events at one instant give n different values"),
+        (
+            moving,
+            "when x > 0.1 { n = 1 }\nwhen n > 0.5 { n = 0 }\nwhen n < 0.5 and x > 0.1 { n = 1 }",
+            "events make each other happen over and over",
+        ),
+        (
+            moving,
+            "v -> TF:gear(2) -> 1:w -> I:big(5)\nwhen x > 0.1 { reset m.f = 1; reset big.f = 7 }",
+            "m.f cannot be reset: what is reset depends on each other",
+        ),
+        (
+            moving,
+            "when x > 0.1 { reset m.f = log(x - 3) }",
+            "the value that `when x > 0.1` gives m.f is not a finite number",
+        ),
+        (
+            moving,
+            "v -> C:c(e = q^2 + 1)\nwhen x > 0.05 { reset c.e = -1 }",
+            "c.e cannot be reset: no impulse leads to the values",
+        ),
+        (four_bar, "when t > 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
+        (four_bar, "when every 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
+    ];
+    let folder = common::folder("failures_at_events_models");
+    let all: Vec<Exported> = cases
+        .iter()
+        .zip(Method::ALL.iter().cycle())
+        .enumerate()
+        .map(|(i, ((head, clauses, _), &method))| {
+            let path = folder.join(format!("fails{i}.bond"));
+            std::fs::write(&path, format!("model Fails{i}\n{head}{clauses}\n")).expect("a model");
+            export(&path, method, 1e-3)
+        })
+        .collect();
+    let output = build("failures_at_events", &all, &driver(&all, &|_| (-1, 0.0))).run(&[]);
+    for ((one, (_, clauses, wanted)), text) in all.iter().zip(cases).zip(output.split("== ").skip(1)) {
+        compare(one, text, &one.simulate(STEPS)).unwrap_or_else(|fault| panic!("{clauses}: {fault}"));
+        let said = text.lines().find_map(|line| line.strip_prefix("! ")).unwrap_or_default();
+        assert!(said.contains(wanted), "{clauses}: {said:?}");
+    }
+}
+
 /// Rates at points beside the run, of which the solution goes on from the one accepted: at time 0 the current of the mains is 0
 /// but for the rounding of others, wherever the state is. Both programs give the same bits, and those of the diodes' law.
 #[test]

@@ -367,6 +367,63 @@ def derivatives(where, file):
     fmu.close()
 
 
+def events_by_hand(where, file):
+    """Periods are told without drift, states and discrete variables change at an event, and a saved state takes it back."""
+    fmu = Fmu(file, exchange=True)
+    fmu.begin()
+
+    def event():
+        if fmu.version == 2:
+            return fmu.api.newDiscreteStates()
+        needed, ends, _, changed, defined, at = fmu.api.updateDiscreteStates()
+        return needed, ends, False, changed, defined, at
+
+    for k in range(1, 120):
+        needed, _, _, changed, defined, at = event()
+        if needed or changed or not defined or at != k * 0.02:
+            fault(where, f"after event {k - 1} the next one is told at {at}, states changed: {changed}")
+            break
+        if fmu.get(["samples"]) != [float(k)]:
+            fault(where, f"{fmu.get(['samples'])} samples at event {k - 1}")
+        fmu.api.enterContinuousTimeMode()
+        state = fmu.save()
+        fmu.api.setTime(at)
+        fmu.api.enterEventMode()
+        event()
+        if fmu.get(["samples"]) != [float(k + 1)]:
+            fault(where, f"{fmu.get(['samples'])} samples after event {k}")
+        other = fmu.deserialise(fmu.serialise(state))
+        fmu.restore(other)
+        if fmu.get(["samples"]) != [float(k)]:
+            fault(where, "a discrete variable is not restored")
+        fmu.free(state)
+        fmu.free(other)
+        fmu.api.setTime(at)
+        fmu.api.enterEventMode()
+    fmu.close()
+
+
+def impact_by_hand(where, file):
+    """An impact: the importer is told that states have changed; the height stays, the speed is turned round."""
+    fmu = Fmu(file, exchange=True)
+    fmu.begin()
+    update = fmu.api.newDiscreteStates if fmu.version == 2 else fmu.api.updateDiscreteStates
+    update()
+    fmu.api.enterContinuousTimeMode()
+    fmu.api.setTime(0.5)
+    states = [v for v in fmu.description.modelVariables if any(w.derivative is v for w in fmu.description.modelVariables)]
+    x = [-1e-9 if v.name == "h" else -4.0 for v in states]
+    fmu.api.setContinuousStates((ctypes.c_double * len(x))(*x), len(x))
+    fmu.api.enterEventMode()
+    changed = update()[3]
+    if not changed or fmu.get(["h", "ball.f", "n"]) != [-1e-9, 3.2, 1.0]:
+        fault(where, f"an impact gives {fmu.get(['h', 'ball.f', 'n'])}, states changed: {changed}")
+    fmu.api.enterEventMode()
+    if update()[3] or fmu.get(["n"]) != [1.0]:
+        fault(where, "an impact happens again at the same instant")
+    fmu.close()
+
+
 def initial_unknowns(where, file):
     """What is said to follow from parameters and inputs at the start does, and nothing else does."""
     fmu = Fmu(file)
@@ -484,6 +541,10 @@ def main():
             derivatives(where, file)
             if name in LONGER:
                 of_closed_form(where, name, file)
+            if name == "controlled":
+                events_by_hand(where, file)
+            if name == "when_bouncing_ball":
+                impact_by_hand(where, file)
             if name in ("tuned", "controlled", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
                 initial_unknowns(where, file)
             if name in ("contact", "quarter_car"):

@@ -17,7 +17,7 @@ impl Run<'_> {
         point: &mut [f64],
     ) -> Result<(f64, bool), Failure> {
         let handled = std::mem::take(&mut self.handled);
-        if !S::DENSE && stepper.events().locates_crossings() {
+        if !S::DENSE && !self.signs.is_empty() && stepper.events().locates_crossings() {
             return self.accept_by_shorter_steps(stepper, end, point, handled);
         }
         if !S::DENSE {
