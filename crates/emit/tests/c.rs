@@ -93,6 +93,18 @@ fn c_says_what_fails() {
     }
 }
 
+/// A run that the caller takes from step to step, as in real time, has the same results at events.
+#[test]
+fn c_does_at_events_what_a_run_by_steps_does() {
+    let names = ["when_beam", "when_bounce", "when_four_bar", "when_gears", "when_order", "when_relay", "when_springs"];
+    let all: Vec<Exported> = names
+        .iter()
+        .zip([Method::Rk4, Method::Rosenbrock].iter().cycle())
+        .map(|(name, &method)| export(&own(name), method, 1e-3))
+        .collect();
+    check("by_steps", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.step(STEPS));
+}
+
 /// What goes wrong at events stops the run where it stops in the interpreter, and says why.
 #[test]
 fn c_says_what_fails_at_events() {
@@ -141,6 +153,21 @@ fn c_says_what_fails_at_events() {
         let said = text.lines().find_map(|line| line.strip_prefix("! ")).unwrap_or_default();
         assert!(said.contains(wanted), "{clauses}: {said:?}");
     }
+}
+
+/// There is room for the balance of so many impulses, and no more.
+#[test]
+fn balances_of_too_many_impulses_are_refused() {
+    let folder = common::folder("balances");
+    let write = |bodies: usize| {
+        let path = folder.join("many.bond");
+        let bodies = format!("for i in 1..{bodies} {{ 1:v[i] -> I:m[i](i, f0 = 1) }}\n");
+        std::fs::write(&path, format!("model Many\n{bodies}when t > 0.01 {{ reset m[1].f = 2 }}\n")).expect("a model");
+        common::export_as(common::read_program(&path), Method::Heun, 1e-3, (false, halfarrow_emit::Real::Double))
+    };
+    assert!(matches!(write(200), Err(halfarrow_emit::EmitError::Impulses(201))));
+    let most = [write(199).expect("there is room")];
+    check("balances", &most, &driver(&most, &|_| (-1, 0.0)), |one| one.simulate(STEPS));
 }
 
 /// Rates at points beside the run, of which the solution goes on from the one accepted: at time 0 the current of the mains is 0
