@@ -103,6 +103,7 @@ pub fn export_as(
     (derivatives, real): (bool, Real),
 ) -> Result<Exported, EmitError> {
     let mut model = Model::new(program.clone()).expect("parameters have values");
+    model.record_impulses();
     let mut x = model.initialise(0.0).expect("a start");
     let start = Start {
         states: x.clone(),

@@ -2,6 +2,7 @@
 
 use halfarrow_compiler::program::{Program, StartCondition, Target, Trigger, Value};
 
+use crate::c::header::comment;
 use crate::c::written::{Needed, Notes, Part, Written, written};
 
 /// What an action changes, as in `runtime/events.c`.
@@ -136,8 +137,9 @@ pub(super) fn code_of(clause: usize) -> String {
 pub(super) fn cases(program: &Program) -> Written {
     let mut notes = Notes::default();
     let mut text = String::new();
-    for i in 0..program.clauses.len() {
-        let case = written!("    case {}:\n        return {}(m, t, x, out);\n", i, Needed(code_of(i).into()));
+    for (i, clause) in program.clauses.iter().enumerate() {
+        let (name, code) = (comment(&clause.name), Needed(code_of(i).into()));
+        let case = written!("    case {}: /* {} */\n        return {}(m, t, x, out);\n", i, name, code);
         case.note(&mut notes);
         text += &case.text;
     }
