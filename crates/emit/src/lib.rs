@@ -155,8 +155,8 @@ pub enum EmitError {
     Implicit,
     /// States that a jump of a source changes: their names.
     Jumps(Vec<String>),
-    /// What happens at events (`when`), which code that is exported does not do yet: as they begin in the model.
-    Events(Vec<String>),
+    /// The balance of impulses at events has more unknowns than there is room for: how many.
+    Impulses(usize),
     /// The step is not a finite number above zero.
     Step(f64),
     /// A value does not fit real numbers of single precision: what it is, and the value.
@@ -174,11 +174,11 @@ impl fmt::Display for EmitError {
                 "a source that jumps changes {}, which are states of this form: export the form minimal, whose states do not jump",
                 states.join(", ")
             ),
-            EmitError::Events(clauses) => write!(
+            EmitError::Impulses(unknowns) => write!(
                 f,
-                "exported code does not act at events yet: `{}`; simulate the model here, or write what it sets as a law with \
-                 `if ... then ... else` or `sample`, which are exported",
-                clauses.join("`, `")
+                "what `when` resets, or changes of what moves together, is balanced over {unknowns} unknowns at once; exported \
+                 code has room for {} of them: leave out the resets, or export a part of the model",
+                c::MOST_BALANCED
             ),
             EmitError::Step(step) => write!(f, "the step is {step}: it has to be a finite number above zero"),
             EmitError::Range(what, value) => write!(

@@ -47,6 +47,10 @@ fn c_follows_parameters_and_inputs() {
         (own("closure"), "coupler0", 1.0),
         (own("working_point"), "k", 0.4),
         (own("freedom"), "v", -1.5),
+        (own("when_bounce"), "e", 0.9),
+        (own("when_beam"), "ratio", 0.4),
+        (own("when_sampled"), "period", 6e-3),
+        (own("when_four_bar"), "b", 0.52),
     ];
     let all: Vec<Exported> = cases.iter().map(|(path, ..)| export(path, Method::Heun, 1e-3)).collect();
     let of = |one: &Exported| {
@@ -89,6 +93,83 @@ fn c_says_what_fails() {
     }
 }
 
+/// A run that the caller takes from step to step, as in real time, has the same results at events.
+#[test]
+fn c_does_at_events_what_a_run_by_steps_does() {
+    let names = ["when_beam", "when_bounce", "when_four_bar", "when_gears", "when_order", "when_relay", "when_springs"];
+    let all: Vec<Exported> = names
+        .iter()
+        .zip([Method::Rk4, Method::Rosenbrock].iter().cycle())
+        .map(|(name, &method)| export(&own(name), method, 1e-3))
+        .collect();
+    check("by_steps", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.step(STEPS));
+}
+
+/// What goes wrong at events stops the run where it stops in the interpreter, and says why.
+#[test]
+fn c_says_what_fails_at_events() {
+    let moving = "1:v -> I:m(1, f0 = 1)\nstate x' = v.f from 0\ndiscrete n = 0\n";
+    let four_bar = std::fs::read_to_string(own("when_four_bar")).expect("a model");
+    let four_bar = four_bar.split("when").next().and_then(|text| text.split_once('\n')).expect("a head").1;
+    let cases = [
+        (moving, "when x > 0.1 { n = 1 }\nwhen x > 0.1 { n = 2 }", "two events at one instant give n different values"),
+        (
+            moving,
+            "when x > 0.1 { n = 1 }\nwhen n > 0.5 { n = 0 }\nwhen n < 0.5 and x > 0.1 { n = 1 }",
+            "events make each other happen over and over",
+        ),
+        (
+            moving,
+            "v -> TF:gear(2) -> 1:w -> I:big(5)\nwhen x > 0.1 { reset m.f = 1; reset big.f = 7 }",
+            "m.f cannot be reset: what is reset depends on each other",
+        ),
+        (
+            moving,
+            "when x > 0.1 { reset m.f = log(x - 3) }",
+            "the value that `when x > 0.1` gives m.f is not a finite number",
+        ),
+        (
+            moving,
+            "v -> C:c(e = q^2 + 1)\nwhen x > 0.05 { reset c.e = -1 }",
+            "c.e cannot be reset: no impulse leads to the values",
+        ),
+        (four_bar, "when t > 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
+        (four_bar, "when every 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
+    ];
+    let folder = common::folder("failures_at_events_models");
+    let all: Vec<Exported> = cases
+        .iter()
+        .zip(Method::ALL.iter().cycle())
+        .enumerate()
+        .map(|(i, ((head, clauses, _), &method))| {
+            let path = folder.join(format!("fails{i}.bond"));
+            std::fs::write(&path, format!("model Fails{i}\n{head}{clauses}\n")).expect("a model");
+            export(&path, method, 1e-3)
+        })
+        .collect();
+    let output = build("failures_at_events", &all, &driver(&all, &|_| (-1, 0.0))).run(&[]);
+    for ((one, (_, clauses, wanted)), text) in all.iter().zip(cases).zip(output.split("== ").skip(1)) {
+        compare(one, text, &one.simulate(STEPS)).unwrap_or_else(|fault| panic!("{clauses}: {fault}"));
+        let said = text.lines().find_map(|line| line.strip_prefix("! ")).unwrap_or_default();
+        assert!(said.contains(wanted), "{clauses}: {said:?}");
+    }
+}
+
+/// There is room for the balance of so many impulses, and no more.
+#[test]
+fn balances_of_too_many_impulses_are_refused() {
+    let folder = common::folder("balances");
+    let write = |bodies: usize| {
+        let path = folder.join("many.bond");
+        let bodies = format!("for i in 1..{bodies} {{ 1:v[i] -> I:m[i](i, f0 = 1) }}\n");
+        std::fs::write(&path, format!("model Many\n{bodies}when t > 0.01 {{ reset m[1].f = 2 }}\n")).expect("a model");
+        common::export_as(common::read_program(&path), Method::Heun, 1e-3, (false, halfarrow_emit::Real::Double))
+    };
+    assert!(matches!(write(200), Err(halfarrow_emit::EmitError::Impulses(201))));
+    let most = [write(199).expect("there is room")];
+    check("balances", &most, &driver(&most, &|_| (-1, 0.0)), |one| one.simulate(STEPS));
+}
+
 /// Rates at points beside the run, of which the solution goes on from the one accepted: at time 0 the current of the mains is 0
 /// but for the rounding of others, wherever the state is. Both programs give the same bits, and those of the diodes' law.
 #[test]
@@ -129,6 +210,15 @@ fn unknowns_that_are_rounding_hide_no_solution() {
 fn c_is_clean() {
     let all: Vec<Exported> = ["contact", "bridge", "tables", "delay", "mesh", "net", "net_cubic"]
         .iter()
+        .chain(&[
+            "when_beam",
+            "when_four_bar",
+            "when_gears",
+            "when_order",
+            "when_relay",
+            "when_sampled",
+            "when_springs",
+        ])
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
         .collect();
     let driver = driver(&all, &|_| (-1, 0.0));

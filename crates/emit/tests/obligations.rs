@@ -32,12 +32,19 @@ fn models() -> Vec<Exported> {
     ] {
         all.push(export(&of(name), method, 1e-3));
     }
+    for (name, method) in
+        [("when_beam", Method::Rk4), ("when_order", Method::Heun), ("when_relay", Method::ImplicitMidpoint)]
+    {
+        all.push(export(&own(name), method, 1e-3));
+    }
     for (name, method) in [
         ("contact", Method::ImplicitMidpoint),
         ("bridge", Method::Rosenbrock),
         ("delay", Method::Rk4),
         ("tables", Method::Heun),
         ("closure", Method::Euler),
+        ("when_four_bar", Method::Heun),
+        ("when_sampled", Method::Rosenbrock),
     ] {
         all.push(export_single(&own(name), method, 1e-3));
     }

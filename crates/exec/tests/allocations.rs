@@ -4,9 +4,14 @@ mod common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
+use halfarrow_compiler::bond_graph::NoFiles;
+use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::equations::EquationStep;
+use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::sparse::SparseMatrix;
-use halfarrow_sim::{Events, System};
+use halfarrow_exec::Model;
+use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::{Events, Stepwise, System};
 use std::alloc::{GlobalAlloc, Layout, System as Memory};
 use std::cell::Cell;
 
@@ -81,4 +86,60 @@ fn takes_no_memory(mut model: halfarrow_exec::Model) {
         }
     });
     assert_eq!(count, 0);
+}
+
+/// Periodic events with discrete variables, a state that is reset and impulses that go through a lever; one whose crossing is
+/// located within a step, one of time alone; what follows from them at the same instant.
+#[test]
+fn events_take_no_memory() {
+    let text = "model Periodic
+discrete u = 0, n = 0, k = 0
+1:a -> I:one(1, f0 = 1)
+a -> TF:lever(f_out = 2 + 0.1*n) -> 1:b -> I:two(3)
+Se:force(u) -> a
+state x' = a.f from 0
+when every 3 ms { u = -x - one.f; n = n + 1 }
+when every 7 ms { reset two.f = -two.f; reset x = 0 }
+when n > 10 { n = 0 }
+when a.f < -0.1 { k = k + 1 }
+when sin(200*t) > 0.5 { k = k + 1 }
+";
+    let closed = "model Closed
+discrete k = 0
+1:crank -> I:one(1)
+1:coupler -> I:two(1)
+1:rocker -> I:three(1)
+state th1' = crank.f from 0.6
+state th2' = coupler.f
+state th3' = rocker.f
+constraint along: 0.2*cos(th1) + 0.5*cos(th2) = 0.5 + 0.4*cos(th3)
+constraint across: 0.2*sin(th1) + 0.5*sin(th2) = 0.4*sin(th3)
+guess th2 = -1.2, th3 = -2
+Se:push(3) -> crank
+when every 11 ms { reset two.f = 0.9*two.f; k = k + 1 }
+";
+    for method in [FixedMethod::Heun, FixedMethod::Rk4, FixedMethod::Rosenbrock] {
+        takes_no_memory_at_events(text, method);
+        takes_no_memory_at_events(closed, method);
+    }
+}
+
+fn takes_no_memory_at_events(text: &str, method: FixedMethod) {
+    let text = Text { name: "p.bond", text, files: &NoFiles, overrides: &[] };
+    let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+    let mut model = Model::new(program).unwrap();
+    let mut x = model.initialise(0.0).unwrap();
+    let mut run = Stepwise::new(method, 0.0, &model);
+    run.start(&mut model, &mut x).unwrap();
+    let mut advance = |from: u32, to: u32| {
+        for tick in from..to {
+            run.advance(&mut model, f64::from(tick) * 1e-3, &mut x).unwrap();
+        }
+    };
+    advance(1, 20);
+    assert_eq!(allocations_during(|| advance(20, 500)), 0, "{method:?}");
+    let mut values = [0.0; 2];
+    model.record(&["two.impulse", "k"]).unwrap();
+    model.observe(0.499, &x, &mut values).unwrap();
+    assert!(values[0] != 0.0 && values[1] >= 1.0, "all of them happen: {values:?}");
 }

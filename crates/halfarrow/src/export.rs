@@ -226,6 +226,7 @@ impl<'a> ExportedProgram<'a> {
             return Err(refused(EmitError::Implicit));
         }
         let mut system = model.system(&model.equations_in(export.form)?)?;
+        system.record_impulses();
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
         let recorded = system.recorded().to_vec();

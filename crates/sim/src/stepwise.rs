@@ -15,6 +15,8 @@ pub struct Stepwise {
     method: FixedStep,
     options: Options,
     position: Position,
+    /// Room for a point inside a step.
+    inside: Vec<f64>,
 }
 
 impl Stepwise {
@@ -24,6 +26,7 @@ impl Stepwise {
         Stepwise {
             method: FixedStep::new(method, system.sparsity()),
             position: Position::new(from, system.indicators()),
+            inside: vec![0.0; system.sparsity().states()],
             options,
         }
     }
@@ -91,10 +94,11 @@ impl Stepwise {
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     fn run(&mut self, work: impl FnOnce(&mut Run<'_>, &mut FixedStep) -> Result<(), Failure>) -> Result<(), Stopped> {
         let mut nobody = Nobody;
-        let mut run = Run::unsampled(&self.options, &mut nobody, std::mem::take(&mut self.position));
+        let (position, inside) = (std::mem::take(&mut self.position), std::mem::take(&mut self.inside));
+        let mut run = Run::unsampled(&self.options, &mut nobody, position, inside);
         let done = work(&mut run, &mut self.method);
         let done = run.ended(done).map(|_| ());
-        self.position = run.into_position();
+        (self.position, self.inside) = run.into_position();
         done
     }
 }

@@ -9,7 +9,15 @@ use super::patterns::FULL_AT_MOST;
 use super::plan::Plan;
 
 /// Jumps within one step at most; more of them are an error.
-pub(super) const MOST_JUMPS: u64 = 64;
+const MOST_JUMPS: u64 = 64;
+/// The same where events follow each other as fast as impacts do that accumulate.
+pub(super) const MOST_EVENTS: u64 = 256;
+/// Steps at most in which a crossing is located: the whole one, its parts, halvings of one of them, and the way to the crossing.
+const LOOKS: u64 = 86;
+/// Of each event indicator the looks where it turns round within a step.
+const TURNS: u64 = 3;
+/// Rounds of what happens at one instant at most.
+const MOST_ROUNDS: u64 = 200;
 /// Evaluations of a Newton block at most while a solution is followed, the looks at its end counted.
 const EVALUATIONS: u64 = 2_000 + 400;
 /// The same at the start and at jumps: attempts from eight points, and a search over all magnitudes.
@@ -156,10 +164,21 @@ pub struct Cost {
     pub memory: u64,
 }
 
+/// Jumps within one step at most.
+pub(super) fn most_jumps(plan: &Plan) -> u64 {
+    if plan.events.conditional.is_empty() { MOST_JUMPS } else { MOST_EVENTS }
+}
+
+/// Steps that are made at most to locate a crossing within one.
+pub(super) fn most_looks(plan: &Plan) -> u64 {
+    if plan.locates() { LOOKS + TURNS * plan.sizes.indicators as u64 } else { 0 }
+}
+
 impl Cost {
-    pub(super) fn new(step: OperationCount, jump: OperationCount, plan: &Plan) -> Cost {
+    pub(super) fn new(step: OperationCount, jump: OperationCount, round: OperationCount, plan: &Plan) -> Cost {
         let s = &plan.sizes;
-        let jumps = !(plan.export.program.held.is_empty() && plan.export.program.conditions.is_empty());
+        let p = plan.export.program;
+        let jumps = !(p.held.is_empty() && p.conditions.is_empty() && p.clauses.is_empty());
         let implicit = plan.export.method == crate::Method::ImplicitMidpoint;
         let newton_solves = step.newton_solves();
         Cost {
@@ -171,8 +190,10 @@ impl Cost {
             newton_evaluations: if newton_solves > 0 { EVALUATIONS } else { 0 },
             method_iterations: if implicit { 20 } else { 0 },
             total: step.total(EVALUATIONS),
-            jump_total: jump.total(EVALUATIONS_AT_JUMPS * 9),
-            most_jumps: if jumps || !plan.export.program.inputs.is_empty() { MOST_JUMPS } else { 0 },
+            jump_total: jump.total(EVALUATIONS_AT_JUMPS * 9)
+                + MOST_ROUNDS * round.total(EVALUATIONS_AT_JUMPS * 9)
+                + most_looks(plan) * step.total(EVALUATIONS),
+            most_jumps: if jumps || !plan.export.program.inputs.is_empty() { most_jumps(plan) } else { 0 },
             delay_points: plan.delays.iter().map(|d| d.1 as u64).sum(),
             memory: (s.memory + s.work + s.crossing + s.factors + s.derived) as u64,
         }

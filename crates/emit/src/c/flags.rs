@@ -46,6 +46,20 @@ flags! {
     curves
     /// Conditions of the state.
     switches
+    /// What happens at events, where a condition becomes true or at multiples of a period.
+    clauses
+    conditional_clauses
+    periodic_clauses
+    /// Crossings of conditions are located within steps.
+    locates
+    /// Balances of impulses.
+    impulses
+    /// Resets that take impulses.
+    resets
+    /// Constraints on displacements that events may break.
+    positions
+    /// Discrete variables, and what tells impulses.
+    discretes
     /// Delays or samples.
     held
     delays

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use halfarrow_compiler::unit::Unit;
 
-use super::cost::{Cost, MOST_JUMPS};
+use super::cost::{Cost, most_jumps};
 use super::plan::Plan;
 use super::template::{Filling, Words};
 use super::written::Written;
@@ -38,7 +38,7 @@ pub(super) fn header(plan: &Plan, names: &Names, cost: &Cost) -> String {
         ("NUMBER_PARAMETERS", p.parameters.len().to_string()),
         ("NUMBER_OUTPUTS", export.recorded.len().to_string()),
         ("NUMBER_INDICATORS", s.indicators.to_string()),
-        ("NUMBER_JUMPS", MOST_JUMPS.to_string()),
+        ("NUMBER_JUMPS", most_jumps(plan).to_string()),
         ("STATE_LINES", enumerators((&capitals, "X"), &names.states, states)),
         ("INPUT_LINES", enumerators((&capitals, "U"), &names.inputs, inputs)),
         ("PARAMETER_LINES", enumerators((&capitals, "P"), &names.parameters, parameters)),

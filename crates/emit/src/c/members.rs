@@ -19,6 +19,7 @@ enum Kind {
     Delay,
     Point,
     Sample,
+    Clause,
 }
 
 impl Kind {
@@ -32,6 +33,7 @@ impl Kind {
             Kind::Delay => format!("{}_delay", plan.name),
             Kind::Point => format!("{}_point", plan.name),
             Kind::Sample => format!("{}_sample", plan.name),
+            Kind::Clause => format!("{}_clause", plan.name),
         }
     }
 
@@ -42,6 +44,7 @@ impl Kind {
             (Kind::Int, _) | (Kind::Real, Real::Float) => 4,
             (Kind::Wide, _) | (Kind::Real, Real::Double) => 8,
             (Kind::Failure, _) => 16,
+            (Kind::Clause, _) => 56,
             (Kind::Point, Real::Float) => 24,
             (Kind::Point, Real::Double) | (Kind::Delay | Kind::Sample, _) => 32,
         }
@@ -149,6 +152,7 @@ fn of_events(list: &mut List, plan: &Plan) {
     let switches = plan.switches.len();
     if switches > 0 {
         list.one(Kind::Int, &["state_hold"], "what is done with those of the state");
+        list.one(Kind::Wide, &["signs_taken"], "when their sides were taken last");
         list.arrays(Kind::Int, &["sides"], s.indicators, "sides of the indicators");
         let sizes = [("operands", switches), ("beyond", s.indicators)];
         list.put(Kind::Real, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
@@ -156,7 +160,43 @@ fn of_events(list: &mut List, plan: &Plan) {
     list.some(Kind::Delay, &["delays"], plan.delays.len(), "");
     list.some(Kind::Point, &["points"], plan.delays.iter().map(|d| d.1).sum(), "");
     list.some(Kind::Sample, &["samples"], plan.samples.len(), "");
-    list.some(Kind::Real, &["source", "source_rate"], p.held.len(), "what is delayed or sampled");
+    if !(plan.delays.is_empty() && plan.samples.is_empty()) {
+        list.some(Kind::Real, &["source", "source_rate"], p.held.len(), "what is delayed or sampled");
+    }
+    of_clauses(list, plan);
+}
+
+fn of_clauses(list: &mut List, plan: &Plan) {
+    let (p, events) = (plan.program, &plan.events);
+    if p.clauses.is_empty() {
+        return;
+    }
+    list.arrays(Kind::Clause, &["clauses"], p.clauses.len(), "what happens at events");
+    list.some(Kind::Real, &["becomes"], events.conditional.len(), "their conditions");
+    list.arrays(Kind::Real, &["new_values"], events.actions(), "what they change");
+    if plan.locates() {
+        list.one(Kind::Int, &["handled"], "whether an event has been handled at the present time");
+        list.arrays(Kind::Real, &["seen"], 3 * plan.sizes.indicators, "the last values of indicators in a step");
+    }
+    if let Some(jumps) = &p.jumps {
+        let (rows, columns, moved) = (events.equations(), events.columns(), events.moved.len());
+        let values = jumps.values().count() + moved;
+        list.arrays(Kind::Real, &["stored"], jumps.stored.len(), "what storages keep before an event");
+        if moved > 0 {
+            list.one(Kind::Int, &["asked"], "how many resets a round has");
+            list.arrays(Kind::Int, &["asked_actions"], moved, "which they are");
+            list.arrays(Kind::Real, &["impulses"], moved, "their impulses");
+        }
+        list.arrays(Kind::Real, &["jump_out", "jump_rates"], values, "");
+        list.arrays(Kind::Real, &["jump_matrix"], rows * columns, "balances of impulses");
+        list.arrays(Kind::Real, &["jump_residual", "jump_sizes"], rows, "");
+        list.arrays(Kind::Real, &["jump_columns", "jump_step"], columns, "");
+        list.arrays(Kind::Int, &["jump_order"], columns, "");
+    }
+    if !events.positions.is_empty() {
+        let names = ["misses", "misses_after", "position_out", "position_rates"];
+        list.arrays(Kind::Real, &names, events.positions.len(), "how far constraints are missed");
+    }
 }
 
 fn of_blocks(list: &mut List, plan: &Plan) {

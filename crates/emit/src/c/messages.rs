@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Assumption, DomainKind, LawDomain, PivotGuard, first_of};
+use halfarrow_compiler::program::{Assumption, Clause, DomainKind, LawDomain, PivotGuard, first_of};
 
 use super::fragment::{Fragment, Kind};
 use super::plan::Plan;
@@ -31,6 +31,16 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
     let group = |g: &super::start::Group| {
         let names: Vec<&str> = g.conditions.iter().map(|&c| p.start[c].name.as_str()).collect();
         format!("no start was found with {}: give start values that fit and are near to each other", names.join(", "))
+    };
+    let clauses = |text: &dyn Fn(&str) -> String| p.clauses.iter().map(|c| text(&c.name)).collect::<Vec<_>>();
+    let actions = |text: &dyn Fn(&str, &str) -> String| {
+        let of = |c: &Clause| c.actions.iter().map(|a| text(&c.name, &a.name)).collect::<Vec<_>>();
+        p.clauses.iter().flat_map(of).collect::<Vec<_>>()
+    };
+    let resets = |text: &dyn Fn(&str) -> String| {
+        let mut all = actions(&|_, action| text(action));
+        all.push(text("what storages keep"));
+        all
     };
     vec![
         ("VANISHED", p.pivot_guards.iter().map(vanished).collect()),
@@ -76,6 +86,44 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ),
         ("OUT_OF_RANGE", out_of_range(plan)),
         ("NOT_STARTED", vec!["the model has not been started".into()]),
+        ("EVENT_NOT_FINITE", actions(&|clause, action| not_finite(format!("the value that `{clause}` gives {action}")))),
+        (
+            "CONFLICT",
+            actions(&|clause, action| {
+                format!("two events at one instant give {action} different values, one of them is `{clause}`: say in one of them what holds where both happen")
+            }),
+        ),
+        (
+            "ENDLESS_EVENTS",
+            clauses(&|name| {
+                format!("events make each other happen over and over and time stands still, `{name}` among them; let one of them leave the condition of the other as it is, or put a gap between the conditions (hysteresis)")
+            }),
+        ),
+        (
+            "ACCUMULATION",
+            clauses(&|name| {
+                format!("`{name}` happens ever faster: its events accumulate, and what is beyond that the model does not say; end the run before it, or let a law take over where it gets fast, such as a spring and a damper")
+            }),
+        ),
+        (
+            "RESET_DEPENDENT",
+            resets(&|what| {
+                format!("{what} cannot be reset: what is reset depends on each other there, or nothing that keeps an impulse takes part: reset one of those that move together")
+            }),
+        ),
+        (
+            "RESET_UNMET",
+            resets(&|what| {
+                format!("{what} cannot be reset: no impulse leads to the values that are asked for: look whether the laws of the storages have values there, and whether a constraint stands against them")
+            }),
+        ),
+        (
+            "CONSTRAINT_BROKEN",
+            plan.events
+                .constraints(p)
+                .map(|c| format!("what events change does not fit the constraint {}: reset all positions that it reads, so that they fit each other", c.name))
+                .collect(),
+        ),
         ("STRUCTURE", p.assumptions.iter().map(structure).collect()),
     ]
 }
@@ -143,17 +191,34 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "OUT_OF_RANGE" => "a parameter, or what follows from it, does not fit float",
         "BAD_PARAMETER" => "no such parameter, a constant, or a value that is not finite",
         "STRUCTURE" => "parameters for which the equations are others",
+        "EVENT_NOT_FINITE" => "an event gives a value that is no finite number",
+        "CONFLICT" => "two events at one instant give one thing different values",
+        "ENDLESS_EVENTS" => "events at one instant set each other off without end",
+        "ACCUMULATION" => "events come ever faster",
+        "RESET_DEPENDENT" => "resets of what moves together",
+        "RESET_UNMET" => "no impulse leads to what a reset asks for",
+        "CONSTRAINT_BROKEN" => "what events change does not fit a constraint",
         _ => "a step before the start",
     };
-    let there = |code: &str| code != "OUT_OF_RANGE" || plan.export.real == Real::Float;
-    texts(plan).into_iter().filter(|(code, _)| there(code)).map(|(code, _)| (code, meaning(code))).collect()
+    texts(plan).into_iter().filter(|(code, _)| can_happen(code, plan)).map(|(code, _)| (code, meaning(code))).collect()
+}
+
+/// Whether a model can fail so.
+fn can_happen(code: &str, plan: &Plan) -> bool {
+    match code {
+        "OUT_OF_RANGE" => plan.export.real == Real::Float,
+        "EVENT_NOT_FINITE" | "CONFLICT" | "ENDLESS_EVENTS" | "ACCUMULATION" => !plan.program.clauses.is_empty(),
+        "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
+        "CONSTRAINT_BROKEN" => !plan.events.positions.is_empty(),
+        _ => true,
+    }
 }
 
 /// The function that gives them, under a heading.
 pub(super) fn messages(plan: &Plan) -> Vec<Fragment> {
     let (model, capitals) = (&plan.name, plan.name.to_ascii_uppercase());
     let (mut tables, mut cases) = (String::new(), String::new());
-    for (code, texts) in texts(plan).iter().filter(|(_, texts)| !texts.is_empty()) {
+    for (code, texts) in texts(plan).iter().filter(|(code, texts)| !texts.is_empty() && can_happen(code, plan)) {
         let name = code.to_ascii_lowercase();
         let _ = writeln!(tables, "static const char *const ha_text_{name}[] = {{");
         for one in texts {

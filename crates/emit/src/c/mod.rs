@@ -32,6 +32,9 @@ use halfarrow_compiler::program::Program;
 
 use crate::{EmitError, Method, Real, Start, names};
 
+/// Unknowns at most that a balance of impulses at events may have: there is room for a full matrix.
+pub(crate) const MOST_BALANCED: usize = 200;
+
 /// What is to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct Export<'a> {
@@ -86,20 +89,18 @@ pub struct Names {
 /// Writes a program.
 ///
 /// # Errors
-/// The program is implicit or has events that change something, the step makes no sense, a delay is too long for it, or a value does not fit the real numbers.
+/// The program is implicit or has states that jump, events move too much at once, the step makes no sense, a delay is too long for it, or a value does not fit the real numbers.
 pub fn write(export: &Export) -> Result<Written, EmitError> {
     if export.program.implicit.is_some() {
         return Err(EmitError::Implicit);
     }
-    let mut events: Vec<String> = export.program.clauses.iter().map(|c| c.name.clone()).collect();
-    let discrete = export.program.held.iter().filter(|h| h.kind.is_discrete());
-    events.extend(discrete.map(|h| format!("discrete {}", h.name)));
-    if !events.is_empty() {
-        return Err(EmitError::Events(events));
-    }
     if !export.program.kept.is_empty() {
         let name = |k: &(u32, _)| export.program.states[k.0 as usize].name.clone();
         return Err(EmitError::Jumps(export.program.kept.iter().map(name).collect()));
+    }
+    let balanced = plan::EventTables::of(export.program).columns();
+    if balanced > MOST_BALANCED {
+        return Err(EmitError::Impulses(balanced));
     }
     if !(export.step > 0.0 && export.step.is_finite()) {
         return Err(EmitError::Step(export.step));

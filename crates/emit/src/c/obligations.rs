@@ -2,6 +2,7 @@
 
 use halfarrow_compiler::bond_graph::HeldKind;
 
+use super::cost::most_looks;
 use super::members;
 use super::plan::Plan;
 use crate::{Method, Real};
@@ -60,6 +61,15 @@ fn bounds(plan: &Plan) -> String {
     ];
     if !plan.newton.is_empty() {
         bounds.push("evaluations of Newton blocks by most_evaluations (20000 at the start and at jumps)".into());
+    }
+    if plan.locates() {
+        bounds.push(format!("{} steps to locate a crossing", most_looks(plan)));
+    }
+    if !plan.program.clauses.is_empty() {
+        bounds.push("200 rounds of events at one instant".into());
+    }
+    if plan.program.jumps.is_some() {
+        bounds.push("50 iterations of the balance of impulses".into());
     }
     if plan.export.method == Method::ImplicitMidpoint {
         bounds.push("20 iterations of the method".into());

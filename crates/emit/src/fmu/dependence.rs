@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::ids::Id;
-use halfarrow_compiler::program::{Op, Program, Value};
+use halfarrow_compiler::program::{Op, Program, Target, Trigger, Value};
 
 /// What values read, through everything between.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -98,12 +98,32 @@ pub(super) fn starts(p: &Program) -> Vec<Knowns> {
         let held = knowns_of(p, &sources);
         groups.iter_mut().filter(|g| reads_held(g)).for_each(|g| g.add(&held));
     }
-    let at_start = |u: usize| {
+    let given = |u: usize| {
         let mut knowns = groups[find(&leader, u)].clone();
         (knowns.states, knowns.conserved, knowns.positions) = Default::default();
         knowns
     };
-    (0..n).map(at_start).collect()
+    let mut starts: Vec<Knowns> = (0..n).map(given).collect();
+    let at_events = at_start(p, &starts, &events_at_start(p));
+    changed_at_events(p).into_iter().for_each(|u| starts[u as usize].add(&at_events));
+    starts
+}
+
+/// What is read by what happens at the start: events with a period, and those that follow from them.
+fn events_at_start(p: &Program) -> Vec<Value> {
+    if !p.clauses.iter().any(|c| matches!(c.trigger, Trigger::Every(_))) {
+        return Vec::new();
+    }
+    p.clauses.iter().flat_map(|c| c.values()).chain(p.jumps.iter().flat_map(|j| j.values())).collect()
+}
+
+/// The states and conserved constants that events can change.
+fn changed_at_events(p: &Program) -> Vec<u32> {
+    let signals = p.clauses.iter().flat_map(|c| &c.actions).filter_map(|a| match a.target {
+        Target::Signal(state) => Some(state),
+        _ => None,
+    });
+    signals.chain(p.jumps.iter().flat_map(|j| j.unknowns.iter().copied())).collect()
 }
 
 /// What values depend on at the start: inputs, parameters, time, with what states and held signals start from.
@@ -113,6 +133,9 @@ pub(super) fn at_start(p: &Program, starts: &[Knowns], wanted: &[Value]) -> Know
         let sources: Vec<Value> = p.held.iter().map(|h| h.source).collect();
         let held = knowns_of(p, &sources);
         knowns.add(&held);
+        if p.held.iter().any(|h| h.kind.is_discrete()) {
+            knowns.add(&knowns_of(p, &events_at_start(p)));
+        }
     }
     let (states, conserved) = (std::mem::take(&mut knowns.states), std::mem::take(&mut knowns.conserved));
     let first = p.states.len();

@@ -58,7 +58,8 @@ pub(super) fn description(export: &Export, variables: &Variables, version: Versi
 fn interfaces(export: &Export, version: Version, name: &str) -> String {
     let p = export.program;
     // Solutions and delays go on from step to step.
-    let follows = p.blocks.values().any(|b| matches!(b, Block::Newton { .. })) || !p.held.is_empty();
+    let follows =
+        p.blocks.values().any(|b| matches!(b, Block::Newton { .. })) || p.held.iter().any(|h| !h.kind.is_discrete());
     match version {
         Version::V2 => {
             let common =
@@ -100,7 +101,8 @@ fn variable(
         Role::Parameter(false) => ("parameter", "fixed", Some("exact")),
         Role::Calculated(true) => ("calculatedParameter", "tunable", Some("calculated")),
         Role::Calculated(false) => ("calculatedParameter", "fixed", Some("calculated")),
-        Role::Output => ("output", "continuous", Some("calculated")),
+        Role::Output(false) => ("output", "continuous", Some("calculated")),
+        Role::Output(true) => ("output", "discrete", Some("calculated")),
     };
     let attribute =
         |name: &str, value: Option<String>| value.map_or(String::new(), |v| format!(" {name}=\"{}\"", escaped(&v)));
@@ -163,7 +165,7 @@ fn structure(export: &Export, variables: &Variables, version: Version) -> String
                 let parameter = v.reference - 1 - 2 * p.states.len() - p.inputs.len();
                 initial.push(unknown(v, &knowns_of(p, &[p.parameters[parameter].default])));
             }
-            Role::Output => {
+            Role::Output(_) => {
                 if let Ok(value) = p.observed[export.recorded[next]].value.clone() {
                     outputs.push(running(v, value));
                     initial.push(unknown(v, &at_start(p, &begin, &[value])));

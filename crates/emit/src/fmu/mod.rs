@@ -138,6 +138,7 @@ pub fn binary_path(version: Version, name: &str, os: &str, architecture: &str) -
 /// The functions of the interface around a model.
 fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model: &str, token: &str) -> String {
     let switches = export.program.conditions.values().any(|c| c.trigger == EventTrigger::State);
+    let clauses = !export.program.clauses.is_empty();
     let list = |values: Vec<String>| match values.is_empty() {
         true => "    0".to_string(),
         false => values.chunks(20).map(|row| format!("    {}", row.join(", "))).collect::<Vec<_>>().join(",\n"),
@@ -149,8 +150,12 @@ fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model:
         ("NOMINALS", list(variables.nominals(export).iter().map(|v| format!("{v:?}")).collect())),
     ];
     let words = words.map(|(word, text)| (word, Text::of(text)));
-    let mut filling =
-        Filling { flags: Flags { switches, ..Flags::default() }, words: Words::from(words), model, real: Real::Double };
+    let mut filling = Filling {
+        flags: Flags { switches, clauses, ..Flags::default() },
+        words: Words::from(words),
+        model,
+        real: Real::Double,
+    };
     let common = filling.text(include_str!("runtime/common.c"));
     filling.words.insert("COMMON", Text::of(common.trim_end()));
     filling.text(text)

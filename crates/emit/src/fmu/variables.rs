@@ -1,6 +1,6 @@
 //! The variables that importers see: their value references, kinds and start values.
 
-use halfarrow_compiler::program::{EventTrigger, Op, Program, Reads, Value};
+use halfarrow_compiler::program::{EventTrigger, Op, Program, Reads, Trigger, Value};
 use halfarrow_compiler::unit::Unit;
 
 use crate::c::Export;
@@ -19,7 +19,8 @@ pub(super) enum Role {
     Parameter(bool),
     /// A parameter given by other ones.
     Calculated(bool),
-    Output,
+    /// Whether it changes at events only.
+    Output(bool),
     /// A function that changes its sign where a condition switches; a variable in FMI 3 only.
     Indicator,
 }
@@ -84,7 +85,8 @@ impl Variables {
         let first = first + p.parameters.len();
         for (i, &observed) in export.recorded.iter().enumerate() {
             let observed = &p.observed[observed];
-            all.push(variable(&observed.name, first + i, Role::Output, observed.unit.as_ref()));
+            let discrete = observed.value.as_ref().is_ok_and(|&v| is_discrete(p, v));
+            all.push(variable(&observed.name, first + i, Role::Output(discrete), observed.unit.as_ref()));
         }
         let first = first + export.recorded.len();
         all.extend(
@@ -149,9 +151,15 @@ pub(super) fn indicators(p: &Program) -> Vec<Value> {
     of_state.flat_map(|c| vec![c.operand; c.kind.switches()]).collect()
 }
 
-/// Parameters that delays and samples read: what they remember depends on them.
+/// Whether a value is that of a discrete variable.
+fn is_discrete(p: &Program, value: Value) -> bool {
+    matches!(p.values.op(value), Op::Held(i) if p.held[i as usize].kind.is_discrete())
+}
+
+/// Parameters that delays, samples and periods of events read: what they remember depends on them.
 fn structural(p: &Program) -> Vec<u32> {
-    let times: Vec<Value> = p.held.iter().map(|h| h.time).collect();
+    let periods = p.clauses.iter().map(|c| c.trigger).filter(|t| matches!(t, Trigger::Every(_))).map(Trigger::value);
+    let times: Vec<Value> = p.held.iter().map(|h| h.time).chain(periods).collect();
     debug_assert!(times.iter().all(|&v| p.values.reads(v) == Reads::PARAMETERS));
     let mut all: Vec<u32> = knowns_of(p, &times).parameters.into_iter().collect();
     all.extend(times.iter().filter_map(|&v| if let Op::Parameter(i) = p.values.op(v) { Some(i) } else { None }));

@@ -8,7 +8,7 @@ use halfarrow_emit::c::{Export, Written, write};
 use halfarrow_emit::{EmitError, Method, Real, Start};
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Events as _, Options, Sink, System, simulate};
+use halfarrow_sim::{Events as _, Options, Sink, Stepwise, System, simulate, tick};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -46,8 +46,6 @@ pub fn models() -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = folders.map(|e| e.unwrap().path().join("model.bond")).filter(|p| p.is_file()).collect();
     let own = fs::read_dir(root.join("tests/models")).expect("models of the tests");
     all.extend(own.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "bond")));
-    // What happens at events is not exported.
-    all.retain(|path| !fs::read_to_string(path).expect("a model").contains("\nwhen "));
     all.sort();
     all
 }
@@ -105,6 +103,7 @@ pub fn export_as(
     (derivatives, real): (bool, Real),
 ) -> Result<Exported, EmitError> {
     let mut model = Model::new(program.clone()).expect("parameters have values");
+    model.record_impulses();
     let mut x = model.initialise(0.0).expect("a start");
     let start = Start {
         states: x.clone(),
@@ -140,16 +139,38 @@ impl Exported {
         self.simulate_from(self.model.clone(), self.start.clone(), steps)
     }
 
-    /// The same with another model, from other start values.
-    pub fn simulate_from(&self, mut model: Model, mut x: Vec<f64>, steps: usize) -> (Rows, Option<String>) {
-        let method = match self.method {
+    /// The same run, taken from step to step.
+    pub fn step(&self, steps: usize) -> (Rows, Option<String>) {
+        let (mut model, mut x) = (self.model.clone(), self.start.clone());
+        let mut run = Stepwise::new(self.fixed_method(), 0.0, &model);
+        let mut values = vec![0.0; model.observed()];
+        let mut rows = Vec::new();
+        for i in 0..=steps {
+            let t = tick(0.0, self.step, i as f64);
+            let done = if i == 0 { run.start(&mut model, &mut x) } else { run.advance(&mut model, t, &mut x) };
+            if let Err(stopped) = done {
+                return (rows, Some(stopped.to_string()));
+            }
+            model.observe(t, &x, &mut values).expect("values");
+            rows.push(std::iter::once(t).chain(values.iter().copied()).collect());
+        }
+        (rows, None)
+    }
+
+    fn fixed_method(&self) -> FixedMethod {
+        match self.method {
             Method::Euler => FixedMethod::Euler,
             Method::Heun => FixedMethod::Heun,
             Method::Rk4 => FixedMethod::Rk4,
             Method::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
             Method::LinearlyImplicitEuler => FixedMethod::LinearlyImplicitEuler,
             Method::Rosenbrock => FixedMethod::Rosenbrock,
-        };
+        }
+    }
+
+    /// The same with another model, from other start values.
+    pub fn simulate_from(&self, mut model: Model, mut x: Vec<f64>, steps: usize) -> (Rows, Option<String>) {
+        let method = self.fixed_method();
         let per_second = (1.0 / self.step).round();
         let to = if 1.0 / per_second == self.step { steps as f64 / per_second } else { steps as f64 * self.step };
         let (method, step) = (halfarrow_sim::Method::Fixed(method), Some(self.step));

@@ -3,7 +3,8 @@
 Each model is exported as FMI 2.0 and 3.0, validated against the schemas and the rules of the standard, and run:
 co-simulation must give what `halfarrow simulate` gives with the same method, bit for bit; model exchange with CVODE what
 it gives with tight tolerances. States are saved, restored and serialised in the middle, derivatives are compared with
-differences, parameters are set, errors are provoked, sources are built again.
+differences, parameters are set, errors are provoked, sources are built again. What happens at events is compared with closed
+forms too.
 """
 
 import csv
@@ -48,7 +49,15 @@ MODELS = [
     (HERE.parent / "models/mesh.bond", 1e-5),
     (HERE.parent / "models/names.bond", 1e-5),
     (HERE / "tuned.bond", 1e-5),
+    (HERE / "controlled.bond", 1e-6),
+    (HERE.parent / "models/when_sampled.bond", 1e-4),
+    (HERE.parent / "models/when_beam.bond", 1e-5),
+    (HERE.parent / "models/when_four_bar.bond", 1e-5),
+    (ROOT / "models/when_bouncing_ball/model.bond", 1e-5),
+    (ROOT / "models/when_rimless_wheel/model.bond", 1e-5),
 ]
+# Points of those that take longer.
+LONGER = {"controlled": 100, "when_bouncing_ball": 300, "when_rimless_wheel": 1500}
 
 
 right_side = sundials.CVodeSolver.f
@@ -201,6 +210,75 @@ def co_simulation(where, file, reference, values={}):
     fmu.close()
 
 
+def ball(t):
+    """Height, speed and impacts of the ball: parabolas between impacts."""
+    g, e, at, speed, n = 9.81, 0.8, 0.0, 0.0, 0
+    lands = math.sqrt(2 / g)
+    while lands < t:
+        at, speed, n = lands, e * (g * (lands - at) - speed if n else g * lands), n + 1
+        lands = at + 2 * speed / g
+    passed = t - at
+    return [(1.0 if n == 0 else 0.0) + speed * passed - 0.5 * g * passed**2, speed - g * passed, n]
+
+
+def controlled(t):
+    """The mass between samples: a constant force."""
+    m, kp, kd, period = 2.0, 20.0, 12.0, 0.02
+    x, v = 1.0, 0.0
+    count = math.floor(t / period + 1e-9)
+    for _ in range(count):
+        u = -kp * x - kd * v
+        x, v = x + v * period + u / (2 * m) * period**2, v + u / m * period
+    u, passed = -kp * x - kd * v, t - count * period
+    return [x + v * passed + u / (2 * m) * passed**2, v + u / m * passed, u, count + 1]
+
+
+def wheel(theta, speed):
+    """The square of the speed that the spoke began with, which energy tells."""
+    alpha, gamma, g = 0.4, 0.08, 9.81
+    return speed**2 + 2 * g * (math.cos(theta) - math.cos(gamma - alpha))
+
+
+def closed_form(where, name, at, tolerance):
+    """What a run gives at times, by name of the variable, against what is known."""
+    if name == "when_bouncing_ball":
+        found = [(t, [values[n] for n in ("h", "ball.f", "n")], ball(t)) for t, values in at]
+    elif name == "controlled":
+        found = [(t, [values[n] for n in ("x", "mass.f", "u", "samples")], controlled(t)) for t, values in at]
+    else:
+        alpha, gamma, g = 0.4, 0.08, 9.81
+        begun, squares = wheel(gamma - alpha, 1.2), []
+        for _ in range(100):
+            squares.append(begun)
+            begun = math.cos(2 * alpha) ** 2 * (begun + 4 * g * math.sin(gamma) * math.sin(alpha))
+        found = [(t, [wheel(values["theta"], values["leg.f"])], [squares[round(values["steps"])]]) for t, values in at]
+        if not found or max(values["steps"] for _, values in at) < 5:
+            fault(where, "the wheel has not walked")
+    for t, values, wanted in found:
+        if any(abs(a - b) > tolerance * max(1.0, abs(b)) for a, b in zip(values, wanted)):
+            fault(where, f"at {t} s {values}, but {wanted}")
+            break
+
+
+def of_closed_form(where, name, file):
+    """Both ways of running an FMU against closed forms; variables by co-simulation, and by CVODE."""
+    fmu = Fmu(file)
+    fmu.begin()
+    names = [n for n, v in fmu.variables.items() if v.causality in ("local", "output") and "der(" not in n and "indicator" not in n]
+    at = [(0.0, dict(zip(names, fmu.get(names))))]
+    for point in range(POINTS):
+        fmu.step(point)
+        at.append(((point + 1) / 100, dict(zip(names, fmu.get(names)))))
+    fmu.close()
+    # The wheel follows no polynomial, the others do.
+    closed_form(where + " co-simulation", name, at, 1e-8)
+    result = fmpy.simulate_fmu(
+        str(file), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-10, stop_time=POINTS / 100,
+        output_interval=EVERY, output=names, record_events=False)
+    at = [(t, dict(zip(names, list(row)[1:]))) for t, row in zip(result["time"], result)]
+    closed_form(where + " model exchange", name, at, 1e-6)
+
+
 def variable_steps(where, file):
     """A communication step that is no multiple of the step: two halves are near to a whole."""
     whole, halves = Fmu(file), Fmu(file)
@@ -286,6 +364,64 @@ def derivatives(where, file):
                 fault(where, f"d {name} / d {variable.name} is {slope}, but by differences {difference}")
             if slope != 0.0 and variable.name not in structure[name]:
                 fault(where, f"{name} depends on {variable.name}, which the structure does not say")
+    fmu.close()
+
+
+def events_by_hand(where, file):
+    """Periods are told without drift, states and discrete variables change at an event, and a saved state takes it back."""
+    fmu = Fmu(file, exchange=True)
+    fmu.begin()
+
+    def event():
+        if fmu.version == 2:
+            return fmu.api.newDiscreteStates()
+        needed, ends, _, changed, defined, at = fmu.api.updateDiscreteStates()
+        return needed, ends, False, changed, defined, at
+
+    for k in range(1, 120):
+        needed, _, _, changed, defined, at = event()
+        if needed or changed or not defined or at != k * 0.02:
+            fault(where, f"after event {k - 1} the next one is told at {at}, states changed: {changed}")
+            break
+        if fmu.get(["samples"]) != [float(k)]:
+            fault(where, f"{fmu.get(['samples'])} samples at event {k - 1}")
+        fmu.api.enterContinuousTimeMode()
+        state = fmu.save()
+        fmu.api.setTime(at)
+        fmu.api.enterEventMode()
+        event()
+        if fmu.get(["samples"]) != [float(k + 1)]:
+            fault(where, f"{fmu.get(['samples'])} samples after event {k}")
+        other = fmu.deserialise(fmu.serialise(state))
+        fmu.restore(other)
+        if fmu.get(["samples"]) != [float(k)]:
+            fault(where, "a discrete variable is not restored")
+        fmu.free(state)
+        fmu.free(other)
+        fmu.api.setTime(at)
+        fmu.api.enterEventMode()
+    fmu.close()
+
+
+def impact_by_hand(where, file):
+    """An impact: the importer is told that states have changed; the height stays, the speed is turned round."""
+    fmu = Fmu(file, exchange=True)
+    fmu.begin()
+    update = fmu.api.newDiscreteStates if fmu.version == 2 else fmu.api.updateDiscreteStates
+    update()
+    fmu.api.enterContinuousTimeMode()
+    fmu.api.setTime(0.5)
+    states = [v for v in fmu.description.modelVariables if any(w.derivative is v for w in fmu.description.modelVariables)]
+    x = [-1e-9 if v.name == "h" else -4.0 for v in states]
+    fmu.api.setContinuousStates((ctypes.c_double * len(x))(*x), len(x))
+    fmu.api.enterEventMode()
+    changed = update()[3]
+    names = ["h", "ball.f", "n", "ball.impulse"]
+    if not changed or fmu.get(names) != [-1e-9, 3.2, 1.0, 7.2]:
+        fault(where, f"an impact gives {fmu.get(names)}, states changed: {changed}")
+    fmu.api.enterEventMode()
+    if update()[3] or fmu.get(["n"]) != [1.0]:
+        fault(where, "an impact happens again at the same instant")
     fmu.close()
 
 
@@ -387,6 +523,8 @@ def main():
         name = model.parent.name if model.name == "model.bond" else model.stem
         if sys.argv[2:] and name not in sys.argv[2:]:
             continue
+        global POINTS
+        POINTS = LONGER.get(name, 40)
         reference = trajectory(model, "--solver", "rk4", "--step", STEP)
         tight = trajectory(model, "--rtol", "1e-10", "--solver", "explicit")
         for version in (2, 3):
@@ -402,7 +540,13 @@ def main():
             if name == "rectifier":  # at rest at the start: its nominal tells what a loose tolerance is relative to
                 model_exchange(where + " model exchange, loosely", file, tight, 2e-2, 1e-4)
             derivatives(where, file)
-            if name in ("tuned", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
+            if name in LONGER:
+                of_closed_form(where, name, file)
+            if name == "controlled":
+                events_by_hand(where, file)
+            if name == "when_bouncing_ball":
+                impact_by_hand(where, file)
+            if name in ("tuned", "controlled", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
                 initial_unknowns(where, file)
             if name in ("contact", "quarter_car"):
                 sources(where + " from source", file, reference, scratch)

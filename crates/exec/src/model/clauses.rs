@@ -5,6 +5,8 @@
 
 use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::Mode;
+use super::impulses::{ImpulseBalance, ImpulseWork};
+use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Program, Target, Trigger, Value};
@@ -66,8 +68,9 @@ pub(super) struct EventWork {
     pub fired: Vec<bool>,
     /// The new values of all actions, clause by clause.
     pub values: Vec<f64>,
-    /// What storages keep before the round.
-    pub stored: Vec<f64>,
+    pub impulses: ImpulseWork,
+    /// By how much constraints on displacements are missed before the round.
+    pub misses: Vec<f64>,
 }
 
 impl EventWork {
@@ -76,7 +79,8 @@ impl EventWork {
         EventWork {
             fired: vec![false; clauses.len()],
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
-            stored: vec![0.0; mode.program.jumps.as_ref().map_or(0, |j| j.stored.len())],
+            misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],
+            impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),
         }
     }
 }
@@ -268,7 +272,7 @@ impl Model {
     fn change(&mut self, t: f64, x: &mut [f64], first: bool) -> Result<(), Failure> {
         let code = self.code.clone();
         self.take_stored(t, x)?;
-        let positions = self.position_misses(t, x)?;
+        self.take_misses(t, x)?;
         let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
         let work = std::mem::take(&mut self.events);
         for (_, at, action) in Model::actions(&code, &work) {
@@ -285,6 +289,6 @@ impl Model {
             Some(_) => self.balance_impulses(t, x, first)?,
             None => _ = self.conserve_sums(t, x, &sums)?,
         }
-        self.refuse_broken_positions(t, x, &positions)
+        self.refuse_broken_positions(t, x)
     }
 }

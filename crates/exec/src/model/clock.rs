@@ -47,9 +47,8 @@ impl Clock {
         }
         frame.conditions.clock = Hold::Keep;
         let lines = self.next_on_linear(frame, t);
-        let curves: Vec<usize> =
-            (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == EventTrigger::CurvedTime).collect();
-        let along = curves.into_iter().filter_map(|i| self.next_on_curve(frame, i, t, lines));
+        let curves = (0..self.conditions.len()).filter(|&i| self.conditions[i].1 == EventTrigger::CurvedTime);
+        let along = curves.filter_map(|i| self.next_on_curve(frame, i, t, lines));
         *next = along.chain(lines).reduce(f64::min);
         self.evaluate(frame, t);
         frame.d[self.time] = 0.0;

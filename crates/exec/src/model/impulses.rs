@@ -1,7 +1,8 @@
 //! Impulses: what storages keep after an event follows from what they kept before it, the resets, and what the junction
 //! structure lets through.
 
-use super::{DelayOrSample, Model, minimum_norm};
+use super::impulse_elimination::Elimination;
+use super::{DelayOrSample, Model};
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Jumps, Program, Target, Value};
 use halfarrow_sim::Failure;
@@ -27,7 +28,21 @@ pub(super) struct ImpulseBalance {
     moved: Vec<Value>,
 }
 
+/// Room for what is computed of impulses.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ImpulseWork {
+    /// What storages keep before the round.
+    stored: Vec<f64>,
+    asked: Vec<Asked>,
+    /// Of each that is asked for.
+    impulses: Vec<f64>,
+    equations: Elimination,
+    /// The magnitude of what each equation adds up.
+    sizes: Vec<f64>,
+}
+
 /// A reset of the round: the place of what it changes among the outputs, the value that it asks for, its impulse.
+#[derive(Debug, Clone, Copy)]
 struct Asked {
     output: usize,
     value: f64,
@@ -56,6 +71,17 @@ impl ImpulseBalance {
     fn unknowns(&self) -> usize {
         self.jumps.unknowns.len()
     }
+
+    pub fn work(&self) -> ImpulseWork {
+        let (rows, unknowns, asked) = (self.jumps.balances.len(), self.unknowns(), self.moved.len());
+        ImpulseWork {
+            stored: vec![0.0; self.jumps.stored.len()],
+            asked: Vec::with_capacity(asked),
+            impulses: Vec::with_capacity(asked),
+            equations: Elimination::new(rows + asked, unknowns + asked),
+            sizes: Vec::with_capacity(rows + asked),
+        }
+    }
 }
 
 impl Model {
@@ -67,7 +93,7 @@ impl Model {
         self.frame.run(&balance.stored).map_err(|error| self.failure(t, error))?;
         let Model { events, frame, .. } = self;
         let outputs = balance.stored.outputs.iter();
-        events.stored.iter_mut().zip(outputs).for_each(|(stored, &r)| *stored = frame.r[r as usize]);
+        events.impulses.stored.iter_mut().zip(outputs).for_each(|(stored, &r)| *stored = frame.r[r as usize]);
         Ok(())
     }
 
@@ -76,52 +102,18 @@ impl Model {
     pub(super) fn balance_impulses(&mut self, t: f64, x: &mut [f64], first: bool) -> Result<(), Failure> {
         let code = self.code.clone();
         let Some(balance) = &code.impulses else { return Ok(()) };
-        let asked = self.asked(balance);
-        let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
-        if m == 0 {
-            return Ok(());
-        }
-        let mut impulses = vec![0.0; asked.len()];
-        let (mut last, mut met) = (f64::INFINITY, false);
-        for _ in 0..ITERATIONS {
-            let (matrix, residual) = self.balanced(t, x, balance, &asked, &impulses)?;
-            met = residual.iter().all(|r| *r == 0.0);
-            if met {
-                break;
-            }
-            let Some(step) = minimum_norm::step(&matrix, &residual, m) else { break };
-            if step.rank < m {
-                return Err(self.dependent_resets(t));
-            }
-            let mut length = 0.0f64;
-            for (&u, s) in balance.jumps.unknowns.iter().zip(&step.step) {
-                let value = self.unknown_mut(x, u);
-                length = length.max(s.abs() / value.abs().max(s.abs()).max(f64::MIN_POSITIVE));
-                *value += s;
-            }
-            impulses.iter_mut().zip(&step.step[n..]).for_each(|(p, s)| *p += s);
-            met = length <= SETTLED || length < NOISE && length >= 0.5 * last;
-            if met {
-                break;
-            }
-            last = length;
-        }
-        self.place(t, x);
-        self.frame.run(&balance.all).map_err(|error| self.failure(t, error))?;
-        let now = |a: &Asked| self.frame.r[balance.all.outputs[a.output] as usize];
-        let fits = |a: &Asked| (now(a) - a.value).abs() <= MET * now(a).abs().max(a.value.abs());
-        if !(met && asked.iter().all(fits)) {
-            return Err(self.unmet_resets(t));
-        }
+        let mut work = std::mem::take(&mut self.events.impulses);
+        self.take_asked(balance, &mut work.asked);
+        let done = self.solve_balance(t, x, balance, &mut work);
+        self.events.impulses = work;
+        done?;
         if first {
-            for impulse in &balance.jumps.impulses {
-                self.run.delays_and_samples[impulse.held as usize] =
-                    match Model::is_reset(&asked, balance, impulse.held) {
-                        true => DelayOrSample::Discrete(0.0),
-                        false => continue,
-                    };
+            for a in &self.events.impulses.asked {
+                let held = balance.jumps.impulses[a.impulse].held as usize;
+                self.run.delays_and_samples[held] = DelayOrSample::Discrete(0.0);
             }
         }
+        let ImpulseWork { asked, impulses, .. } = &self.events.impulses;
         for (a, p) in asked.iter().zip(impulses) {
             let held = balance.jumps.impulses[a.impulse].held as usize;
             if let DelayOrSample::Discrete(value) = &mut self.run.delays_and_samples[held] {
@@ -131,14 +123,58 @@ impl Model {
         Ok(())
     }
 
-    fn is_reset(asked: &[Asked], balance: &ImpulseBalance, held: u32) -> bool {
-        asked.iter().any(|a| balance.jumps.impulses[a.impulse].held == held)
+    /// Newton on the unknowns and the impulses.
+    fn solve_balance(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        balance: &ImpulseBalance,
+        work: &mut ImpulseWork,
+    ) -> Result<(), Failure> {
+        let (n, m) = (balance.unknowns(), balance.unknowns() + work.asked.len());
+        work.impulses.clear();
+        work.impulses.resize(work.asked.len(), 0.0);
+        if m == 0 {
+            return Ok(());
+        }
+        let (mut last, mut met) = (f64::INFINITY, false);
+        for _ in 0..ITERATIONS {
+            self.balanced(t, x, balance, work)?;
+            met = work.equations.residual.iter().all(|r| *r == 0.0);
+            if met {
+                break;
+            }
+            match work.equations.solve() {
+                None => break,
+                Some(rank) if rank < m => return Err(self.dependent_resets(t)),
+                Some(_) => {}
+            }
+            let step = &work.equations.step;
+            let mut length = 0.0f64;
+            for (&u, s) in balance.jumps.unknowns.iter().zip(step) {
+                let value = self.unknown_mut(x, u);
+                length = length.max(s.abs() / value.abs().max(s.abs()).max(f64::MIN_POSITIVE));
+                *value += s;
+            }
+            work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
+            met = length <= SETTLED || length < NOISE && length >= 0.5 * last;
+            if met {
+                break;
+            }
+            last = length;
+        }
+        self.balanced(t, x, balance, work)?;
+        let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
+        match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
+            true => Ok(()),
+            false => Err(self.unmet_resets(t)),
+        }
     }
 
     /// The resets of the round, each thing once.
-    fn asked(&self, balance: &ImpulseBalance) -> Vec<Asked> {
+    fn take_asked(&self, balance: &ImpulseBalance, asked: &mut Vec<Asked>) {
         let first = balance.all.outputs.len() - balance.moved.len();
-        let mut asked: Vec<Asked> = Vec::new();
+        asked.clear();
         for (_, at, action) in Model::actions(&self.code, &self.events) {
             let Target::Moved { what, impulse } = action.target else { continue };
             let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
@@ -146,7 +182,6 @@ impl Model {
                 asked.push(Asked { output, value: self.events.values[at], impulse: impulse as usize });
             }
         }
-        asked
     }
 
     fn unknown_mut<'m>(&'m mut self, x: &'m mut [f64], unknown: u32) -> &'m mut f64 {
@@ -157,20 +192,16 @@ impl Model {
         }
     }
 
-    /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, row by row.
-    fn balanced(
-        &mut self,
-        t: f64,
-        x: &[f64],
-        balance: &ImpulseBalance,
-        asked: &[Asked],
-        impulses: &[f64],
-    ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+    /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
+    fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
         let jumps = &balance.jumps;
+        let ImpulseWork { stored: before, asked, impulses, equations, sizes } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
         let rows = jumps.balances.len();
-        let (mut matrix, mut residual) = (vec![0.0; (rows + asked.len()) * m], vec![0.0; rows + asked.len()]);
-        let before = self.events.stored.clone();
+        equations.clear(rows + asked.len(), m);
+        sizes.clear();
+        sizes.resize(rows + asked.len(), 0.0);
+        let Elimination { matrix, residual, .. } = equations;
         for column in 0..n.max(1) {
             self.place(t, x);
             self.still();
@@ -187,14 +218,16 @@ impl Model {
             };
             let mut factor = jumps.stored.len();
             for (row, terms) in jumps.balances.iter().enumerate() {
-                let (mut sum, mut slope) = (0.0, 0.0);
+                let (mut sum, mut slope, mut size) = (0.0, 0.0, 0.0);
                 for &(k, _) in terms {
                     let ((c, dc), (stored, change)) = (at(factor), at(k as usize));
                     let jump = stored - before[k as usize];
-                    (sum, slope) = (sum + c * jump, slope + c * change + dc * jump);
+                    sum += c * jump;
+                    slope += c * change + dc * jump;
+                    size += (c * stored).abs() + (c * before[k as usize]).abs();
                     factor += 1;
                 }
-                residual[row] = sum;
+                (residual[row], sizes[row]) = (sum, size);
                 if column < n {
                     matrix[row * m + column] = slope;
                 }
@@ -205,22 +238,24 @@ impl Model {
                     let (c, dc) = at(factor);
                     factor += 1;
                     let Some(place) = place else { continue };
-                    residual[row as usize] -= c * impulses[place];
-                    matrix[row as usize * m + n + place] = -c;
+                    let row = row as usize;
+                    residual[row] -= c * impulses[place];
+                    sizes[row] += (c * impulses[place]).abs();
+                    matrix[row * m + n + place] = -c;
                     if column < n {
-                        matrix[row as usize * m + column] -= dc * impulses[place];
+                        matrix[row * m + column] -= dc * impulses[place];
                     }
                 }
             }
             for (k, a) in asked.iter().enumerate() {
                 let (value, slope) = at(a.output);
-                residual[rows + k] = value - a.value;
+                (residual[rows + k], sizes[rows + k]) = (value - a.value, value.abs().max(a.value.abs()));
                 if column < n {
                     matrix[(rows + k) * m + column] = slope;
                 }
             }
         }
-        Ok((matrix, residual))
+        Ok(())
     }
 
     pub(super) fn what_is_reset(&self) -> String {

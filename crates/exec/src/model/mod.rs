@@ -12,6 +12,7 @@ mod exchanges;
 mod explain;
 mod history;
 mod implicit;
+mod impulse_elimination;
 mod impulses;
 mod inputs;
 mod jacobian;

@@ -38,6 +38,11 @@ impl PositionConstraints {
     pub fn routine(&self) -> &Routine {
         &self.residuals
     }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
 }
 
 /// How the computed positions move that rates read: their steps are short enough to follow them.
@@ -61,22 +66,30 @@ impl Motion {
 }
 
 impl Model {
-    /// By how much each constraint on displacements is missed.
-    pub(super) fn position_misses(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {
+    /// Keeps in mind by how much each constraint on displacements is missed.
+    pub(super) fn take_misses(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
-        let Some(constraints) = &code.positions else { return Ok(Vec::new()) };
+        let Some(constraints) = &code.positions else { return Ok(()) };
+        self.miss_positions(t, x, constraints)?;
+        let Model { events, frame, .. } = self;
+        let outputs = constraints.residuals.outputs.iter();
+        events.misses.iter_mut().zip(outputs).for_each(|(miss, &r)| *miss = frame.r[r as usize].abs());
+        Ok(())
+    }
+
+    fn miss_positions(&mut self, t: f64, x: &[f64], constraints: &PositionConstraints) -> Result<(), Failure> {
         self.place(t, x);
-        self.frame.run(&constraints.residuals).map_err(|error| self.failure(t, error))?;
-        Ok(constraints.residuals.outputs.iter().map(|&r| self.frame.r[r as usize].abs()).collect())
+        self.frame.run(&constraints.residuals).map_err(|error| self.failure(t, error))
     }
 
     /// Refuses new positions that a constraint does not allow.
-    pub(super) fn refuse_broken_positions(&mut self, t: f64, x: &[f64], before: &[f64]) -> Result<(), Failure> {
+    pub(super) fn refuse_broken_positions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
         let Some(constraints) = &code.positions else { return Ok(()) };
-        let after = self.position_misses(t, x)?;
         let fits = |after: f64, before: f64, size: f64| after <= 2.0 * before + MISSED * size;
-        for (i, (after, &before)) in after.into_iter().zip(before).enumerate() {
+        for (i, &output) in constraints.residuals.outputs.iter().enumerate() {
+            self.miss_positions(t, x, constraints)?;
+            let (after, before) = (self.frame.r[output as usize].abs(), self.events.misses[i]);
             if fits(after, before, 0.0) {
                 continue;
             }
@@ -86,7 +99,7 @@ impl Model {
                 self.still();
                 self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
                 self.frame.run_along(&constraints.residuals).map_err(|error| self.failure(t, error))?;
-                size += (self.frame.d[constraints.residuals.outputs[i] as usize] * x[state as usize]).abs();
+                size += (self.frame.d[output as usize] * x[state as usize]).abs();
             }
             if !fits(after, before, size) {
                 let name = &constraints.names[i];

@@ -3,7 +3,8 @@
 use super::compiled::Mode;
 use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
-use halfarrow_compiler::program::{BlockId, Value};
+use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::program::{BlockId, Op, Value};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -64,6 +65,21 @@ impl Model {
         let available = self.code.program.observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
         let chosen = available.map(|(i, _)| i).collect();
         self.take_recorded(Recorded::new(&self.code, chosen));
+    }
+
+    /// Records what tells the impulses of resets too, behind everything else.
+    pub fn record_impulses(&mut self) {
+        let program = &self.code.program;
+        let tells = |value: Value| match program.values.op(value) {
+            Op::Held(held) => program.held[held as usize].kind == HeldKind::Impulse,
+            _ => false,
+        };
+        let known = &self.recorded.chosen;
+        let all = program.observed.iter().enumerate().filter(|(_, o)| o.value.as_ref().is_ok_and(|&v| tells(v)));
+        let more: Vec<usize> = all.map(|(i, _)| i).filter(|i| !known.contains(i)).collect();
+        if !more.is_empty() {
+            self.take_recorded(Recorded::new(&self.code, [&known[..], &more].concat()));
+        }
     }
 
     /// Indices into [`Program::observed`](halfarrow_compiler::program::Program) of what is recorded.

@@ -17,7 +17,7 @@ impl Run<'_> {
         point: &mut [f64],
     ) -> Result<(f64, bool), Failure> {
         let handled = std::mem::take(&mut self.handled);
-        if !S::DENSE && stepper.events().locates_crossings() {
+        if !S::DENSE && !self.signs.is_empty() && stepper.events().locates_crossings() {
             return self.accept_by_shorter_steps(stepper, end, point, handled);
         }
         if !S::DENSE {
@@ -53,6 +53,13 @@ impl Run<'_> {
     ) -> Result<(f64, bool), Failure> {
         let Run { signs, inside, time, .. } = self;
         inside.resize(point.len(), 0.0);
+        // The step to the end has just been made.
+        stepper.accept(end, inside);
+        let switched = signs.crossed(&mut *stepper.events(), end, inside)?.is_some();
+        if !(handled || switched) {
+            point.copy_from_slice(inside);
+            return Ok((end, false));
+        }
         let mut crossed = |signs: &mut Signs, t: f64| {
             match t > *time {
                 true => {
@@ -63,10 +70,7 @@ impl Run<'_> {
             }
             signs.crossed(&mut *stepper.events(), t, inside)
         };
-        let crossing = match handled || crossed(signs, end)?.is_some() {
-            true => first_crossing(signs, *time, end, &mut crossed)?,
-            false => None,
-        };
+        let crossing = first_crossing(signs, *time, end, &mut crossed)?;
         let (end, indicator) = crossing.map_or((end, None), |(time, indicator)| (time, Some(indicator)));
         crossed(signs, end)?;
         point.copy_from_slice(inside);

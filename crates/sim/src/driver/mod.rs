@@ -81,11 +81,16 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// A run of which nobody takes samples, from where it stands.
-    pub(crate) fn unsampled(options: &'a Options, sink: &'a mut dyn Sink, position: Position) -> Run<'a> {
+    /// A run of which nobody takes samples, from where it stands, with room for a point inside a step.
+    pub(crate) fn unsampled(
+        options: &'a Options,
+        sink: &'a mut dyn Sink,
+        position: Position,
+        inside: Vec<f64>,
+    ) -> Run<'a> {
         let Position { time, signs, counts } = position;
         let (chatter, ticking) = (Chatter::new(options.to - options.from), Chatter::of_times());
-        let (values, inside) = (Vec::new(), Vec::new());
+        let values = Vec::new();
         let (samples, watched, seen) = (Samples::Nowhere, false, None);
         let to = options.to;
         let handled = true;
@@ -107,9 +112,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Where it stands.
-    pub(crate) fn into_position(self) -> Position {
-        Position { time: self.time, signs: self.signs, counts: self.counts }
+    /// Where it stands, and its room.
+    pub(crate) fn into_position(self) -> (Position, Vec<f64>) {
+        (Position { time: self.time, signs: self.signs, counts: self.counts }, self.inside)
     }
 
     /// The start counts as an event.

@@ -29,14 +29,15 @@ pub(crate) fn first_crossing(
     }
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
     crossed(signs, start)?;
-    let mut seen = vec![signs.values().to_vec()];
+    signs.keep(0);
     for part in 1..=PARTS {
         let found = crossed(signs, time(part))?;
-        seen.push(signs.values().to_vec());
         if found.is_some() {
             return bisect(signs, (time(part - 1), time(part)), FINEST * (end - start), found, &mut crossed);
         }
-        for turn in extrema(&seen) {
+        signs.keep(part);
+        for indicator in 0..signs.len() {
+            let Some(turn) = signs.turn(indicator, part) else { continue };
             let extremum = start + (end - start) * turn / PARTS as f64;
             let found = crossed(signs, extremum)?;
             if found.is_some() {
@@ -46,17 +47,6 @@ pub(crate) fn first_crossing(
         }
     }
     Ok(None)
-}
-
-/// Where, in parts, values turn round on their way to 0, judged by the parabola through the last three.
-fn extrema(seen: &[Vec<f64>]) -> Vec<f64> {
-    let [.., a, b, c] = seen else { return vec![] };
-    let part = (seen.len() - 2) as f64;
-    let turn = |((&a, &b), &c): ((&f64, &f64), &f64)| {
-        let (slope, bend) = (0.5 * (c - a), a - 2.0 * b + c);
-        (bend * b > 0.0).then(|| -slope / bend).filter(|turn| turn.abs() <= 1.0).map(|turn| part + turn)
-    };
-    a.iter().zip(b).zip(c).filter_map(turn).collect()
 }
 
 /// Halves the bracket until it is as short as times can be told apart, or as `finest`.
@@ -87,7 +77,7 @@ mod tests {
 
     /// The first zero crossing of `g`, whose sign is held from 0, in (0, 1].
     fn first(g: impl Fn(f64) -> f64) -> Option<f64> {
-        let mut signs = Signs { held: vec![g(0.0) > 0.0], values: vec![0.0] };
+        let mut signs = Signs::holding(g(0.0) > 0.0);
         let crossing = first_crossing(&mut signs, 0.0, 1.0, |signs, t| {
             signs.values[0] = g(t);
             Ok((signs.held[0] != (g(t) > 0.0)).then_some(0))

@@ -1,6 +1,7 @@
 //! All functions of a model, and the source that they make.
 
 mod checks;
+mod events;
 mod routines;
 mod shapes;
 mod source;
@@ -11,16 +12,17 @@ mod work;
 use std::rc::Rc;
 
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine};
+use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine, Trigger};
 
 use super::Export;
 use super::blocks::{elimination_room, full_room};
-use super::cost::OperationCount;
+use super::cost::{MOST_EVENTS, OperationCount};
 use super::function::Function;
 use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
 use super::write::{Moving, Shape, TimeRate, Writer};
 use crate::EmitError;
+pub(super) use events::EventTables;
 use routines::{Routines, newton_of};
 use shapes::{ALONG, CLOCK, PLAIN, PREAMBLE, block_functions, of_parameters};
 pub(super) use step_order::StepOrder;
@@ -43,6 +45,10 @@ pub(super) struct Plan<'a> {
     pub delays: Vec<(usize, usize)>,
     /// Samples: held signals.
     pub samples: Vec<usize>,
+    /// Discrete variables and impulses: held signals.
+    pub discretes: Vec<usize>,
+    /// What happens at events.
+    pub events: EventTables,
     /// Newton blocks in use.
     pub newton: Vec<BlockId>,
     /// Where the matrices of solve blocks have entries.
@@ -88,6 +94,8 @@ struct Works {
     sources: OperationCount,
     directional: OperationCount,
     clock: OperationCount,
+    /// A round of what happens at events.
+    round: OperationCount,
 }
 
 impl<'a> Plan<'a> {
@@ -104,7 +112,9 @@ impl<'a> Plan<'a> {
             switches: of(|trigger| trigger == EventTrigger::State),
             clocks: of(|trigger| matches!(trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime)),
             delays: delays(export)?,
-            samples: held(program, HeldKind::Sample),
+            samples: held(program, |kind| kind == HeldKind::Sample),
+            discretes: held(program, HeldKind::is_discrete),
+            events: EventTables::of(program),
             newton: Vec::new(),
             patterns: Rc::new(Patterns::of(program)),
             reads: Vec::new(),
@@ -141,6 +151,8 @@ impl<'a> Plan<'a> {
             of_parameters(&writer, "ha_defaults_code", program.inputs.iter().map(|i| i.default), false),
             of_parameters(&writer, "ha_times_code", program.held.iter().map(|h| h.time), true),
             of_parameters(&writer, "ha_asked_code", program.start.iter().map(|c| c.asked), false),
+            of_parameters(&writer, "ha_discretes_code", self.discretes.iter().map(|&i| program.held[i].source), false),
+            of_parameters(&writer, "ha_periods_code", self.events.periods(program), true),
         ];
         let plain = |writer: &mut Writer, name: &str, routine: &Routine| {
             let n = routine.code.outputs.len();
@@ -150,6 +162,11 @@ impl<'a> Plan<'a> {
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
         functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
+        functions.extend(plain(&mut writer, "ha_becomes_code", &routines.becomes));
+        for (i, clause) in routines.clauses.iter().enumerate() {
+            functions.extend(plain(&mut writer, &events::code_of(i), clause));
+        }
+        functions.extend(plain(&mut writer, "ha_stored_code", &routines.stored));
         functions.extend(self.domain_checks(&writer));
         functions.extend(self.assumption_checks(&writer));
 
@@ -176,6 +193,8 @@ impl<'a> Plan<'a> {
         for (name, routine) in &routines.starts {
             functions.extend(along(&mut writer, name, ALONG, routine, begin));
         }
+        functions.extend(along(&mut writer, "ha_impulses_along", ALONG, &routines.impulses, begin));
+        functions.extend(along(&mut writer, "ha_positions_along", ALONG, &routines.positions, begin));
 
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
@@ -194,6 +213,7 @@ impl<'a> Plan<'a> {
             sources: work(&routines.sources),
             directional: work(&routines.rates).along(),
             clock: work(&routines.clock).along(),
+            round: self.round(&routines),
         };
         self.newton = used.clone();
         self.find_sizes(&writer);
@@ -232,6 +252,23 @@ impl<'a> Plan<'a> {
         &self.functions
     }
 
+    /// What a round of what happens at events takes at most.
+    fn round(&self, routines: &Routines) -> OperationCount {
+        let work = |routine: &Routine| OperationCount::of(self.program, &routine.code);
+        let mut round = routines.clauses.iter().fold(work(&routines.becomes), |sum, clause| sum + work(clause));
+        let unknowns = self.events.unknowns.len().max(1) as u64;
+        round = round + work(&routines.stored) + work(&routines.impulses).along() * (51 * unknowns);
+        let positions = self.events.positions.iter().map(|reads| reads.len() as u64 + 2).sum();
+        let size = (self.events.equations() * self.events.columns() * self.events.columns()) as u64;
+        round.operations += 50 * 2 * size;
+        round + work(&routines.positions).along() * positions
+    }
+
+    /// Whether crossings are located within steps, since something happens there.
+    pub fn locates(&self) -> bool {
+        !(self.events.conditional.is_empty() || self.switches.is_empty())
+    }
+
     /// Whether a start may differ from the exported one.
     pub fn solves_start(&self) -> bool {
         !(self.program.start.is_empty() && self.program.guesses.is_empty())
@@ -243,18 +280,21 @@ impl<'a> Plan<'a> {
     }
 }
 
-fn held(program: &Program, kind: HeldKind) -> Vec<usize> {
-    program.held.iter().enumerate().filter(|(_, h)| h.kind == kind).map(|(i, _)| i).collect()
+fn held(program: &Program, wanted: impl Fn(HeldKind) -> bool) -> Vec<usize> {
+    program.held.iter().enumerate().filter(|(_, h)| wanted(h.kind)).map(|(i, _)| i).collect()
 }
 
 fn delays(export: &Export) -> Result<Vec<(usize, usize)>, EmitError> {
+    // Crossings that are located add points, each on both of its sides.
+    let conditional = export.program.clauses.iter().any(|c| matches!(c.trigger, Trigger::Becomes(_)));
+    let events = if conditional { 2.0 * MOST_EVENTS as f64 } else { 64.0 };
     let room = |i: usize| {
         let time = export.start.times.get(i).copied().unwrap_or(0.0);
-        let points = 2.0 * (time / export.step).ceil() + 64.0;
+        let points = 2.0 * (time / export.step).ceil() + events;
         match points <= MOST_POINTS {
             true => Ok((i, points as usize)),
             false => Err(EmitError::Delay(export.program.held[i].name.clone(), points)),
         }
     };
-    held(export.program, HeldKind::Delay).into_iter().map(room).collect()
+    held(export.program, |kind| kind == HeldKind::Delay).into_iter().map(room).collect()
 }

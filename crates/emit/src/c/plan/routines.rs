@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow_compiler::program::{Arg, BlockId, Code, ConditionId, Method, Routine, Solve, Value};
+use halfarrow_compiler::program::{Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, Routine, Solve, Value};
 
 use super::Plan;
 
@@ -15,6 +15,13 @@ pub(super) struct Routines {
     pub clock: Routine,
     pub sources: Routine,
     pub domains: Routine,
+    /// Conditions of events, the new values that each event gives, what storages keep, the same with what balances of
+    /// impulses read, constraints on displacements.
+    pub becomes: Routine,
+    pub clauses: Vec<Routine>,
+    pub stored: Routine,
+    pub impulses: Routine,
+    pub positions: Routine,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -33,7 +40,17 @@ impl Routines {
         let start = |(kind, number, wanted): (&str, usize, Vec<Value>)| {
             (format!("ha_start_{kind}_{number}"), p.start_routine(&wanted))
         };
+        let events = &plan.events;
+        let stored = p.jumps.as_ref().map_or(&[][..], |jumps| &jumps.stored);
+        let values = |c: &Clause| p.routine(&c.actions.iter().map(|a| a.value).collect::<Vec<_>>());
+        let becomes: Vec<Value> = events.conditional.iter().map(|&c| p.clauses[c].trigger.value()).collect();
+        let balanced = p.jumps.iter().flat_map(Jumps::values).chain(events.moved.iter().copied());
         Routines {
+            becomes: p.routine(&becomes),
+            clauses: p.clauses.iter().map(values).collect(),
+            stored: p.routine(stored),
+            impulses: p.routine(&balanced.collect::<Vec<_>>()),
+            positions: p.routine(&events.constraints(p).map(|c| c.residual).collect::<Vec<_>>()),
             preamble: p.preamble(&p.determined(&[])),
             rates: p.guarded_routine(&rates),
             observe: p.guarded_routine(&shown.collect::<Vec<_>>()),
@@ -46,9 +63,10 @@ impl Routines {
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
-        let Routines { preamble, rates, observe, switching, clock, sources, domains, starts } = self;
-        let all = [preamble, rates, observe, switching, clock, sources, domains];
-        all.into_iter().chain(starts.iter().map(|s| &s.1))
+        let Routines { preamble, rates, observe, switching, clock, sources, domains, .. } = self;
+        let Routines { becomes, clauses, stored, impulses, positions, starts, .. } = self;
+        let all = [preamble, rates, observe, switching, clock, sources, domains, becomes, stored, impulses, positions];
+        all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }
 
     /// All Newton blocks, each with what it reads from outside and its code.

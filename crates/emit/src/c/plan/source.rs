@@ -61,6 +61,10 @@ impl Plan<'_> {
         }
         put(filling.fragments(include_str!("../runtime/held.c")));
         put(filling.fragments(include_str!("../runtime/system.c")));
+        if !self.program.clauses.is_empty() {
+            put(filling.fragments(include_str!("../runtime/events.c")));
+        }
+        put(filling.fragments(include_str!("../runtime/cross.c")));
         if self.export.method.is_implicit() {
             put(filling.fragments(include_str!("../runtime/matrix.c")));
         }
@@ -87,7 +91,7 @@ impl Plan<'_> {
     /// What the model has.
     pub(in crate::c) fn flags(&self) -> Flags {
         let Plan { export, program: p, .. } = *self;
-        let held = !p.held.is_empty();
+        let held = !(self.delays.is_empty() && self.samples.is_empty());
         let time_derivative = export.method.is_linearly_implicit();
         let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
         Flags {
@@ -107,6 +111,14 @@ impl Plan<'_> {
             clocks: !self.clocks.is_empty(),
             curves: self.clocks.iter().any(|&c| p.conditions[c].trigger == EventTrigger::CurvedTime),
             switches: !self.switches.is_empty(),
+            clauses: !p.clauses.is_empty(),
+            conditional_clauses: !self.events.conditional.is_empty(),
+            periodic_clauses: !self.events.periodic.is_empty(),
+            locates: self.locates(),
+            impulses: p.jumps.is_some(),
+            resets: !self.events.moved.is_empty(),
+            positions: !self.events.positions.is_empty(),
+            discretes: !self.discretes.is_empty(),
             held,
             delays: !self.delays.is_empty(),
             samples: !self.samples.is_empty(),

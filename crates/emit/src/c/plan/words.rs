@@ -113,7 +113,10 @@ impl Plan<'_> {
             ("COUNT_CONSERVED", program.conserved.len().to_string()),
             ("COUNT_POSITIONS", program.positions.len().to_string()),
             ("COUNT_INDICATORS", self.sizes.indicators.to_string()),
+            ("DISCRETES", self.discretes.len().to_string()),
+            ("DISCRETE_PLACES", join(self.discretes.iter().map(usize::to_string).collect())),
         ];
+        let events = self.events.words(program, &lines, &join);
         let ints = |values: Vec<u32>| lines(values.iter().map(u32::to_string).collect());
         let order = self.step_order.iter().flat_map(|order| {
             let places = ("STEP_PLACES", order.places(&columns));
@@ -124,9 +127,11 @@ impl Plan<'_> {
             ("TABLES", Written::of(self.tables())),
             ("BLOCK_TABLE", self.block_table()),
             ("START_TABLES", self.start_tables()),
+            ("CLAUSE_CASES", super::events::cases(program)),
         ];
         words
             .into_iter()
+            .chain(events)
             .chain(order)
             .chain(more)
             .chain(tolerances(real))

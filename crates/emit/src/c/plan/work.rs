@@ -76,7 +76,7 @@ impl Plan<'_> {
             w.rates.clone() + w.sources.clone().along()
         };
         step = step + followed.clone() + sources.clone();
-        let held = self.program.held.len() as u64;
+        let held = (self.delays.len() + self.samples.len()) as u64;
         let curves =
             self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()
                 as u64;
@@ -84,6 +84,12 @@ impl Plan<'_> {
         let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
         let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
         let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
-        Cost::new(step, jump, self)
+        // A round takes the sides of conditions anew.
+        let round = if self.program.clauses.is_empty() {
+            OperationCount::default()
+        } else {
+            w.round.clone() + w.switching.clone()
+        };
+        Cost::new(step, jump, round, self)
     }
 }

@@ -99,6 +99,15 @@ typedef struct $model_sample {
 } $model_sample;
 
 //end
+//if clauses
+/* What happens at events: whether a condition holds, when it became true last and how fast that follows each other, or period
+ * and number of the next time; whether it happens now. */
+typedef struct $model_clause {
+    double start, last, interval, period, next;
+    int holds, faster, fired;
+} $model_clause;
+
+//end
 typedef struct $model {
 $PUBLIC_PARTS
 
@@ -162,8 +171,13 @@ int $model_switched($model *m, double t, const $real *x, int *switched);
 /* The next time after t at which something jumps, infinite if nothing does. */
 double $model_next_jump($model *m, double t);
 
+//if clauses
+/* The run stands at a jump, at a switch, or at its beginning: conditions are taken anew, samples taken, and what happens at
+ * events happens, which may change x. */
+//else
 /* The run stands at a jump, at a switch, or at its beginning: conditions are taken anew, samples taken. */
-int $model_cross($model *m, double t, const $real *x);
+//end
+int $model_cross($model *m, double t, $real *x);
 
 /* The run has come to (t, x): solutions and delays go on from there. */
 int $model_accept($model *m, double t, const $real *x);

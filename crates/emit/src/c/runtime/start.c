@@ -111,6 +111,41 @@ static void ha_restart(ha_model *m)
 //end
     }
 //end
+//if switches
+    m->signs_taken = (double)NAN;
+//end
+//if discretes
+    {
+        static const int places[] = {$DISCRETE_PLACES};
+        $real starts[$DISCRETES];
+        int i;
+        $ha_discretes_code(m, starts);
+        for (i = 0; i < $DISCRETES; ++i) {
+            m->z[places[i]] = starts[i];
+        }
+    }
+//end
+//if clauses
+    {
+        int i;
+        for (i = 0; i < $CLAUSES; ++i) {
+            m->clauses[i].next = HUGE_VAL;
+            m->clauses[i].holds = 0;
+            m->clauses[i].fired = 0;
+        }
+    }
+//end
+//if periodic_clauses
+    {
+        static const int periodic[] = {$PERIODIC};
+        double periods[$PERIODICS];
+        int i;
+        $ha_periods_code(m, periods);
+        for (i = 0; i < $PERIODICS; ++i) {
+            m->clauses[periodic[i]].period = periods[i];
+        }
+    }
+//end
 //if held
     {
         double times[HA_NZ];

@@ -29,6 +29,148 @@ static void ha_ticks_from(ha_model *m, double t)
     m->tick_rate = rate >= 1.0 && 1.0 / rate == m->step ? rate : 0.0;
 }
 
+//if locates
+//item ha_look
+/* Makes the step from m->t to a time, in m->trial; whether an event indicator has another sign there than that held. */
+static int ha_look(ha_model *m, double t, int *crossed)
+{
+    int status = $MODEL_OK;
+    int i;
+    *crossed = 0;
+    if (t > m->t) {
+        status = $ha_method(m, m->t, $narrow(t - m->t), m->x);
+        for (i = 0; i < HA_NX && status == $MODEL_OK; ++i) {
+            if (!$ha_finite(m->trial[i])) {
+                status = $ha_fail(m, $MODEL_STATE_NOT_FINITE, i, t);
+            }
+        }
+    } else {
+        $ha_copy(m->trial, m->x, HA_NX);
+//if single
+        $ha_copy(m->trial_rest, m->rest, HA_NX);
+//end
+    }
+    return status == $MODEL_OK ? $model_switched(m, t, m->trial, crossed) : status;
+}
+
+//item ha_bracket
+/* Halves the bracket of a crossing until it is as short as times can be told apart, or as a part of the step within which
+ * crossings are not. */
+static int ha_bracket(ha_model *m, double before, double after, double finest, double *end)
+{
+    int halving;
+    for (halving = 0; halving < 80; ++halving) {
+        const double half = 0.5 * (after - before);
+        const double middle = before + half;
+        int crossed;
+        int status;
+        if (middle <= before || middle >= after || after - before <= finest) {
+            break;
+        }
+        status = $ha_look(m, middle, &crossed);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+        if (crossed) {
+            after = middle;
+        } else {
+            before = middle;
+        }
+    }
+    *end = after;
+    return $MODEL_OK;
+}
+
+//item ha_extremum
+/* Where, in parts from the middle one, the last three values of an indicator turn round on their way to 0, judged by the parabola
+ * through them; beyond 1 if they do not. */
+static double ha_extremum(const ha_model *m, int indicator, int part)
+{
+    const double a = $widen m->seen[(part - 2) % 3 * HA_NG + indicator];
+    const double b = $widen m->seen[(part - 1) % 3 * HA_NG + indicator];
+    const double c = $widen m->seen[part % 3 * HA_NG + indicator];
+    const double slope = 0.5 * (c - a);
+    const double twice = 2.0 * b;
+    const double bend = a - twice + c;
+    return bend * b > 0.0 ? -slope / bend : 2.0;
+}
+
+//item ha_part_of
+/* The end of one of the parts of a step at whose ends signs are looked at. */
+static double ha_part_of(double start, double end, double part)
+{
+    const double way = (end - start) * part / 4.0;
+    return start + way;
+}
+
+//item ha_first_crossing
+/* The first time after m->t, up to *end, at which an event indicator has another sign than that held: if there is one, *end is
+ * it then, a rounding error behind the crossing. Two crossings of one function inside one part of the step are found where its values bend
+ * towards 0 there. */
+static int ha_first_crossing(ha_model *m, double *end, int *crossed)
+{
+    const double start = m->t;
+    const double finest = 2.168404344971009e-19 * (*end - start);
+    int status = $ha_look(m, start, crossed);
+    int part;
+    int i;
+    $ha_copy(m->seen, m->beyond, HA_NG);
+    for (part = 1; part <= 4 && status == $MODEL_OK; ++part) {
+        const double before = $ha_part_of(start, *end, (double)(part - 1));
+        const double at = part == 4 ? *end : $ha_part_of(start, *end, (double)part);
+        status = $ha_look(m, at, crossed);
+        if (status == $MODEL_OK && *crossed) {
+            return $ha_bracket(m, before, at, finest, end);
+        }
+        $ha_copy(m->seen + part % 3 * HA_NG, m->beyond, HA_NG);
+        for (i = 0; part >= 2 && i < HA_NG && status == $MODEL_OK; ++i) {
+            const double turn = $ha_extremum(m, i, part);
+            if (fabs(turn) <= 1.0) {
+                const double there = (double)(part - 1) + turn;
+                const double extremum = $ha_part_of(start, *end, there);
+                status = $ha_look(m, extremum, crossed);
+                if (status == $MODEL_OK && *crossed) {
+                    return $ha_bracket(m, there < (double)(part - 1) ? $ha_part_of(start, *end, (double)(part - 2)) : before, extremum, finest, end);
+                }
+            }
+        }
+    }
+    return status;
+}
+
+//item ha_step_to
+/* From m->t to a target, without a jump between them, or to the first crossing of an event indicator on the way. After an event the
+ * inside of the step is looked at as well: what has been changed there may come back at once. */
+static int ha_step_to(ha_model *m, double target, int jumps)
+{
+    const int handled = m->handled;
+    double end = target;
+    int switched;
+    int status = $ha_look(m, target, &switched);
+    m->handled = 0;
+    if (status == $MODEL_OK && (handled || switched)) {
+        int same;
+        status = $ha_first_crossing(m, &end, &switched);
+        if (status == $MODEL_OK) {
+            status = $ha_look(m, end, &same);
+        }
+    }
+    if (status != $MODEL_OK) {
+        return status;
+    }
+    $ha_copy(m->x, m->trial, HA_NX);
+//if single
+    $ha_copy(m->rest, m->trial_rest, HA_NX);
+//end
+    m->t = end;
+    status = $model_accept(m, end, m->x);
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $model_cross(m, end, m->x);
+    }
+    return status;
+}
+
+//else
 //item ha_step_to
 /* From m->t to a target, without a jump between them. */
 static int ha_step_to(ha_model *m, double target, int jumps)
@@ -62,6 +204,7 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     return status;
 }
 
+//end
 //always
 int $model_step_until($model *m, double end)
 {

@@ -287,6 +287,10 @@ int $model_indicators($model *m, double t, const $real *x, $real *g)
         double high;
         if ($ha_kinds[conditions[i]] == 0) {
             g[next] = m->operands[i];
+            /* Where sides have just been taken, an operand that rounding puts on the other one is on the side taken. */
+            if (t == m->signs_taken) {
+                g[next] = m->held[conditions[i]] != 0.0 ? $ha_max($fabs(g[next]), $DBL_MIN) : -$fabs(g[next]);
+            }
             ++next;
             continue;
         }
@@ -338,6 +342,7 @@ static int ha_take_sides(ha_model *m, double t, const $real *x)
         }
     }
     m->state_hold = HA_KEEP;
+    m->signs_taken = t;
     return status;
 }
 
@@ -525,91 +530,23 @@ double $model_next_jump($model *m, double t)
         }
     }
 //end
+//if periodic_clauses
+    {
+        static const int periodic[] = {$PERIODIC};
+        int i;
+        for (i = 0; i < $PERIODICS; ++i) {
+            const $model_clause *c = &m->clauses[periodic[i]];
+            const double at = c->next * c->period;
+            if (at > t && at < next) {
+                next = at;
+            }
+        }
+    }
+//end
 //if clocks
     if (m->clock_next > t && m->clock_next < next) {
         next = m->clock_next;
     }
 //end
     return next;
-}
-
-int $model_cross($model *m, double t, const $real *x)
-{
-    int status = $MODEL_OK;
-//if assumptions
-    if (m->broken) {
-        return $ha_fail(m, $MODEL_STRUCTURE, m->broken - 1, ((double)NAN));
-    }
-//end
-    m->crossed = t;
-    $ha_copy(m->u_crossed, m->u, HA_NU);
-//if switches
-    m->state_hold = HA_FOLLOW;
-//end
-//if newton
-    {
-        /* A solution may leap where something jumps. */
-        int i;
-        for (i = 0; i < $BLOCKS; ++i) {
-            m->following[i] = 0;
-        }
-    }
-//end
-//if clocks
-    $ha_clock_cross(m, t);
-//end
-//if held
-    if (!m->begun) {
-        status = $ha_begin_held(m, t, x);
-//if samples
-    } else {
-        status = $ha_take_samples(m, t, x);
-//end
-    }
-    if (status != $MODEL_OK) {
-        return status;
-    }
-//end
-    m->begun = 1;
-    m->cross_due = 0;
-//if switches
-    status = $ha_take_sides(m, t, x);
-    if (status != $MODEL_OK) {
-        return status;
-    }
-//end
-//if delays
-    {
-        static const int places[] = {$DELAY_PLACES};
-        int d;
-        status = $ha_sources(m, t, x);
-        if (status != $MODEL_OK) {
-            return status;
-        }
-        for (d = 0; d < $DELAYS; ++d) {
-            $ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
-            if (m->delays[d].full) {
-                return $ha_fail(m, $MODEL_NO_ROOM, d, t);
-            }
-        }
-    }
-//end
-//if follows
-    status = $ha_follow_solutions(m, t, x);
-    if (status != $MODEL_OK) {
-        return status;
-    }
-//end
-//if switches
-    status = $model_indicators(m, t, x, m->beyond);
-    if (status == $MODEL_OK) {
-        int i;
-        for (i = 0; i < HA_NG; ++i) {
-            m->sides[i] = m->beyond[i] > $0.0;
-        }
-    }
-//else
-    (void)x;
-//end
-    return status;
 }

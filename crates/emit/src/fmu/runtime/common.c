@@ -58,6 +58,11 @@ typedef struct ha_fmu {
     int discarded;
     /* Whether what is said last is a warning. */
     int warned;
+//if clauses
+    /* Whether the last event has changed states, and whether the step completed last asks for one. */
+    int moved;
+    int event_due;
+//end
     char name[128];
     void *environment;
     void (*log)(struct ha_fmu *f, const char *message);
@@ -311,9 +316,14 @@ static int ha_initialised(ha_fmu *f)
     return 1;
 }
 
-/* A jump at the present point, and the time of the next one. */
+/* A jump at the present point, and the time of the next one. All that happens at one instant happens in it. */
 static int ha_event(ha_fmu *f, double *next)
 {
+//if clauses
+    double before[HA_NX > 0 ? HA_NX : 1];
+    memcpy(before, f->s.m.x, sizeof before);
+    f->moved = 0;
+//end
     if (!f->s.fresh) {
         if ($model_cross(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_failed(f);
@@ -324,6 +334,14 @@ static int ha_event(ha_fmu *f, double *next)
     if (!ha_scale(f)) {
         return 0;
     }
+//if clauses
+    {
+        int i;
+        for (i = 0; i < HA_NX; ++i) {
+            f->moved = f->moved || f->s.m.x[i] != before[i];
+        }
+    }
+//end
     *next = $model_next_jump(&f->s.m, f->s.m.t);
     return 1;
 }
@@ -333,9 +351,19 @@ static int ha_event(ha_fmu *f, double *next)
 static int ha_stepped(ha_fmu *f)
 {
     $model *m = &f->s.m;
+//if clauses
+    f->event_due = 0;
+//end
     if ($model_accept(m, m->t, m->x) != $MODEL_OK) {
         const $model_failure failure = m->failure;
         m->failure.code = $MODEL_OK;
+//if clauses
+        /* What happens at events may be due there: the importer is asked for one. */
+        (void)failure;
+        f->event_due = 1;
+        ha_changed(f);
+        return 1;
+//else
         if ($model_cross(m, m->t, m->x) != $MODEL_OK) {
             m->failure = failure;
             return ha_failed(f);
@@ -343,6 +371,7 @@ static int ha_stepped(ha_fmu *f)
         f->warned = 1;
         ha_say(f, "the way since the last completed step is too long to follow the solution of an equation: it is taken anew");
         ha_changed(f);
+//end
     }
     return ha_scale(f);
 }

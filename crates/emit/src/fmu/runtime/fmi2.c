@@ -266,7 +266,11 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
+//if clauses
+    eventInfo->valuesOfContinuousStatesChanged = f->moved ? fmi2True : fmi2False;
+//else
     eventInfo->valuesOfContinuousStatesChanged = fmi2False;
+//end
     eventInfo->nextEventTimeDefined = next - next == 0.0 ? fmi2True : fmi2False;
     eventInfo->nextEventTime = next - next == 0.0 ? next : 0.0;
     return fmi2OK;
@@ -283,9 +287,17 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
 {
     HA_CHECK(HA_IN(HA_CONTINUOUS), "fmi2CompletedIntegratorStep")
     (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = fmi2False;
     *terminateSimulation = fmi2False;
+//if clauses
+    {
+        const int good = ha_stepped(f);
+        *enterEventMode = f->event_due ? fmi2True : fmi2False;
+        return ha_tried(f, good);
+    }
+//else
+    *enterEventMode = fmi2False;
     return ha_tried(f, ha_stepped(f));
+//end
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)

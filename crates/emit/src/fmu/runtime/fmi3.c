@@ -316,7 +316,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *discreteStatesNeedUpdate = fmi3False;
     *terminateSimulation = fmi3False;
     *nominalsOfContinuousStatesChanged = fmi3False;
+//if clauses
+    *valuesOfContinuousStatesChanged = f->moved != 0;
+//else
     *valuesOfContinuousStatesChanged = fmi3False;
+//end
     *nextEventTimeDefined = next - next == 0.0;
     *nextEventTime = next - next == 0.0 ? next : 0.0;
     return fmi3OK;
@@ -333,9 +337,17 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
 {
     HA_CHECK(HA_IN(HA_CONTINUOUS), "fmi3CompletedIntegratorStep")
     (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = fmi3False;
     *terminateSimulation = fmi3False;
+//if clauses
+    {
+        const int good = ha_stepped(f);
+        *enterEventMode = f->event_due ? fmi3True : fmi3False;
+        return ha_tried(f, good);
+    }
+//else
+    *enterEventMode = fmi3False;
     return ha_tried(f, ha_stepped(f));
+//end
 }
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
