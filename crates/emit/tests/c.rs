@@ -109,8 +109,8 @@ fn c_does_at_events_what_a_run_by_steps_does() {
 #[test]
 fn c_says_what_fails_at_events() {
     let moving = "1:v -> I:m(1, f0 = 1)\nstate x' = v.f from 0\ndiscrete n = 0\n";
-    let four_bar = std::fs::read_to_string(own("when_four_bar")).expect("a model");
-    let four_bar = four_bar.split("when").next().and_then(|text| text.split_once('\n')).expect("a head").1;
+    let joined = "1:v -> I:m(1, f0 = 1)\n1:w -> I:k(2)\nstate x' = v.f from 0\nstate y' = w.f from 0\n\
+        constraint fit: x^2 + x = 2*y\n";
     let cases = [
         (moving, "when x > 0.1 { n = 1 }\nwhen x > 0.1 { n = 2 }", "two events at one instant give n different values"),
         (
@@ -133,8 +133,8 @@ fn c_says_what_fails_at_events() {
             "v -> C:c(e = q^2 + 1)\nwhen x > 0.05 { reset c.e = -1 }",
             "c.e cannot be reset: no impulse leads to the values",
         ),
-        (four_bar, "when t > 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
-        (four_bar, "when every 0.05 { reset th1 = 3 }", "what events change does not fit the constraint"),
+        (joined, "when t > 0.05 { reset x = 1; reset y = 3 }", "what events change does not fit the constraint"),
+        (joined, "when every 0.05 { reset x = 1; reset y = 3 }", "what events change does not fit the constraint"),
     ];
     let folder = common::folder("failures_at_events_models");
     let all: Vec<Exported> = cases

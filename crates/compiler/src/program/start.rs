@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Program;
+use super::{Program, StartCondition};
 
 /// Start conditions that share unknowns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -14,6 +14,13 @@ pub struct StartGroup {
 }
 
 impl Program {
+    /// Constraints on displacements that states may miss, by their numbers among the start conditions: those that read
+    /// computed positions hold by these.
+    pub fn constraints_on_states(&self) -> impl Iterator<Item = (usize, &StartCondition)> {
+        let first = (self.states.len() + self.conserved.len()) as u32;
+        self.start.iter().enumerate().filter(move |(_, c)| c.firm && c.reads.iter().all(|&u| u < first))
+    }
+
     /// Start conditions in groups that share no unknown: first those that read none, then by the least unknown.
     pub fn start_groups(&self) -> Vec<StartGroup> {
         let n = self.start_unknowns();

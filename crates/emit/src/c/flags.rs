@@ -57,7 +57,7 @@ flags! {
     /// Resets that take impulses.
     resets
     /// Constraints on displacements that events may break.
-    positions
+    constraints
     /// Discrete variables, and what tells impulses.
     discretes
     /// Delays or samples.

@@ -71,7 +71,11 @@ impl Model {
         let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else {
             return Ok(false);
         };
-        let Some(wanted) = self.better(ratios, t, x, if failed { AFTER_FAILURE } else { FAR }) else {
+        let most = if failed { AFTER_FAILURE } else { FAR };
+        if !self.is_suspicious(ratios, t, x, most) {
+            return Ok(false);
+        }
+        let Some(wanted) = self.better(ratios, t, x, most) else {
             return Ok(false);
         };
         let values = self.values_of_all(t, x)?;
@@ -86,6 +90,27 @@ impl Model {
                 Ok(false)
             }
         }
+    }
+
+    /// Whether some variable may move `most` times as fast as all that are independent. Takes no memory.
+    fn is_suspicious(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> bool {
+        let n = ratios.independent.len();
+        let weigh = |e: &Exchanged, rate: f64| e.weight.unwrap_or(1.0) * rate.abs();
+        ratios.states.iter().any(|&state| {
+            self.place(t, x);
+            self.still();
+            self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
+            if self.frame.run_along(&ratios.routine).is_err() {
+                return true;
+            }
+            let (own, others) = ratios.routine.outputs.split_at(n);
+            let fastest = |all: &[Exchanged], registers: &[u32]| {
+                let rates = registers.iter().map(|&r| self.frame.d[r as usize]);
+                all.iter().zip(rates).fold(0.0f64, |most, (e, rate)| most.max(weigh(e, rate)))
+            };
+            let ratio = fastest(&ratios.dependent, others) / fastest(&ratios.independent, own);
+            ratio.is_nan() || ratio > most / n as f64
+        })
     }
 
     /// The variables that should be independent instead of those that are, if some should.

@@ -20,10 +20,7 @@ pub(super) struct PositionConstraints {
 impl PositionConstraints {
     /// `None` where there are none, or no event that could move a position.
     pub fn of(program: &Program, layout: &Layout) -> Option<PositionConstraints> {
-        let unknowns = (program.states.len() + program.conserved.len()) as u32;
-        // Those that read computed positions hold by these.
-        let missed = |reads: &[u32]| reads.iter().all(|&u| u < unknowns);
-        let firm: Vec<_> = program.start.iter().filter(|c| c.firm && missed(&c.reads)).collect();
+        let firm: Vec<_> = program.constraints_on_states().map(|(_, c)| c).collect();
         let residuals: Vec<Value> = firm.iter().map(|c| c.residual).collect();
         let moved = program.clauses.iter().any(|c| !c.actions.is_empty());
         let states = program.states.len() as u32;

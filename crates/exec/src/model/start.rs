@@ -495,10 +495,7 @@ impl Model {
 
     /// The constraints on displacements that states may miss: those that read computed positions hold by these.
     pub(super) fn constraints(&mut self) -> Vec<ConstraintResidual> {
-        let Program { start, states, conserved, .. } = &self.code.program;
-        let unknowns = (states.len() + conserved.len()) as u32;
-        let firm = |c: &usize| start[*c].firm && start[*c].reads.iter().all(|&u| u < unknowns);
-        let firm: Vec<usize> = (0..self.code.program.start.len()).filter(firm).collect();
+        let firm: Vec<usize> = self.code.program.constraints_on_states().map(|(c, _)| c).collect();
         firm.into_iter()
             .map(|c| ConstraintResidual {
                 group: StartGroup { conditions: vec![c], unknowns: self.code.program.start[c].reads.clone() },

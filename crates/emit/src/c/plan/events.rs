@@ -63,7 +63,7 @@ impl EventTables {
     /// The constraints on displacements that events may break.
     pub fn constraints<'p>(&self, program: &'p Program) -> impl Iterator<Item = &'p StartCondition> + use<'p> {
         let any = !self.actions.is_empty();
-        program.start.iter().filter(move |c| any && c.firm)
+        program.constraints_on_states().map(|(_, c)| c).filter(move |_| any)
     }
 
     /// The periods, in s.

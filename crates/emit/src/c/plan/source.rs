@@ -117,7 +117,7 @@ impl Plan<'_> {
             locates: self.locates(),
             impulses: p.jumps.is_some(),
             resets: !self.events.moved.is_empty(),
-            positions: !self.events.positions.is_empty(),
+            constraints: !self.events.positions.is_empty(),
             discretes: !self.discretes.is_empty(),
             held,
             delays: !self.delays.is_empty(),

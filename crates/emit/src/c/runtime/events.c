@@ -617,7 +617,7 @@ static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
 }
 
 //end
-//if positions
+//if constraints
 //item ha_position_misses
 /* By how much each constraint on displacements is missed. */
 static int ha_position_misses(ha_model *m, double t, const $real *x, $real *misses)
@@ -683,7 +683,7 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     $ha_take_asked(m);
 //end
 //end
-//if positions
+//if constraints
     status = $ha_position_misses(m, t, x, m->misses);
     if (status != $MODEL_OK) {
         return status;
@@ -710,7 +710,7 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
 //else
     (void)first;
 //end
-//if positions
+//if constraints
     status = $ha_refuse_broken_positions(m, t, x);
 //else
     (void)t;

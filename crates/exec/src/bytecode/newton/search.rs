@@ -1,5 +1,6 @@
 //! The root of a block: the continuation of the previous solution, at the start and after events any.
 
+use super::CLOSE_TO_ROUNDING;
 use super::damped::{Globalization, NotConverged};
 use super::workspace::Newton;
 use crate::bytecode::frame::{Frame, SolveError, entries};
@@ -69,8 +70,7 @@ impl Frame {
         let newton = &mut solvers[solve.block.0 as usize].newton;
         (newton.evaluations, newton.fresh, newton.valued) = (0, false, false);
         newton.floating.now.fill(false);
-        // A position that is 0 is so against its size.
-        newton.floor.fill(if newton.moving.is_some() { LEAST_SIZE } else { 0.0 });
+        newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
         if let Err(why) = self.continue_root(solve)
             && (self.newton_of(solve).following || !self.search(solve))
@@ -122,12 +122,14 @@ impl Frame {
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
         let near = first.is_ok() && self.is_continuation(solve);
-        if let Some((expected, ahead)) = self.expected(solve) {
-            if self.is_on_motion(solve, near, &expected) {
+        if let Some(ahead) = self.expect(solve) {
+            let on_motion = self.is_on_motion(solve, (first.is_ok(), near));
+            self.newton_of(solve).floor.fill(0.0);
+            if on_motion {
                 return Ok(());
             }
             if ahead {
-                return Err(self.off_motion(solve, &expected));
+                return Err(self.off_motion(solve));
             }
             // Inside a step that has been made.
             self.newton_of(solve).start_at_previous();
@@ -152,48 +154,55 @@ impl Frame {
         if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
     }
 
-    /// Where the motion of the previous solution leads, of positions, and whether that is ahead.
-    fn expected(&mut self, solve: &Solve) -> Option<(Vec<f64>, bool)> {
+    /// Notes where the motion of the previous solution leads, of positions; gives whether that is ahead.
+    fn expect(&mut self, solve: &Solve) -> Option<bool> {
         let t = self.r[self.time as usize];
-        let newton = self.newton_of(solve);
-        let moving = newton.moving.as_ref().filter(|m| newton.following && m.time != t)?;
-        let lead = |(previous, rate): (&f64, &f64)| previous + (t - moving.time) * rate;
-        Some((newton.previous.iter().zip(&moving.rates).map(lead).collect(), t > moving.time))
+        let Newton { moving, following, expected, previous, .. } = self.newton_of(solve);
+        let moving = moving.as_ref().filter(|m| *following && m.time != t)?;
+        for ((expected, previous), rate) in expected.iter_mut().zip(&*previous).zip(&moving.rates) {
+            *expected = previous + (t - moving.time) * rate;
+        }
+        Some(t > moving.time)
     }
 
-    /// Whether the root found, if it is `near`, is where the motion leads; or another one is, which is taken then: of several
-    /// motions from one place the smooth one. Not where the motion is so long that this says nothing.
-    fn is_on_motion(&mut self, solve: &Solve, near: bool, expected: &[f64]) -> bool {
+    /// Whether the root found, if there is one that is `near`, is where the motion leads; or another one is, which is taken
+    /// then: of several motions from one place the smooth one. Not where the motion is so long that this says nothing.
+    fn is_on_motion(&mut self, solve: &Solve, (found, near): (bool, bool)) -> bool {
         let newton = self.newton_of(solve);
-        let is_short = |(e, p): (&f64, &f64)| (e - p).abs() <= MOST_MOVED * p.abs().clamp(LEAST_SIZE, 1.0);
-        if !expected.iter().zip(&newton.previous).all(is_short) {
+        let size = |p: &f64| p.abs().clamp(LEAST_SIZE, 1.0);
+        let is_short = |(e, p): (&f64, &f64)| (e - p).abs() <= MOST_MOVED * size(p);
+        if !newton.expected.iter().zip(&newton.previous).all(is_short) {
             return false;
         }
-        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
-        let gone = distance(expected, &newton.previous);
-        let first = newton.x.clone();
-        if near && distance(&first, expected) <= STRAYED * gone {
+        // What is less than this is rounding.
+        let least = newton.previous.iter().map(size).fold(0.0, f64::max) * CLOSE_TO_ROUNDING;
+        let strayed = STRAYED * distance(&newton.expected, &newton.previous) + least;
+        if near && distance(&newton.x, &newton.expected) <= strayed {
             return true;
         }
-        newton.start.copy_from_slice(expected);
+        newton.other.copy_from_slice(&newton.x);
+        newton.start.copy_from_slice(&newton.expected);
+        // A position that is 0 is so against its size.
+        newton.floor.fill(LEAST_SIZE);
         if self.iterate(solve, Globalization::Damped).is_err() {
             return false;
         }
         let newton = self.newton_of(solve);
-        if near && distance(&newton.x, &first) <= STRAYED * distance(&first, &newton.previous) {
-            // Both ways lead there: where the motion turns back it is not where it was led to.
+        if found && distance(&newton.x, &newton.other) <= least {
+            // Both ways lead there: where the motion turns back, or is not what time says, it is not where it was led to.
+            newton.floor.fill(0.0);
             newton.start_at_previous();
             return self.iterate(solve, Globalization::Damped).is_ok();
         }
-        distance(&newton.x, expected) <= STRAYED * gone
+        distance(&newton.x, &newton.expected) <= strayed
     }
 
     /// The motion cannot be followed as far as this.
-    fn off_motion(&mut self, solve: &Solve, expected: &[f64]) -> NoContinuation {
+    fn off_motion(&mut self, solve: &Solve) -> NoContinuation {
         let newton = self.newton_of(solve);
-        let leap = |i: usize| (expected[i] - newton.previous[i]).abs();
-        let unknown = (0..expected.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
-        NoContinuation::OtherRoot { unknown, root: expected[unknown] }
+        let leap = |i: usize| (newton.expected[i] - newton.previous[i]).abs();
+        let unknown = (0..newton.expected.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
+        NoContinuation::OtherRoot { unknown, root: newton.expected[unknown] }
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
@@ -277,6 +286,10 @@ impl Frame {
         }
         false
     }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
 /// Whether inner code reads conditions, which may be held or not.

@@ -58,6 +58,9 @@ pub(crate) struct Newton {
     pub(super) contracts: bool,
     /// Of positions: when the previous solution was, and how fast it moved.
     pub moving: Option<Moving>,
+    /// Where that leads, and the root that was found otherwise.
+    pub(super) expected: Vec<f64>,
+    pub(super) other: Vec<f64>,
     /// Whether the laws had a value where an iteration began, since a root is sought.
     pub(super) valued: bool,
     /// Unknowns that no equation determines.
@@ -92,6 +95,8 @@ impl Newton {
         let (line, matrix) = (vec![0.0; size], vec![0.0; entries]);
         Newton {
             previous: line.clone(),
+            expected: line.clone(),
+            other: line.clone(),
             version: 1,
             following: false,
             previous_outer: Vec::new(),
