@@ -105,6 +105,21 @@ fn c_does_at_events_what_a_run_by_steps_does() {
     check("by_steps", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.step(STEPS));
 }
 
+/// Where two motions meet, as where a parallelogram lies flat, C does not choose one of them: it stops and says so.
+#[test]
+fn c_stops_where_motions_meet() {
+    let text = "model Flat\nparam a = 0.2, d = 0.5\nstate th1' = c1.f from 0.7\nstate th2' = c2.f from 0.7\n\
+        state ph' = bar.f from 0\n1:c1 -> I:I1(0.01, f0 = 3)\n1:c2 -> I:I2(0.01)\n1:bar -> I:Ib(0.02)\n\
+        constraint x: a*cos(th1) + d*cos(ph) = d + a*cos(th2)\n\
+        constraint y: a*sin(th1) + d*sin(ph) = a*sin(th2)\n";
+    let path = common::folder("flat_models").join("flat.bond");
+    std::fs::write(&path, text).expect("a model");
+    let all = [export(&path, Method::Rk4, 1e-2)];
+    let output = build("flat", &all, &driver(&all, &|_| (-1, 0.0))).run(&[]);
+    let said = output.lines().find_map(|line| line.strip_prefix("! ")).unwrap_or_default();
+    assert!(said.contains("the one that the run has followed ends here"), "{output}");
+}
+
 /// What goes wrong at events stops the run where it stops in the interpreter, and says why.
 #[test]
 fn c_says_what_fails_at_events() {

@@ -187,7 +187,14 @@ impl Plan<'_> {
             let n = self.program.blocks[*block].size();
             let (pattern, entries) = self.patterns.of_block(self.program, *block);
             let [code, terms, along] = ["", "_terms", "_along"].map(|k| Needed(format!("ha_block_{i}{k}").into()));
-            let row = written!("    {{{}, {}, {}, {}, {}, {}}},\n", pattern, reads, memory, code, terms, along);
+            let positions = &self.program.positions;
+            let position = match self.sought_positions().is_empty() {
+                true => "",
+                false if positions.iter().any(|p| p.block == *block) => "1, ",
+                false => "0, ",
+            };
+            let row =
+                written!("    {{{}, {}, {}, {}{}, {}, {}}},\n", pattern, reads, memory, position, code, terms, along);
             row.note(&mut notes);
             list += &row.text;
             memory += 2 * (n + reads + entries);

@@ -298,6 +298,18 @@ static int ha_continue_root(ha_model *m, ha_newton *w)
     $ha_fill(w->offset, $0.0, w->n);
     $ha_copy(w->start, w->previous, w->n);
     $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+//if sought_positions
+    if (w->block->position && w->following) {
+        /* Where motions meet, a way that is longer might lead to another one. */
+        if ($ha_iterate(m, w, HA_DAMPED) && $ha_is_continuation(w)) {
+            return $MODEL_OK;
+        }
+        /* A position that is 0 is so against its size. */
+        $ha_fill(w->floor, $0.05, w->n);
+        $ha_copy(w->start, w->previous, w->n);
+        return $ha_iterate(m, w, HA_DAMPED) && $ha_is_continuation(w) ? $MODEL_OK : $MODEL_BRANCH;
+    }
+//end
     if ($ha_iterate(m, w, HA_DAMPED)) {
         if ($ha_is_continuation(w) || (w->following && $ha_is_unique_near_path(m, w))) {
             return $MODEL_OK;

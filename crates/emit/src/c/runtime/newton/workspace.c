@@ -10,6 +10,10 @@ typedef struct {
     int reads;
     /* First place of its memory in m->memory. */
     int memory;
+//if sought_positions
+    /* Whether its unknowns are positions that constraints determine. */
+    int position;
+//end
     void (*code)(ha_model *m, const $real *o, const $real *g, $real *right, $real *matrix);
     /* Of what the residuals are the sums, in magnitude. */
     void (*terms)(ha_model *m, const $real *o, const $real *g, $real *terms);
