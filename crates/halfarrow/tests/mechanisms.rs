@@ -202,3 +202,27 @@ fn what_cannot_move_is_not_taken_for_repetition() {
     let said = said.err().map(|e| e.render(false)).expect("it cannot be assembled and move");
     assert!(said.contains("error"), "{said}");
 }
+
+/// Where an input says the position, the motion asks for no derivative of the input; what takes one is not there, and says
+/// so.
+#[test]
+fn a_position_given_by_an_input_moves_others_without_its_rate() {
+    let text = "model Led
+input z = 0.1
+state x' = u.f
+state y' = v.f from 0.2
+1:u -> I:a(2)
+1:v -> I:b(2)
+Se:pull(3*(x - y)) -> v
+constraint led: x = z
+";
+    assert_eq!(states(text), ["b.f", "y"]);
+    let wanted = Run { to: 3.0, rtol: 1e-10, every: Some(0.1), ..Run::default() };
+    let done = run(text, &wanted);
+    for (t, y) in done.trace.times.iter().zip(column(&done, "y")) {
+        assert!((y - 0.1 - 0.1 * (1.5f64.sqrt() * t).cos()).abs() < 1e-9, "{t}: {y}");
+    }
+    let asked = Run { record: Record::Names(vec!["a.e".into()]), ..wanted };
+    let refused = model(text).simulate(&asked, &mut |_| true).err().expect("nobody gives the rate");
+    assert!(refused.render(false).contains("time derivative of the input z"), "{}", refused.render(false));
+}

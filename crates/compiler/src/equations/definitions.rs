@@ -162,6 +162,8 @@ impl<'a> Definitions<'a> {
             Some(Meaning::Input(input)) => {
                 return Err(Unavailable::NeedsRateOf(self.graph.inputs[input].name.clone()));
             }
+            // The rate of a rate of an input, which nobody gives.
+            Some(Meaning::Rate(of)) if matches!(self.meaning(of), Some(Meaning::Input(_))) => return self.rate_of(of),
             Some(Meaning::Signal(signal)) => return Ok(self.graph.signals[signal].rate),
             Some(Meaning::Held(held)) => match self.graph.held[held].kind {
                 HeldKind::Sample | HeldKind::Discrete | HeldKind::Impulse => return Ok(self.x.int(0)),
