@@ -43,7 +43,9 @@ pub(super) fn eliminate(assembled: &mut Assembled, causal: &CausalGraph) -> Vec<
     }
     let candidates = candidates(assembled);
     let rows: Vec<Row> = kept.into_iter().filter_map(|c| row(assembled, graph, c, &candidates)).collect();
-    let chosen = chosen(assembled, graph, &rows, &candidates);
+    let sources: BTreeSet<Symbol> =
+        causal.ports.ports.iter().filter(|p| is_source(graph, p)).map(|p| p.input).collect();
+    let chosen = chosen(assembled, graph, &rows, (&candidates, &sources));
     let Some(pairs) = matched(&rows, &chosen) else { return Vec::new() };
     let mut constraint_of: BTreeMap<Symbol, usize> =
         pairs.iter().map(|&(at, candidate)| (candidates[candidate].symbol, rows[at].constraint)).collect();
@@ -81,6 +83,10 @@ pub(super) fn found_by_iteration(computed: &[Computed], steps: &[EquationStep]) 
     });
     let computed: BTreeSet<Symbol> = computed.iter().map(|c| c.position.symbol).collect();
     unknowns.copied().filter(|s| computed.contains(s)).collect()
+}
+
+fn is_source(graph: &BondGraph, port: &crate::causal_graph::PortState) -> bool {
+    matches!(graph.elements[port.port.element].kind, Kind::EffortSource { .. } | Kind::FlowSource { .. })
 }
 
 /// Whether a constraint on displacements acts: one that repeats others says nothing new.
@@ -134,12 +140,18 @@ fn row(assembled: &mut Assembled, graph: &BondGraph, constraint: usize, candidat
     (!slopes.is_empty()).then_some(Row { constraint, slopes })
 }
 
-/// Which positions are computed: those whose rate is no kept speed first, by the size of their slopes at the start.
-fn chosen(assembled: &Assembled, graph: &BondGraph, rows: &[Row], candidates: &[Chosen]) -> BTreeSet<usize> {
+/// Which positions are computed: those first whose rate is no kept speed and not imposed, by the size of their slopes at the
+/// start.
+fn chosen(
+    assembled: &Assembled,
+    graph: &BondGraph,
+    rows: &[Row],
+    (candidates, sources): (&[Chosen], &BTreeSet<Symbol>),
+) -> BTreeSet<usize> {
     let x = &assembled.d.x;
     let mut point = start_point(x, graph);
     let mut open: Vec<BTreeMap<usize, f64>> = rows.iter().map(|row| numbers(assembled, row, &mut point)).collect();
-    let follows: Vec<bool> = candidates.iter().map(|c| !is_speed(assembled, c.symbol)).collect();
+    let follows: Vec<bool> = candidates.iter().map(|c| !is_speed(assembled, c.symbol, sources)).collect();
     let mut chosen = BTreeSet::new();
     for class in [true, false] {
         loop {
@@ -181,11 +193,11 @@ fn subtract(row: &mut BTreeMap<usize, f64>, pivot: &BTreeMap<usize, f64>, column
     }
 }
 
-/// Whether a state integrates a speed that is a state itself.
-fn is_speed(assembled: &Assembled, position: Symbol) -> bool {
+/// Whether a state integrates a speed that is a state itself, or that a source imposes.
+fn is_speed(assembled: &Assembled, position: Symbol, sources: &BTreeSet<Symbol>) -> bool {
     let d = &assembled.d;
     let mut rate = d.states[&position];
-    while !d.states.contains_key(&rate) {
+    while !d.states.contains_key(&rate) && !sources.contains(&rate) {
         match d.of.get(&rate).map(|of| (of, d.x.node(of.expr()))) {
             Some((Definition::Explicit(_), &Node::Symbol(symbol))) => rate = symbol,
             _ => return false,

@@ -159,13 +159,14 @@ impl Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = layout.guarded_routine(&program, &rates);
+        let of_states = rates;
+        let rates = layout.guarded_routine(&program, &of_states);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
         let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);
-        let motion = Motion::of(&program, &layout, &rates);
+        let motion = Motion::of(&program, &layout, &layout.routine(&program, &of_states));
         Mode {
             preamble: layout.preamble(&program),
             assumed: layout.routine(&program, &assumed),

@@ -12,7 +12,7 @@ const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 /// Positions go on smoothly if they come this near, by the way gone, to where they were expected.
 const STRAYED: f64 = 0.25;
 /// In one step they go at most this part of their size, which counts from the least one to 1, in their own unit.
-const MOST_MOVED: f64 = 0.5;
+const MOST_MOVED: f64 = 0.25;
 const LEAST_SIZE: f64 = 0.05;
 
 /// Why the continuation of the previous solution was not found.
