@@ -6,12 +6,6 @@ use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Moving, SolveError};
 use halfarrow_sim::{Affected, Events, Failure};
 
-/// Positions have moved as their rates at both ends of a step tell if they are off by less than this part of the way,
-const OFF_COURSE: f64 = 0.25;
-/// or by what is rounding, or by what a speed comes to that is none, in 1/s.
-const ROUNDED: f64 = 1e-9;
-const AT_REST: f64 = 1e-6;
-
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
     pub(super) fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
@@ -34,41 +28,23 @@ impl Model {
         Ok(())
     }
 
-    /// Notes how computed positions move at `(t, x)`. Where they have not come to where they are by moving so, the step has
-    /// led to another motion, which meets theirs.
+    /// Notes how computed positions move at `(t, x)`.
     fn follow_motion(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
         let Some(motion) = &code.motion else { return Ok(()) };
-        let mut before = None;
         for &(block, _) in &motion.unknowns {
             let newton = &mut self.frame.solvers[block].newton;
-            let n = newton.previous.len();
-            before = before.or(newton.moving.as_ref().map(|moving| moving.time));
-            let still = || Moving { time: t, rates: vec![0.0; n], from: vec![0.0; n] };
-            newton.moving.get_or_insert_with(still).time = t;
+            newton.moving.get_or_insert_with(|| Moving { time: t, rates: vec![0.0; newton.previous.len()] }).time = t;
         }
         self.place(t, x);
         self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
-        let mut strayed = None;
         for (&(block, i), &register) in motion.unknowns.iter().zip(&motion.rates.outputs) {
             let rate = self.frame.r[register as usize];
-            let rate = if rate.is_finite() { rate } else { 0.0 };
-            let newton = &mut self.frame.solvers[block].newton;
-            let (now, Some(moving)) = (newton.previous[i], &mut newton.moving) else { continue };
-            let (from, old) = (moving.from[i], moving.rates[i]);
-            (moving.rates[i], moving.from[i]) = (rate, now);
-            if let Some(span) = before.map(|before| t - before).filter(|span| *span > 0.0) {
-                let off = (now - from - 0.5 * span * (old + rate)).abs();
-                let least = (ROUNDED + AT_REST * span) * now.abs().max(1.0);
-                if off > OFF_COURSE * span * old.abs().max(rate.abs()) + least {
-                    strayed = strayed.or(Some((block as u32, i, from, now)));
-                }
+            if let Some(moving) = &mut self.frame.solvers[block].newton.moving {
+                moving.rates[i] = if rate.is_finite() { rate } else { 0.0 };
             }
         }
-        match strayed {
-            None => Ok(()),
-            Some((block, unknown, from, to)) => Err(self.failure(t, SolveError::Ended { block, unknown, from, to })),
-        }
+        Ok(())
     }
 
     /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.

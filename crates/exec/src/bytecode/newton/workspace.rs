@@ -74,8 +74,6 @@ pub(crate) struct Moving {
     pub time: f64,
     /// Their rates.
     pub rates: Vec<f64>,
-    /// Where they were.
-    pub from: Vec<f64>,
 }
 
 /// The state of a Newton block in a run.
