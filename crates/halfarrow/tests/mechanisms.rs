@@ -223,7 +223,7 @@ constraint led: x = z
         assert!((y - 0.1 - 0.1 * (1.5f64.sqrt() * t).cos()).abs() < 1e-9, "{t}: {y}");
     }
     let asked = Run { record: Record::Names(vec!["a.e".into()]), ..wanted };
-    let refused = model(text).simulate(&asked, &mut |_| true).err().expect("nobody gives the rate");
+    let refused = model(text).simulate(&asked, &mut |_| true).expect_err("nobody gives the rate");
     assert!(refused.render(false).contains("time derivative of the input z"), "{}", refused.render(false));
 }
 
