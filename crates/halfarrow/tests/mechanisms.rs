@@ -260,3 +260,18 @@ constraint across: r*sin(th) + l*sin(ph) = 0
         assert!((stopped.report.reached - limit).abs() < 1e-3, "{method:?}: {}", stopped.report.reached);
     }
 }
+
+/// A run that has changed its independent variables leaves nothing behind: the next one, with other parameters too, begins as
+/// if it were the first.
+#[test]
+fn a_model_runs_again_after_exchanges() {
+    let wanted = Run { to: 2.0, record: Record::All, every: Some(0.1), ..Run::default() };
+    let mut kept = model(OVER).compile(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let again = || kept.simulate(&wanted, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let (first, second) = (again(), again());
+    assert!(first.report.exchanges > 2);
+    assert_eq!(first.trace, second.trace);
+    kept.set("m", 2.0).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let heavy = kept.simulate(&wanted, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert_eq!(heavy.trace, run(&OVER.replace("m = 1 kg", "m = 2 kg"), &wanted).trace);
+}

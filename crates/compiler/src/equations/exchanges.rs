@@ -30,6 +30,13 @@ pub struct Exchanged {
     pub weight: Option<f64>,
 }
 
+impl Exchanged {
+    /// By what it is multiplied, 1 without a storage.
+    pub fn weighs(&self) -> f64 {
+        self.weight.unwrap_or(1.0)
+    }
+}
+
 /// The exchanges among what depends on each other by divisors that may vanish while running.
 pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph) -> Exchanges {
     let d = &mut assembled.d;

@@ -92,21 +92,25 @@ impl Model {
         }
     }
 
+    /// How all of them move with one state, in the registers of the routine; whether they have a value.
+    fn move_by(&mut self, ratios: &Ratios, state: u32, t: f64, x: &[f64]) -> bool {
+        self.place(t, x);
+        self.still();
+        self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
+        self.frame.run_along(&ratios.routine).is_ok()
+    }
+
     /// Whether some variable may move `most` times as fast as all that are independent. Takes no memory.
     fn is_suspicious(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> bool {
         let n = ratios.independent.len();
-        let weigh = |e: &Exchanged, rate: f64| e.weight.unwrap_or(1.0) * rate.abs();
         ratios.states.iter().any(|&state| {
-            self.place(t, x);
-            self.still();
-            self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
-            if self.frame.run_along(&ratios.routine).is_err() {
+            if !self.move_by(ratios, state, t, x) {
                 return true;
             }
             let (own, others) = ratios.routine.outputs.split_at(n);
             let fastest = |all: &[Exchanged], registers: &[u32]| {
                 let rates = registers.iter().map(|&r| self.frame.d[r as usize]);
-                all.iter().zip(rates).fold(0.0f64, |most, (e, rate)| most.max(weigh(e, rate)))
+                all.iter().zip(rates).fold(0.0f64, |most, (e, rate)| most.max(e.weighs() * rate.abs()))
             };
             let ratio = fastest(&ratios.dependent, others) / fastest(&ratios.independent, own);
             ratio.is_nan() || ratio > most / n as f64
@@ -119,17 +123,15 @@ impl Model {
         // Column by column: how all of them move with each state.
         let mut columns = Vec::with_capacity(n);
         for &state in &ratios.states {
-            self.place(t, x);
-            self.still();
-            self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
-            self.frame.run_along(&ratios.routine).ok()?;
+            if !self.move_by(ratios, state, t, x) {
+                return None;
+            }
             let column: Vec<f64> = ratios.routine.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
             columns.push(column);
         }
         let mut table = Table::new(&columns, n, m)?;
-        // Without a storage a variable counts as those do that it moves with.
-        let light = |k: usize| ratios.independent.iter().chain(&ratios.dependent).nth(k).and_then(|e| e.weight);
-        let weights: Vec<f64> = (0..n + m).map(|k| light(k).unwrap_or(1.0)).collect();
+        let all: Vec<Exchanged> = ratios.independent.iter().chain(&ratios.dependent).copied().collect();
+        let weights: Vec<f64> = all.iter().map(Exchanged::weighs).collect();
         table.weigh(&weights);
         if table.greatest().is_none_or(|(_, _, ratio)| ratio <= most) {
             return None;
@@ -145,11 +147,7 @@ impl Model {
                 _ => break,
             }
         }
-        let symbol = |k: usize| {
-            let all = ratios.independent.iter().chain(&ratios.dependent);
-            all.map(|e| e.symbol).nth(k).expect("one of them")
-        };
-        let mut wanted: Vec<Symbol> = inside.into_iter().map(symbol).collect();
+        let mut wanted: Vec<Symbol> = inside.into_iter().map(|k| all[k].symbol).collect();
         wanted.sort_unstable();
         Some(wanted)
     }
@@ -176,10 +174,21 @@ impl Model {
         let bounds = self.frame.solvers.iter().map(|s| s.newton.most()).min();
         let mut frame = Frame::new(&code.program, &code.layout, code.layout.size);
         code.routines().for_each(|routine| frame.reserve(routine));
-        self.run.mode = mode;
-        self.run.conserved = vec![0.0; code.program.conserved.len()];
-        self.run.positions = vec![0.0; code.program.positions.len()];
-        self.run.scales = vec![0.0; code.program.states.len()];
+        // What the start has fixed belongs to the first mode, to which a new run returns.
+        let run = &mut self.run;
+        let zero = |n: usize| vec![0.0; n];
+        let others = [code.program.conserved.len(), code.program.positions.len(), code.program.states.len()].map(zero);
+        let next = if mode == ModeId::default() { run.first.take().unwrap_or(others) } else { others };
+        let [conserved, positions, scales] = next;
+        let left = [
+            std::mem::replace(&mut run.conserved, conserved),
+            std::mem::replace(&mut run.positions, positions),
+            std::mem::replace(&mut run.scales, scales),
+        ];
+        if run.mode == ModeId::default() {
+            run.first = Some(left);
+        }
+        run.mode = mode;
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         (self.frame, self.recorded, self.code) = (frame, recorded, code);

@@ -44,6 +44,8 @@ pub(super) struct Remembered {
     pub conserved: Vec<f64>,
     /// Values of the positions that iterations determine, as the last start has found them.
     pub positions: Vec<f64>,
+    /// These constants, positions and magnitudes of the first mode, in a run that has left it.
+    pub first: Option<[Vec<f64>; 3]>,
     /// Typical magnitudes of the states.
     pub scales: Vec<f64>,
     pub delays_and_samples: Vec<DelayOrSample>,

@@ -116,6 +116,7 @@ impl Model {
             clock_event: None,
             conserved: vec![0.0; code.program.conserved.len()],
             positions: vec![0.0; code.program.positions.len()],
+            first: None,
             scales: vec![0.0; n],
             delays_and_samples: Vec::new(),
             clauses: Vec::new(),
@@ -263,8 +264,8 @@ impl Model {
 
     /// Forgets a run: the next event is its start. Parameters, inputs and conserved constants stay.
     pub fn restart(&mut self) {
-        if self.run.mode != ModeId::default() && self.enter(ModeId::default()).is_err() {
-            self.broken = Some(0);
+        if self.run.mode != ModeId::default() {
+            self.enter(ModeId::default()).expect("it has run with these parameters");
         }
         self.run.begun = false;
         self.run.crossed = f64::NEG_INFINITY;
@@ -284,6 +285,9 @@ impl Model {
     }
 
     fn parameters_changed(&mut self) -> Result<(), Failure> {
+        if self.run.mode != ModeId::default() {
+            self.enter(ModeId::default())?;
+        }
         self.frame.set.clone_from(&self.setup.parameters);
         self.frame.parameters_changed();
         self.forget_solutions();

@@ -1,5 +1,7 @@
 //! What stands in the place of words in the parts that do not depend on the model: sizes, tables, lists.
 
+use std::collections::BTreeMap;
+
 use halfarrow_compiler::algebra::{Outside, math};
 use halfarrow_compiler::program::{BlockId, ConditionId, ConditionKind, EventTrigger};
 
@@ -164,15 +166,19 @@ impl Plan<'_> {
         text + &list + "};"
     }
 
+    /// Where the memory of the model has that of each block that is solved by iteration.
+    fn memory_places(&self) -> Vec<usize> {
+        let size = |(block, reads): (&BlockId, &usize)| {
+            let block = &self.program.blocks[*block];
+            2 * (block.size() + reads + block.matrix().values.pattern().len())
+        };
+        let sizes = self.newton.iter().zip(&self.reads).map(size);
+        sizes.scan(0, |next, size| Some(std::mem::replace(next, *next + size))).collect()
+    }
+
     /// The positions that are sought while running, by number, and where the memory of the model has their last values.
     pub(super) fn sought_positions(&self) -> Vec<(usize, usize)> {
-        let mut memory = 0;
-        let mut first = std::collections::BTreeMap::new();
-        for (block, reads) in self.newton.iter().zip(&self.reads) {
-            let of = &self.program.blocks[*block];
-            first.insert(*block, memory);
-            memory += 2 * (of.size() + reads + of.matrix().values.pattern().len());
-        }
+        let first: BTreeMap<BlockId, usize> = self.newton.iter().copied().zip(self.memory_places()).collect();
         let positions = self.program.positions.iter().enumerate();
         positions.filter_map(|(k, p)| Some((k, first.get(&p.block)? + p.unknown as usize))).collect()
     }
@@ -181,23 +187,22 @@ impl Plan<'_> {
         let mut notes = Notes::default();
         let mut text = String::new();
         let mut list = String::from("static const ha_block ha_blocks[] = {\n");
-        let mut memory = 0;
+        let sought = !self.sought_positions().is_empty();
+        let memory = self.memory_places();
         for (i, (block, reads)) in self.newton.iter().zip(&self.reads).enumerate() {
             text += &super::shapes::block_declarations(i, self.export.real);
-            let n = self.program.blocks[*block].size();
-            let (pattern, entries) = self.patterns.of_block(self.program, *block);
+            let (pattern, _) = self.patterns.of_block(self.program, *block);
             let [code, terms, along] = ["", "_terms", "_along"].map(|k| Needed(format!("ha_block_{i}{k}").into()));
-            let positions = &self.program.positions;
-            let position = match self.sought_positions().is_empty() {
-                true => "",
-                false if positions.iter().any(|p| p.block == *block) => "1, ",
+            let position = match self.program.positions.iter().any(|p| p.block == *block) {
+                _ if !sought => "",
+                true => "1, ",
                 false => "0, ",
             };
+            let place = memory[i];
             let row =
-                written!("    {{{}, {}, {}, {}{}, {}, {}}},\n", pattern, reads, memory, position, code, terms, along);
+                written!("    {{{}, {}, {}, {}{}, {}, {}}},\n", pattern, reads, place, position, code, terms, along);
             row.note(&mut notes);
             list += &row.text;
-            memory += 2 * (n + reads + entries);
         }
         Written { notes, ..Written::of(text + "\n" + &list + "};") }
     }
