@@ -49,6 +49,13 @@ pub enum Failure {
         /// What would happen in another solution.
         leap: Box<Leap>,
     },
+    /// Positions that constraints determine are not found where their motion leads.
+    OffMotion {
+        /// When, in s.
+        time: f64,
+        /// Which positions.
+        what: String,
+    },
     /// Equations were not solved within the bound on evaluations.
     Bound {
         /// When, in s.
@@ -218,6 +225,7 @@ impl Failure {
             | Failure::Conflict { time, .. }
             | Failure::Reset { time, .. }
             | Failure::Branch { time, .. }
+            | Failure::OffMotion { time, .. }
             | Failure::Bound { time, .. }
             | Failure::Untrue { time, .. }
             | Failure::Interrupted { time } => Some(*time).filter(|time| !time.is_nan()),
@@ -277,6 +285,12 @@ impl fmt::Display for Failure {
                 leap.unknown,
                 leap.from,
                 leap.to
+            ),
+            Failure::OffMotion { time, what } => write!(
+                f,
+                "{} the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or \
+                 another motion leads through the same position; take a shorter --step or a tighter --rtol",
+                When(*time)
             ),
             Failure::Bound { time, what, most } => write!(
                 f,

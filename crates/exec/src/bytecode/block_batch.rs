@@ -126,7 +126,8 @@ impl BlockShape {
         let size = solve.unknowns.len();
         let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
         let conditions = code.steps.iter().any(|step| matches!(step, Step::Op { op, .. } if op.is_held()));
-        if !symmetric || size > LARGEST || program.blocks[solve.block].matrix().factors.is_some() || conditions {
+        let positions = program.positions.iter().any(|p| p.block == solve.block);
+        if positions || !symmetric || size > LARGEST || program.blocks[solve.block].matrix().factors.is_some() || conditions {
             return None;
         }
         let mut read: Vec<Arg> = Vec::new();

@@ -37,6 +37,8 @@ pub(crate) enum SolveError {
     NoSolution { block: u32, nearest: f64, residual: f64 },
     /// The solution followed ends; what one of its unknowns was, and what it is in another solution.
     Ended { block: u32, unknown: usize, from: f64, to: f64 },
+    /// Positions are not found where their motion leads.
+    OffMotion { block: u32 },
     /// The bound on evaluations of a Newton block is hit.
     Bound { block: u32, evaluations: usize },
 }

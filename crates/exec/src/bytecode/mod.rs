@@ -23,7 +23,7 @@ pub(crate) use frame::{InnerCode, PIVOT_BELOW};
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
 pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
-pub(crate) use newton::{Followed, Moving};
+pub(crate) use newton::Followed;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;
 pub(crate) use wide::{HasFrame, Vector, WideFrame};

@@ -3,7 +3,7 @@
 use super::clause_memory::ClauseMemory;
 use super::system::What;
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Hold, Moving, SolveError};
+use crate::bytecode::{Frame, Hold, SolveError};
 use halfarrow_sim::{Affected, Events, Failure};
 
 impl Model {
@@ -32,16 +32,17 @@ impl Model {
     fn follow_motion(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
         let Some(motion) = &code.motion else { return Ok(()) };
-        for &(block, _) in &motion.unknowns {
-            let newton = &mut self.frame.solvers[block].newton;
-            newton.moving.get_or_insert_with(|| Moving { time: t, rates: vec![0.0; newton.previous.len()] }).time = t;
-        }
+        motion.blocks.iter().for_each(|(block, _)| self.frame.solvers[block.0 as usize].newton.arrive(t));
         self.place(t, x);
         self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
-        for (&(block, i), &register) in motion.unknowns.iter().zip(&motion.rates.outputs) {
-            let rate = self.frame.r[register as usize];
-            if let Some(moving) = &mut self.frame.solvers[block].newton.moving {
-                moving.rates[i] = if rate.is_finite() { rate } else { 0.0 };
+        for (block, rates) in &motion.blocks {
+            let Frame { r, solvers, .. } = &mut self.frame;
+            let rates = motion.rates.outputs[rates.clone()].iter().map(|&rate| r[rate as usize]);
+            let newton = &mut solvers[block.0 as usize].newton;
+            if rates.clone().any(|rate| !rate.is_finite()) {
+                newton.motion.known = false;
+            } else if !newton.note_rates(rates) {
+                return Err(self.failure(t, SolveError::OffMotion { block: block.0 }));
             }
         }
         Ok(())
@@ -199,6 +200,10 @@ impl Events for Model {
 
     fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
         self.exchange(t, x, failed)
+    }
+
+    fn try_end(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.code.motion.is_some() { self.rates_at(t, x) } else { Ok(()) }
     }
 
     fn locates_crossings(&self) -> bool {

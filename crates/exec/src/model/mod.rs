@@ -393,6 +393,7 @@ impl Model {
                 let leap = Leap { unknown: unknown(block, index), from, to };
                 Failure::Branch { time, what: what(block), leap: Box::new(leap) }
             }
+            SolveError::OffMotion { block } => Failure::OffMotion { time, what: what(block) },
             SolveError::Bound { block, evaluations } => Failure::Bound { time, what: what(block), most: evaluations },
         }
     }

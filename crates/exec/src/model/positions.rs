@@ -2,8 +2,10 @@
 
 use super::Model;
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Position, Program, Value};
+use halfarrow_compiler::program::{BlockId, Program, Value};
 use halfarrow_sim::Failure;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// How far a constraint may be missed after an event, as part of its terms, if it was not before.
 const MISSED: f64 = 1e-9;
@@ -42,23 +44,27 @@ impl PositionConstraints {
     }
 }
 
-/// How the computed positions move that rates read: their steps are short enough to follow them.
+/// How the computed positions move that rates read: from step to step they are sought where that leads.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
-    /// They are these unknowns of these blocks.
-    pub unknowns: Vec<(usize, usize)>,
+    /// The blocks whose unknowns they are, and where their rates stand among the outputs.
+    pub blocks: Vec<(BlockId, Range<usize>)>,
     pub rates: Routine,
 }
 
 impl Motion {
     /// `None` where there are none whose rates are known.
     pub fn of(program: &Program, layout: &Layout, of_rates: &Routine) -> Option<Motion> {
-        let read = |p: &&Position| of_rates.solves.iter().any(|solve| solve.block == p.block);
-        let positions: Vec<&Position> = program.positions.iter().filter(read).collect();
-        let rates: Option<Vec<Value>> = positions.iter().map(|p| p.rate).collect();
-        let rates = rates.filter(|rates| !rates.is_empty())?;
-        let unknowns = positions.iter().map(|p| (p.block.0 as usize, p.unknown as usize)).collect();
-        Some(Motion { unknowns, rates: layout.routine(program, &rates) })
+        let (mut blocks, mut rates) = (Vec::new(), Vec::new());
+        let read: BTreeSet<BlockId> = of_rates.solves.iter().map(|solve| solve.block).collect();
+        for (id, block) in program.blocks.iter().filter(|(id, _)| read.contains(id)) {
+            let mut own = vec![None; block.size()];
+            program.positions.iter().filter(|p| p.block == id).for_each(|p| own[p.unknown as usize] = p.rate);
+            let Some(own) = own.into_iter().collect::<Option<Vec<Value>>>() else { continue };
+            blocks.push((id, rates.len()..rates.len() + own.len()));
+            rates.extend(own);
+        }
+        (!rates.is_empty()).then(|| Motion { blocks, rates: layout.routine(program, &rates) })
     }
 }
 

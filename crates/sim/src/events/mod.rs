@@ -86,6 +86,15 @@ pub trait Events {
         false
     }
 
+    /// Looks whether a step of fixed length may end at `(t, point)`, before it is accepted.
+    ///
+    /// # Errors
+    /// [`OffMotion`](Failure::OffMotion): one that ends sooner may; else as [`event_indicators`](Events::event_indicators).
+    fn try_end(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
+        let _ = (t, point);
+        Ok(())
+    }
+
     /// The step that ends at `(t, point)` is accepted, or the run starts there: Newton starting points and delay buffers,
     /// which belong to the model's memory, move on. Times never decrease from call to call.
     ///

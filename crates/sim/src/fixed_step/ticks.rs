@@ -8,6 +8,10 @@ use crate::driver::{Grid, Stepper};
 use crate::events::Events;
 use crate::shared::Counted;
 
+/// Parts of a step, one after the other, by which it is tried where positions cannot be followed to its end: beside a
+/// position through which another motion leads, not all of them are too near to it.
+const SHORTER: [f64; 4] = [0.5, 0.7, 0.3, 0.1];
+
 /// A method of fixed step at work on a run: from tick to tick, in shorter steps where something else comes before.
 pub(crate) struct Ticks<'m, 'a> {
     method: &'m mut FixedStep,
@@ -30,6 +34,13 @@ impl<'m, 'a> Ticks<'m, 'a> {
     pub(crate) fn system(&mut self) -> &mut Counted<'a> {
         &mut self.system
     }
+
+    /// A step to `end`, which is given back.
+    fn advance(&mut self, from: f64, end: f64, x: &[f64]) -> Result<f64, Failure> {
+        self.method.advance(&mut self.system, from, end - from, x)?;
+        self.system.events().try_end(end, self.method.advanced())?;
+        Ok(end)
+    }
 }
 
 /// Where the step has to end that starts at `time`: at the tick, sooner at a sample or the stop; a stop a rounding error
@@ -48,8 +59,12 @@ impl Stepper for Ticks<'_, '_> {
     }
     fn step(&mut self, from: f64, sample: f64, stop: f64, x: &[f64]) -> Result<f64, Failure> {
         let end = self.grid.as_mut().map_or(stop, |ticks| target(ticks, from, sample, stop));
-        self.method.advance(&mut self.system, from, end - from, x)?;
-        Ok(end)
+        let failure = match self.advance(from, end, x) {
+            Err(failure @ Failure::OffMotion { .. }) => failure,
+            other => return other,
+        };
+        let shorter = SHORTER.iter().map(|part| from + part * (end - from));
+        shorter.filter(|&sooner| sooner > from).find_map(|sooner| self.advance(from, sooner, x).ok()).ok_or(failure)
     }
     fn again(&mut self, from: f64, end: f64, x: &[f64]) -> Result<(), Failure> {
         self.method.advance(&mut self.system, from, end - from, x)

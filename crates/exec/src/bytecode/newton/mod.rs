@@ -18,7 +18,7 @@
 //! 4. [`continuation`]: if not, a path of roots is followed, its step length doubled and halved.
 //! 5. [`search`], [`scan`]: at the start and after events, iterations from other points.
 //!
-//! [`nonsmooth`] is for laws whose derivative jumps.
+//! [`positions`] that constraints determine go where their motion leads. [`nonsmooth`] is for laws whose derivative jumps.
 //!
 //! Everything depends on the previous solution ([`Newton::previous`]) and the values the block reads, on nothing else.
 //! Evaluations are bounded.
@@ -28,13 +28,14 @@ mod correction;
 mod damped;
 mod nonsmooth;
 mod path;
+mod positions;
 mod rounding;
 mod scan;
 mod search;
 mod workspace;
 
 pub(super) use damped::{CONTRACTION, CONVERGED};
-pub(crate) use workspace::{Followed, Moving, Newton};
+pub(crate) use workspace::{Followed, Newton};
 
 /// A correction below this part of the unknowns that no longer gets shorter is rounding.
 pub(in crate::bytecode) const CLOSE_TO_ROUNDING: f64 = 1e-9;

@@ -1,6 +1,5 @@
 //! The root of a block: the continuation of the previous solution, at the start and after events any.
 
-use super::CLOSE_TO_ROUNDING;
 use super::damped::{Globalization, NotConverged};
 use super::workspace::Newton;
 use crate::bytecode::frame::{Frame, SolveError, entries};
@@ -9,12 +8,6 @@ use crate::bytecode::instruction::Solve;
 /// First guesses after the previous solution and zero, at the start and after events.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
 
-/// Positions go on smoothly if they come this near, by the way gone, to where they were expected.
-const STRAYED: f64 = 0.25;
-/// In one step they go at most this part of their size, which counts from the least one to 1, in their own unit.
-const MOST_MOVED: f64 = 0.25;
-const LEAST_SIZE: f64 = 0.05;
-
 /// Why the continuation of the previous solution was not found.
 #[derive(Debug, Clone, Copy)]
 enum NoContinuation {
@@ -22,6 +15,8 @@ enum NoContinuation {
     OtherRoot { unknown: usize, root: f64 },
     /// No root was found.
     NotConverged(NotConverged),
+    /// Positions are not found where their motion leads.
+    OffMotion,
 }
 
 impl Frame {
@@ -68,7 +63,7 @@ impl Frame {
     fn find_single_root(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        (newton.evaluations, newton.fresh, newton.valued) = (0, false, false);
+        (newton.evaluations, newton.fresh, newton.valued, newton.short) = (0, false, false, true);
         newton.floating.now.fill(false);
         newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
@@ -96,6 +91,7 @@ impl Frame {
             NoContinuation::OtherRoot { unknown, root } => {
                 SolveError::Ended { block, unknown, from: newton.previous[unknown], to: root }
             }
+            NoContinuation::OffMotion => SolveError::OffMotion { block },
             NoContinuation::NotConverged(_) if newton.exhausted() => {
                 SolveError::Bound { block, evaluations: newton.limit() }
             }
@@ -118,24 +114,13 @@ impl Frame {
 
     /// The root that continues the previous solution.
     fn continue_root(&mut self, solve: &Solve) -> Result<(), NoContinuation> {
+        if self.is_in_motion(solve) {
+            return if self.follow_motion(solve) { Ok(()) } else { Err(NoContinuation::OffMotion) };
+        }
         let newton = self.newton_of(solve);
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
-        let near = first.is_ok() && self.is_continuation(solve);
-        if let Some(ahead) = self.expect(solve) {
-            let on_motion = self.is_on_motion(solve, (first.is_ok(), near));
-            self.newton_of(solve).floor.fill(0.0);
-            if on_motion {
-                return Ok(());
-            }
-            if ahead {
-                return Err(self.off_motion(solve));
-            }
-            // Inside a step that has been made.
-            self.newton_of(solve).start_at_previous();
-            _ = self.iterate(solve, Globalization::Damped);
-        }
-        if near
+        if first.is_ok() && self.is_continuation(solve)
             || first.is_ok() && self.newton_of(solve).following && self.is_unique_near_path(solve)
             || self.previous_is_root(solve)
             || self.solve_rank_deficient(solve)
@@ -152,57 +137,6 @@ impl Frame {
             Err(failed) => NoContinuation::NotConverged(failed),
         };
         if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
-    }
-
-    /// Notes where the motion of the previous solution leads, of positions; gives whether that is ahead.
-    fn expect(&mut self, solve: &Solve) -> Option<bool> {
-        let t = self.r[self.time as usize];
-        let Newton { moving, following, expected, previous, .. } = self.newton_of(solve);
-        let moving = moving.as_ref().filter(|m| *following && m.time != t)?;
-        for ((expected, previous), rate) in expected.iter_mut().zip(&*previous).zip(&moving.rates) {
-            *expected = previous + (t - moving.time) * rate;
-        }
-        Some(t > moving.time)
-    }
-
-    /// Whether the root found, if there is one that is `near`, is where the motion leads; or another one is, which is taken
-    /// then: of several motions from one place the smooth one. Not where the motion is so long that this says nothing.
-    fn is_on_motion(&mut self, solve: &Solve, (found, near): (bool, bool)) -> bool {
-        let newton = self.newton_of(solve);
-        let size = |p: &f64| p.abs().clamp(LEAST_SIZE, 1.0);
-        let is_short = |(e, p): (&f64, &f64)| (e - p).abs() <= MOST_MOVED * size(p);
-        if !newton.expected.iter().zip(&newton.previous).all(is_short) {
-            return false;
-        }
-        // What is less than this is rounding.
-        let least = newton.previous.iter().map(size).fold(0.0, f64::max) * CLOSE_TO_ROUNDING;
-        let strayed = STRAYED * distance(&newton.expected, &newton.previous) + least;
-        if near && distance(&newton.x, &newton.expected) <= strayed {
-            return true;
-        }
-        newton.other.copy_from_slice(&newton.x);
-        newton.start.copy_from_slice(&newton.expected);
-        // A position that is 0 is so against its size.
-        newton.floor.fill(LEAST_SIZE);
-        if self.iterate(solve, Globalization::Damped).is_err() {
-            return false;
-        }
-        let newton = self.newton_of(solve);
-        if found && distance(&newton.x, &newton.other) <= least {
-            // Both ways lead there: where the motion turns back, or is not what time says, it is not where it was led to.
-            newton.floor.fill(0.0);
-            newton.start_at_previous();
-            return self.iterate(solve, Globalization::Damped).is_ok();
-        }
-        distance(&newton.x, &newton.expected) <= strayed
-    }
-
-    /// The motion cannot be followed as far as this.
-    fn off_motion(&mut self, solve: &Solve) -> NoContinuation {
-        let newton = self.newton_of(solve);
-        let leap = |i: usize| (newton.expected[i] - newton.previous[i]).abs();
-        let unknown = (0..newton.expected.len()).fold(0, |most, i| if leap(i) > leap(most) { i } else { most });
-        NoContinuation::OtherRoot { unknown, root: newton.expected[unknown] }
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never
@@ -286,10 +220,6 @@ impl Frame {
         }
         false
     }
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
 /// Whether inner code reads conditions, which may be held or not.

@@ -1,5 +1,6 @@
 //! The state and the workspace of a Newton block.
 
+use super::positions::Motion;
 use crate::bytecode::floating::Floating;
 
 /// Evaluations of a block at most at the start and after jumps.
@@ -56,30 +57,21 @@ pub(crate) struct Newton {
     pub(in crate::bytecode) magnitude: Vec<f64>,
     /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
     pub(super) contracts: bool,
-    /// Of positions: when the previous solution was, and how fast it moved.
-    pub moving: Option<Moving>,
-    /// Where that leads, and the root that was found otherwise.
+    /// Of positions: how they move at the previous solution, and where that leads.
+    pub motion: Motion,
     pub(super) expected: Vec<f64>,
-    pub(super) other: Vec<f64>,
+    /// Whether the last way of positions was short.
+    pub(super) short: bool,
     /// Whether the laws had a value where an iteration began, since a root is sought.
     pub(super) valued: bool,
     /// Unknowns that no equation determines.
     pub floating: Floating,
 }
 
-/// How positions move.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Moving {
-    /// When, in s.
-    pub time: f64,
-    /// Their rates.
-    pub rates: Vec<f64>,
-}
-
 /// The state of a Newton block in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Followed {
-    moving: Option<Moving>,
+    motion: Motion,
     previous: Vec<f64>,
     following: bool,
     /// What the block read at the accepted solution, and its Jacobian there.
@@ -96,7 +88,7 @@ impl Newton {
         Newton {
             previous: line.clone(),
             expected: line.clone(),
-            other: line.clone(),
+            short: true,
             version: 1,
             following: false,
             previous_outer: Vec::new(),
@@ -120,7 +112,7 @@ impl Newton {
             first_right: line.clone(),
             magnitude: line,
             start_jacobian: matrix,
-            moving: None,
+            motion: Motion::default(),
             contracts: false,
             valued: false,
             floating: Floating::new(size, sparse),
@@ -136,7 +128,6 @@ impl Newton {
     /// Forgets the run.
     pub fn forget(&mut self) {
         self.previous.fill(0.0);
-        self.moving = None;
         self.version += 1;
         self.floating.ever.fill(false);
         self.leave();
@@ -144,7 +135,7 @@ impl Newton {
 
     /// Any solution may come next.
     pub fn leave(&mut self) {
-        (self.following, self.fresh) = (false, false);
+        (self.following, self.fresh, self.motion.known) = (false, false, false);
     }
 
     /// The next solution starts where unknown `i` has this value.
@@ -176,7 +167,7 @@ impl Newton {
     /// The state, to be restored.
     pub fn followed(&self) -> Followed {
         Followed {
-            moving: self.moving.clone(),
+            motion: self.motion.clone(),
             previous: self.previous.clone(),
             following: self.following,
             outer: self.previous_outer.clone(),
@@ -188,7 +179,7 @@ impl Newton {
     /// Restores a state.
     pub fn follow_from(&mut self, from: &Followed) {
         self.version += 1;
-        self.moving.clone_from(&from.moving);
+        self.motion.clone_from(&from.motion);
         self.previous.copy_from_slice(&from.previous);
         self.previous_outer.copy_from_slice(&from.outer);
         self.previous_jacobian.copy_from_slice(&from.jacobian);

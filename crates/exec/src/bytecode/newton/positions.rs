@@ -1,0 +1,131 @@
+//! Positions that constraints determine: from one to the next by where the motion leads.
+//!
+//! Two motions may lead through one position, as where a parallelogram lies flat. Newton's method from the solution before
+//! leads into either of them there; the smooth one is where the rates point that the positions had, on either side of it:
+//! [Allgower and Georg], "Introduction to Numerical Continuation Methods", chapter 8, on jumping over bifurcation points.
+
+use super::CLOSE_TO_ROUNDING;
+use super::damped::Globalization;
+use super::workspace::Newton;
+use crate::bytecode::frame::Frame;
+use crate::bytecode::instruction::Solve;
+
+/// The way of positions is short if along it the Jacobian changes by at most this part: no other motion is near.
+const SHORT: f64 = 0.5;
+/// Elsewhere, how near positions are to where they are expected, by their distance from where the Jacobian is singular.
+const STRAYED: f64 = 0.25;
+/// The way is at most so many times that distance: nearer, motions are not told apart.
+const NEAREST: f64 = 50.0;
+/// A position counts with its own size, or this one.
+const LEAST_SIZE: f64 = 0.05;
+/// Part of their size by which rates may change over a way that is not short.
+const TURNED: f64 = 0.25;
+
+/// How positions move.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Motion {
+    /// Whether that is known.
+    pub known: bool,
+    /// When, in s, and the time passed since they were looked at before.
+    time: f64,
+    passed: f64,
+    /// Their rates, and the rates of these.
+    rates: Vec<f64>,
+    bends: Vec<f64>,
+}
+
+impl Frame {
+    /// Whether the unknowns are positions whose motion from the previous solution is known, which is at another time.
+    pub(super) fn is_in_motion(&mut self, solve: &Solve) -> bool {
+        let t = self.r[self.time as usize];
+        let newton = self.newton_of(solve);
+        newton.following && newton.motion.known && newton.motion.time != t
+    }
+
+    /// Goes where the motion leads, if it can be told from others at this distance. Leaves the block evaluated there.
+    pub(super) fn follow_motion(&mut self, solve: &Solve) -> bool {
+        let t = self.r[self.time as usize];
+        let newton = self.newton_of(solve);
+        newton.expect(t);
+        newton.offset.fill(0.0);
+        newton.start.copy_from_slice(&newton.expected);
+        // A position that is 0 is so against its size.
+        newton.floor.fill(LEAST_SIZE);
+        let found = self.iterate(solve, Globalization::Damped).is_ok();
+        let newton = self.newton_of(solve);
+        newton.floor.fill(0.0);
+        found && self.factor(solve) && {
+            let newton = self.newton_of(solve);
+            let rounding = CLOSE_TO_ROUNDING * newton.x.iter().fold(LEAST_SIZE, |most, x| most.max(x.abs()));
+            let (way, strayed) = (distance(&newton.x, &newton.previous), distance(&newton.x, &newton.expected));
+            let change = self.change_on_way(solve);
+            let short = way <= rounding || change <= SHORT * way;
+            self.newton_of(solve).short = short;
+            short || change <= NEAREST * way && (strayed - rounding) * change <= STRAYED * way * way
+        }
+    }
+
+    /// By how much the way from the previous solution to the root is missed by the Jacobian there in place of that at the
+    /// root. By the way's length: how much longer that is than the distance of the root from where the Jacobian is
+    /// singular.
+    fn change_on_way(&mut self, solve: &Solve) -> f64 {
+        let Frame { r, solvers, .. } = self;
+        let solver = &mut solvers[solve.block.0 as usize];
+        let newton = &mut solver.newton;
+        for i in 0..newton.x.len() {
+            let terms = solve.pattern.row(i).map(|e| {
+                let column = solve.pattern.columns()[e] as usize;
+                (r[solve.matrix[e] as usize] - newton.previous_jacobian[e]) * (newton.x[column] - newton.previous[column])
+            });
+            newton.simplified[i] = terms.sum();
+        }
+        solver.factors.solve(&mut newton.simplified);
+        let change = newton.simplified.iter().map(|way| way * way).sum::<f64>().sqrt();
+        if change.is_finite() { change } else { f64::INFINITY }
+    }
+}
+
+impl Newton {
+    /// Where the motion leads until `t`.
+    fn expect(&mut self, t: f64) {
+        let Newton { motion, expected, previous, .. } = self;
+        let gone = t - motion.time;
+        for (i, expected) in expected.iter_mut().enumerate() {
+            *expected = previous[i] + gone * (motion.rates[i] + 0.5 * gone * motion.bends[i]);
+        }
+    }
+
+    /// The previous solution, positions, is that at `t`; rates follow.
+    pub fn arrive(&mut self, t: f64) {
+        (self.motion.passed, self.motion.time) = (t - self.motion.time, t);
+    }
+
+    /// Notes the rates with which positions go on from the previous solution. Whether they go on smoothly from where they
+    /// came: not where the solution has got into another motion.
+    pub fn note_rates(&mut self, rates: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
+        let motion = &mut self.motion;
+        motion.rates.resize(rates.len(), 0.0);
+        motion.bends.resize(rates.len(), 0.0);
+        let passed = motion.passed;
+        let looked_at_before = std::mem::replace(&mut motion.known, true);
+        if !looked_at_before {
+            motion.bends.fill(0.0);
+        }
+        let (mut turned, mut size) = (0.0f64, [0.0f64; 2]);
+        for ((before, bend), rate) in motion.rates.iter_mut().zip(&mut motion.bends).zip(rates) {
+            if looked_at_before && passed != 0.0 {
+                let off = rate - *before - passed * *bend;
+                turned += off * off;
+                size = [size[0] + *before * *before, size[1] + rate * rate];
+                *bend = (rate - *before) / passed;
+            }
+            *before = rate;
+        }
+        let [before, after] = size;
+        self.short || turned <= TURNED * TURNED * before.max(after)
+    }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
