@@ -71,6 +71,10 @@ impl WideModel {
         let (states, time) = (code.layout.states as usize, code.layout.time as usize);
         frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Vector(*x));
         frame.r[time] = Vector(*t);
+        if code.motion.is_some() {
+            // Positions are sought where their motion leads until then.
+            models.iter_mut().zip(t).for_each(|(model, &t)| model.frame.r[time] = t);
+        }
         if states == time + 1 {
             return; // no inputs, held signals or constants
         }

@@ -16,6 +16,8 @@ const SHORT: f64 = 0.5;
 const STRAYED: f64 = 0.25;
 /// The way is at most so many times that distance: nearer, motions are not told apart.
 const NEAREST: f64 = 50.0;
+/// By so much of their size, at a distance of 1 from there, rounding of the constraints moves positions.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// A position counts with its own size, or this one.
 const LEAST_SIZE: f64 = 0.05;
 /// Part of their size by which rates may change over a way that is not short.
@@ -56,12 +58,15 @@ impl Frame {
         newton.floor.fill(0.0);
         found && self.factor(solve) && {
             let newton = self.newton_of(solve);
-            let rounding = CLOSE_TO_ROUNDING * newton.x.iter().fold(LEAST_SIZE, |most, x| most.max(x.abs()));
-            let (way, strayed) = (distance(&newton.x, &newton.previous), distance(&newton.x, &newton.expected));
+            let size = newton.x.iter().fold(LEAST_SIZE, |most, x| most.max(x.abs()));
+            let (way, strayed) = (between(&newton.x, &newton.previous), between(&newton.x, &newton.expected));
             let change = self.change_on_way(solve);
-            let short = way <= rounding || change <= SHORT * way;
+            let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way;
             self.newton_of(solve).short = short;
-            short || change <= NEAREST * way && (strayed - rounding) * change <= STRAYED * way * way
+            // What cannot be told at this distance from where the Jacobian is singular.
+            let distance = way * (way / change);
+            let rounding = size * f64::max(CLOSE_TO_ROUNDING, ROUNDING / distance);
+            short || way <= NEAREST * distance && strayed <= STRAYED * distance + rounding
         }
     }
 
@@ -126,6 +131,6 @@ impl Newton {
     }
 }
 
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+fn between(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
