@@ -19,7 +19,7 @@ use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
-use halfarrow_sim::{Options, simulate};
+use halfarrow_sim::{Failure, Options, Stopped, simulate};
 use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -365,7 +365,9 @@ impl<'a> Copies<'a> {
             Some(mut wide) => {
                 let outcomes = self.together(work, &mut wide, sets, start);
                 self.wide = Some(wide);
-                outcomes
+                // Beside positions where motions meet a run by itself takes shorter steps.
+                let all = outcomes.into_iter().zip(sets);
+                all.map(|(outcome, &set)| outcome.unwrap_or_else(|| self.alone(work, set, start))).collect()
             }
             None => sets.iter().map(|&set| self.alone(work, set, start)).collect(),
         }
@@ -379,14 +381,14 @@ impl<'a> Copies<'a> {
         Ok(sink.finish())
     }
 
-    /// Several sets on vectors.
+    /// Several sets on vectors; `None` where a set has to run by itself.
     fn together(
         &self,
         work: &SweepContext<'_>,
         wide: &mut exec::WideModel,
         sets: &[usize],
         start: crate::run::Start,
-    ) -> Vec<Outcome> {
+    ) -> Vec<Option<Outcome>> {
         let states = self.system.program().states.len();
         let mut x = vec![[0.0; LANES]; states];
         let mut prepared: Vec<Result<(), String>> = Vec::with_capacity(sets.len());
@@ -399,10 +401,11 @@ impl<'a> Copies<'a> {
         wide.begin();
         let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers));
         let ends = simulate_wide(wide, work.options, &mut x, &mut sinks, wanted);
-        let outcome = |((prepared, end), sink): ((Result<(), String>, Result<_, halfarrow_sim::Stopped>), _)| {
-            prepared?;
-            end.map_err(|stopped| stopped.to_string())?;
-            Ok(reduce::Reducing::finish(sink))
+        let outcome = |((prepared, end), sink): ((Result<(), String>, Result<_, Stopped>), _)| match (prepared, end) {
+            (Err(why), _) => Some(Err(why)),
+            (_, Err(Stopped { failure: Failure::OffMotion { .. }, .. })) => None,
+            (_, Err(stopped)) => Some(Err(stopped.to_string())),
+            (_, Ok(_)) => Some(Ok(reduce::Reducing::finish(sink))),
         };
         prepared.into_iter().zip(ends).zip(sinks).map(outcome).collect()
     }

@@ -185,6 +185,25 @@ impl Program {
         Builder::new(self, true).build(determined, &self.watches_of(true))
     }
 
+    /// Blocks whose unknowns are positions with rates that have values, of those given.
+    pub fn motion_blocks(&self, among: &[BlockId]) -> Vec<BlockId> {
+        let moves = |id: &BlockId| {
+            let with_rate = self.positions.iter().filter(|p| p.block == *id && p.rate.is_some());
+            with_rate.count() == self.blocks[*id].size()
+        };
+        self.blocks.ids().filter(|id| among.contains(id)).filter(moves).collect()
+    }
+
+    /// The rates of the positions that blocks determine, block by block, in the order of their unknowns.
+    pub fn rates_of_positions(&self, blocks: &[BlockId]) -> Vec<Value> {
+        let of_block = |id: BlockId| {
+            let mut own: Vec<_> = self.positions.iter().filter(|p| p.block == id).collect();
+            own.sort_by_key(|p| p.unknown);
+            own.into_iter().filter_map(|p| p.rate)
+        };
+        blocks.iter().flat_map(|&id| of_block(id)).collect()
+    }
+
     /// The routine that computes the wanted values, in the order of [`Program::values`].
     pub fn routine(&self, wanted: &[Value]) -> Routine {
         Builder::new(self, false).build(wanted, &[])

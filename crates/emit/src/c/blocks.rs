@@ -136,6 +136,9 @@ impl Writer<'_> {
             }
             false => written!("{}(m, {}, {}, {})", needed("ha_find_root"), which, outer, solution),
         };
+        if self.program.positions.iter().any(|p| p.block == solve.block) {
+            f.line(written!("    m->sought_at = {};", f.shape.time.text()), 0);
+        }
         f.line(written!("    {} = {};", Variable::Status, call), 0);
         let failure = written!("{}(m, status, {}, {})", needed("ha_fail"), solve.block.0, f.shape.time.text());
         f.line(written!("    if (status != {}_OK) {{\n        return {};\n    }}", self.capitals, failure), 0);

@@ -35,6 +35,8 @@ flags! {
     positions
     /// Such as are sought while running.
     sought_positions
+    /// Those whose motion is followed.
+    moving_positions
     tables
     conditions
     sign_conditions

@@ -205,6 +205,14 @@ fn of_blocks(list: &mut List, plan: &Plan) {
         let about = "solutions of Newton blocks, where they were found, their Jacobians";
         list.arrays(Kind::Real, &["memory"], s.memory, about);
         list.arrays(Kind::Int, &["following"], plan.newton.len(), "whether they are followed");
+        if !plan.sought_positions().is_empty() {
+            let about = "whether the motion of positions is known, and their last way was short";
+            list.arrays(Kind::Int, &["motion_known", "motion_short"], plan.newton.len(), about);
+            list.arrays(Kind::Wide, &["motion_time", "motion_passed"], plan.newton.len(), "since when, and before");
+            list.one(Kind::Wide, &["sought_at"], "the time for which they are sought");
+        }
+        let moving: usize = plan.motion_blocks.iter().map(|&b| plan.program.blocks[b].size()).sum();
+        list.some(Kind::Real, &["moves"], moving, "their rates");
     }
     if s.factored > 0 {
         list.arrays(Kind::Real, &["factors"], s.factors, "of matrices of parameters alone");

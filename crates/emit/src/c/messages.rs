@@ -55,6 +55,12 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
                 format!("the equations of {what} have two solutions; the one that the run has followed ends here, or a step is too long to follow it")
             }),
         ),
+        (
+            "OFF_MOTION",
+            block(&|what| {
+                format!("the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or another motion leads through the same position; make the step shorter")
+            }),
+        ),
         ("BOUND", block(&|what| format!("the equations of {what} are not solved within the bound on evaluations"))),
         ("OUT_OF_DOMAIN", p.domains.iter().map(domain).collect()),
         ("RATE_NOT_FINITE", states(&|name| not_finite(format!("the rate of {name}")))),

@@ -127,7 +127,12 @@ impl BlockShape {
         let symmetric = size == 1 || program.blocks[solve.block].is_symmetric();
         let conditions = code.steps.iter().any(|step| matches!(step, Step::Op { op, .. } if op.is_held()));
         let positions = program.positions.iter().any(|p| p.block == solve.block);
-        if positions || !symmetric || size > LARGEST || program.blocks[solve.block].matrix().factors.is_some() || conditions {
+        if positions
+            || !symmetric
+            || size > LARGEST
+            || program.blocks[solve.block].matrix().factors.is_some()
+            || conditions
+        {
             return None;
         }
         let mut read: Vec<Arg> = Vec::new();

@@ -4,7 +4,6 @@ use super::Model;
 use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{BlockId, Program, Value};
 use halfarrow_sim::Failure;
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// How far a constraint may be missed after an event, as part of its terms, if it was not before.
@@ -55,15 +54,16 @@ pub(super) struct Motion {
 impl Motion {
     /// `None` where there are none whose rates are known.
     pub fn of(program: &Program, layout: &Layout, of_rates: &Routine) -> Option<Motion> {
-        let (mut blocks, mut rates) = (Vec::new(), Vec::new());
-        let read: BTreeSet<BlockId> = of_rates.solves.iter().map(|solve| solve.block).collect();
-        for (id, block) in program.blocks.iter().filter(|(id, _)| read.contains(id)) {
-            let mut own = vec![None; block.size()];
-            program.positions.iter().filter(|p| p.block == id).for_each(|p| own[p.unknown as usize] = p.rate);
-            let Some(own) = own.into_iter().collect::<Option<Vec<Value>>>() else { continue };
-            blocks.push((id, rates.len()..rates.len() + own.len()));
-            rates.extend(own);
-        }
+        let read: Vec<BlockId> = of_rates.solves.iter().map(|solve| solve.block).collect();
+        let moving = program.motion_blocks(&read);
+        let rates = program.rates_of_positions(&moving);
+        let mut next = 0;
+        let places = moving.into_iter().map(|id| {
+            let first = next;
+            next += program.blocks[id].size();
+            (id, first..next)
+        });
+        let blocks = places.collect();
         (!rates.is_empty()).then(|| Motion { blocks, rates: layout.routine(program, &rates) })
     }
 }

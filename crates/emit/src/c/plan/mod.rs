@@ -56,6 +56,8 @@ pub(super) struct Plan<'a> {
     reads: Vec<usize>,
     rates_blocks: Vec<BlockId>,
     shown_blocks: Vec<BlockId>,
+    /// Newton blocks of positions whose motion is followed.
+    pub(super) motion_blocks: Vec<BlockId>,
     /// What the sizes of arrays in the model are.
     pub sizes: Sizes,
     passes: Vec<Pass>,
@@ -120,6 +122,7 @@ impl<'a> Plan<'a> {
             reads: Vec::new(),
             rates_blocks: Vec::new(),
             shown_blocks: Vec::new(),
+            motion_blocks: Vec::new(),
             sizes: Sizes::default(),
             passes: Vec::new(),
             groups: Vec::new(),
@@ -145,6 +148,7 @@ impl<'a> Plan<'a> {
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
         self.shown_blocks = numbers(&routines.observe);
+        self.motion_blocks = program.motion_blocks(&self.rates_blocks);
         self.shown_blocks.retain(|block| !self.rates_blocks.contains(block));
 
         let mut functions = vec![
@@ -160,6 +164,7 @@ impl<'a> Plan<'a> {
         };
         functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
+        functions.extend(plain(&mut writer, "ha_motion_code", &routines.motion));
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
         functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
         functions.extend(plain(&mut writer, "ha_becomes_code", &routines.becomes));
@@ -228,15 +233,14 @@ impl<'a> Plan<'a> {
         let newton: Vec<(&Block, usize)> =
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (&program.blocks[*b], reads)).collect();
         let entries = |b: &Block| b.matrix().values.pattern().len();
-        let memory = |&(b, reads): &(&Block, usize)| 2 * (b.size() + reads + entries(b));
-        let work = |&(b, reads): &(&Block, usize)| 17 * b.size() + reads + 2 * entries(b) + full_room(b) + lu(b);
+        let work = |&(b, reads): &(&Block, usize)| 18 * b.size() + reads + 2 * entries(b) + full_room(b) + lu(b);
         let all = linear.iter().copied().chain(newton.iter().map(|b| b.0));
         self.sizes = Sizes {
             derived: writer.givens.derived(),
             exact: writer.givens.exact(),
             wide: writer.wide_crossing,
             crossing: writer.crossing,
-            memory: newton.iter().map(memory).sum(),
+            memory: self.memory_sizes().sum(),
             work: newton.iter().map(work).chain(linear.iter().map(|b| lu(b))).max().unwrap_or(0),
             order: all.map(order).max().unwrap_or(0),
             factors: writer.factored.size,

@@ -10,6 +10,8 @@ use super::Plan;
 pub(super) struct Routines {
     pub preamble: Routine,
     pub rates: Routine,
+    /// Of positions that these read.
+    pub motion: Routine,
     pub observe: Routine,
     pub switching: Routine,
     pub clock: Routine,
@@ -45,6 +47,8 @@ impl Routines {
         let values = |c: &Clause| p.routine(&c.actions.iter().map(|a| a.value).collect::<Vec<_>>());
         let becomes: Vec<Value> = events.conditional.iter().map(|&c| p.clauses[c].trigger.value()).collect();
         let balanced = p.jumps.iter().flat_map(Jumps::values).chain(events.moved.iter().copied());
+        let guarded = p.guarded_routine(&rates);
+        let read: Vec<BlockId> = newton_of(&guarded.code).map(|solve| solve.block).collect();
         Routines {
             becomes: p.routine(&becomes),
             clauses: p.clauses.iter().map(values).collect(),
@@ -52,7 +56,8 @@ impl Routines {
             impulses: p.routine(&balanced.collect::<Vec<_>>()),
             positions: p.routine(&events.constraints(p).map(|c| c.residual).collect::<Vec<_>>()),
             preamble: p.preamble(&p.determined(&[])),
-            rates: p.guarded_routine(&rates),
+            motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&read))),
+            rates: guarded,
             observe: p.guarded_routine(&shown.collect::<Vec<_>>()),
             switching: p.routine(&operands(&plan.switches)),
             clock: p.routine(&operands(&plan.clocks)),
@@ -63,9 +68,11 @@ impl Routines {
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
-        let Routines { preamble, rates, observe, switching, clock, sources, domains, .. } = self;
+        let Routines { preamble, rates, motion, observe, switching, clock, sources, domains, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, .. } = self;
-        let all = [preamble, rates, observe, switching, clock, sources, domains, becomes, stored, impulses, positions];
+        let all = [
+            preamble, rates, motion, observe, switching, clock, sources, domains, becomes, stored, impulses, positions,
+        ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }
 

@@ -103,6 +103,7 @@ impl Plan<'_> {
             conserved: !p.conserved.is_empty(),
             positions: !p.positions.is_empty(),
             sought_positions: !self.sought_positions().is_empty(),
+            moving_positions: !self.motion_blocks.is_empty(),
             tables: !p.tables.is_empty(),
             conditions: !p.conditions.is_empty(),
             sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),

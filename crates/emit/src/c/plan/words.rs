@@ -78,6 +78,10 @@ impl Plan<'_> {
             ("RATES_BLOCK_COUNT", self.rates_blocks.len().to_string()),
             ("SHOWN_BLOCKS", join(block_numbers(&self.shown_blocks))),
             ("SHOWN_BLOCK_COUNT", self.shown_blocks.len().to_string()),
+            ("MOTION_BLOCKS", join(block_numbers(&self.motion_blocks))),
+            ("MOTION_BLOCK_COUNT", self.motion_blocks.len().to_string()),
+            ("MOTION_ORIGINS", join(self.motion_blocks.iter().map(|b| b.0.to_string()).collect())),
+            ("MOTION_COUNT", self.motion_blocks.iter().map(|&b| program.blocks[b].size()).sum::<usize>().to_string()),
             ("DISTANCES", real.numbers(&distances)),
             ("DOMAINS", program.domains.len().to_string()),
             ("MEMORY", self.sizes.memory.to_string()),
@@ -168,16 +172,26 @@ impl Plan<'_> {
 
     /// Where the memory of the model has that of each block that is solved by iteration.
     fn memory_places(&self) -> Vec<usize> {
-        let size = |(block, reads): (&BlockId, &usize)| {
-            let block = &self.program.blocks[*block];
-            2 * (block.size() + reads + block.matrix().values.pattern().len())
-        };
-        let sizes = self.newton.iter().zip(&self.reads).map(size);
-        sizes.scan(0, |next, size| Some(std::mem::replace(next, *next + size))).collect()
+        self.memory_sizes().scan(0, |next, size| Some(std::mem::replace(next, *next + size))).collect()
+    }
+
+    /// How much memory that takes: the solution, what the block read and its Jacobian, followed and found last; rates of
+    /// positions.
+    pub(super) fn memory_sizes(&self) -> impl Iterator<Item = usize> + '_ {
+        self.newton.iter().zip(&self.reads).map(|(&id, reads)| {
+            let block = &self.program.blocks[id];
+            let rates = if self.has_positions(id) { 2 * block.size() } else { 0 };
+            2 * (block.size() + reads + block.matrix().values.pattern().len()) + rates
+        })
+    }
+
+    /// Whether the unknowns of a block are positions that constraints determine.
+    fn has_positions(&self, block: BlockId) -> bool {
+        self.program.positions.iter().any(|p| p.block == block)
     }
 
     /// The positions that are sought while running, by number, and where the memory of the model has their last values.
-    pub(super) fn sought_positions(&self) -> Vec<(usize, usize)> {
+    pub(in crate::c) fn sought_positions(&self) -> Vec<(usize, usize)> {
         let first: BTreeMap<BlockId, usize> = self.newton.iter().copied().zip(self.memory_places()).collect();
         let positions = self.program.positions.iter().enumerate();
         positions.filter_map(|(k, p)| Some((k, first.get(&p.block)? + p.unknown as usize))).collect()
@@ -193,7 +207,7 @@ impl Plan<'_> {
             text += &super::shapes::block_declarations(i, self.export.real);
             let (pattern, _) = self.patterns.of_block(self.program, *block);
             let [code, terms, along] = ["", "_terms", "_along"].map(|k| Needed(format!("ha_block_{i}{k}").into()));
-            let position = match self.program.positions.iter().any(|p| p.block == *block) {
+            let position = match self.has_positions(*block) {
                 _ if !sought => "",
                 true => "1, ",
                 false => "0, ",
@@ -276,8 +290,8 @@ impl Plan<'_> {
 
 /// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value, of
 /// residuals in units of their own; how far beside a point is another one; the least damping of Newton's method at a start; and
-/// what a solution in a fixed order may leave of an equation.
-fn tolerances(real: Real) -> [(&'static str, String); 7] {
+/// what a solution in a fixed order may leave of an equation; how near to a singular position rates are rounding.
+fn tolerances(real: Real) -> [(&'static str, String); 8] {
     let words = [
         "CLOSE_TO_ROUNDING",
         "ROUNDING_OF_ENTRIES",
@@ -286,13 +300,14 @@ fn tolerances(real: Real) -> [(&'static str, String); 7] {
         "BESIDE",
         "LEAST_DAMPING",
         "LEFT_OVER",
+        "CLOSE_TO_SINGULAR",
     ];
     // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10, 1e-6],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4, 1e-3],
     };
-    [0, 1, 2, 3, 4, 5, 6].map(|i| (words[i], real.number(values[i])))
+    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (words[i], real.number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.

@@ -22,6 +22,9 @@ int $model_cross($model *m, double t, $real *x)
         int i;
         for (i = 0; i < $BLOCKS; ++i) {
             m->following[i] = 0;
+//if sought_positions
+            m->motion_known[i] = 0;
+//end
         }
     }
 //end

@@ -744,6 +744,9 @@ static int ha_run_clauses(ha_model *m, double t, $real *x)
             int i;
             for (i = 0; i < $BLOCKS; ++i) {
                 m->following[i] = 0;
+//if sought_positions
+                m->motion_known[i] = 0;
+//end
             }
         }
 //end

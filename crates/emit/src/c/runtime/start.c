@@ -47,6 +47,9 @@ static int ha_parameters(ha_model *m)
 //if newton
     for (i = 0; i < $BLOCKS; ++i) {
         m->following[i] = 0;
+//if sought_positions
+        m->motion_known[i] = 0;
+//end
     }
     if (!m->begun) {
         $ha_fill(m->memory, $0.0, $MEMORY);
@@ -104,6 +107,9 @@ static void ha_restart(ha_model *m)
         int i;
         for (i = 0; i < $BLOCKS; ++i) {
             m->following[i] = 0;
+//if sought_positions
+            m->motion_known[i] = 0;
+//end
         }
         $ha_fill(m->memory, $0.0, $MEMORY);
 //if sought_positions

@@ -29,21 +29,58 @@ static void ha_ticks_from(ha_model *m, double t)
     m->tick_rate = rate >= 1.0 && 1.0 / rate == m->step ? rate : 0.0;
 }
 
+//item ha_try
+/* Makes the step from m->t to a time, in m->trial. */
+static int ha_try(ha_model *m, double t)
+{
+    int status = $ha_method(m, m->t, $narrow(t - m->t), m->x);
+    int i;
+    for (i = 0; i < HA_NX && status == $MODEL_OK; ++i) {
+        if (!$ha_finite(m->trial[i])) {
+            status = $ha_fail(m, $MODEL_STATE_NOT_FINITE, i, t);
+        }
+    }
+//if moving_positions
+    return status == $MODEL_OK ? $model_rates(m, t, m->trial, m->dx) : status;
+//else
+    return status;
+//end
+}
+
+//item ha_reach
+/* Makes the step from m->t to *end, or where positions cannot be followed to there, beside one through which another motion
+ * leads, to a time before it. */
+static int ha_reach(ha_model *m, double *end)
+{
+    int status = $ha_try(m, *end);
+//if moving_positions
+    static const double shorter[] = {0.5, 0.7, 0.3, 0.1};
+    const double way = *end - m->t;
+    int i;
+    for (i = 0; i < 4 && status == $MODEL_OFF_MOTION; ++i) {
+        const $model_failure failure = m->failure;
+        const double part = shorter[i] * way;
+        const double sooner = m->t + part;
+        m->failure.code = $MODEL_OK;
+        if (sooner > m->t && $ha_try(m, sooner) == $MODEL_OK) {
+            *end = sooner;
+            return $MODEL_OK;
+        }
+        m->failure = failure;
+    }
+//end
+    return status;
+}
+
 //if locates
 //item ha_look
 /* Makes the step from m->t to a time, in m->trial; whether an event indicator has another sign there than that held. */
 static int ha_look(ha_model *m, double t, int *crossed)
 {
     int status = $MODEL_OK;
-    int i;
     *crossed = 0;
     if (t > m->t) {
-        status = $ha_method(m, m->t, $narrow(t - m->t), m->x);
-        for (i = 0; i < HA_NX && status == $MODEL_OK; ++i) {
-            if (!$ha_finite(m->trial[i])) {
-                status = $ha_fail(m, $MODEL_STATE_NOT_FINITE, i, t);
-            }
-        }
+        status = $ha_try(m, t);
     } else {
         $ha_copy(m->trial, m->x, HA_NX);
 //if single
@@ -145,8 +182,11 @@ static int ha_step_to(ha_model *m, double target, int jumps)
 {
     const int handled = m->handled;
     double end = target;
-    int switched;
-    int status = $ha_look(m, target, &switched);
+    int switched = 0;
+    int status = $ha_reach(m, &end);
+    if (status == $MODEL_OK) {
+        status = $model_switched(m, end, m->trial, &switched);
+    }
     m->handled = 0;
     if (status == $MODEL_OK && (handled || switched)) {
         int same;
@@ -175,31 +215,26 @@ static int ha_step_to(ha_model *m, double target, int jumps)
 /* From m->t to a target, without a jump between them. */
 static int ha_step_to(ha_model *m, double target, int jumps)
 {
+    double end = target;
     int switched = 0;
-    int status = $ha_method(m, m->t, $narrow(target - m->t), m->x);
-    int i;
+    int status = $ha_reach(m, &end);
     if (status != $MODEL_OK) {
         return status;
-    }
-    for (i = 0; i < HA_NX; ++i) {
-        if (!$ha_finite(m->trial[i])) {
-            return $ha_fail(m, $MODEL_STATE_NOT_FINITE, i, target);
-        }
     }
     $ha_copy(m->x, m->trial, HA_NX);
 //if single
     $ha_copy(m->rest, m->trial_rest, HA_NX);
 //end
 //if switches
-    status = $model_switched(m, target, m->x, &switched);
+    status = $model_switched(m, end, m->x, &switched);
     if (status != $MODEL_OK) {
         return status;
     }
 //end
-    m->t = target;
-    status = $model_accept(m, target, m->x);
-    if (status == $MODEL_OK && (switched || jumps)) {
-        status = $model_cross(m, target, m->x);
+    m->t = end;
+    status = $model_accept(m, end, m->x);
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $model_cross(m, end, m->x);
     }
     return status;
 }

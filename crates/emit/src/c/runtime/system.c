@@ -440,6 +440,52 @@ static int ha_take_samples(ha_model *m, double t, const $real *x)
 }
 
 //end
+//if moving_positions
+//item ha_note_motion
+/* Notes how positions move at (t, x), where they have been accepted. */
+static int ha_note_motion(ha_model *m, double t, const $real *x)
+{
+    static const int blocks[] = {$MOTION_BLOCKS};
+    const $real *rates = m->moves;
+    int status;
+    int b;
+    int i;
+    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+        m->motion_passed[blocks[b]] = t - m->motion_time[blocks[b]];
+        m->motion_time[blocks[b]] = t;
+    }
+    status = $ha_run(m, $ha_motion_code, t, x, m->moves, $MOTION_COUNT);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+        const int number = blocks[b];
+        const ha_newton w = $ha_newton_of(m, number);
+        const $real passed = $narrow(m->motion_passed[number]);
+        const int known = m->motion_known[number];
+        m->motion_known[number] = $ha_all_finite(rates, w.n);
+        if (m->motion_known[number]) {
+            const int turns = known && m->motion_passed[number] != 0.0
+                && $ha_turns(&w, m->motion_short[number], passed, rates);
+            for (i = 0; i < w.n; ++i) {
+                if (!known) {
+                    w.bends[i] = $0.0;
+                } else if (m->motion_passed[number] != 0.0) {
+                    w.bends[i] = (rates[i] - w.rates[i]) / passed;
+                }
+                w.rates[i] = rates[i];
+            }
+            if (turns) {
+                static const int origins[] = {$MOTION_ORIGINS};
+                return $ha_fail(m, $MODEL_OFF_MOTION, origins[b], t);
+            }
+        }
+        rates += w.n;
+    }
+    return $MODEL_OK;
+}
+
+//end
 //if follows
 //item ha_follow_solutions
 /* Goes on with the Newton solutions at (t, x). */
@@ -457,6 +503,12 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
         for (i = 0; i < $RATES_BLOCK_COUNT; ++i) {
             $ha_newton_accept(m, blocks[i]);
         }
+//if moving_positions
+        status = $ha_note_motion(m, t, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+//end
     }
 //end
 //if shown_newton
@@ -550,3 +602,42 @@ double $model_next_jump($model *m, double t)
 //end
     return next;
 }
+
+//if moving_positions
+//always
+/* An importer may not tell of every step: positions are followed from each point at which it asks for rates, which have just
+ * been found. */
+int $model_follow($model *m, double t, const $real *x)
+{
+    static const int blocks[] = {$MOTION_BLOCKS};
+    const $real *rates = m->moves;
+    int status = $ha_run(m, $ha_motion_code, t, x, m->moves, $MOTION_COUNT);
+    int b;
+    if (status != $MODEL_OK) {
+        return status;
+    }
+    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+        static const int origins[] = {$MOTION_ORIGINS};
+        const int number = blocks[b];
+        const ha_newton w = $ha_newton_of(m, number);
+        if (m->motion_known[number] && m->motion_time[number] != t
+            && $ha_turns(&w, m->motion_short[number], $narrow(t - m->motion_time[number]), rates)) {
+            return $ha_fail(m, $MODEL_OFF_MOTION, origins[b], t);
+        }
+        rates += w.n;
+    }
+    rates = m->moves;
+    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+        const int number = blocks[b];
+        const ha_newton w = $ha_newton_of(m, number);
+        $ha_newton_accept(m, number);
+        m->motion_known[number] = $ha_all_finite(rates, w.n);
+        m->motion_time[number] = t;
+        $ha_copy(w.rates, rates, w.n);
+        $ha_fill(w.bends, $0.0, w.n);
+        rates += w.n;
+    }
+    return $MODEL_OK;
+}
+
+//end

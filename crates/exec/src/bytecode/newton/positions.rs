@@ -16,8 +16,8 @@ const SHORT: f64 = 0.5;
 const STRAYED: f64 = 0.25;
 /// The way is at most so many times that distance: nearer, motions are not told apart.
 const NEAREST: f64 = 50.0;
-/// By so much of their size, at a distance of 1 from there, rounding of the constraints moves positions.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Nearer than this part of their size, rates of positions are rounding.
+const CLOSE_TO_SINGULAR: f64 = 1e-6;
 /// A position counts with its own size, or this one.
 const LEAST_SIZE: f64 = 0.05;
 /// Part of their size by which rates may change over a way that is not short.
@@ -63,10 +63,10 @@ impl Frame {
             let change = self.change_on_way(solve);
             let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way;
             self.newton_of(solve).short = short;
-            // What cannot be told at this distance from where the Jacobian is singular.
+            // From where the Jacobian is singular.
             let distance = way * (way / change);
-            let rounding = size * f64::max(CLOSE_TO_ROUNDING, ROUNDING / distance);
-            short || way <= NEAREST * distance && strayed <= STRAYED * distance + rounding
+            let far = distance >= f64::max(way / NEAREST, CLOSE_TO_SINGULAR * size);
+            short || far && strayed <= STRAYED * distance
         }
     }
 
@@ -80,7 +80,8 @@ impl Frame {
         for i in 0..newton.x.len() {
             let terms = solve.pattern.row(i).map(|e| {
                 let column = solve.pattern.columns()[e] as usize;
-                (r[solve.matrix[e] as usize] - newton.previous_jacobian[e]) * (newton.x[column] - newton.previous[column])
+                (r[solve.matrix[e] as usize] - newton.previous_jacobian[e])
+                    * (newton.x[column] - newton.previous[column])
             });
             newton.simplified[i] = terms.sum();
         }

@@ -289,27 +289,127 @@ static int ha_continue_above_rounding(ha_model *m, ha_newton *w)
     return 0;
 }
 
+//if sought_positions
+//item ha_between
+static $real ha_between(const $real *a, const $real *b, int n)
+{
+    $real sum = -$0.0;
+    int i;
+    for (i = 0; i < n; ++i) {
+        const $real way = a[i] - b[i];
+        const $real square = way * way;
+        sum += square;
+    }
+    return $sqrt(sum);
+}
+
+//item ha_change_on_way
+/* By how much the way from the previous solution to the root is missed by the Jacobian there in place of that at the root. By
+ * the way's length: how much longer that is than the distance of the root from where the Jacobian is singular. */
+static $real ha_change_on_way(ha_newton *w)
+{
+    $real sum = -$0.0;
+    int i;
+    int e;
+    for (i = 0; i < w->n; ++i) {
+        $real terms = -$0.0;
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            const int column = w->columns[e];
+            const $real product = (w->matrix[e] - w->previous_jacobian[e]) * (w->x[column] - w->previous[column]);
+            terms += product;
+        }
+        w->simplified[i] = terms;
+    }
+    $ha_lu_solve(&w->lu, w->simplified);
+    for (i = 0; i < w->n; ++i) {
+        const $real square = w->simplified[i] * w->simplified[i];
+        sum += square;
+    }
+    sum = $sqrt(sum);
+    return $ha_finite(sum) ? sum : $HUGE_VAL;
+}
+
+//item ha_follow_motion
+/* Positions that constraints determine go where their motion leads, if that can be told from others through the same position:
+ * E. L. Allgower, K. Georg, "Introduction to Numerical Continuation Methods", chapter 8. */
+static int ha_follow_motion(ha_model *m, ha_newton *w, int number)
+{
+    const $real gone = $narrow(m->sought_at - m->motion_time[number]);
+    $real size = $0.05;
+    $real way;
+    $real strayed;
+    $real change;
+    $real distance;
+    int found;
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        const $real bend = $0.5 * gone * w->bends[i];
+        const $real on = gone * (w->rates[i] + bend);
+        w->expected[i] = w->previous[i] + on;
+        w->start[i] = w->expected[i];
+    }
+    $ha_fill(w->offset, $0.0, w->n);
+    /* A position that is 0 is so against its size. */
+    $ha_fill(w->floor, $0.05, w->n);
+    found = $ha_iterate(m, w, HA_DAMPED);
+    $ha_fill(w->floor, $0.0, w->n);
+    if (!found || !$ha_newton_factor(w)) {
+        return 0;
+    }
+    for (i = 0; i < w->n; ++i) {
+        size = $ha_max(size, $fabs(w->x[i]));
+    }
+    way = $ha_between(w->x, w->previous, w->n);
+    strayed = $ha_between(w->x, w->expected, w->n);
+    change = $ha_change_on_way(w);
+    m->motion_short[number] = way <= $CLOSE_TO_ROUNDING * size || change <= $0.5 * way;
+    if (m->motion_short[number]) {
+        return 1;
+    }
+    /* From where the Jacobian is singular: near it rates are rounding. */
+    distance = way * (way / change);
+    return distance >= $ha_max(way / $50.0, $CLOSE_TO_SINGULAR * size) && strayed <= $0.25 * distance;
+}
+
+//item ha_turns
+/* Whether rates of positions are others than those with which they came, over a way that is not short. */
+static int ha_turns(const ha_newton *w, int is_short, $real passed, const $real *rates)
+{
+    $real turned = $0.0;
+    $real before = $0.0;
+    $real after = $0.0;
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        const $real bend = passed * w->bends[i];
+        const $real off = rates[i] - w->rates[i] - bend;
+        const $real square = off * off;
+        const $real old = w->rates[i] * w->rates[i];
+        const $real new = rates[i] * rates[i];
+        turned += square;
+        before += old;
+        after += new;
+    }
+    return !(is_short || turned <= $0.0625 * $ha_max(before, after));
+}
+
+//end
 //item ha_continue_root
 /* The root that continues the previous solution: 0, or why there is none. */
-static int ha_continue_root(ha_model *m, ha_newton *w)
+static int ha_continue_root(ha_model *m, ha_newton *w, int number)
 {
     int why = $MODEL_NO_CONVERGENCE;
     int i;
+//if sought_positions
+    m->motion_short[number] = 1;
+    if (w->following && m->motion_known[number] && m->motion_time[number] != m->sought_at) {
+        return $ha_follow_motion(m, w, number) ? $MODEL_OK : $MODEL_OFF_MOTION;
+    }
+//else
+    (void)number;
+//end
     $ha_fill(w->offset, $0.0, w->n);
     $ha_copy(w->start, w->previous, w->n);
     $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
-//if sought_positions
-    if (w->block->position && w->following) {
-        /* Where motions meet, a way that is longer might lead to another one. */
-        if ($ha_iterate(m, w, HA_DAMPED) && $ha_is_continuation(w)) {
-            return $MODEL_OK;
-        }
-        /* A position that is 0 is so against its size. */
-        $ha_fill(w->floor, $0.05, w->n);
-        $ha_copy(w->start, w->previous, w->n);
-        return $ha_iterate(m, w, HA_DAMPED) && $ha_is_continuation(w) ? $MODEL_OK : $MODEL_BRANCH;
-    }
-//end
     if ($ha_iterate(m, w, HA_DAMPED)) {
         if ($ha_is_continuation(w) || (w->following && $ha_is_unique_near_path(m, w))) {
             return $MODEL_OK;

@@ -172,7 +172,7 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     $ha_copy(w.outer, o, w.block->reads);
     $ha_copy(w.present, o, w.block->reads);
     $ha_fill(w.floor, $0.0, w.n);
-    status = $ha_continue_root(m, &w);
+    status = $ha_continue_root(m, &w, number);
     if (status != $MODEL_OK && w.following) {
 //if newton_single
         /* Is there a solution elsewhere, or none at all? */

@@ -79,6 +79,13 @@ typedef struct {
     $real *unseen;
     /* Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them. */
     $real *floor;
+//if sought_positions
+    /* Of positions: their rates at the previous solution, and the rates of these. */
+    $real *rates;
+    $real *bends;
+    /* Where they lead. */
+    $real *expected;
+//end
     ha_lu lu;
 } ha_newton;
 
@@ -115,6 +122,14 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.x = $ha_take(&place, n);
     w.outer = $ha_take(&place, reads);
     w.jacobian = $ha_take(&place, entries);
+//if sought_positions
+    w.rates = NULL;
+    w.bends = NULL;
+    if (block->position) {
+        w.rates = $ha_take(&place, n);
+        w.bends = $ha_take(&place, n);
+    }
+//end
     place = m->work;
     w.correction = $ha_take(&place, n);
     w.trial = $ha_take(&place, n);
@@ -136,6 +151,9 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.order = $ha_take(&place, n);
     w.rest = $ha_take(&place, n);
     w.floor = $ha_take(&place, n);
+//if sought_positions
+    w.expected = $ha_take(&place, n);
+//end
     w.loose = NULL;
     w.unseen = NULL;
 //if sparse
