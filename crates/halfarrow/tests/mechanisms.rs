@@ -1,7 +1,7 @@
 //! Closed loops: positions that follow from others, and runs past positions where one set of variables does not do.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
-use halfarrow::{FixedMethod, Form, Method, Model, Record, Run, Simulated};
+use halfarrow::{Error, Failure, FixedMethod, Form, Method, Model, Record, Run, Simulated};
 
 fn model(text: &str) -> Model {
     Model::from_text("test.bond", text, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
@@ -275,4 +275,55 @@ fn a_model_runs_again_after_exchanges() {
     kept.set("m", 2.0).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let heavy = kept.simulate(&wanted, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
     assert_eq!(heavy.trace, run(&OVER.replace("m = 1 kg", "m = 2 kg"), &wanted).trace);
+}
+
+/// Kites, antiparallelograms and a rod as long as its crank pass the positions through which another motion leads, by every
+/// method and also where a step of fixed length ends close beside one: no energy is made or lost there. Efforts may be
+/// rounding where a sample lies beside one; then the audit says so.
+#[test]
+fn no_step_leaps_into_another_motion() {
+    let four_bar = |sides: [f64; 4], guess: [f64; 2]| {
+        let [a, b, c, d] = sides;
+        format!(
+            "model Bars\n1:crank -> I:one(1, f0 = 10)\n1:coupler -> I:two(0.5)\n1:rocker -> I:three(0.7)\n\
+             state th1' = crank.f from 0.6\nstate th2' = coupler.f\nstate th3' = rocker.f\n\
+             constraint along: {a}*cos(th1) + {b}*cos(th2) = {d} + {c}*cos(th3)\n\
+             constraint across: {a}*sin(th1) + {b}*sin(th2) = {c}*sin(th3)\n\
+             guess th2 = {}, th3 = {}\n\
+             output E = (one.p*one.f + two.p*two.f + three.p*three.f)/2\n",
+            guess[0], guess[1]
+        )
+    };
+    let slider = "model Slider\n1:crank -> I:wheel(1, f0 = 10)\n1:rod -> I:bar(0.5)\n1:piston -> I:mass(0.7)\n\
+        state th' = crank.f from 0.6\nstate ph' = rod.f\nstate x' = piston.f\n\
+        constraint along: 0.2*cos(th) + 0.2*cos(ph) = x\nconstraint across: 0.2*sin(th) = 0.2*sin(ph)\n\
+        guess ph = 0.6, x = 0.3\noutput E = (wheel.p*wheel.f + bar.p*bar.f + mass.p*mass.f)/2\n";
+    let models = [
+        ("kite", four_bar([0.2, 0.2, 0.5, 0.5], [0.5, 1.5])),
+        ("antiparallelogram", four_bar([0.2, 0.5, 0.2, 0.5], [-0.5, -1.5])),
+        ("slider", slider.to_string()),
+    ];
+    let fixed = |method, step| Run { to: 10.0, method, step: Some(step), every: Some(0.1), ..Run::default() };
+    let variable = |method, rtol| Run { to: 10.0, method, rtol, every: Some(0.1), ..Run::default() };
+    for (name, text) in models {
+        for (run_with, drift) in [
+            (fixed(Method::Fixed(FixedMethod::Rk4), 1e-3), 1e-4),
+            (fixed(Method::Fixed(FixedMethod::Rk4), 3e-3), 1e-4),
+            (fixed(Method::Fixed(FixedMethod::Rk4), 1e-2), 1e-3),
+            (fixed(Method::Fixed(FixedMethod::Heun), 1e-3), 2e-3),
+            (variable(Method::Explicit, 1e-6), 1e-3),
+            (variable(Method::Explicit, 1e-10), 1e-7),
+            (variable(Method::Radau, 1e-7), 1e-4),
+        ] {
+            let run_with = Run { record: Record::All, ..run_with };
+            let done = match model(&text).simulate(&run_with, &mut |_| true) {
+                Ok(done) => done,
+                Err(Error::Run(stopped)) if matches!(stopped.failure, Failure::Untrue { .. }) => continue,
+                Err(error) => panic!("{name}: {}", error.render(false)),
+            };
+            let energy = column(&done, "E");
+            let most = energy.iter().fold(0.0f64, |most, e| most.max((e / energy[0] - 1.0).abs()));
+            assert!(most < drift, "{name} {:?} {:?} {:e}: {most:e}", run_with.method, run_with.step, run_with.rtol);
+        }
+    }
 }

@@ -304,8 +304,8 @@ fn tolerances(real: Real) -> [(&'static str, String); 8] {
     ];
     // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10, 1e-6],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4, 1e-3],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10, 1e-7],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4, 3e-4],
     };
     [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (words[i], real.number(values[i])))
 }

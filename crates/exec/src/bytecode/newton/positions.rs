@@ -16,8 +16,8 @@ const SHORT: f64 = 0.5;
 const STRAYED: f64 = 0.25;
 /// The way is at most so many times that distance: nearer, motions are not told apart.
 const NEAREST: f64 = 50.0;
-/// Nearer than this part of their size, rates of positions are rounding.
-const CLOSE_TO_SINGULAR: f64 = 1e-6;
+/// Nearer than this, times the root of their size, rates of positions are rounding.
+const CLOSE_TO_SINGULAR: f64 = 1e-7;
 /// A position counts with its own size, or this one.
 const LEAST_SIZE: f64 = 0.05;
 /// Part of their size by which rates may change over a way that is not short.
@@ -34,6 +34,12 @@ pub(crate) struct Motion {
     /// Their rates, and the rates of these.
     rates: Vec<f64>,
     bends: Vec<f64>,
+    /// Where the last step began: how long it took, in s (0 if it is not known), and positions and rates there.
+    span: f64,
+    start: Vec<f64>,
+    start_rates: Vec<f64>,
+    /// The solution before the previous one.
+    pub left: Vec<f64>,
 }
 
 impl Frame {
@@ -62,11 +68,14 @@ impl Frame {
             let (way, strayed) = (between(&newton.x, &newton.previous), between(&newton.x, &newton.expected));
             let change = self.change_on_way(solve);
             let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way;
-            self.newton_of(solve).short = short;
+            let newton = self.newton_of(solve);
+            newton.short = short;
             // From where the Jacobian is singular.
             let distance = way * (way / change);
-            let far = distance >= f64::max(way / NEAREST, CLOSE_TO_SINGULAR * size);
-            short || far && strayed <= STRAYED * distance
+            let far = distance >= f64::max(way / NEAREST, CLOSE_TO_SINGULAR * size.sqrt());
+            // Samples inside a step that has been made may lie anywhere.
+            let ahead = t > newton.motion.time;
+            short || (far || !ahead) && strayed <= STRAYED * distance
         }
     }
 
@@ -96,6 +105,16 @@ impl Newton {
     fn expect(&mut self, t: f64) {
         let Newton { motion, expected, previous, .. } = self;
         let gone = t - motion.time;
+        if gone < 0.0 && -gone <= motion.span {
+            // Inside the last step: the cubic through both its ends.
+            let (s, h) = (1.0 + gone / motion.span, motion.span);
+            for (i, expected) in expected.iter_mut().enumerate() {
+                let way = previous[i] - motion.start[i];
+                let (first, last) = (h * motion.start_rates[i] - way, way - h * motion.rates[i]);
+                *expected = motion.start[i] + s * (way + (1.0 - s) * ((1.0 - s) * first + s * last));
+            }
+            return;
+        }
         for (i, expected) in expected.iter_mut().enumerate() {
             *expected = previous[i] + gone * (motion.rates[i] + 0.5 * gone * motion.bends[i]);
         }
@@ -103,7 +122,12 @@ impl Newton {
 
     /// The previous solution, positions, is that at `t`; rates follow.
     pub fn arrive(&mut self, t: f64) {
-        (self.motion.passed, self.motion.time) = (t - self.motion.time, t);
+        let motion = &mut self.motion;
+        (motion.passed, motion.time) = (t - motion.time, t);
+        if motion.passed != 0.0 {
+            std::mem::swap(&mut motion.start, &mut motion.left);
+            motion.span = 0.0;
+        }
     }
 
     /// Notes the rates with which positions go on from the previous solution. Whether they go on smoothly from where they
@@ -112,10 +136,15 @@ impl Newton {
         let motion = &mut self.motion;
         motion.rates.resize(rates.len(), 0.0);
         motion.bends.resize(rates.len(), 0.0);
+        motion.start_rates.resize(rates.len(), 0.0);
         let passed = motion.passed;
         let looked_at_before = std::mem::replace(&mut motion.known, true);
         if !looked_at_before {
             motion.bends.fill(0.0);
+            motion.span = 0.0;
+        } else if passed != 0.0 {
+            motion.span = passed;
+            motion.start_rates.copy_from_slice(&motion.rates);
         }
         let (mut turned, mut size) = (0.0f64, [0.0f64; 2]);
         for ((before, bend), rate) in motion.rates.iter_mut().zip(&mut motion.bends).zip(rates) {

@@ -158,6 +158,9 @@ impl Newton {
     pub fn accept(&mut self) {
         self.version += 1;
         self.floating.accept();
+        if self.motion.known {
+            self.motion.left.clone_from(&self.previous);
+        }
         self.previous.copy_from_slice(&self.x);
         self.previous_outer.copy_from_slice(&self.outer);
         self.previous_jacobian.copy_from_slice(&self.jacobian);

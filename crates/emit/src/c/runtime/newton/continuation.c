@@ -368,7 +368,10 @@ static int ha_follow_motion(ha_model *m, ha_newton *w, int number)
     }
     /* From where the Jacobian is singular: near it rates are rounding. */
     distance = way * (way / change);
-    return distance >= $ha_max(way / $50.0, $CLOSE_TO_SINGULAR * size) && strayed <= $0.25 * distance;
+    if (distance < $ha_max(way / $50.0, $CLOSE_TO_SINGULAR * $sqrt(size)) && gone > $0.0) {
+        return 0;
+    }
+    return strayed <= $0.25 * distance;
 }
 
 //item ha_turns
