@@ -177,7 +177,8 @@ impl Auditor {
     pub fn finish(self) -> Audit {
         let settled = self.scales.settled(&self.graph);
         let notes = energy::notes(&self.graph);
-        let events = if self.graph.clauses.is_empty() { BTreeMap::new() } else { self.by_impulses };
+        let impulses = !self.graph.clauses.is_empty() || self.graph.has_leaping_ratios();
+        let events = if impulses { self.by_impulses } else { BTreeMap::new() };
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),

@@ -96,7 +96,16 @@ fn c_says_what_fails() {
 /// A run that the caller takes from step to step, as in real time, has the same results at events.
 #[test]
 fn c_does_at_events_what_a_run_by_steps_does() {
-    let names = ["when_beam", "when_bounce", "when_four_bar", "when_gears", "when_order", "when_relay", "when_springs"];
+    let names = [
+        "when_beam",
+        "when_bounce",
+        "when_four_bar",
+        "when_gears",
+        "when_order",
+        "when_relay",
+        "when_springs",
+        "leaping_ratio",
+    ];
     let all: Vec<Exported> = names
         .iter()
         .zip([Method::Rk4, Method::Rosenbrock].iter().cycle())
@@ -240,6 +249,7 @@ fn c_is_clean() {
             "when_relay",
             "when_sampled",
             "when_springs",
+            "leaping_ratio",
         ])
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
         .collect();

@@ -482,3 +482,33 @@ fn a_run_by_steps_is_saved_between_events() {
     assert_eq!(once, twice);
     assert_eq!(steps.read("n").expect("a value"), 3.0);
 }
+
+/// Where a ratio leaps or a cam has a corner bodies meet as in an impact without restitution: what each keeps changes by
+/// what the new ratios let through, `Nᵀ (X⁺ - X⁻) = 0`, in every form.
+#[test]
+fn ratios_that_leap_keep_momentum() {
+    let lever = |when: &str| {
+        format!(
+            "model Lever\n1:a -> I:one(1, f0 = 2)\nstate th' = a.f from -1\n\
+             a -> TF:lever(m = if {when} then 1/0.3 else 1/0.1) -> 1:b -> I:two(0.5)\n"
+        )
+    };
+    let cam = "model Cam\n1:a -> I:one(1, f0 = 2)\n1:b -> I:two(0.5)\nstate th' = a.f from -1\nstate x' = b.f\n\
+               constraint contact: x = 0.3*max(th, 0)\n";
+    // Two speeds in the ratio r from then on: one.f = (p one + r p two)/(1 + 0.5 r^2) with what they kept before.
+    let after = |ratio: f64, kept: f64| (2.0 + ratio * kept) / (1.0 + 0.5 * ratio * ratio);
+    let forms = [Form::Minimal, Form::Kane, Form::Break, Form::Lagrange];
+    for (text, ratio, kept, forms) in [
+        (lever("t > 0.5"), 1.0 / 0.3, 10.0, &forms[..]),
+        (lever("th > 0"), 1.0 / 0.3, 10.0, &forms[..]),
+        (cam.to_string(), 0.3, 0.0, &forms[..2]),
+    ] {
+        for &form in forms {
+            let trace = trace(&text, &Run { form, ..exact(1.0) });
+            let last = |name: &str| *column(&trace, name).last().expect("samples");
+            let wanted = after(ratio, kept);
+            assert!((last("one.f") / wanted - 1.0).abs() < 1e-9, "{form:?} {}: {wanted}\n{text}", last("one.f"));
+            assert!((last("two.f") / (ratio * wanted) - 1.0).abs() < 1e-9, "{form:?} {}\n{text}", last("two.f"));
+        }
+    }
+}

@@ -3,6 +3,7 @@
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::node::{Comparison, Expr, Function, Node, Parts, Symbol};
 use super::rational::Rational;
+use super::table::Interpolation;
 use rustc_hash::FxHashMap;
 use smallvec::smallvec;
 use std::collections::BTreeMap;
@@ -105,6 +106,18 @@ impl Exprs {
                 let root = self.is_number(n).is_some_and(|n| n.signum() > 0 && *n < Rational::from(1));
                 root && !self.nonzero(base)
             }
+            _ => false,
+        })
+    }
+
+    /// Whether the expression may leap while what it reads moves steadily, as `if x > 0 then 1 else 2` does.
+    pub fn may_leap(&self, e: Expr) -> bool {
+        let table = |table| self.table1d(table).interpolation();
+        self.below(&[e], &|_| true).into_iter().any(|part| match *self.node(part) {
+            Node::Select(..) | Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => true,
+            Node::Call(function, _) => matches!(function, Function::Sign | Function::Floor | Function::Mod),
+            Node::Table(of, _) => table(of) == Interpolation::Step,
+            Node::TableSlope(of, _) => table(of) != Interpolation::Cubic,
             _ => false,
         })
     }

@@ -4,6 +4,14 @@ use super::{BondGraph, Clause, Kind, ResistorLaw, Storage, StorageLaw, Trigger};
 use crate::algebra::Expr;
 
 impl BondGraph {
+    /// Whether a ratio of the graph may leap: a modulus with a condition, a constraint with a corner.
+    pub fn has_leaping_ratios(&self) -> bool {
+        self.elements.values().any(|element| match element.kind {
+            Kind::Transformer { modulus, .. } | Kind::Gyrator { modulus, .. } => self.exprs.may_leap(modulus),
+            _ => false,
+        })
+    }
+
     /// The expressions of laws, signals, named values, constraints and guesses.
     pub(super) fn expressions(&self) -> Vec<Expr> {
         let mut all: Vec<Expr> = self.elements.values().flat_map(|e| e.kind.expressions()).collect();

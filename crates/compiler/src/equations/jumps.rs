@@ -1,4 +1,4 @@
-//! What storages do at an event. An impulse acts for no time, so that whatever is finite takes no part in it: what
+//! What storages do at an event, and where a ratio leaps. An impulse acts for no time, so that whatever is finite takes no part in it: what
 //! storages keep changes by what the junction structure lets through, `Nᵀ ΔX = Nᵀ P` with `N = [1; S]` as it is after
 //! the event, and `P` the impulse that a reset takes. Source: `method.md`, 5.3, over an instant.
 
@@ -9,6 +9,7 @@ use crate::algebra::{Expr, ONE, Symbol};
 use crate::bond_graph::{Action, BondGraph, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
+use crate::span::Span;
 
 /// How storages change at events.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +20,8 @@ pub struct Jumps {
     pub balances: Vec<Vec<(usize, Expr)>>,
     /// The impulses that resets take.
     pub impulses: Vec<Impulse>,
+    /// Whether a factor may leap by itself: a ratio that depends on a condition, a constraint with a corner.
+    pub leaps: bool,
 }
 
 /// The impulse of a reset.
@@ -48,7 +51,8 @@ impl Assembled<'_> {
         let actions = || graph.clauses.iter().flat_map(|c| &c.actions);
         let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);
-        if reset.is_none() && (!depend || actions().next().is_none()) {
+        let acts = actions().next().is_some();
+        if reset.is_none() && !(depend && (acts || graph.has_leaping_ratios())) {
             return Ok(None);
         }
         if let (Form::Stiff, true) = (form, depend) {
@@ -67,6 +71,10 @@ impl Assembled<'_> {
                 balance.extend(row.coefficient(*z).map(|factor| (k, factor)));
             }
         }
+        let leaps = balances.iter().flatten().any(|t| self.d.x.may_leap(t.1));
+        if !(acts || leaps) {
+            return Ok(None);
+        }
         let mut impulses: Vec<Impulse> = Vec::new();
         for action in actions() {
             let Some(symbol) = action.impulse.filter(|s| impulses.iter().all(|i| i.symbol != *s)) else { continue };
@@ -83,7 +91,7 @@ impl Assembled<'_> {
             impulses.push(Impulse { symbol, along });
         }
         let stored = ports.iter().map(|p| p.stored).collect();
-        Ok(Some(Jumps { stored, balances, impulses }))
+        Ok(Some(Jumps { stored, balances, impulses, leaps }))
     }
 
     /// What an impulse moves that acts on an effort or flow between storages.
@@ -144,12 +152,14 @@ fn springs(action: &Action) -> Diagnostics {
 
 /// Refuses events that read what has no value.
 pub(super) fn readable(d: &mut Definitions, jumps: Option<&Jumps>) -> Result<(), Diagnostics> {
-    if let Some((jumps, clause)) = jumps.zip(d.graph.clauses.first()) {
+    if let Some(jumps) = jumps {
         let factors = jumps.balances.iter().flatten().chain(jumps.impulses.iter().flat_map(|i| &i.along));
         let mut read: Vec<Expr> = factors.map(|t| t.1).collect();
         read.extend(jumps.stored.iter().map(|&s| d.x.sym(s)));
         if let Some(reason) = read.into_iter().find_map(|e| observed::value_of(d, e).err()) {
-            return Err(unreadable(&clause.name, clause.span, &reason));
+            let clause = d.graph.clauses.first().map(|c| (c.name.as_str(), c.span));
+            let (name, span) = clause.unwrap_or(("a ratio that depends on a condition", Span::default()));
+            return Err(unreadable(name, span, &reason));
         }
     }
     for clause in &d.graph.clauses {
@@ -163,7 +173,7 @@ pub(super) fn readable(d: &mut Definitions, jumps: Option<&Jumps>) -> Result<(),
     Ok(())
 }
 
-fn unreadable(name: &str, span: crate::span::Span, reason: &Unavailable) -> Diagnostics {
+fn unreadable(name: &str, span: Span, reason: &Unavailable) -> Diagnostics {
     Diagnostic::error(codes::E003, format!("`{name}` reads what has no value"), span, reason.to_string())
         .hint("read states, or variables that follow from them")
         .into()

@@ -78,6 +78,8 @@ pub struct Jumps {
     pub unknowns: Vec<u32>,
     /// The impulses `P`.
     pub impulses: Vec<Impulse>,
+    /// Whether factors may leap where a condition changes, without a clause.
+    pub leaps: bool,
 }
 
 /// The impulse of a reset.
@@ -160,7 +162,7 @@ pub(super) fn jumps(lower: &mut Lowering, equations: &Equations) -> Option<Jumps
         Impulse { held, along: row(&i.along) }
     };
     let impulses = jumps.impulses.iter().map(impulse).collect();
-    Some(Jumps { stored, balances, unknowns: Vec::new(), impulses })
+    Some(Jumps { stored, balances, unknowns: Vec::new(), impulses, leaps: jumps.leaps })
 }
 
 /// The same with the states and constants by which storages tell what they keep.

@@ -291,7 +291,9 @@ impl Schedule<'_> {
         let at_start = Dependence::new(flow, count, (first_position, &positions), &wanted);
         let dependence = Dependence::new(flow, count, (first_position, &[]), &rates);
         let becomes = clauses.iter().filter(|c| matches!(c.trigger, Trigger::Becomes(_))).map(|c| c.trigger.value());
-        let integrated = rates.iter().copied().chain(held.iter().map(|h| h.source)).chain(becomes).collect();
+        let leaps = jumps.iter().filter(|jumps| jumps.leaps).flat_map(events::Jumps::values);
+        let sources = held.iter().map(|h| h.source);
+        let integrated = rates.iter().copied().chain(sources).chain(becomes).chain(leaps).collect();
         let program = Program {
             name: graph.name.clone(),
             kept: kept(flow, equations, &momenta),

@@ -56,6 +56,8 @@ flags! {
     locates
     /// Balances of impulses.
     impulses
+    /// Ratios that may leap where a condition changes.
+    leaps
     /// Resets that take impulses.
     resets
     /// Constraints on displacements that events may break.

@@ -168,12 +168,11 @@ fn of_events(list: &mut List, plan: &Plan) {
 
 fn of_clauses(list: &mut List, plan: &Plan) {
     let (p, events) = (plan.program, &plan.events);
-    if p.clauses.is_empty() {
-        return;
+    if !p.clauses.is_empty() {
+        list.arrays(Kind::Clause, &["clauses"], p.clauses.len(), "what happens at events");
+        list.some(Kind::Real, &["becomes"], events.conditional.len(), "their conditions");
+        list.arrays(Kind::Real, &["new_values"], events.actions(), "what they change");
     }
-    list.arrays(Kind::Clause, &["clauses"], p.clauses.len(), "what happens at events");
-    list.some(Kind::Real, &["becomes"], events.conditional.len(), "their conditions");
-    list.arrays(Kind::Real, &["new_values"], events.actions(), "what they change");
     if plan.locates() {
         list.one(Kind::Int, &["handled"], "whether an event has been handled at the present time");
         list.arrays(Kind::Real, &["seen"], 3 * plan.sizes.indicators, "the last values of indicators in a step");

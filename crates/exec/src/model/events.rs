@@ -1,6 +1,7 @@
 //! Events of a model: what is held between them, and what happens where one is handled.
 
 use super::clause_memory::ClauseMemory;
+use super::impulses::ImpulseBalance;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
@@ -124,7 +125,12 @@ impl Model {
         if let Some(failure) = self.broken().filter(|_| !self.run.begun) {
             return Err(failure);
         }
-        let sums = if self.run.begun { self.sums(t, x)? } else { Vec::new() };
+        let leaps = self.code.impulses.as_ref().is_some_and(ImpulseBalance::leaps);
+        let sums = if self.run.begun && !leaps { self.sums(t, x)? } else { Vec::new() };
+        if self.run.begun && leaps {
+            self.events.fired.fill(false);
+            self.take_stored(t, x)?;
+        }
         self.run.crossed = t;
         self.rated = None;
         let inputs = &self.setup.inputs;
@@ -139,11 +145,15 @@ impl Model {
             self.take_signs(t, x)?;
             self.begin_clauses(t, x)?;
         } else {
-            self.conserve_sums(t, x, &sums)?;
+            let conserve = |model: &mut Model, x: &mut [f64]| match leaps {
+                true => model.balance_leaps(t, x),
+                false => model.conserve_sums(t, x, &sums),
+            };
+            conserve(self, x)?;
             self.take_samples(t, x)?;
-            self.conserve_sums(t, x, &sums)?;
+            conserve(self, x)?;
             self.take_signs(t, x)?;
-            if self.conserve_sums(t, x, &sums)? {
+            if conserve(self, x)? {
                 self.take_signs(t, x)?;
             }
             self.find_fired(t, x, told)?;

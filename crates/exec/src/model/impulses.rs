@@ -68,6 +68,11 @@ impl ImpulseBalance {
         &self.all
     }
 
+    /// Whether what storages keep may leap where a condition changes.
+    pub fn leaps(&self) -> bool {
+        self.jumps.leaps
+    }
+
     fn unknowns(&self) -> usize {
         self.jumps.unknowns.len()
     }
@@ -123,21 +128,32 @@ impl Model {
         Ok(())
     }
 
-    /// Newton on the unknowns and the impulses.
+    /// Gives states and conserved constants the values after ratios have leapt; whether any has changed.
+    pub(super) fn balance_leaps(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
+        let code = self.code.clone();
+        let Some(balance) = &code.impulses else { return Ok(false) };
+        let mut work = std::mem::take(&mut self.events.impulses);
+        work.asked.clear();
+        let done = self.solve_balance(t, x, balance, &mut work);
+        self.events.impulses = work;
+        done
+    }
+
+    /// Newton on the unknowns and the impulses; whether any unknown has changed.
     fn solve_balance(
         &mut self,
         t: f64,
         x: &mut [f64],
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
-    ) -> Result<(), Failure> {
+    ) -> Result<bool, Failure> {
         let (n, m) = (balance.unknowns(), balance.unknowns() + work.asked.len());
         work.impulses.clear();
         work.impulses.resize(work.asked.len(), 0.0);
         if m == 0 {
-            return Ok(());
+            return Ok(false);
         }
-        let (mut last, mut met) = (f64::INFINITY, false);
+        let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
             met = work.equations.residual.iter().all(|r| *r == 0.0);
@@ -151,6 +167,7 @@ impl Model {
             }
             let step = &work.equations.step;
             let mut length = 0.0f64;
+            changed = true;
             for (&u, s) in balance.jumps.unknowns.iter().zip(step) {
                 let value = self.unknown_mut(x, u);
                 length = length.max(s.abs() / value.abs().max(s.abs()).max(f64::MIN_POSITIVE));
@@ -166,7 +183,7 @@ impl Model {
         self.balanced(t, x, balance, work)?;
         let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
         match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
-            true => Ok(()),
+            true => Ok(changed),
             false => Err(self.unmet_resets(t)),
         }
     }

@@ -61,7 +61,7 @@ impl Plan<'_> {
         }
         put(filling.fragments(include_str!("../runtime/held.c")));
         put(filling.fragments(include_str!("../runtime/system.c")));
-        if !self.program.clauses.is_empty() {
+        if !self.program.clauses.is_empty() || self.program.jumps.is_some() {
             put(filling.fragments(include_str!("../runtime/events.c")));
         }
         put(filling.fragments(include_str!("../runtime/cross.c")));
@@ -118,6 +118,7 @@ impl Plan<'_> {
             locates: self.locates(),
             impulses: p.jumps.is_some(),
             resets: !self.events.moved.is_empty(),
+            leaps: p.jumps.as_ref().is_some_and(|jumps| jumps.leaps),
             constraints: !self.events.positions.is_empty(),
             discretes: !self.discretes.is_empty(),
             held,

@@ -83,7 +83,10 @@ impl Plan<'_> {
         let looks = 2 + curves * (2 * 4000 + 4 * 2200);
         let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
         let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
-        let jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
+        let mut jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
+        if self.program.jumps.as_ref().is_some_and(|jumps| jumps.leaps) {
+            jump = jump + w.round.clone() * 3 + w.switching.clone();
+        }
         // A round takes the sides of conditions anew.
         let round = if self.program.clauses.is_empty() {
             OperationCount::default()

@@ -6,9 +6,20 @@ int $model_cross($model *m, double t, $real *x)
 //if clauses
     const int first = !m->begun;
 //end
+//if leaps
+    const int leaps = m->begun;
+//end
 //if assumptions
     if (m->broken) {
         return $ha_fail(m, $MODEL_STRUCTURE, m->broken - 1, ((double)NAN));
+    }
+//end
+//if leaps
+    if (leaps) {
+        status = $ha_take_stored(m, t, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
     }
 //end
     m->crossed = t;
@@ -31,6 +42,12 @@ int $model_cross($model *m, double t, $real *x)
 //if clocks
     $ha_clock_cross(m, t);
 //end
+//if leaps
+    status = leaps ? $ha_balance_leaps(m, t, x) : $MODEL_OK;
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
 //if held
     if (!m->begun) {
         status = $ha_begin_held(m, t, x);
@@ -43,6 +60,12 @@ int $model_cross($model *m, double t, $real *x)
         return status;
     }
 //end
+//if leaps
+    status = leaps ? $ha_balance_leaps(m, t, x) : $MODEL_OK;
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
     m->begun = 1;
     m->cross_due = 0;
 //if switches
@@ -50,6 +73,15 @@ int $model_cross($model *m, double t, $real *x)
     if (status != $MODEL_OK) {
         return status;
     }
+//if leaps
+    status = leaps ? $ha_balance_leaps(m, t, x) : $MODEL_OK;
+    if (status == $MODEL_OK && leaps) {
+        status = $ha_take_sides(m, t, x);
+    }
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
 //end
 //if clauses
     status = first ? $ha_begin_clauses(m, t, x) : $ha_find_fired(m, t, x);

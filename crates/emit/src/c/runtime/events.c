@@ -233,6 +233,7 @@ static int ha_refuse_conflicts(ha_model *m, double t)
 /* The first action of the round that resets something; if there is none, one more than there are. */
 static int ha_reset_of_round(const ha_model *m)
 {
+//if clauses
     int i;
     int a;
     for (i = 0; i < $CLAUSES; ++i) {
@@ -242,6 +243,9 @@ static int ha_reset_of_round(const ha_model *m)
             }
         }
     }
+//else
+    (void)m;
+//end
     return $ACTIONS;
 }
 
@@ -616,6 +620,47 @@ static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
     return $MODEL_OK;
 }
 
+//if leaps
+//item ha_take_stored
+/* What storages keep before a condition changes, with the inputs of before. */
+static int ha_take_stored(ha_model *m, double t, const $real *x)
+{
+    int status;
+    int i;
+    for (i = 0; i < HA_NU; ++i) {
+        const $real now = m->u[i];
+        m->u[i] = m->u_crossed[i];
+        m->u_crossed[i] = now;
+    }
+//if held
+    $ha_place(m, t);
+//end
+    status = $ha_stored_code(m, t, x, m->stored);
+    for (i = 0; i < HA_NU; ++i) {
+        const $real before = m->u[i];
+        m->u[i] = m->u_crossed[i];
+        m->u_crossed[i] = before;
+    }
+    return status;
+}
+
+//item ha_balance_leaps
+/* What storages keep after ratios have leapt. */
+static int ha_balance_leaps(ha_model *m, double t, $real *x)
+{
+//if clauses
+    int i;
+    for (i = 0; i < $CLAUSES; ++i) {
+        m->clauses[i].fired = 0;
+    }
+//end
+//if resets
+    m->asked = 0;
+//end
+    return $ha_balance_impulses(m, t, x, 0);
+}
+
+//end
 //end
 //if constraints
 //item ha_position_misses

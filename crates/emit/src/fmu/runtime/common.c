@@ -330,6 +330,10 @@ static int ha_event(ha_fmu *f, double *next)
     f->moved = 0;
 //end
     if (!f->s.fresh) {
+//if leaps
+        /* Inputs move on their own between events. */
+        memcpy(f->s.m.u_crossed, f->s.m.u, sizeof f->s.m.u_crossed);
+//end
         if ($model_cross(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_failed(f);
         }
