@@ -104,7 +104,7 @@ fn c_does_at_events_what_a_run_by_steps_does() {
         "when_order",
         "when_relay",
         "when_springs",
-        "leaping_ratio",
+        "unsteady_ratio",
     ];
     let all: Vec<Exported> = names
         .iter()
@@ -249,7 +249,7 @@ fn c_is_clean() {
             "when_relay",
             "when_sampled",
             "when_springs",
-            "leaping_ratio",
+            "unsteady_ratio",
         ])
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
         .collect();

@@ -327,3 +327,28 @@ fn no_step_leaps_into_another_motion() {
         }
     }
 }
+
+/// Where a source says how fast the crank turns no state depends on the positions behind it: they are followed all the same,
+/// in steps short enough to see them.
+#[test]
+fn what_a_motor_of_given_speed_drives_stays_in_its_motion() {
+    let flat = "model P\nSf:motor(6) -> 1:a\nstate th1' = a.f from 0.7\nstate th2' = b.f\nstate ph' = bar.f\n\
+        1:b -> I:I2(0.01)\n1:bar -> I:Ib(0.02)\nguess th2 = 0.7\n\
+        constraint x: 0.2*cos(th1) + 0.5*cos(ph) = 0.5 + 0.2*cos(th2)\n\
+        constraint y: 0.2*sin(th1) + 0.5*sin(ph) = 0.2*sin(th2)\n";
+    let rod = "model R\nSf:motor(10) -> 1:w\nstate th1' = w.f from 0.3\nstate x' = slide.f\n1:slide -> I:sl(0.5)\n\
+        guess x = 0.4\nconstraint rod: (x - 0.2*cos(th1))^2 + (0.2*sin(th1))^2 = 0.04\n";
+    for (method, rtol) in
+        [(Method::Explicit, 1e-6), (Method::Explicit, 1e-9), (Method::Radau, 1e-4), (Method::Bdf, 1e-6)]
+    {
+        let every = Run { to: 3.0, method, rtol, every: Some(0.0371), ..Run::default() };
+        let done = run(flat, &every);
+        for (th1, th2) in column(&done, "th1").iter().zip(column(&done, "th2")) {
+            assert!((th1 - th2).abs() < 1e-10, "{method:?} {rtol:e}: {th1} {th2}");
+        }
+        let done = run(rod, &every);
+        for (th1, x) in column(&done, "th1").iter().zip(column(&done, "x")) {
+            assert!((x - 0.4 * th1.cos()).abs() < 1e-10, "{method:?} {rtol:e}: {th1} {x}");
+        }
+    }
+}

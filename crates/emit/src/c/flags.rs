@@ -35,8 +35,10 @@ flags! {
     positions
     /// Such as are sought while running.
     sought_positions
-    /// Those whose motion is followed.
+    /// Those whose motion is followed: that rates read, that only outputs do.
     moving_positions
+    rates_motion
+    shown_motion
     tables
     conditions
     sign_conditions

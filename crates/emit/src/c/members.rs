@@ -210,8 +210,8 @@ fn of_blocks(list: &mut List, plan: &Plan) {
             list.arrays(Kind::Wide, &["motion_time", "motion_passed"], plan.newton.len(), "since when, and before");
             list.one(Kind::Wide, &["sought_at"], "the time for which they are sought");
         }
-        let moving: usize = plan.motion_blocks.iter().map(|&b| plan.program.blocks[b].size()).sum();
-        list.some(Kind::Real, &["moves"], moving, "their rates");
+        let [of_rates, of_shown] = plan.motion_sizes();
+        list.some(Kind::Real, &["moves"], of_rates.max(of_shown), "their rates");
     }
     if s.factored > 0 {
         list.arrays(Kind::Real, &["factors"], s.factors, "of matrices of parameters alone");

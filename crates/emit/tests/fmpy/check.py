@@ -53,7 +53,7 @@ MODELS = [
     (HERE.parent / "models/when_sampled.bond", 1e-4),
     (HERE.parent / "models/when_beam.bond", 1e-5),
     (HERE.parent / "models/when_four_bar.bond", 1e-5),
-    (HERE.parent / "models/leaping_ratio.bond", 1e-5),
+    (HERE.parent / "models/unsteady_ratio.bond", 1e-5),
     (ROOT / "models/when_bouncing_ball/model.bond", 1e-5),
     (ROOT / "models/when_rimless_wheel/model.bond", 1e-5),
 ]

@@ -9,7 +9,7 @@ use super::jumps::ConservedSums;
 use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{ConditionId, EventTrigger, JacobianEntry, Program, Value};
+use halfarrow_compiler::program::{BlockId, ConditionId, EventTrigger, JacobianEntry, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -148,7 +148,7 @@ pub(super) struct Mode {
     pub impulses: Option<ImpulseBalance>,
     /// Constraints that events may break.
     pub positions: Option<PositionConstraints>,
-    /// How computed positions move.
+    /// How the computed positions move that rates read.
     pub motion: Option<Motion>,
     /// Variables that could be independent in place of others, where some could.
     pub exchanges: Option<Ratios>,
@@ -159,14 +159,14 @@ impl Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let of_states = rates;
-        let rates = layout.guarded_routine(&program, &of_states);
+        let rates = layout.guarded_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
         let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);
-        let motion = Motion::of(&program, &layout, &layout.routine(&program, &of_states));
+        let read: Vec<BlockId> = rates.solves.iter().map(|solve| solve.block).collect();
+        let motion = Motion::of(&program, &layout, &read);
         Mode {
             preamble: layout.preamble(&program),
             assumed: layout.routine(&program, &assumed),

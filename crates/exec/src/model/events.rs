@@ -2,6 +2,7 @@
 
 use super::clause_memory::ClauseMemory;
 use super::impulses::ImpulseBalance;
+use super::positions::Motion;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
@@ -18,21 +19,23 @@ impl Model {
             self.rated = None;
             let blocks = self.code.rates.solves.iter().map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
-            self.follow_motion(t, x)?;
+            let code = self.code.clone();
+            self.follow_motion(t, x, code.motion.as_ref())?;
         }
         if !self.recorded.blocks.is_empty() {
             self.place(t, x);
             self.evaluate(What::Recorded, false, t)?;
             let blocks = self.recorded.blocks.iter();
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
+            let recorded = self.recorded.clone();
+            self.follow_motion(t, x, recorded.motion.as_ref())?;
         }
         Ok(())
     }
 
     /// Notes how computed positions move at `(t, x)`.
-    fn follow_motion(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        let code = self.code.clone();
-        let Some(motion) = &code.motion else { return Ok(()) };
+    fn follow_motion(&mut self, t: f64, x: &[f64], motion: Option<&Motion>) -> Result<(), Failure> {
+        let Some(motion) = motion else { return Ok(()) };
         motion.blocks.iter().for_each(|(block, _)| self.frame.solvers[block.0 as usize].newton.arrive(t));
         self.place(t, x);
         self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
@@ -213,7 +216,19 @@ impl Events for Model {
     }
 
     fn try_end(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if self.code.motion.is_some() { self.rates_at(t, x) } else { Ok(()) }
+        if self.code.motion.is_some() {
+            self.rates_at(t, x)?;
+        }
+        let recorded = self.recorded.clone();
+        let Some(motion) = &recorded.motion else { return Ok(()) };
+        self.place(t, x);
+        self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))
+    }
+
+    fn longest_step(&self) -> f64 {
+        let idle = self.code.motion.iter().chain(&self.recorded.motion).flat_map(|motion| &motion.idle);
+        let longest = idle.map(|block| self.frame.solvers[block.0 as usize].newton.longest_way());
+        longest.fold(f64::INFINITY, f64::min)
     }
 
     fn locates_crossings(&self) -> bool {

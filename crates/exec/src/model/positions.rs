@@ -43,19 +43,24 @@ impl PositionConstraints {
     }
 }
 
-/// How the computed positions move that rates read: from step to step they are sought where that leads.
+/// How computed positions move: from step to step they are sought where that leads.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     /// The blocks whose unknowns they are, and where their rates stand among the outputs.
     pub blocks: Vec<(BlockId, Range<usize>)>,
     pub rates: Routine,
+    /// The blocks whose positions move no state.
+    pub idle: Vec<BlockId>,
 }
 
 impl Motion {
-    /// `None` where there are none whose rates are known.
-    pub fn of(program: &Program, layout: &Layout, of_rates: &Routine) -> Option<Motion> {
-        let read: Vec<BlockId> = of_rates.solves.iter().map(|solve| solve.block).collect();
-        let moving = program.motion_blocks(&read);
+    /// Of these blocks; `None` where there are none whose rates are known.
+    pub fn of(program: &Program, layout: &Layout, blocks: &[BlockId]) -> Option<Motion> {
+        let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
+        let rates = program.routine(&rates);
+        let moves = |block: &BlockId| rates.code.solves().any(|solve| solve.block == *block);
+        let idle = blocks.iter().filter(|block| !moves(block)).copied().collect();
+        let moving = program.motion_blocks(blocks);
         let rates = program.rates_of_positions(&moving);
         let mut next = 0;
         let places = moving.into_iter().map(|id| {
@@ -64,7 +69,7 @@ impl Motion {
             (id, first..next)
         });
         let blocks = places.collect();
-        (!rates.is_empty()).then(|| Motion { blocks, rates: layout.routine(program, &rates) })
+        (!rates.is_empty()).then(|| Motion { blocks, rates: layout.routine(program, &rates), idle })
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a run records, and the code for it.
 
 use super::compiled::Mode;
+use super::positions::Motion;
 use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
 use halfarrow_compiler::bond_graph::HeldKind;
@@ -18,6 +19,8 @@ pub(super) struct Recorded {
     pub batches: Option<Arc<BlockBatches>>,
     /// Newton blocks that it needs and no rate does.
     pub blocks: Vec<BlockId>,
+    /// How the positions among their unknowns move.
+    pub motion: Option<Motion>,
 }
 
 impl Recorded {
@@ -27,9 +30,10 @@ impl Recorded {
         let routine = mode.layout.guarded_routine(&mode.program, &wanted);
         let of_rates = |block: &BlockId| mode.rates.solves.iter().any(|s| s.block == *block);
         let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
-        let blocks = newton.filter(|block| !of_rates(block)).collect();
+        let blocks: Vec<BlockId> = newton.filter(|block| !of_rates(block)).collect();
+        let motion = Motion::of(&mode.program, &mode.layout, &blocks);
         let batches = BlockBatches::of(&mode.program, &mode.layout, &routine).map(Arc::new);
-        Recorded { chosen, routine, batches, blocks }
+        Recorded { chosen, routine, batches, blocks, motion }
     }
 
     /// What is recorded where nothing is asked for.
@@ -96,6 +100,7 @@ impl Model {
 
     pub(super) fn reserve_recorded(&mut self) {
         self.frame.reserve(&self.recorded.routine);
+        self.recorded.motion.iter().for_each(|motion| self.frame.reserve(&motion.rates));
         for batches in [&self.code.batches, &self.recorded.batches].into_iter().flatten() {
             self.frame.reserve_batches(batches);
         }

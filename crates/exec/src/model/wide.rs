@@ -67,11 +67,11 @@ impl WideModel {
 
     /// Puts time, inputs, held signals, constants and states where routines read them.
     fn place(&mut self, t: &Wide, x: &[Wide]) {
-        let WideModel { models, frame, code, .. } = self;
+        let WideModel { models, frame, code, recorded, .. } = self;
         let (states, time) = (code.layout.states as usize, code.layout.time as usize);
         frame.r[states..].iter_mut().zip(x).for_each(|(r, x)| *r = Vector(*x));
         frame.r[time] = Vector(*t);
-        if code.motion.is_some() {
+        if code.motion.is_some() || recorded.motion.is_some() {
             // Positions are sought where their motion leads until then.
             models.iter_mut().zip(t).for_each(|(model, &t)| model.frame.r[time] = t);
         }

@@ -172,7 +172,9 @@ impl<'a> Run<'a> {
 
     /// One step, with what happens at its end.
     fn step<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<StopReason, Failure> {
-        let end = match stepper.step(self.time, self.next_sample(), stop.time, point) {
+        let longest = if S::DENSE { stepper.events().longest_step() } else { f64::INFINITY };
+        let latest = f64::min(stop.time, self.time + longest);
+        let end = match stepper.step(self.time, self.next_sample(), latest, point) {
             Ok(end) => end,
             Err(_) if self.exchange(&mut *stepper.events(), point, true)? => return Ok(StopReason::Exchange),
             Err(failure) => return Err(failure),

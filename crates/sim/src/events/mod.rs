@@ -95,6 +95,12 @@ pub trait Events {
         Ok(())
     }
 
+    /// The longest step with dense output from where the run stands that lets all be seen that moves, in s: what moves no
+    /// state has no error that makes steps short.
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// The step that ends at `(t, point)` is accepted, or the run starts there: Newton starting points and delay buffers,
     /// which belong to the model's memory, move on. Times never decrease from call to call.
     ///

@@ -58,6 +58,8 @@ pub(super) struct Plan<'a> {
     shown_blocks: Vec<BlockId>,
     /// Newton blocks of positions whose motion is followed.
     pub(super) motion_blocks: Vec<BlockId>,
+    /// How many of them, the first ones, rates read.
+    motion_of_rates: usize,
     /// What the sizes of arrays in the model are.
     pub sizes: Sizes,
     passes: Vec<Pass>,
@@ -123,6 +125,7 @@ impl<'a> Plan<'a> {
             rates_blocks: Vec::new(),
             shown_blocks: Vec::new(),
             motion_blocks: Vec::new(),
+            motion_of_rates: 0,
             sizes: Sizes::default(),
             passes: Vec::new(),
             groups: Vec::new(),
@@ -148,7 +151,9 @@ impl<'a> Plan<'a> {
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
         self.shown_blocks = numbers(&routines.observe);
-        self.motion_blocks = program.motion_blocks(&self.rates_blocks);
+        let [of_rates, of_shown] = [&self.rates_blocks, &self.shown_blocks].map(|among| program.motion_blocks(among));
+        self.motion_of_rates = of_rates.len();
+        self.motion_blocks = [of_rates, of_shown].concat();
         self.shown_blocks.retain(|block| !self.rates_blocks.contains(block));
 
         let mut functions = vec![
@@ -165,6 +170,7 @@ impl<'a> Plan<'a> {
         functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
         functions.extend(plain(&mut writer, "ha_motion_code", &routines.motion));
+        functions.extend(plain(&mut writer, "ha_shown_motion_code", &routines.shown_motion));
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
         functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
         functions.extend(plain(&mut writer, "ha_becomes_code", &routines.becomes));

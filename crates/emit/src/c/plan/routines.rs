@@ -10,8 +10,9 @@ use super::Plan;
 pub(super) struct Routines {
     pub preamble: Routine,
     pub rates: Routine,
-    /// Of positions that these read.
+    /// Of positions that these read, and of those that only outputs do.
     pub motion: Routine,
+    pub shown_motion: Routine,
     pub observe: Routine,
     pub switching: Routine,
     pub clock: Routine,
@@ -48,7 +49,10 @@ impl Routines {
         let becomes: Vec<Value> = events.conditional.iter().map(|&c| p.clauses[c].trigger.value()).collect();
         let balanced = p.jumps.iter().flat_map(Jumps::values).chain(events.moved.iter().copied());
         let guarded = p.guarded_routine(&rates);
+        let observe = p.guarded_routine(&shown.collect::<Vec<_>>());
         let read: Vec<BlockId> = newton_of(&guarded.code).map(|solve| solve.block).collect();
+        let shown_blocks = newton_of(&observe.code).map(|solve| solve.block);
+        let shown_alone: Vec<BlockId> = shown_blocks.filter(|block| !read.contains(block)).collect();
         Routines {
             becomes: p.routine(&becomes),
             clauses: p.clauses.iter().map(values).collect(),
@@ -57,8 +61,9 @@ impl Routines {
             positions: p.routine(&events.constraints(p).map(|c| c.residual).collect::<Vec<_>>()),
             preamble: p.preamble(&p.determined(&[])),
             motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&read))),
+            shown_motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&shown_alone))),
             rates: guarded,
-            observe: p.guarded_routine(&shown.collect::<Vec<_>>()),
+            observe,
             switching: p.routine(&operands(&plan.switches)),
             clock: p.routine(&operands(&plan.clocks)),
             sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
@@ -68,10 +73,22 @@ impl Routines {
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
-        let Routines { preamble, rates, motion, observe, switching, clock, sources, domains, .. } = self;
+        let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, .. } = self;
         let all = [
-            preamble, rates, motion, observe, switching, clock, sources, domains, becomes, stored, impulses, positions,
+            preamble,
+            rates,
+            motion,
+            shown_motion,
+            observe,
+            switching,
+            clock,
+            sources,
+            domains,
+            becomes,
+            stored,
+            impulses,
+            positions,
         ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }

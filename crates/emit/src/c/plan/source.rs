@@ -104,6 +104,8 @@ impl Plan<'_> {
             positions: !p.positions.is_empty(),
             sought_positions: !self.sought_positions().is_empty(),
             moving_positions: !self.motion_blocks.is_empty(),
+            rates_motion: self.motion_of_rates > 0,
+            shown_motion: self.motion_blocks.len() > self.motion_of_rates,
             tables: !p.tables.is_empty(),
             conditions: !p.conditions.is_empty(),
             sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),

@@ -81,7 +81,9 @@ impl Plan<'_> {
             ("MOTION_BLOCKS", join(block_numbers(&self.motion_blocks))),
             ("MOTION_BLOCK_COUNT", self.motion_blocks.len().to_string()),
             ("MOTION_ORIGINS", join(self.motion_blocks.iter().map(|b| b.0.to_string()).collect())),
-            ("MOTION_COUNT", self.motion_blocks.iter().map(|&b| program.blocks[b].size()).sum::<usize>().to_string()),
+            ("MOTION_OF_RATES", self.motion_of_rates.to_string()),
+            ("MOTION_COUNT", self.motion_sizes()[0].to_string()),
+            ("SHOWN_MOTION_COUNT", self.motion_sizes()[1].to_string()),
             ("DISTANCES", real.numbers(&distances)),
             ("DOMAINS", program.domains.len().to_string()),
             ("MEMORY", self.sizes.memory.to_string()),
@@ -183,6 +185,12 @@ impl Plan<'_> {
             let rates = if self.has_positions(id) { 2 * block.size() } else { 0 };
             2 * (block.size() + reads + block.matrix().values.pattern().len()) + rates
         })
+    }
+
+    /// How many rates of positions are computed for rates, and for outputs alone.
+    pub(in crate::c) fn motion_sizes(&self) -> [usize; 2] {
+        let (of_rates, of_shown) = self.motion_blocks.split_at(self.motion_of_rates);
+        [of_rates, of_shown].map(|blocks| blocks.iter().map(|&b| self.program.blocks[b].size()).sum())
     }
 
     /// Whether the unknowns of a block are positions that constraints determine.

@@ -181,7 +181,7 @@ int $model_cross($model *m, double t, $real *x);
 
 /* The run has come to (t, x): solutions and delays go on from there. */
 int $model_accept($model *m, double t, const $real *x);
-//if moving_positions
+//if rates_motion
 
 /* Rates have just been asked for at (t, x), by one who may not tell of every step: positions are followed from there. */
 int $model_follow($model *m, double t, const $real *x);

@@ -40,11 +40,17 @@ static int ha_try(ha_model *m, double t)
             status = $ha_fail(m, $MODEL_STATE_NOT_FINITE, i, t);
         }
     }
-//if moving_positions
-    return status == $MODEL_OK ? $model_rates(m, t, m->trial, m->dx) : status;
-//else
-    return status;
+//if rates_motion
+    if (status == $MODEL_OK) {
+        status = $model_rates(m, t, m->trial, m->dx);
+    }
 //end
+//if shown_motion
+    if (status == $MODEL_OK) {
+        status = $ha_run(m, $ha_shown_motion_code, t, m->trial, m->moves, $SHOWN_MOTION_COUNT);
+    }
+//end
+    return status;
 }
 
 //item ha_reach

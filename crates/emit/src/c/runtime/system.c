@@ -442,23 +442,23 @@ static int ha_take_samples(ha_model *m, double t, const $real *x)
 //end
 //if moving_positions
 //item ha_note_motion
-/* Notes how positions move at (t, x), where they have been accepted. */
-static int ha_note_motion(ha_model *m, double t, const $real *x)
+/* Notes how the positions of some blocks move at (t, x), where they have been accepted, by code that computes so many rates. */
+static int ha_note_motion(ha_model *m, double t, const $real *x, ha_code code, int first, int last, int count)
 {
     static const int blocks[] = {$MOTION_BLOCKS};
     const $real *rates = m->moves;
     int status;
     int b;
     int i;
-    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+    for (b = first; b < last; ++b) {
         m->motion_passed[blocks[b]] = t - m->motion_time[blocks[b]];
         m->motion_time[blocks[b]] = t;
     }
-    status = $ha_run(m, $ha_motion_code, t, x, m->moves, $MOTION_COUNT);
+    status = $ha_run(m, code, t, x, m->moves, count);
     if (status != $MODEL_OK) {
         return status;
     }
-    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+    for (b = first; b < last; ++b) {
         const int number = blocks[b];
         const ha_newton w = $ha_newton_of(m, number);
         const $real passed = $narrow(m->motion_passed[number]);
@@ -503,8 +503,8 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
         for (i = 0; i < $RATES_BLOCK_COUNT; ++i) {
             $ha_newton_accept(m, blocks[i]);
         }
-//if moving_positions
-        status = $ha_note_motion(m, t, x);
+//if rates_motion
+        status = $ha_note_motion(m, t, x, $ha_motion_code, 0, $MOTION_OF_RATES, $MOTION_COUNT);
         if (status != $MODEL_OK) {
             return status;
         }
@@ -522,6 +522,9 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
         for (i = 0; i < $SHOWN_BLOCK_COUNT; ++i) {
             $ha_newton_accept(m, blocks[i]);
         }
+//if shown_motion
+        status = $ha_note_motion(m, t, x, $ha_shown_motion_code, $MOTION_OF_RATES, $MOTION_BLOCK_COUNT, $SHOWN_MOTION_COUNT);
+//end
     }
 //end
     return status;
@@ -603,7 +606,7 @@ double $model_next_jump($model *m, double t)
     return next;
 }
 
-//if moving_positions
+//if rates_motion
 //always
 /* An importer may not tell of every step: positions are followed from each point at which it asks for rates, which have just
  * been found. */
@@ -616,7 +619,7 @@ int $model_follow($model *m, double t, const $real *x)
     if (status != $MODEL_OK) {
         return status;
     }
-    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+    for (b = 0; b < $MOTION_OF_RATES; ++b) {
         static const int origins[] = {$MOTION_ORIGINS};
         const int number = blocks[b];
         const ha_newton w = $ha_newton_of(m, number);
@@ -627,7 +630,7 @@ int $model_follow($model *m, double t, const $real *x)
         rates += w.n;
     }
     rates = m->moves;
-    for (b = 0; b < $MOTION_BLOCK_COUNT; ++b) {
+    for (b = 0; b < $MOTION_OF_RATES; ++b) {
         const int number = blocks[b];
         const ha_newton w = $ha_newton_of(m, number);
         $ha_newton_accept(m, number);

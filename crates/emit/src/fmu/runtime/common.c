@@ -179,7 +179,7 @@ static int ha_rates(ha_fmu *f)
         if ($model_rates(&f->s.m, f->s.m.t, f->s.m.x, f->s.dx) != $MODEL_OK) {
             return ha_without_value(f);
         }
-//if moving_positions
+//if rates_motion
         if (f->exchange && f->s.mode == HA_CONTINUOUS && $model_follow(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_without_value(f);
         }

@@ -12,6 +12,8 @@ use crate::bytecode::instruction::Solve;
 
 /// The way of positions is short if along it the Jacobian changes by at most this part: no other motion is near.
 const SHORT: f64 = 0.5;
+/// Or the way is not much against the size of the positions (1 at most), or leads to where they are expected.
+const FEW: f64 = 0.25;
 /// Elsewhere, how near positions are to where they are expected, by their distance from where the Jacobian is singular.
 const STRAYED: f64 = 0.25;
 /// The way is at most so many times that distance: nearer, motions are not told apart.
@@ -20,6 +22,8 @@ const NEAREST: f64 = 50.0;
 const CLOSE_TO_SINGULAR: f64 = 1e-7;
 /// A position counts with its own size, or this one.
 const LEAST_SIZE: f64 = 0.05;
+/// Part of their size by which positions move in a step at most that move no state: no error of one makes steps short there.
+const LOOKED_AT: f64 = 0.03;
 /// Part of their size by which rates may change over a way that is not short.
 const TURNED: f64 = 0.25;
 
@@ -67,7 +71,9 @@ impl Frame {
             let size = newton.x.iter().fold(LEAST_SIZE, |most, x| most.max(x.abs()));
             let (way, strayed) = (between(&newton.x, &newton.previous), between(&newton.x, &newton.expected));
             let change = self.change_on_way(solve);
-            let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way;
+            // A whole turn would end at the same Jacobian.
+            let no_turn = way <= FEW * size.min(1.0) || strayed <= 0.5 * way;
+            let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way && no_turn;
             let newton = self.newton_of(solve);
             newton.short = short;
             // From where the Jacobian is singular.
@@ -118,6 +124,19 @@ impl Newton {
         for (i, expected) in expected.iter_mut().enumerate() {
             *expected = previous[i] + gone * (motion.rates[i] + 0.5 * gone * motion.bends[i]);
         }
+    }
+
+    /// The time in which positions move by a small part of their size, as they move at the previous solution.
+    pub fn longest_way(&self) -> f64 {
+        let Motion { known, rates, bends, .. } = &self.motion;
+        if !known {
+            return f64::INFINITY;
+        }
+        let longest = |((x, rate), bend): ((&f64, &f64), &f64)| {
+            let way = LOOKED_AT * x.abs().clamp(LEAST_SIZE, 1.0);
+            f64::min(way / rate.abs(), (2.0 * way / bend.abs()).sqrt())
+        };
+        self.previous.iter().zip(rates).zip(bends).map(longest).fold(f64::INFINITY, f64::min)
     }
 
     /// The previous solution, positions, is that at `t`; rates follow.

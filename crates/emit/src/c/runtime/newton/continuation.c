@@ -362,7 +362,9 @@ static int ha_follow_motion(ha_model *m, ha_newton *w, int number)
     way = $ha_between(w->x, w->previous, w->n);
     strayed = $ha_between(w->x, w->expected, w->n);
     change = $ha_change_on_way(w);
-    m->motion_short[number] = way <= $CLOSE_TO_ROUNDING * size || change <= $0.5 * way;
+    /* A whole turn would end at the same Jacobian. */
+    m->motion_short[number] = way <= $CLOSE_TO_ROUNDING * size
+        || (change <= $0.5 * way && (way <= $0.25 * (size < $1.0 ? size : $1.0) || strayed <= $0.5 * way));
     if (m->motion_short[number]) {
         return 1;
     }
