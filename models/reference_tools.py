@@ -155,10 +155,10 @@ def agree(one, other, digits=22):
         assert worst <= size * mpf(10) ** -digits, f"differ by {nstr(worst / size, 3)} of {nstr(size, 3)}"
 
 
-def write(program, times, columns, source, inputs=None):
+def write(program, times, columns, source, inputs=None, tolerance=1e-9):
     """Writes reference.json beside the program. `columns`: recorded name -> one value a time."""
     data = {"t": list(times), "values": {name: [decimal(v) for v in values] for name, values in columns.items()},
-            "tolerance": 1e-9, "source": source}
+            "tolerance": tolerance, "source": source}
     if inputs:
         data["inputs"] = inputs
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(program).with_name("reference.json")

@@ -34,7 +34,7 @@ def rates(t, s):
 
 
 theta = asin(mpf("0.3") / l)
-start = [theta, (mpf("6.5") - amplitude * omega) / (l * cos(theta)), mpf(0)]
+start = [theta, (mpf(1) - amplitude * omega) / (l * cos(theta)), mpf(0)]
 states = twice(rates, start, times, "0.02")
 found = [motion(mpf(t), s) for t, s in zip(times, states)]
 
@@ -47,7 +47,7 @@ first = energy(*motion(mpf(0), start)[:2])
 assert all(abs(energy(x, u) - first - s[2]) < mpf("1e-20") for (x, u, _), s in zip(found, states))
 force = [m * (a[1] + g) / (2 * x[1]) for x, _, a in found]
 assert all(abs(m * a[0] - 2 * (x[0] - base(mpf(t))[0]) * f) < mpf("1e-30") for t, (x, _, a), f in zip(times, found, force))
-assert states[-1][0] > 7, "it turns over"
+assert all(abs(s[0]) < 1.2 for s in states)
 columns = {"rod.e": force}
 for place, (x, mass) in enumerate([("x", "mx"), ("y", "my")]):
     columns[x] = [f[0][place] for f in found]
