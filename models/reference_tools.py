@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from mpmath import expm, matrix, mp, mpf, nstr
+from mpmath import atan2, cos, expm, matrix, mp, mpf, nstr, sin, sqrt
 
 mp.dps = 40
 
@@ -56,6 +56,97 @@ def linear(a, x, times):
     return [list(expm(a * mpf(t), method="taylor") * x) for t in times]
 
 
+class Jet:
+    """A function of one variable at a point: its value, first and second derivative."""
+
+    def __init__(self, value, first=0, second=0):
+        self.value, self.first, self.second = mpf(value), mpf(first), mpf(second)
+
+    def through(self, value, first, second):
+        """f of this, from f and its derivatives at the value."""
+        return Jet(value, first * self.first, second * self.first**2 + first * self.second)
+
+    def __add__(self, other):
+        other = jet(other)
+        return Jet(self.value + other.value, self.first + other.first, self.second + other.second)
+
+    def __mul__(self, other):
+        other = jet(other)
+        second = self.second * other.value + 2 * self.first * other.first + self.value * other.second
+        return Jet(self.value * other.value, self.first * other.value + self.value * other.first, second)
+
+    def __neg__(self):
+        return self * -1
+
+    def __sub__(self, other):
+        return self + jet(other) * -1
+
+    def __rsub__(self, other):
+        return jet(other) - self
+
+    def __truediv__(self, other):
+        v = jet(other).value
+        return self * jet(other).through(1 / v, -1 / v**2, 2 / v**3)
+
+    def __rtruediv__(self, other):
+        return jet(other) / self
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def sin(self):
+        s, c = sin(self.value), cos(self.value)
+        return self.through(s, c, -s)
+
+    def cos(self):
+        s, c = sin(self.value), cos(self.value)
+        return self.through(c, -s, -c)
+
+    def sqrt(self):
+        r = sqrt(self.value)
+        return self.through(r, 1 / (2 * r), -1 / (4 * r**3))
+
+
+def jet(value):
+    return value if isinstance(value, Jet) else Jet(value)
+
+
+def angle(y, x, near):
+    """The angle of (x, y) as a Jet, of its values 2 pi apart the one nearest to `near`."""
+    turn = 2 * mp.pi
+    value = atan2(y.value, x.value)
+    value += turn * mp.nint((near - value) / turn)
+    square = x.value**2 + y.value**2
+    first = (x.value * y.first - y.value * x.first) / square
+    second = (x.value * y.second - y.value * x.second) / square
+    return Jet(value, first, second - 2 * first * (x.value * x.first + y.value * y.first) / square)
+
+
+def meet(x1, y1, r1, x2, y2, r2, side):
+    """Where two circles meet: of both points the one to the left (side = 1) or right (-1) of the way between the centres."""
+    dx, dy = x2 - x1, y2 - y1
+    square = dx * dx + dy * dy
+    part = (square + r1**2 - r2**2) / (2 * square)
+    high = (jet(r1**2) / square - part * part).sqrt() * side
+    return x1 + part * dx - high * dy, y1 + part * dy + high * dx
+
+
+def one_freedom(coordinates, inertias, energy, force=0):
+    """Acceleration of a machine with one degree of freedom at speed w, by Lagrange: M a + M' w²/2 + V' = force.
+
+    `coordinates`: Jets in the angle that tells its position; `energy`: V, a Jet. Returns a function of w."""
+    mass = sum(m * q.first**2 for q, m in zip(coordinates, inertias))
+    slope = sum(m * q.first * q.second for q, m in zip(coordinates, inertias))
+    return lambda w: (force - jet(energy).first - slope * w**2) / mass
+
+
+def rate(q, w):
+    return q.first * w
+
+
+def acceleration(q, w, a):
+    return q.second * w**2 + q.first * a
+
+
 def agree(one, other, digits=22):
     """Stops the program unless two tables of states agree to `digits` of each column's largest magnitude."""
     for a, b in zip(zip(*one), zip(*other)):
@@ -64,10 +155,10 @@ def agree(one, other, digits=22):
         assert worst <= size * mpf(10) ** -digits, f"differ by {nstr(worst / size, 3)} of {nstr(size, 3)}"
 
 
-def write(program, times, columns, source, inputs=None):
+def write(program, times, columns, source, inputs=None, tolerance=1e-9):
     """Writes reference.json beside the program. `columns`: recorded name -> one value a time."""
     data = {"t": list(times), "values": {name: [decimal(v) for v in values] for name, values in columns.items()},
-            "tolerance": 1e-9, "source": source}
+            "tolerance": tolerance, "source": source}
     if inputs:
         data["inputs"] = inputs
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(program).with_name("reference.json")

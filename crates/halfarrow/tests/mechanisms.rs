@@ -352,3 +352,149 @@ fn what_a_motor_of_given_speed_drives_stays_in_its_motion() {
         }
     }
 }
+
+/// A model of `models/`, run with everything recorded.
+fn run_of(name: &str, run: &Run) -> Simulated {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(name).join("model.bond");
+    let run = Run { record: Record::All, ..run.clone() };
+    let model = Model::load(&path, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+/// A line that is straight and a curve of the sixth degree, whatever the tolerance of the motion along them.
+#[test]
+fn linkages_draw_their_curves() {
+    for rtol in [1e-4, 1e-8] {
+        let wanted = Run { to: 20.0, rtol, every: Some(0.01), ..Run::default() };
+        let line = run_of("peaucellier", &wanted);
+        let (x, y) = (column(&line, "xq"), column(&line, "yq"));
+        assert!(greatest(y) > 0.2, "it moves");
+        let bend = x.iter().map(|x| (x - 0.8625).abs()).fold(0.0, f64::max);
+        assert!(bend < 1e-14, "{rtol}: {bend}");
+        // Q is the inverse of P, so that it stands on the ray through P.
+        for (y, theta) in y.iter().zip(column(&line, "theta")) {
+            assert!((y - 0.8625 * (0.5 * theta).tan()).abs() < 1e-13, "{rtol}: {y} {theta}");
+        }
+        let eight = run_of("watt_linkage", &wanted);
+        let middle = greatest(column(&eight, "y"));
+        assert!(middle > 0.1, "it moves: {middle}");
+        let miss = greatest(column(&eight, "sextic"));
+        assert!(miss < 1e-16, "{rtol}: {miss}");
+    }
+}
+
+/// A crank-rocker of Grashof: the crank turns over, the rocker swings.
+const CRANK_ROCKER: &str = "model CrankRocker
+param a = 0.2 m, b = 0.5 m, c = 0.4 m, d = 0.55 m
+state th1' = crank.f from 0.6 rad
+state th2' = coupler.f
+state th3' = rocker.f
+guess th2 = 0.6 rad, th3 = 1.5 rad
+1:crank -> I:I1(0.05 kg.m2, f0 = 20)
+1:coupler -> I:I2(0.002 kg.m2)
+1:rocker -> I:I3(0.01 kg.m2)
+constraint along: a*cos(th1) + b*cos(th2) = d + c*cos(th3)
+constraint across: a*sin(th1) + b*sin(th2) = c*sin(th3)
+output E = 0.025*crank.f^2 + 0.001*coupler.f^2 + 0.005*rocker.f^2 : J
+";
+
+/// Angles of coupler and rocker from that of the crank: the joint between them is where two circles meet.
+fn crank_rocker(th1: f64) -> (f64, f64) {
+    let (a, b, c, d) = (0.2, 0.5, 0.4, 0.55);
+    let (x, y) = (a * th1.cos(), a * th1.sin());
+    let (dx, dy) = (d - x, -y);
+    let square = dx * dx + dy * dy;
+    let part = (square + b * b - c * c) / (2.0 * square);
+    let high = (b * b / square - part * part).sqrt();
+    let (jx, jy) = (x + part * dx - high * dy, y + part * dy + high * dx);
+    ((jy - y).atan2(jx - x), jy.atan2(jx - d))
+}
+
+/// A thousand turns under a torque with drag, and a thousand free ones: positions stay those of the crank, energy its own.
+#[test]
+fn a_crank_rocker_turns_a_thousand_times() {
+    let driven = format!("{CRANK_ROCKER}Se:motor(0.4) -> crank\ncrank -> R:drag(0.02)\n");
+    for (text, rtol, free) in [(driven, 1e-8, false), (CRANK_ROCKER.to_string(), 1e-12, true)] {
+        let done = run(&text, &Run { to: 330.0, rtol, every: Some(0.1571), ..Run::default() });
+        assert!(last(&done, "th1") > 1000.0 * std::f64::consts::TAU, "{}", last(&done, "th1"));
+        assert_eq!(done.report.exchanges, 0);
+        let mut worst = 0.0f64;
+        for (k, th1) in column(&done, "th1").iter().enumerate() {
+            let (th2, th3) = crank_rocker(*th1);
+            worst = worst.max((column(&done, "th2")[k] - th2).abs()).max((column(&done, "th3")[k] - th3).abs());
+        }
+        assert!(worst < 1e-10, "{worst}");
+        if free {
+            let energy = column(&done, "E");
+            let drift = energy.iter().map(|e| (e / energy[0] - 1.0).abs()).fold(0.0, f64::max);
+            assert!(drift < 1e-9, "{drift}");
+        }
+    }
+}
+
+/// A sleigh on one edge behind its centre of mass, after Chaplygin: it swings round until it runs straight. The speed along
+/// the edge is a hyperbolic tangent, the turning a hyperbolic secant, the angle a Gudermannian.
+#[test]
+fn a_sleigh_on_one_edge_turns_round() {
+    let (m, j, l, phi0, s0, w0) = (2.0f64, 0.3f64, 0.4f64, 0.3f64, -0.6f64, 1.5f64);
+    let text = format!(
+        "model Sleigh\nparam m = {m}, j = {j}, l = {l}\nstate phi' = w.f from {phi0}\nstate x' = u.f\nstate y' = v.f\n\
+         1:w -> I:turn(j, f0 = {w0})\n1:u -> I:Iu(m, f0 = {})\n1:v -> I:Iv(m)\n\
+         constraint edge: v.f*cos(phi) - u.f*sin(phi) = l*w.f\n",
+        s0 * phi0.cos() - l * w0 * phi0.sin()
+    );
+    let about = j + m * l * l;
+    let speed = (s0 * s0 + about / m * w0 * w0).sqrt();
+    let rate = l * m * speed / about;
+    let begin = (s0 / speed).atanh();
+    let gudermann = |z: f64| 2.0 * (0.5 * z).tanh().atan();
+    for (method, rtol, error) in
+        [(Method::Explicit, 1e-12, 1e-10), (Method::Bdf, 1e-10, 1e-7), (Method::Radau, 1e-10, 1e-8)]
+    {
+        let done = run(&text, &Run { to: 6.0, method, rtol, every: Some(0.05), ..Run::default() });
+        for (k, t) in done.trace.times.iter().enumerate() {
+            let z = rate * t + begin;
+            let turning = speed * (m / about).sqrt() / z.cosh();
+            let phi = phi0 + (about / m).sqrt() / l * (gudermann(z) - gudermann(begin));
+            let along = column(&done, "u.f")[k] * phi.cos() + column(&done, "v.f")[k] * phi.sin();
+            let found = [column(&done, "w.f")[k] - turning, column(&done, "phi")[k] - phi, along - speed * z.tanh()];
+            assert!(greatest(&found) < error, "{method:?} {t}: {found:?}");
+        }
+    }
+}
+
+/// A disc that rolls upright in the plane draws a circle, and its contact carries what turns the motion.
+#[test]
+fn a_disc_rolls_in_a_circle() {
+    let (r, phi0, turn, spin) = (0.25f64, 0.3f64, 0.7f64, 9.0f64);
+    let text = "model Disc\nparam m = 2, j = 0.3, k = 0.1, r = 0.25\nstate phi' = turn.f from 0.3\nstate x' = u.f\n\
+        state y' = v.f\n1:turn -> I:upright(k, f0 = 0.7)\n1:spin -> I:wheel(j, f0 = 9)\n1:u -> I:Iu(m)\n1:v -> I:Iv(m)\n\
+        constraint along: u.f = r*cos(phi)*spin.f\nconstraint across: v.f = r*sin(phi)*spin.f\n";
+    let done = run(text, &Run { to: 20.0, rtol: 1e-11, every: Some(0.1), ..Run::default() });
+    let radius = r * spin / turn;
+    for (k, t) in done.trace.times.iter().enumerate() {
+        let phi = phi0 + turn * t;
+        let found = [
+            column(&done, "x")[k] - radius * (phi.sin() - phi0.sin()),
+            column(&done, "y")[k] - radius * (phi0.cos() - phi.cos()),
+            column(&done, "spin.f")[k] - spin,
+            column(&done, "along.e")[k] + 2.0 * r * spin * turn * phi.sin(),
+            column(&done, "across.e")[k] - 2.0 * r * spin * turn * phi.cos(),
+        ];
+        assert!(greatest(&found) < 1e-9, "{t}: {found:?}");
+    }
+}
+
+/// A scissor lift of many stages has one degree of freedom, and each stage adds the same work to a step.
+#[test]
+fn the_work_of_a_scissor_lift_grows_with_its_stages() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/scissors/model.bond");
+    let counted = [1, 5, 10, 20].map(|n| {
+        let size = halfarrow::Override { name: "n".into(), value: n.to_string() };
+        let model = Model::load(&path, &[size]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        let compiled = model.compile(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        compiled.operations()
+    });
+    let stage = |k: usize, from: usize, more: usize| (counted[k] - counted[from]) as f64 / more as f64;
+    assert!(stage(3, 2, 10) < 1.05 * stage(2, 1, 5), "{counted:?}");
+}
