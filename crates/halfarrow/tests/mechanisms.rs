@@ -355,7 +355,7 @@ fn what_a_motor_of_given_speed_drives_stays_in_its_motion() {
 
 /// A model of `models/`, run with everything recorded.
 fn run_of(name: &str, run: &Run) -> Simulated {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(name).join("model.bond");
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages").join(name).join("model.bond");
     let run = Run { record: Record::All, ..run.clone() };
     let model = Model::load(&path, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
     model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
@@ -488,7 +488,7 @@ fn a_disc_rolls_in_a_circle() {
 /// A scissor lift of many stages has one degree of freedom, and each stage adds the same work to a step.
 #[test]
 fn the_work_of_a_scissor_lift_grows_with_its_stages() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/scissors/model.bond");
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages/scissors/model.bond");
     let counted = [1, 5, 10, 20].map(|n| {
         let size = halfarrow::Override { name: "n".into(), value: n.to_string() };
         let model = Model::load(&path, &[size]).unwrap_or_else(|e| panic!("{}", e.render(false)));
@@ -497,4 +497,33 @@ fn the_work_of_a_scissor_lift_grows_with_its_stages() {
     });
     let stage = |k: usize, from: usize, more: usize| (counted[k] - counted[from]) as f64 / more as f64;
     assert!(stage(3, 2, 10) < 1.05 * stage(2, 1, 5), "{counted:?}");
+}
+
+/// Linkages against their references, which know closed forms of positions and Lagrange's equation alone.
+#[test]
+fn linkages_meet_their_references() {
+    let names = ["double_pendulum_points", "moving_base", "peaucellier", "scissors", "seven_body", "watt_linkage"];
+    for name in names {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages").join(name);
+        let text = std::fs::read_to_string(folder.join("reference.json")).expect("a reference");
+        let reference: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let numbers = |list: &serde_json::Value| -> Vec<f64> {
+            let all = list.as_array().expect("a list").iter();
+            all.map(|v| v.as_str().and_then(|v| v.parse().ok()).expect("a number")).collect()
+        };
+        let times = numbers(&reference["t"]);
+        let tolerance = reference["tolerance"].as_f64().expect("a number");
+        // All times are multiples of it.
+        let (to, every) = (times[times.len() - 1], times[0].min(0.1));
+        let done = run_of(name, &Run { to, rtol: 1e-12, every: Some(every), ..Run::default() });
+        for (variable, wanted) in reference["values"].as_object().expect("variables") {
+            let (values, wanted) = (column(&done, variable), numbers(wanted));
+            let size = wanted.iter().fold(0.0f64, |most, v| most.max(v.abs())).max(1e-6);
+            for (t, wanted) in times.iter().zip(&wanted) {
+                let k = (t / every).round() as usize;
+                let off = (values[k] - wanted).abs();
+                assert!(off <= tolerance * size, "{name}: {variable} at {t} s is {}, not {wanted}", values[k]);
+            }
+        }
+    }
 }
