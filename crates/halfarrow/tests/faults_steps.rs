@@ -97,7 +97,7 @@ fn a_double_zero_of_time_is_no_jump() {
 }
 
 /// On every model, by every method of variable step: a decade of tolerance takes about as many more steps as the one
-/// before, down to 1e-12, and hardly fewer than a looser one.
+/// before, down to 1e-12, and never fewer than a looser one.
 #[test]
 fn work_follows_the_tolerance() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
@@ -109,8 +109,6 @@ fn work_follows_the_tolerance() {
     assert!(faults.is_empty(), "{} of {}:\n{}", faults.len(), 3 * models.len(), faults.join("\n"));
 }
 
-/// Part of the steps of a looser tolerance that a tighter one takes at least: at 1e-12 rounding has its say.
-const LEAST: f64 = 0.9;
 /// Steps below which the start and jumps decide.
 const FEW: usize = 60;
 
@@ -143,7 +141,7 @@ fn work_faults(folder: &Path) -> Vec<String> {
             let bend = pair[1] / pair[0];
             steps < FEW || (0.6..1.6).contains(&bend)
         });
-        let sound = growth.iter().zip(&steps).all(|(growth, &steps)| (LEAST..2.2).contains(growth) || steps < FEW);
+        let sound = growth.iter().zip(&steps).all(|(growth, &steps)| (0.98..2.2).contains(growth) || steps < FEW);
         if !straight || !sound || steps.contains(&0) {
             faults.push(format!("{} {method:?}: {steps:?}", folder.file_name().expect("a name").to_string_lossy()));
         }

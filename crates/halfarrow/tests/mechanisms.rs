@@ -181,8 +181,9 @@ fn a_parallelogram_passes_its_flat_positions() {
         let inertia = 0.01 * f64::from(cranks);
         let one = format!("model One\nstate th1' = c1.f from 0.7\n1:c1 -> I:I1({inertia}, f0 = 3)\n{driven}");
         let wanted = run(&one, &exact);
-        // Where positions nearly vanish their rates are rounding beside a tighter tolerance of the multistep method.
-        for (method, rtol, error) in [(Method::Explicit, 1e-11, 1e-7), (Method::Bdf, 1e-9, 1e-5)] {
+        // Of a third crank the rates are rounding where its angle vanishes, beside a tighter tolerance of the multistep method.
+        let multistep = if cranks == 3 { (Method::Bdf, 1e-9, 1e-5) } else { (Method::Bdf, 1e-11, 1e-6) };
+        for (method, rtol, error) in [(Method::Explicit, 1e-11, 1e-7), multistep] {
             let done = run(&text, &Run { method, rtol, ..exact.clone() });
             for (k, wanted) in column(&wanted, "th1").iter().enumerate() {
                 for crank in ["th1", "th2", "th3"].into_iter().take(cranks as usize) {

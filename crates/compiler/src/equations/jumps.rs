@@ -1,6 +1,6 @@
-//! What storages do at an event, and where a ratio leaps. An impulse acts for no time, so that whatever is finite takes no part in it: what
-//! storages keep changes by what the junction structure lets through, `Nᵀ ΔX = Nᵀ P` with `N = [1; S]` as it is after
-//! the event, and `P` the impulse that a reset takes. Source: `method.md`, 5.3, over an instant.
+//! What storages do at an event, and where a ratio leaps. An impulse acts for no time, so that whatever is finite takes
+//! no part in it: what storages keep changes by what the junction structure lets through, `Nᵀ ΔX = Nᵀ P` with
+//! `N = [1; S]` as it is after the event, and `P` the impulse that a reset takes. Source: `method.md`, 5.3, over an instant.
 
 use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, rows_of};

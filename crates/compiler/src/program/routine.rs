@@ -187,6 +187,9 @@ impl Program {
 
     /// Blocks whose unknowns are positions with rates that have values, of those given.
     pub fn motion_blocks(&self, among: &[BlockId]) -> Vec<BlockId> {
+        if self.positions.is_empty() {
+            return Vec::new();
+        }
         let moves = |id: &BlockId| {
             let with_rate = self.positions.iter().filter(|p| p.block == *id && p.rate.is_some());
             with_rate.count() == self.blocks[*id].size()

@@ -56,20 +56,21 @@ pub(super) struct Motion {
 impl Motion {
     /// Of these blocks; `None` where there are none whose rates are known.
     pub fn of(program: &Program, layout: &Layout, blocks: &[BlockId]) -> Option<Motion> {
-        let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
-        let rates = program.routine(&rates);
-        let moves = |block: &BlockId| rates.code.solves().any(|solve| solve.block == *block);
-        let idle = blocks.iter().filter(|block| !moves(block)).copied().collect();
-        let moving = program.motion_blocks(blocks);
-        let rates = program.rates_of_positions(&moving);
+        let followed = program.motion_blocks(blocks);
+        if followed.is_empty() {
+            return None;
+        }
+        let of_states = program.routine(&program.states.iter().map(|s| s.rate).collect::<Vec<Value>>());
+        let moves = |block: &BlockId| of_states.code.solves().any(|solve| solve.block == *block);
+        let idle = followed.iter().filter(|block| !moves(block)).copied().collect();
+        let rates = layout.routine(program, &program.rates_of_positions(&followed));
         let mut next = 0;
-        let places = moving.into_iter().map(|id| {
+        let places = followed.into_iter().map(|id| {
             let first = next;
             next += program.blocks[id].size();
             (id, first..next)
         });
-        let blocks = places.collect();
-        (!rates.is_empty()).then(|| Motion { blocks, rates: layout.routine(program, &rates), idle })
+        Some(Motion { blocks: places.collect(), rates, idle })
     }
 }
 
