@@ -56,7 +56,7 @@ impl<'a> Builder<'a, '_> {
         let read: Vec<Option<Action>> = written.ast.actions.iter().map(|a| self.action(&cx, a, impulses)).collect();
         let actions: Vec<Action> = read.into_iter().collect::<Option<_>>()?;
         self.refuse_twice(&actions);
-        Some(Clause { name, trigger: trigger?, actions, span: written.span })
+        Some(Clause { name, trigger: trigger?, actions, bound: None, span: written.span })
     }
 
     /// A condition that can become true as time goes on.

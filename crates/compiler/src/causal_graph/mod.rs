@@ -11,6 +11,7 @@ mod digits;
 mod drawn;
 mod local;
 mod matched;
+mod modes;
 mod ports;
 mod rank;
 mod repeated;
@@ -29,6 +30,7 @@ use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
 use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
+pub use modes::in_first_mode;
 pub use contradiction::warnings;
 pub(crate) use digits::magnitude_of_slope;
 pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};

@@ -16,6 +16,8 @@ use crate::span::Span;
 pub struct Jumps {
     /// What storages keep, port by port.
     pub stored: Vec<Symbol>,
+    /// The variables of the bond graph that these are.
+    pub storages: Vec<Symbol>,
     /// For each independent variable what follows it: places in `stored` with a factor.
     pub balances: Vec<Vec<(usize, Expr)>>,
     /// The impulses that resets take.
@@ -52,7 +54,8 @@ impl Assembled<'_> {
         let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);
         let acts = actions().next().is_some();
-        if reset.is_none() && !(depend && (acts || graph.has_leaping_ratios())) {
+        let switches = !graph.set_valued.is_empty();
+        if reset.is_none() && !switches && !(depend && (acts || graph.has_leaping_ratios())) {
             return Ok(None);
         }
         if let (Form::Stiff, true) = (form, depend) {
@@ -72,7 +75,7 @@ impl Assembled<'_> {
             }
         }
         let leaps = balances.iter().flatten().any(|t| self.d.x.may_leap(t.1));
-        if !(acts || leaps) {
+        if !(acts || leaps || switches) {
             return Ok(None);
         }
         let mut impulses: Vec<Impulse> = Vec::new();
@@ -90,8 +93,9 @@ impl Assembled<'_> {
             }
             impulses.push(Impulse { symbol, along });
         }
-        let stored = ports.iter().map(|p| p.stored).collect();
-        Ok(Some(Jumps { stored, balances, impulses, leaps }))
+        let stored: Vec<Symbol> = ports.iter().map(|p| p.stored).collect();
+        let storages = stored.iter().map(|&s| self.d.x.untwinned(s)).collect();
+        Ok(Some(Jumps { stored, storages, balances, impulses, leaps }))
     }
 
     /// What an impulse moves that acts on an effort or flow between storages.

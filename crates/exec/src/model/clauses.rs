@@ -8,7 +8,7 @@ use super::compiled::Mode;
 use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Layout, Routine};
+use crate::bytecode::{Hold, Layout, Routine};
 use halfarrow_compiler::program::{Program, Target, Trigger, Value};
 use halfarrow_sim::{Affected, Failure};
 
@@ -153,15 +153,26 @@ impl Model {
             return Ok(becoming);
         }
         self.place(t, x);
-        let held = std::mem::replace(&mut self.frame.conditions.state, crate::bytecode::Hold::Follow);
+        let true_now = self.truth_of_clauses(t, Hold::Follow)?;
+        for &clause in &code.clauses.conditional {
+            let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
+            becoming[clause] = true_now[clause] && !condition.holds;
+        }
+        Ok(becoming)
+    }
+
+    /// Which conditions of clauses are true at what is placed.
+    pub(super) fn truth_of_clauses(&mut self, t: f64, hold: Hold) -> Result<Vec<bool>, Failure> {
+        let code = self.code.clone();
+        let held = std::mem::replace(&mut self.frame.conditions.state, hold);
         let run = self.frame.run(&code.clauses.becomes);
         self.frame.conditions.state = held;
         run.map_err(|error| self.failure(t, error))?;
+        let mut truth = vec![false; code.program.clauses.len()];
         for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
-            let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
-            becoming[clause] = self.frame.r[register as usize] != 0.0 && !condition.holds;
+            truth[clause] = self.frame.r[register as usize] != 0.0;
         }
-        Ok(becoming)
+        Ok(truth)
     }
 
     /// Lets happen what has been found to happen, and what follows from that at the same instant.

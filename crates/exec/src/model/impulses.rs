@@ -89,6 +89,18 @@ impl ImpulseBalance {
     }
 }
 
+impl ImpulseWork {
+    /// What storages kept when that was noted last, in the order of [`Jumps::storages`].
+    pub fn stored(&self) -> &[f64] {
+        &self.stored
+    }
+
+    /// Notes it.
+    pub fn keep_stored(&mut self, stored: &[f64]) {
+        self.stored.copy_from_slice(stored);
+    }
+}
+
 impl Model {
     /// Keeps in mind what storages keep.
     pub(super) fn take_stored(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
