@@ -14,6 +14,8 @@ struct Part<'v, 'a> {
     column: Option<&'a [f64]>,
     terms: Vec<Term>,
     what: &'static str,
+    /// Whether it vanishes; else it is not negative.
+    vanishes: bool,
 }
 
 /// A branch: its law, its margins, and the conditions that end it.
@@ -69,7 +71,8 @@ impl<'v, 'a> Held<'v, 'a> {
             return worst;
         }
         for margin in &self.margins {
-            let miss = margin.at(k).min(0.0);
+            let miss = margin.at(k);
+            let miss = if margin.vanishes { miss } else { miss.min(0.0) };
             let found = (relative(margin, miss), miss, margin);
             worst = if found.0 > worst.0 { found } else { worst };
         }
@@ -105,6 +108,7 @@ fn held<'v, 'a>(
             column: Some(column.ok_or_else(|| missing(flow))?),
             terms: vec![Term::of(scales.of_bond(bond, flow), 1.0)],
             what: if flow { "its flow" } else { "its effort" },
+            vanishes: true,
         })
     };
     let number = |expr: Expr, what: &'static str| -> Result<Part<'v, 'a>, String> {
@@ -115,11 +119,11 @@ fn held<'v, 'a>(
         let found = (0..values.times.len()).filter_map(|k| reader.values(k, None));
         let greatest = found.map(|v| v[0].abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
         terms.push(Term::of(Quantity::Number, greatest));
-        Ok(Part { reader, column: None, terms, what })
+        Ok(Part { reader, column: None, terms, what, vanishes: false })
     };
     let own = match &branch.kind {
         Kind::EffortSource { value } => of_column(*value, false)?,
-        Kind::FlowSource { value } => of_column(*value, true)?,
+        Kind::FlowSource { value } | Kind::ZeroCompliance { flow: value } => of_column(*value, true)?,
         Kind::Resistor(laws) => match laws[..] {
             [ResistorLaw::Implicit(expr)] => number(expr, "its law")?,
             _ => return Err("what it is".to_string()),
@@ -127,6 +131,9 @@ fn held<'v, 'a>(
         _ => return Err("what it is".to_string()),
     };
     let (mut margins, mut commands) = (Vec::new(), Vec::new());
+    if let (Kind::ZeroCompliance { .. }, Some(constraint)) = (&branch.kind, &law.constraint) {
+        margins.push(Part { vanishes: true, ..number(constraint.expr, "its gap")? });
+    }
     for bound in &branch.bounds {
         match bound.kind {
             BoundKind::Margin(margin) => margins.push(number(margin, "what is never negative")?),

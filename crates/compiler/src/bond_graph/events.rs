@@ -111,6 +111,11 @@ impl<'a> Builder<'a, '_> {
         Some(Action { name, target: symbol, value: value.expr, impulse, span: action.span })
     }
 
+    /// The variable that tells the impulse of a law.
+    pub(super) fn impulse_of(&mut self, name: &str, target: Symbol, span: Span) -> Symbol {
+        self.impulse(name, target, span, &mut BTreeMap::new())
+    }
+
     /// The variable that tells the impulse of a reset: `ball.impulse` of `ball.f` and `ball.p`.
     fn impulse(&mut self, name: &str, target: Symbol, span: Span, impulses: &mut BTreeMap<String, Symbol>) -> Symbol {
         let own = name.rsplit_once('.').map_or(name, |(own, _)| own);

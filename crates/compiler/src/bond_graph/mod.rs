@@ -53,7 +53,7 @@ pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
-pub use set_valued::{Bound, BoundKind, Branch, SetValuedLaw};
+pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};
 pub use verify::verify;
 pub use warnings::warnings;
 

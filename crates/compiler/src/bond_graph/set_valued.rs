@@ -3,8 +3,8 @@
 
 use super::builder::Builder;
 use super::value::Reading;
-use super::{BondGraph, Clause, ElementId, Kind, ResistorLaw, Trigger};
-use crate::algebra::{Comparison, Expr};
+use super::{Action, BondGraph, Clause, Constraint, ElementId, Kind, ResistorLaw, Trigger};
+use crate::algebra::{Comparison, Expr, Symbol};
 use crate::ast::{self, Arg, BinaryOp, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -21,6 +21,8 @@ pub struct SetValuedLaw {
     pub branches: Vec<Branch>,
     /// The branch that the element has in this graph.
     pub present: usize,
+    /// The constraint that holds on the first branch, of a constraint on one side.
+    pub constraint: Option<Constraint>,
     /// Where it stands.
     pub span: Span,
 }
@@ -34,15 +36,31 @@ pub struct Branch {
     pub kind: Kind,
     /// Where it ends.
     pub bounds: Vec<Bound>,
+    /// The branch instead of it while impulses are shared out: an effort that is bounded makes none, and contacts make those
+    /// that fit.
+    pub released: Option<usize>,
 }
 
 /// An end of a branch.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Bound {
     /// What ends it.
     pub kind: BoundKind,
     /// The branch beyond it.
     pub next: usize,
+    /// What happens there, if storages take an impulse.
+    pub impact: Option<Impact>,
+}
+
+/// Two sides of a gap meet.
+#[derive(Debug, Clone)]
+pub struct Impact {
+    /// The rate of the gap.
+    pub rate: Expr,
+    /// The flow of the element after the impact: that before it, turned round by the coefficient of restitution.
+    pub action: Action,
+    /// The flow with which the gap stays as it is.
+    pub still: Expr,
 }
 
 /// What ends a branch.
@@ -80,8 +98,14 @@ impl SetValuedLaw {
             for bound in &mut branch.bounds {
                 let (BoundKind::Margin(e) | BoundKind::Command(e)) = &mut bound.kind;
                 visit(e);
+                if let Some(impact) = &mut bound.impact {
+                    visit(&mut impact.rate);
+                    visit(&mut impact.action.value);
+                    visit(&mut impact.still);
+                }
             }
         }
+        self.constraint.iter_mut().for_each(|c| visit(&mut c.expr));
     }
 }
 
@@ -103,6 +127,10 @@ impl BondGraph {
             let law = &mut graph.set_valued[at];
             law.present = branch;
             graph.elements[law.element].kind = law.branches[branch].kind.clone();
+            if let Some(constraint) = &law.constraint {
+                graph.constraints.retain(|c| c.element != constraint.element);
+                graph.constraints.extend((branch == CLOSED).then(|| constraint.clone()));
+            }
         }
         let bounds = graph.bounds_of_branches();
         graph.clauses.extend(bounds);
@@ -124,7 +152,8 @@ impl BondGraph {
                 };
                 let name = format!("{} ends `{}`", self.elements[law.element].name, branch.name);
                 let (trigger, span) = (Trigger::Becomes(condition), law.span);
-                clauses.push(Clause { name, trigger, actions: Vec::new(), bound: Some((at, number)), span });
+                let actions = bound.impact.iter().map(|impact| impact.action.clone()).collect();
+                clauses.push(Clause { name, trigger, actions, bound: Some((at, number)), span });
             }
         }
         clauses
@@ -136,6 +165,10 @@ impl BondGraph {
         self.set_valued.iter().map(name).collect::<Vec<_>>().join(", ")
     }
 }
+
+/// The branch on which a constraint on one side holds.
+const CLOSED: usize = 0;
+const OPEN: usize = 1;
 
 /// Whether an argument says that something is never negative.
 fn is_comparison(arg: &Arg) -> bool {
@@ -199,7 +232,8 @@ impl<'a> Builder<'a, '_> {
         let branch = |name, kind, margin, next| Branch {
             name,
             kind,
-            bounds: vec![Bound { kind: BoundKind::Margin(margin), next }],
+            bounds: vec![Bound { kind: BoundKind::Margin(margin), next, impact: None }],
+            released: None,
         };
         let branches = vec![branch(names[0], a_kind, b, 1), branch(names[1], b_kind, a, 0)];
         Some(self.add_set_valued(part, "R", branches))
@@ -273,12 +307,17 @@ impl<'a> Builder<'a, '_> {
         let (e, f) = (self.exprs.sym(pair.effort), self.exprs.sym(pair.flow));
         let (back, minus_f) = (self.exprs.neg(slide), self.exprs.neg(f));
         let (above, below) = (self.exprs.sub(stick, e), self.exprs.add(&[stick, e]));
-        let margin = |margin, next| Bound { kind: BoundKind::Margin(margin), next };
-        let slides = |name, value, bound| Branch { name, kind: Kind::EffortSource { value }, bounds: vec![bound] };
+        let margin = |margin, next| Bound { kind: BoundKind::Margin(margin), next, impact: None };
+        let slides = |name, value, bound| Branch { name, kind: Kind::EffortSource { value }, bounds: vec![bound], released: None };
         let still = Kind::FlowSource { value: self.exprs.int(0) };
         let branches = vec![
             slides("forward", slide, margin(f, 1)),
-            Branch { name: "stick", kind: still, bounds: vec![margin(above, 0), margin(below, 2)] },
+            Branch {
+                name: "stick",
+                kind: still,
+                bounds: vec![margin(above, 0), margin(below, 2)],
+                released: Some(0),
+            },
             slides("backward", back, margin(minus_f, 1)),
         ];
         Some(self.add_set_valued(part, "R", branches))
@@ -301,7 +340,8 @@ impl<'a> Builder<'a, '_> {
         let branch = |name, kind, ends, next| Branch {
             name,
             kind,
-            bounds: vec![Bound { kind: BoundKind::Command(ends), next }],
+            bounds: vec![Bound { kind: BoundKind::Command(ends), next, impact: None }],
+            released: None,
         };
         let branches = vec![
             branch("on", Kind::EffortSource { value: zero }, off, 1),
@@ -310,10 +350,50 @@ impl<'a> Builder<'a, '_> {
         Some(self.add_set_valued(part, "Sw", branches))
     }
 
+    /// A constraint on one side, built as `constraint` with the flow of its ZC: `rest` is the part of the rate of its gap that
+    /// this flow does not tell.
+    pub(super) fn one_sided(&mut self, constraint: &Constraint, rest: Expr, flow: Symbol, restitution: Expr) {
+        let own = self.exprs.sym(flow);
+        let rate = self.exprs.add(&[own, rest]);
+        let still = self.exprs.neg(rest);
+        let impact = constraint.holonomic.then(|| {
+            let back = self.exprs.mul(&[restitution, rate]);
+            let value = self.exprs.sub(still, back);
+            let name = format!("{}.f", constraint.name);
+            let impulse = Some(self.impulse_of(&name, flow, constraint.span));
+            Impact { rate, action: Action { name, target: flow, value, impulse, span: constraint.span }, still }
+        });
+        let zero = self.exprs.int(0);
+        let margin = if constraint.holonomic { constraint.expr } else { rate };
+        let bound = |margin, next, impact| vec![Bound { kind: BoundKind::Margin(margin), next, impact }];
+        let branches = vec![
+            Branch {
+                name: "closed",
+                kind: Kind::ZeroCompliance { flow: still },
+                bounds: bound(constraint.multiplier, OPEN, None),
+                released: Some(OPEN),
+            },
+            Branch {
+                name: "open",
+                kind: Kind::EffortSource { value: zero },
+                bounds: bound(margin, CLOSED, impact),
+                released: None,
+            },
+        ];
+        self.set_valued.push(SetValuedLaw {
+            element: constraint.element,
+            word: "constraint",
+            branches,
+            present: CLOSED,
+            constraint: Some(constraint.clone()),
+            span: constraint.span,
+        });
+    }
+
     fn add_set_valued(&mut self, part: usize, word: &'static str, branches: Vec<Branch>) -> Kind {
         let kind = branches[0].kind.clone();
         let (element, span) = (ElementId::new(part), self.part(part).ast.span);
-        self.set_valued.push(SetValuedLaw { element, word, branches, present: 0, span });
+        self.set_valued.push(SetValuedLaw { element, word, branches, present: 0, constraint: None, span });
         kind
     }
 }

@@ -79,15 +79,23 @@ impl Assembled<'_> {
             return Ok(None);
         }
         let mut impulses: Vec<Impulse> = Vec::new();
-        for action in actions() {
+        let all = graph.clauses.iter().flat_map(|c| c.actions.iter().map(move |a| (c.bound.is_some(), a)));
+        for (of_bound, action) in all {
             let Some(symbol) = action.impulse.filter(|s| impulses.iter().all(|i| i.symbol != *s)) else { continue };
-            let along = match moving.storage_of(graph, action.target) {
+            let along: Vec<(usize, Expr)> = match moving.storage_of(graph, action.target) {
                 Some(k) => {
                     let of = |row: &[(usize, Expr)]| row.iter().find(|t| t.0 == k).map(|t| t.1);
                     balances.iter().enumerate().filter_map(|(b, row)| Some((b, of(row)?))).collect()
                 }
-                None => self.along(truth, &moving, &mut rows, action)?,
+                None => match self.along(truth, &moving, &mut rows, action) {
+                    // What no storage resists takes no impulse to move.
+                    Err(_) if of_bound => continue,
+                    along => along?,
+                },
             };
+            if along.is_empty() && of_bound {
+                continue;
+            }
             if along.is_empty() {
                 return Err(refused(action, "a source sets it, or nothing that keeps an impulse stands there"));
             }

@@ -33,6 +33,8 @@ pub struct Bound {
     pub next: u32,
     /// What is never negative while the branch holds; none where a condition ends it.
     pub margin: Option<Value>,
+    /// Where the margin is a gap: its rate, and the flow of the element with which it stays as it is.
+    pub gap: Option<(Value, Value)>,
 }
 
 /// A set-valued law.
@@ -44,6 +46,8 @@ pub struct SetValued {
     pub branches: Vec<&'static str>,
     /// The branch to which this program belongs.
     pub present: u32,
+    /// The branch that it has while impulses are shared out, where it would take part in them otherwise.
+    pub released: Option<u32>,
 }
 
 /// When an event happens.
@@ -132,7 +136,8 @@ impl Clause {
             Target::Moved { what, .. } => [Some(a.value), Some(what)],
             _ => [Some(a.value), None],
         };
-        let margin = self.bound.and_then(|b| b.margin);
+        let gap = self.bound.and_then(|b| b.gap).into_iter().flat_map(|(rate, still)| [rate, still]);
+        let margin = self.bound.and_then(|b| b.margin).into_iter().chain(gap);
         std::iter::once(self.trigger.value()).chain(margin).chain(self.actions.iter().flat_map(of).flatten())
     }
 }
@@ -152,12 +157,13 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
             actions.push(Action { name: action.name.clone(), target, value: lower.value(action.value) });
         }
         let bound = clause.bound.map(|(law, number)| {
-            let bound = graph.set_valued[law].branch().bounds[number];
+            let bound = &graph.set_valued[law].branch().bounds[number];
             let margin = match bound.kind {
                 BoundKind::Margin(margin) => Some(lower.value(margin)),
                 BoundKind::Command(_) => None,
             };
-            Bound { law: law as u32, next: bound.next as u32, margin }
+            let gap = bound.impact.as_ref().map(|i| (lower.value(i.rate), lower.value(i.still)));
+            Bound { law: law as u32, next: bound.next as u32, margin, gap }
         });
         clauses.push(Clause { name: clause.name.clone(), trigger, actions, bound, span: clause.span });
     }
@@ -187,6 +193,7 @@ pub(super) fn set_valued(graph: &BondGraph) -> Vec<SetValued> {
         name: graph.elements[law.element].name.clone(),
         branches: law.branches.iter().map(|b| b.name).collect(),
         present: law.present as u32,
+        released: law.branch().released.map(|branch| branch as u32),
     };
     graph.set_valued.iter().map(law).collect()
 }

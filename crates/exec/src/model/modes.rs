@@ -8,7 +8,7 @@ use super::compiled::ModeId;
 use super::Model;
 use crate::bytecode::{Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Bound, Program, Value};
+use halfarrow_compiler::program::{Bound, Clause, Program, Target, Value};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -24,7 +24,7 @@ const NO_LEAP: f64 = 1e-7;
 /// The bounds of the branches of a mode.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
-    /// Each with the number of its clause and its place among the margins.
+    /// Each with the number of its clause and its place among the margins; the rate of a gap stands behind it.
     all: Vec<(usize, Bound, Option<usize>)>,
     /// Computes the margins.
     margins: Routine,
@@ -42,7 +42,9 @@ impl Bounds {
         let place = |(clause, bound): (usize, Bound)| {
             let place = bound.margin.map(|margin| {
                 values.push(margin);
-                values.len() - 1
+                let place = values.len() - 1;
+                values.extend(bound.gap.map(|(rate, _)| rate));
+                place
             });
             (clause, bound, place)
         };
@@ -59,8 +61,8 @@ impl Bounds {
 /// What a run remembers of set-valued laws: how great things have been.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Extents {
-    /// Of margins and of their rates, by law, branch and bound.
-    margins: BTreeMap<(u32, u32, usize), [f64; 2]>,
+    /// Of margins, of their rates and of the rates of these, by law, branch and bound.
+    margins: BTreeMap<(u32, u32, usize), [f64; 3]>,
     /// Of what storages keep.
     stored: BTreeMap<Symbol, f64>,
 }
@@ -130,9 +132,12 @@ impl Model {
         let Model { run, frame, events, .. } = self;
         for (number, (_, bound, place)) in bounds.all.iter().enumerate() {
             let Some(place) = place else { continue };
-            let margin = frame.r[bounds.margins.outputs[*place] as usize].abs();
+            let value = |place: usize| frame.r[bounds.margins.outputs[place] as usize].abs();
             let most = run.extents.margins.entry(key(bounds, bound, number)).or_default();
-            most[0] = most[0].max(margin);
+            most[0] = most[0].max(value(*place));
+            if bound.gap.is_some() {
+                most[1] = most[1].max(value(place + 1));
+            }
         }
         let storages = code.program.jumps.iter().flat_map(|jumps| &jumps.storages);
         for (&symbol, stored) in storages.zip(events.impulses.stored()) {
@@ -161,11 +166,16 @@ impl Model {
                 continue;
             };
             let margin = margins[*place];
-            let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
-            if margin.is_nan() || margin < -ROUNDING * most {
+            let most = self.run.extents.margins.get(&key(bounds, bound, number)).copied().unwrap_or_default();
+            if margin.is_nan() || margin < -ROUNDING * most[0] {
                 ended.push(beyond);
-            } else if at_event && margin <= ROUNDING * most {
-                open.push((number, *bound, *place));
+            } else if at_event && margin <= ROUNDING * most[0] {
+                match bound.gap.map(|_| margins[place + 1]) {
+                    None => open.push((number, *bound, *place, 1)),
+                    Some(rate) if rate < -ROUNDING * most[1] => ended.push(beyond),
+                    Some(rate) if rate <= ROUNDING * most[1] => open.push((number, *bound, place + 1, 2)),
+                    Some(_) => {}
+                }
             }
         }
         if !open.is_empty() {
@@ -177,11 +187,11 @@ impl Model {
             frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
             let along = self.frame.run_along(&bounds.margins);
             along.map_err(|error| self.failure(t, error))?;
-            for (number, bound, place) in open {
+            for (number, bound, place, level) in open {
                 let rate = self.frame.d[bounds.margins.outputs[place] as usize];
                 let most = self.run.extents.margins.entry(key(bounds, &bound, number)).or_default();
-                most[1] = most[1].max(rate.abs());
-                if rate < -ROUNDING * most[1] {
+                most[level] = most[level].max(rate.abs());
+                if rate < -ROUNDING * most[level] {
                     ended.push((bound.law, bound.next));
                 }
             }
@@ -201,6 +211,67 @@ impl Model {
         let mut what: Vec<String> = ended.iter().map(name).collect();
         what.dedup();
         Failure::NoMode { time, what: what.join(", ") }
+    }
+
+    /// Opens contacts and lets go what sticks, before impulses are shared out among all that move: what they take of it is
+    /// found then.
+    pub(super) fn release(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        let laws = &code.program.set_valued;
+        let free: Vec<u32> = laws.iter().map(|law| law.released.unwrap_or(law.present)).collect();
+        let impulses = code.program.clauses.iter().zip(&self.events.fired).any(|(clause, fired)| {
+            *fired && clause.actions.iter().any(|action| matches!(action.target, Target::Moved { .. }))
+        });
+        if !impulses || free == bounds.branches {
+            return Ok(());
+        }
+        self.take_stored(t, x)?;
+        let (stored, values) = (self.stored_now(), self.values_of_all(t, x)?);
+        let fired = std::mem::take(&mut self.events.fired);
+        let (mut model, mut point) = (self.clone(), x.to_vec());
+        let mode = self.compiled.in_mode(&free);
+        let entered = match mode {
+            Some(mode) => Instant { model: self, t, x, values, stored }.enter(&mut model, mode, &mut point)?,
+            None => None,
+        };
+        if entered.is_none_or(|leap| leap > NO_LEAP) {
+            let what = "what is stuck or in contact there".to_string();
+            return Err(Failure::NoMode { time: t, what });
+        }
+        for (clause, fired) in code.program.clauses.iter().zip(fired).filter(|(_, fired)| *fired) {
+            let same = |c: &&Clause| match (c.bound, clause.bound) {
+                (Some(own), Some(other)) => (own.law, own.next) == (other.law, other.next),
+                (None, None) => c.span == clause.span && c.name == clause.name,
+                _ => false,
+            };
+            if let Some(place) = model.code.program.clauses.iter().position(|c| same(&c)) {
+                model.events.fired[place] = fired;
+            }
+        }
+        model.switched = true;
+        *self = model;
+        x.copy_from_slice(&point);
+        Ok(())
+    }
+
+    /// The clauses of contacts whose gap is closed: what an impulse may act through.
+    pub(super) fn contacts(&mut self, t: f64, x: &[f64]) -> Result<Vec<usize>, Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        let mut contacts = Vec::new();
+        for (number, (clause, bound, place)) in bounds.all.iter().enumerate() {
+            let (Some(place), Some(_)) = (place, bound.gap) else { continue };
+            let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
+            let gap = self.frame.r[bounds.margins.outputs[*place] as usize];
+            let moved = code.program.clauses[*clause].actions.iter().any(|a| matches!(a.target, Target::Moved { .. }));
+            if moved && (gap <= ROUNDING * most || self.events.fired[*clause]) {
+                contacts.push(*clause);
+            }
+        }
+        Ok(contacts)
     }
 
     /// Clauses of another mode: those of the modeller go on, bounds begin anew.
@@ -270,7 +341,7 @@ impl Instant<'_> {
             match self.try_mode(&mode) {
                 Tried::Fits(found, leap) if leap <= NO_LEAP => return Some(*found),
                 Tried::Fits(found, leap) => {
-                    if leaping.as_ref().is_none_or(|(least, _)| leap < *least) {
+                    if self.may_leap(&mode, bounds) && leaping.as_ref().is_none_or(|(least, _)| leap < *least) {
                         leaping = Some((leap, found));
                     }
                 }
@@ -289,6 +360,14 @@ impl Instant<'_> {
             }
         }
         leaping.map(|(_, found)| *found)
+    }
+
+    /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.
+    fn may_leap(&self, mode: &[u32], bounds: &Bounds) -> bool {
+        let Some(id) = self.model.compiled.in_mode(mode) else { return false };
+        let code = self.model.compiled.mode(id);
+        let laws = code.program.set_valued.iter().zip(&bounds.branches);
+        laws.clone().all(|(law, before)| law.released.is_none() || law.present == *before)
     }
 
     fn try_mode(&self, branches: &[u32]) -> Tried {
