@@ -239,7 +239,8 @@ impl<'a> Builder<'a, '_> {
         let cell = cell_of(self.flat.names.turn_around(*here));
         (first..structure.elements.len()).for_each(|at| structure.elements[ElementId::new(at)].cell = cell);
         let multiplier = self.exprs.sym(effort);
-        let constraint = Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span };
+        let constraint =
+            Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span };
         if let Some(restitution) = r.restitution {
             self.one_sided(&constraint, r.rest, flow, restitution);
         }

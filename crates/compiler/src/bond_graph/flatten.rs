@@ -72,11 +72,13 @@ impl Word {
     }
     /// The word with its article.
     pub fn with_article(self) -> String {
-        let article = if matches!(self, Word::I | Word::R | Word::Se | Word::Sf | Word::Sw | Word::ResidualSe | Word::ResidualSf) {
-            "an"
-        } else {
-            "a"
-        };
+        let article =
+            if matches!(self, Word::I | Word::R | Word::Se | Word::Sf | Word::Sw | Word::ResidualSe | Word::ResidualSf)
+            {
+                "an"
+            } else {
+                "a"
+            };
         format!("{article} {}", self.text())
     }
     /// Whether it is a junction.

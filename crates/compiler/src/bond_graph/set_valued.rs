@@ -110,6 +110,12 @@ impl SetValuedLaw {
 }
 
 impl BondGraph {
+    /// The keyword of an element in the text.
+    pub fn word(&self, element: ElementId) -> &'static str {
+        let law = self.set_valued.iter().find(|law| law.element == element && law.constraint.is_none());
+        law.map_or_else(|| self.elements[element].kind.word(), |law| law.word)
+    }
+
     /// The branch that each set-valued law has, in their order.
     pub fn mode(&self) -> Vec<usize> {
         self.set_valued.iter().map(|law| law.present).collect()
@@ -308,16 +314,16 @@ impl<'a> Builder<'a, '_> {
         let (back, minus_f) = (self.exprs.neg(slide), self.exprs.neg(f));
         let (above, below) = (self.exprs.sub(stick, e), self.exprs.add(&[stick, e]));
         let margin = |margin, next| Bound { kind: BoundKind::Margin(margin), next, impact: None };
-        let slides = |name, value, bound| Branch { name, kind: Kind::EffortSource { value }, bounds: vec![bound], released: None };
+        let slides = |name, value, bound| Branch {
+            name,
+            kind: Kind::EffortSource { value },
+            bounds: vec![bound],
+            released: None,
+        };
         let still = Kind::FlowSource { value: self.exprs.int(0) };
         let branches = vec![
             slides("forward", slide, margin(f, 1)),
-            Branch {
-                name: "stick",
-                kind: still,
-                bounds: vec![margin(above, 0), margin(below, 2)],
-                released: Some(0),
-            },
+            Branch { name: "stick", kind: still, bounds: vec![margin(above, 0), margin(below, 2)], released: Some(0) },
             slides("backward", back, margin(minus_f, 1)),
         ];
         Some(self.add_set_valued(part, "R", branches))

@@ -30,10 +30,10 @@ use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
 use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
-pub use modes::in_first_mode;
 pub use contradiction::warnings;
 pub(crate) use digits::magnitude_of_slope;
 pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};
+pub use modes::in_first_mode;
 pub use ports::Virtual;
 pub(crate) use ports::{circuits, imposes_effort, rank_given};
 pub use rank::{Reach, StateRank, control_reach, observe_reach, state_rank};

@@ -47,7 +47,11 @@ impl Clauses {
             layout.routine(program, &own.chain(still(c).filter(|_| !c.actions.is_empty())).collect::<Vec<_>>())
         };
         let values: Vec<Routine> = program.clauses.iter().map(values).collect();
-        let still = program.clauses.iter().zip(&values).map(|(c, routine)| still(c).and_then(|_| routine.outputs.get(c.actions.len()).copied()));
+        let still = program
+            .clauses
+            .iter()
+            .zip(&values)
+            .map(|(c, routine)| still(c).and_then(|_| routine.outputs.get(c.actions.len()).copied()));
         let lengths = program.clauses.iter().map(|c| c.actions.len());
         let first = lengths.scan(0, |sum, n| {
             *sum += n;

@@ -59,9 +59,10 @@ impl Ratios {
 }
 
 impl Model {
-    /// Whether a run may go on in other independent variables.
-    pub fn may_exchange(&self) -> bool {
-        self.compiled.has_alternatives() && self.compiled.first().exchanges.is_some()
+    /// Whether a run may go on in another mode: in other independent variables, or with other branches of set-valued laws.
+    pub fn may_change_mode(&self) -> bool {
+        let first = self.compiled.first();
+        self.compiled.has_alternatives() && (first.exchanges.is_some() || first.bounds.is_some())
     }
 
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same

@@ -3,9 +3,9 @@
 //! principal pivoting), and where that leads in a circle or to a mode that cannot be, by the number of exchanges.
 //! Source: K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974).
 
+use super::Model;
 use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::ModeId;
-use super::Model;
 use crate::bytecode::{Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{Bound, Clause, Program, Target, Value};
@@ -114,6 +114,15 @@ impl Model {
         }
         self.note_extents(t, x)?;
         Ok(!self.ended(t, x, false)?.is_empty())
+    }
+
+    /// The set-valued laws of which a branch has ended at `(t, x)`, by name.
+    pub(super) fn laws_ended(&mut self, t: f64, x: &[f64]) -> Result<Vec<String>, Failure> {
+        let ended = self.ended(t, x, true)?;
+        let mut names: Vec<String> =
+            ended.into_iter().map(|(law, _)| self.code.program.set_valued[law as usize].name.clone()).collect();
+        names.dedup();
+        Ok(names)
     }
 
     /// What storages keep, as it was noted last.
@@ -437,4 +446,3 @@ impl Model {
         self.truth_of_clauses(t, hold)
     }
 }
-
