@@ -76,6 +76,8 @@ pub(super) struct Extents {
     margins: BTreeMap<(u32, u32, usize), [f64; 3]>,
     /// Of what storages keep.
     stored: BTreeMap<Symbol, f64>,
+    /// Of states, by the variables that they are.
+    states: BTreeMap<Symbol, f64>,
 }
 
 /// Where a run stands when its mode ends.
@@ -158,6 +160,10 @@ impl Model {
             if bound.gap.is_some() {
                 most[1] = most[1].max(value(place + 1));
             }
+        }
+        for (&symbol, x) in code.program.tracked.iter().zip(x) {
+            let most = run.extents.states.entry(symbol).or_default();
+            *most = most.max(x.abs());
         }
         let storages = code.program.jumps.iter().flat_map(|jumps| &jumps.storages);
         for (&symbol, stored) in storages.zip(events.impulses.stored()) {
@@ -491,6 +497,9 @@ impl Instant<'_> {
         model.take_signs(t, x)?;
         model.follow_solutions(t, x)?;
         model.run.scales = model.magnitudes(t, x);
+        // What a state has been tells its size, not what it begins with.
+        let known = code.program.tracked.iter().map(|s| model.run.extents.states.get(s).copied().unwrap_or(0.0));
+        model.run.scales.iter_mut().zip(known).for_each(|(scale, known)| *scale = scale.max(known));
         model.follow_solutions(t, x)?;
         model.take_stored(t, x)?;
         let most = |symbol: &Symbol| model.run.extents.stored.get(symbol).copied().unwrap_or(0.0);
