@@ -80,7 +80,8 @@ fn ideal_and_exponential_bridges_come_together() {
     let ideal = at_end(&bridge("IdealDiode"));
     let off = |v_t: f64| {
         // The thermal voltage times the logarithm of the current over the saturation current stays small.
-        let text = (0..4).fold(bridge("Diode"), |t, k| t.replace(&format!(":d{k} "), &format!(":d{k}(v_t = {v_t}, i_s = 1e-9) ")));
+        let text = (0..4)
+            .fold(bridge("Diode"), |t, k| t.replace(&format!(":d{k} "), &format!(":d{k}(v_t = {v_t}, i_s = 1e-9) ")));
         (at_end(&text) - ideal).abs()
     };
     let (coarse, fine) = (off(2e-3), off(1e-3));
@@ -261,7 +262,8 @@ fn switches() {
 fn fixed_steps() {
     let text = "Se:pull(3*sin(2*t)) -> 1:v -> I:m(1)\nv -> R:pad(friction = 1)\nv -> C:k(k = 2)\n";
     let reference = last(&run(text, &to(10.0, &["m.f", "k.q"])));
-    let methods = [(FixedMethod::Rk4, 1e-3, 1e-9), (FixedMethod::Heun, 1e-4, 1e-6), (FixedMethod::Rosenbrock, 1e-3, 1e-6)];
+    let methods =
+        [(FixedMethod::Rk4, 1e-3, 1e-9), (FixedMethod::Heun, 1e-4, 1e-6), (FixedMethod::Rosenbrock, 1e-3, 1e-6)];
     for (method, step, within) in methods {
         let fixed = Run { method: Method::Fixed(method), step: Some(step), ..to(10.0, &["m.f", "k.q"]) };
         for (found, expected) in last(&run(text, &fixed)).iter().zip(&reference) {

@@ -135,6 +135,17 @@ pub enum Failure {
         time: f64,
         /// The laws whose branches end there, with these branches.
         what: String,
+        /// How many modes were tried, and in how many of them no branch holds for long; the others have no equations.
+        tried: [usize; 2],
+    },
+    /// A contact begins with its sides through each other.
+    Overlap {
+        /// When, in s.
+        time: f64,
+        /// The contact.
+        what: String,
+        /// Its gap, below 0.
+        gap: f64,
     },
     /// An option of the run makes no sense.
     BadOption {
@@ -232,6 +243,7 @@ impl Failure {
             | Failure::Conflict { time, .. }
             | Failure::Reset { time, .. }
             | Failure::NoMode { time, .. }
+            | Failure::Overlap { time, .. }
             | Failure::Branch { time, .. }
             | Failure::OffMotion { time, .. }
             | Failure::Bound { time, .. }
@@ -332,10 +344,24 @@ impl fmt::Display for Failure {
                 by[0].0, by[0].1, by[1].0, by[1].1
             ),
             Failure::Reset { time, what, reason } => write!(f, "at t = {time} s {what} cannot be reset: {reason}"),
-            Failure::NoMode { time, what } => write!(
+            Failure::NoMode { time, what, tried: [tried, ended] } => {
+                write!(
+                    f,
+                    "at t = {time} s {what} ends, and no branches of the set-valued laws hold together beyond that: "
+                )?;
+                write!(
+                    f,
+                    "of {tried} modes tried, in {ended} a branch ends at once, and {} have no equations",
+                    tried - ended
+                )?;
+                f.write_str(
+                    " (sources joined with nothing between them, a flow with nowhere to go); give what has to yield a \
+                     resistance or an inertance, and friction no effort below 0",
+                )
+            }
+            Failure::Overlap { time, what, gap } => write!(
                 f,
-                "at t = {time} s {what} ends, and no branches of the set-valued laws hold together beyond that: look whether \
-                 sources are joined with nothing between them, or a current or speed is cut off that nothing takes over"
+                "at t = {time} s the sides of the contact {what} overlap, its gap is {gap}: begin where it is 0 or above"
             ),
             Failure::BadOption { option, value, expected } => {
                 write!(f, "{option} is {value}, but it must be {expected}")

@@ -141,7 +141,9 @@ fn text(report: &RealTimeReport, page: Page) -> String {
     if let Some(modes) = report.modes {
         text += &match (modes.all, modes.possible) {
             (Some(all), Some(possible)) => {
-                format!("modes: {possible} of the {all} that the set-valued laws can have have equations, made before the run\n")
+                format!(
+                    "modes: {possible} of the {all} that the set-valued laws can have have equations, made before the run\n"
+                )
             }
             _ => format!("modes: those of {} set-valued laws are too many to be made before the run\n", modes.laws),
         };

@@ -3,7 +3,7 @@
 
 use super::builder::Builder;
 use super::value::Reading;
-use super::{Action, BondGraph, Clause, Constraint, ElementId, Kind, ResistorLaw, Trigger};
+use super::{Action, BondGraph, Clause, Constraint, ElementId, Kind, Meaning, ResistorLaw, Trigger};
 use crate::algebra::{Comparison, Expr, Symbol};
 use crate::ast::{self, Arg, BinaryOp, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -309,22 +309,36 @@ impl<'a> Builder<'a, '_> {
             return self.odd_law(self.part(part).ast.span, "the effort of friction is missing", FORM);
         };
         let stick = found[1].unwrap_or(slide);
+        let span = self.part(part).ast.span;
+        if self.value_of(slide).is_some_and(|slide| slide < 0.0) {
+            return self.odd_law(
+                span,
+                "the effort of friction is below 0",
+                "friction acts against the motion: write its size",
+            );
+        }
+        if let (Some(slide), Some(stick)) = (self.value_of(slide), self.value_of(stick))
+            && stick < slide
+        {
+            let why = "less sets it moving than keeps it from moving on";
+            return self.odd_law(span, why, "`stiction` is as great as `friction` or greater");
+        }
         let pair = self.pairs[self.wire_at(part, 0)?].clone();
         let (e, f) = (self.exprs.sym(pair.effort), self.exprs.sym(pair.flow));
         let (back, minus_f) = (self.exprs.neg(slide), self.exprs.neg(f));
         let (above, below) = (self.exprs.sub(stick, e), self.exprs.add(&[stick, e]));
         let margin = |margin, next| Bound { kind: BoundKind::Margin(margin), next, impact: None };
-        let slides = |name, value, bound| Branch {
-            name,
-            kind: Kind::EffortSource { value },
-            bounds: vec![bound],
-            released: None,
+        // Friction that varies is never negative: where it becomes so no branch holds.
+        let varies = self.exprs.depends_on_any(slide, &|s| !matches!(self.meaning(s), Some(Meaning::Parameter(_))));
+        let slides = |name, value, bound, own| {
+            let bounds = [bound].into_iter().chain(varies.then(|| margin(slide, own))).collect();
+            Branch { name, kind: Kind::EffortSource { value }, bounds, released: None }
         };
         let still = Kind::FlowSource { value: self.exprs.int(0) };
         let branches = vec![
-            slides("forward", slide, margin(f, 1)),
+            slides("forward", slide, margin(f, 1), 0),
             Branch { name: "stick", kind: still, bounds: vec![margin(above, 0), margin(below, 2)], released: Some(0) },
-            slides("backward", back, margin(minus_f, 1)),
+            slides("backward", back, margin(minus_f, 1), 2),
         ];
         Some(self.add_set_valued(part, "R", branches))
     }

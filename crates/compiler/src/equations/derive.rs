@@ -9,7 +9,7 @@ use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::exchanges::{Exchanges, exchanges};
 use super::freedom::{self, Sum};
-use super::jumps::readable;
+use super::jumps::{margins, readable};
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::positions::{self, Computed, found_by_iteration};
@@ -227,6 +227,7 @@ fn order_equations(
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, jumps.as_ref())?;
+    let margins = margins(&d);
     let observed = observed::observed(&mut d, &states, &positions);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
@@ -278,6 +279,7 @@ fn order_equations(
         momenta,
         exchanges,
         jumps,
+        margins,
         free_rates,
         certificate: None,
         dof,

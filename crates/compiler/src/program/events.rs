@@ -48,6 +48,9 @@ pub struct SetValued {
     pub present: u32,
     /// The branch that it has while impulses are shared out, where it would take part in them otherwise.
     pub released: Option<u32>,
+    /// The margins of all branches, by branch and number of the bound, where they have a value: how great they have been tells
+    /// what is zero.
+    pub margins: Vec<(u32, u32, Value)>,
 }
 
 /// When an event happens.
@@ -188,14 +191,22 @@ fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {
 }
 
 /// The set-valued laws of a graph.
-pub(super) fn set_valued(graph: &BondGraph) -> Vec<SetValued> {
-    let law = |law: &bond_graph::SetValuedLaw| SetValued {
+pub(super) fn set_valued(lower: &mut Lowering, equations: &Equations) -> Vec<SetValued> {
+    let graph = &equations.graph;
+    let mut margins = equations.margins.iter();
+    let mut law = |law: &bond_graph::SetValuedLaw| SetValued {
         name: graph.elements[law.element].name.clone(),
         branches: law.branches.iter().map(|b| b.name).collect(),
         present: law.present as u32,
         released: law.branch().released.map(|branch| branch as u32),
+        margins: margins
+            .next()
+            .into_iter()
+            .flatten()
+            .map(|&(branch, bound, e)| (branch as u32, bound as u32, lower.value(e)))
+            .collect(),
     };
-    graph.set_valued.iter().map(law).collect()
+    graph.set_valued.iter().map(&mut law).collect()
 }
 
 /// The balances as values; which unknowns they have is told by [`with_unknowns`].

@@ -269,6 +269,7 @@ impl Schedule<'_> {
         let inputs = self.inputs();
         let held = self.held();
         let clauses = events::clauses(&mut self.lower, equations);
+        let set_valued = events::set_valued(&mut self.lower, equations);
         let jumps = events::jumps(&mut self.lower, equations);
         let observed = self.observed(equations);
         let conditions = self.start_conditions(equations);
@@ -299,7 +300,7 @@ impl Schedule<'_> {
             kept: kept(flow, equations, &momenta),
             jumps: jumps.map(|jumps| events::with_unknowns(jumps, flow, equations)),
             clauses,
-            set_valued: events::set_valued(&equations.graph),
+            set_valued,
             start: start(equations, &conditions, &at_start),
             guesses: placed(equations, &guesses, &at_start),
             conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),

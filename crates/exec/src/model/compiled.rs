@@ -241,7 +241,7 @@ impl Mode {
             .chain(self.positions.as_ref().map(PositionConstraints::routine))
             .chain(self.motion.as_ref().map(|motion| &motion.rates))
             .chain(self.exchanges.as_ref().map(Ratios::routine))
-            .chain(self.bounds.as_ref().map(Bounds::routine));
+            .chain(self.bounds.iter().flat_map(Bounds::routines));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

@@ -156,6 +156,7 @@ impl Model {
             self.run.begun = true;
             self.take_signs(t, x)?;
             self.begin_clauses(t, x)?;
+            self.begin_contacts(t, x)?;
         } else {
             let conserve = |model: &mut Model, x: &mut [f64]| match leaps {
                 true => model.balance_leaps(t, x),

@@ -159,6 +159,10 @@ impl Model {
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
     ) -> Result<(), Failure> {
+        if self.events.contacts.is_empty() {
+            self.take_asked(balance, &mut work.asked);
+            return self.solve_balance(t, x, balance, work).map(|_| ());
+        }
         let contacts = self.events.contacts.clone();
         let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
         contacts.iter().for_each(|&contact| self.events.fired[contact] = false);

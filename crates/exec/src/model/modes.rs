@@ -20,6 +20,8 @@ const FAR: usize = 2;
 const ROUNDING: f64 = 1e-9;
 /// What rounding may leave of a sum that is zero, as part of its greatest term.
 const NOISE: f64 = 1e-13;
+/// By what sides of a contact may overlap where a run begins, as part of what their displacements are.
+const OVERLAP: f64 = 1e-9;
 /// What storages change by without a leap, as part of the most that they have kept.
 const NO_LEAP: f64 = 1e-7;
 
@@ -34,6 +36,9 @@ pub(super) struct Bounds {
     margins: Routine,
     /// The branches of the mode.
     branches: Vec<u32>,
+    /// Margins of all branches: law, branch and number of the bound, and what computes them.
+    keys: Vec<(u32, u32, usize)>,
+    everywhere: Routine,
 }
 
 impl Bounds {
@@ -54,18 +59,21 @@ impl Bounds {
         };
         let all: Vec<(usize, Bound, Option<usize>)> = bounds.map(place).collect();
         let condition = |clause: usize| match program.values.op(program.clauses[clause].trigger.value()) {
-            Op::Sign(condition, _) => {
-                Some(condition).filter(|c| program.conditions[*c].trigger == EventTrigger::State)
-            }
+            Op::Sign(condition, _) => Some(condition).filter(|c| program.conditions[*c].trigger == EventTrigger::State),
             _ => None,
         };
         let conditions = all.iter().map(|(clause, bound, _)| bound.margin.and_then(|_| condition(*clause))).collect();
         let branches = program.set_valued.iter().map(|law| law.present).collect();
-        Some(Bounds { all, conditions, margins: layout.routine(program, &values), branches })
+        let laws = program.set_valued.iter().enumerate();
+        let everywhere =
+            laws.flat_map(|(law, l)| l.margins.iter().map(move |&(b, n, m)| ((law as u32, b, n as usize), m)));
+        let (keys, found): (Vec<(u32, u32, usize)>, Vec<Value>) = everywhere.unzip();
+        let everywhere = layout.routine(program, &found);
+        Some(Bounds { all, conditions, margins: layout.routine(program, &values), branches, keys, everywhere })
     }
 
-    pub fn routine(&self) -> &Routine {
-        &self.margins
+    pub fn routines(&self) -> impl Iterator<Item = &Routine> {
+        [&self.margins, &self.everywhere].into_iter()
     }
 }
 
@@ -114,7 +122,7 @@ impl Model {
         let stored = self.stored_now();
         let values = self.values_of_all(t, x)?;
         let instant = Instant { model: self, t, x, values, stored };
-        let Some((next, point)) = instant.search(&ended) else { return Err(self.no_mode(t, &ended)) };
+        let (next, point) = instant.search(&ended).map_err(|tried| self.no_mode(t, &ended, tried))?;
         *self = next;
         x.copy_from_slice(&point);
         Ok(true)
@@ -150,6 +158,12 @@ impl Model {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(()) };
         self.place(t, x);
+        self.frame.run(&bounds.everywhere).map_err(|error| self.failure(t, error))?;
+        for (&key, &register) in bounds.keys.iter().zip(&bounds.everywhere.outputs) {
+            let margin = self.frame.r[register as usize].abs();
+            let most = self.run.extents.margins.entry(key).or_default();
+            most[0] = if margin.is_finite() { most[0].max(margin) } else { most[0] };
+        }
         self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
         let Model { run, frame, events, .. } = self;
         for (number, (_, bound, place)) in bounds.all.iter().enumerate() {
@@ -251,13 +265,7 @@ impl Model {
     }
 
     /// How great the terms are that margins are the sum of, one for each state moved by its `way`.
-    fn magnitudes_of_margins(
-        &mut self,
-        bounds: &Bounds,
-        t: f64,
-        x: &[f64],
-        way: &[f64],
-    ) -> Result<Vec<f64>, Failure> {
+    fn magnitudes_of_margins(&mut self, bounds: &Bounds, t: f64, x: &[f64], way: &[f64]) -> Result<Vec<f64>, Failure> {
         let mut sizes = vec![0.0f64; bounds.margins.outputs.len()];
         for (state, way) in way.iter().enumerate().filter(|(_, way)| **way != 0.0) {
             self.place(t, x);
@@ -272,7 +280,7 @@ impl Model {
     }
 
     /// No mode can be.
-    fn no_mode(&self, time: f64, ended: &[(u32, u32)]) -> Failure {
+    fn no_mode(&self, time: f64, ended: &[(u32, u32)], tried: [usize; 2]) -> Failure {
         let laws = &self.code.program.set_valued;
         let name = |&(law, _): &(u32, u32)| {
             let law = &laws[law as usize];
@@ -280,7 +288,7 @@ impl Model {
         };
         let mut what: Vec<String> = ended.iter().map(name).collect();
         what.dedup();
-        Failure::NoMode { time, what: what.join(", ") }
+        Failure::NoMode { time, what: what.join(", "), tried }
     }
 
     /// Makes all modes that set-valued laws can have, so that none is made while a run goes on, if they are no more than `most`:
@@ -325,7 +333,7 @@ impl Model {
         };
         if entered.is_none_or(|leap| leap > NO_LEAP) {
             let what = "what is stuck or in contact there".to_string();
-            return Err(Failure::NoMode { time: t, what });
+            return Err(Failure::NoMode { time: t, what, tried: [1, 0] });
         }
         for (clause, fired) in code.program.clauses.iter().zip(fired).filter(|(_, fired)| *fired) {
             let same = |c: &&Clause| match (c.bound, clause.bound) {
@@ -362,6 +370,29 @@ impl Model {
         Ok(contacts)
     }
 
+    /// A run begins: contacts whose sides meet there take an impact. Sides that overlap are refused.
+    pub(super) fn begin_contacts(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        self.note_extents(t, x)?;
+        let ended = self.margins_ended(t, x, true)?;
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        let sizes = self.magnitudes_of_margins(bounds, t, x, x)?;
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        for ((clause, bound, place), ended) in bounds.all.iter().zip(ended) {
+            let (Some(place), Some(_), Some(true)) = (place, bound.gap, ended) else { continue };
+            let gap = self.frame.r[bounds.margins.outputs[*place] as usize];
+            if gap < -OVERLAP * sizes[*place] {
+                let what = code.program.set_valued[bound.law as usize].name.clone();
+                return Err(Failure::Overlap { time: t, what, gap });
+            }
+            self.events.fired[*clause] = self.frame.r[bounds.margins.outputs[place + 1] as usize] < 0.0;
+        }
+        Ok(())
+    }
+
     /// Clauses of another mode: those of the modeller go on, bounds begin anew.
     fn begin_bounds(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         let code = self.code.clone();
@@ -383,9 +414,10 @@ fn key(bounds: &Bounds, bound: &Bound, number: usize) -> (u32, u32, usize) {
 }
 
 impl Instant<'_> {
-    /// The mode in which the run goes on.
-    fn search(&self, ended: &[(u32, u32)]) -> Option<(Model, Vec<f64>)> {
-        let bounds = self.model.code.bounds.as_ref()?;
+    /// The mode in which the run goes on; in the error how many were tried, and in how many of them a branch ends at once.
+    fn search(&self, ended: &[(u32, u32)]) -> Result<(Model, Vec<f64>), [usize; 2]> {
+        let Some(bounds) = &self.model.code.bounds else { return Err([0, 0]) };
+        let mut short = 0;
         let commanded = |law: u32| bounds.all.iter().any(|(_, b, place)| b.law == law && place.is_none());
         let counts: Vec<u32> = self.model.code.program.set_valued.iter().map(|l| l.branches.len() as u32).collect();
         // Commands are obeyed by whatever mode.
@@ -402,7 +434,7 @@ impl Instant<'_> {
             let mode = match pivot.take() {
                 Some(mode) => mode,
                 None => {
-                    let mode = queue.pop_front()?;
+                    let Some(mode) = queue.pop_front() else { break };
                     let distance = mode.iter().zip(&first).filter(|(a, b)| a != b).count();
                     if leaping.is_some() && distance > FAR {
                         break;
@@ -427,13 +459,14 @@ impl Instant<'_> {
             };
             tried.insert(mode.clone());
             match self.try_mode(&mode) {
-                Tried::Fits(found, leap) if leap <= NO_LEAP => return Some(*found),
+                Tried::Fits(found, leap) if leap <= NO_LEAP => return Ok(*found),
                 Tried::Fits(found, leap) => {
                     if self.may_leap(&mode, bounds) && leaping.as_ref().is_none_or(|(least, _)| leap < *least) {
                         leaping = Some((leap, found));
                     }
                 }
                 Tried::Ended(ended) => {
+                    short += 1;
                     let exchanged = ended.first().map(|&(law, beyond)| {
                         let mut other = mode.clone();
                         other[law as usize] = beyond;
@@ -447,7 +480,7 @@ impl Instant<'_> {
                 break;
             }
         }
-        leaping.map(|(_, found)| *found)
+        leaping.map(|(_, found)| *found).ok_or([tried.len() - 1, short])
     }
 
     /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.
@@ -490,7 +523,9 @@ impl Instant<'_> {
         x.iter_mut().zip(&code.program.tracked).for_each(|(x, symbol)| *x = value(symbol));
         model.run.conserved = code.program.replaced.iter().map(value).collect();
         let Some(jumps) = &code.program.jumps else { return Ok(None) };
-        let kept: Option<Vec<f64>> = jumps.storages.iter().map(|s| self.stored.get(s).copied()).collect();
+        // A spring whose displacement follows from others keeps nothing by itself, but has a displacement.
+        let kept = jumps.storages.iter().map(|s| self.stored.get(s).or_else(|| self.values.get(s)).copied());
+        let kept: Option<Vec<f64>> = kept.collect();
         let Some(kept) = kept else { return Ok(None) };
         model.events.impulses.keep_stored(&kept);
         model.balance_leaps(t, x)?;

@@ -1,6 +1,7 @@
 //! The first zero crossing inside a step.
 
 use super::Signs;
+use super::signs::PLACES;
 use crate::Failure;
 
 /// Parts of a step at whose ends the signs are looked at: a pulse as short as one part is not missed.
@@ -13,11 +14,15 @@ const MOST_BISECTIONS: usize = 80;
 /// be as small as you like, but what a state would be then is rounding of the step.
 pub(crate) const FINEST: f64 = 2.168404344971009e-19;
 
+/// Points inside a step that are looked at beside the ends of its parts, at most.
+const MOST_LOOKS: usize = 240;
+
 /// The first time in `(start, end]` at which an event indicator has another sign than that held, and which it is.
 /// `crossed` says for a time inside the step what [`Signs::crossed`] says of the state there. The time returned is just
 /// past the crossing, by a rounding error.
 ///
-/// Two crossings of one function inside one part of the step are found where its values bend towards 0 there.
+/// Two crossings of one function inside one part of the step are found where its values bend towards 0 there: the part is
+/// halved until they do not any more.
 pub(crate) fn first_crossing(
     signs: &mut Signs,
     start: f64,
@@ -29,20 +34,35 @@ pub(crate) fn first_crossing(
     }
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
     crossed(signs, start)?;
+    // Values at the begin of what is looked at stand in place 0, those at the ends of what is left of a part behind it.
     signs.keep(0);
+    let (mut before, mut looks) = (start, 0);
+    let mut ends = [0.0; PLACES];
     for part in 1..=PARTS {
+        let finest = FINEST * (end - start);
         let found = crossed(signs, time(part))?;
         if found.is_some() {
-            return bisect(signs, (time(part - 1), time(part)), FINEST * (end - start), found, &mut crossed);
+            return bisect(signs, (before, time(part)), finest, found, &mut crossed);
         }
-        signs.keep(part);
-        for indicator in 0..signs.len() {
-            let Some(turn) = signs.turn(indicator, part) else { continue };
-            let extremum = start + (end - start) * turn / PARTS as f64;
-            let found = crossed(signs, extremum)?;
+        signs.keep(1);
+        let mut open = 1;
+        ends[open] = time(part);
+        while open > 0 {
+            let middle = before + 0.5 * (ends[open] - before);
+            let inside = middle > before && middle < ends[open] && looks < MOST_LOOKS;
+            let found = if inside { crossed(signs, middle)? } else { None };
+            looks += 1;
             if found.is_some() {
-                let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
-                return bisect(signs, (before, extremum), FINEST * (end - start), found, &mut crossed);
+                return bisect(signs, (before, middle), finest, found, &mut crossed);
+            }
+            if inside && open + 1 < PLACES && signs.may_hide(0, open) {
+                open += 1;
+                signs.keep(open);
+                ends[open] = middle;
+            } else {
+                before = ends[open];
+                signs.keep_as(open, 0);
+                open -= 1;
             }
         }
     }

@@ -3,19 +3,27 @@
 use super::Events;
 use crate::{Affected, Failure};
 
+/// Points of a step of which values are kept.
+pub(super) const PLACES: usize = 12;
+/// What an indicator bends by less, as part of its greatest magnitude, is rounding.
+const NOISE: f64 = 1e-12;
+
 /// The sign of each event indicator during the present mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Signs {
     pub(super) held: Vec<bool>,
     pub(super) values: Vec<f64>,
-    /// The values at the ends of the last three parts of a step.
-    seen: [Vec<f64>; 3],
+    /// Values at points of a step, one place after the other.
+    seen: Vec<f64>,
+    /// The greatest finite magnitude of each value.
+    most: Vec<f64>,
 }
 
 impl Signs {
     pub(crate) fn new(indicators: usize) -> Signs {
         let values = vec![0.0; indicators];
-        Signs { held: vec![false; indicators], seen: [values.clone(), values.clone(), values.clone()], values }
+        let (seen, most) = (vec![0.0; indicators * PLACES], values.clone());
+        Signs { held: vec![false; indicators], seen, most, values }
     }
 
     /// One held sign, for tests.
@@ -28,18 +36,28 @@ impl Signs {
         self.held.len()
     }
 
-    /// Keeps the values as those at the end of a part of a step.
-    pub(super) fn keep(&mut self, part: usize) {
-        self.seen[part % 3].copy_from_slice(&self.values);
+    /// Keeps the values in a place.
+    pub(super) fn keep(&mut self, place: usize) {
+        let n = self.values.len();
+        self.seen[place * n..][..n].copy_from_slice(&self.values);
     }
 
-    /// Where, in parts, the values of an indicator turn round on their way to 0, judged by the parabola through those kept last.
-    pub(super) fn turn(&self, indicator: usize, part: usize) -> Option<f64> {
-        let middle = part.checked_sub(1).filter(|middle| *middle > 0)?;
-        let [a, b, c] = [middle - 1, middle, part].map(|part| self.seen[part % 3][indicator]);
-        let (slope, bend) = (0.5 * (c - a), a - 2.0 * b + c);
-        let turn = (bend * b > 0.0).then(|| -slope / bend).filter(|turn| turn.abs() <= 1.0)?;
-        Some(middle as f64 + turn)
+    /// What was kept in one place is kept in another one as well.
+    pub(super) fn keep_as(&mut self, from: usize, to: usize) {
+        let n = self.values.len();
+        self.seen.copy_within(from * n..(from + 1) * n, to * n);
+    }
+
+    /// Whether an indicator may have been zero twice between two points whose values were kept, as the values between them,
+    /// which are those seen last, tell: it bends there by more than half of its least magnitude.
+    pub(super) fn may_hide(&self, before: usize, after: usize) -> bool {
+        let n = self.values.len();
+        let at = |place: usize, indicator: usize| self.seen[place * n + indicator];
+        (0..n).any(|i| {
+            let (a, m, b) = (at(before, i), self.values[i], at(after, i));
+            let bend = (m - 0.5 * (a + b)).abs();
+            bend > 0.5 * a.abs().min(m.abs()).min(b.abs()) && bend > NOISE * self.most[i]
+        })
     }
 
     /// Whether there is nothing to watch.
@@ -63,6 +81,8 @@ impl Signs {
             return Ok(None);
         }
         events.event_indicators(t, point, &mut self.values)?;
+        let sizes = self.values.iter().map(|value| value.abs()).zip(&mut self.most);
+        sizes.filter(|(size, most)| size.is_finite() && *size > **most).for_each(|(size, most)| *most = size);
         if let Some(indicator) = self.values.iter().position(|value| value.is_nan()) {
             return Err(Failure::NotFinite { time: t, what: Affected::Other(events.indicator_name(indicator)) });
         }
