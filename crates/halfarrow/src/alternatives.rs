@@ -15,9 +15,7 @@ use halfarrow_exec as exec;
 #[derive(Debug)]
 pub(crate) struct Alternatives {
     graph: BondGraph,
-    /// How many states a program has.
-    states: usize,
-    /// How many states constants stand for, at most.
+    /// How many states constants stand for, at most, in the branches of the start.
     conserved: usize,
 }
 
@@ -40,13 +38,16 @@ impl Alternatives {
                 });
             }
         }
-        Alternatives { graph, states: first.states.len(), conserved: first.conserved.len() }
+        Alternatives { graph, conserved: first.conserved.len() }
     }
 }
 
 impl exec::Alternatives for Alternatives {
-    fn program(&self, independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
-        let mut graph = self.graph.clone();
+    fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
+        let mut graph = match branches.is_empty() {
+            true => self.graph.clone(),
+            false => self.graph.in_mode(&branches.iter().map(|&b| b as usize).collect::<Vec<_>>()),
+        };
         let wanted = independent.iter().map(|&symbol| Preference {
             name: graph.exprs.name(symbol).to_string(),
             symbol: graph.exprs.untwinned(symbol),
@@ -54,9 +55,12 @@ impl exec::Alternatives for Alternatives {
         });
         // What the modeller prefers is next.
         graph.preferences = wanted.chain(graph.preferences.iter().cloned()).collect();
-        graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
+        if !point.is_empty() {
+            graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
+        }
         let causal = assign_causality(&graph).ok()?;
-        let equations = derive_minimal(&causal, self.conserved).ok()?;
-        (equations.states.len() == self.states).then(|| schedule(&equations))
+        let conserved = if branches.is_empty() { self.conserved } else { usize::MAX };
+        let equations = derive_minimal(&causal, conserved).ok()?;
+        Some(schedule(&equations))
     }
 }
