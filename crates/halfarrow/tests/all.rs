@@ -48,6 +48,8 @@ mod names;
 mod repeated;
 #[path = "report.rs"]
 mod report;
+#[path = "set_valued.rs"]
+mod set_valued;
 #[path = "stiff_networks.rs"]
 mod stiff_networks;
 #[path = "sweep.rs"]
