@@ -350,7 +350,7 @@ impl Check<'_, '_> {
         let mut room = Vec::new();
         for (k, &time) in self.values.times.iter().enumerate() {
             let Some(found) = reader.values_in(&mut room, k, None) else { continue };
-            let off = miss(k, found);
+            let off = self.least(reader, k, miss(k, found), |v| miss(k, v));
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             self.worst.note(off, scale, settled, || {
                 let mut terms = vec![Term::of(of, 1.0)];
@@ -360,6 +360,23 @@ impl Check<'_, '_> {
                 raw(off, time, name, what, terms)
             });
         }
+    }
+
+    /// What a law is missed by: after a jump, where a condition may stand on its border, in the branch that holds best.
+    /// The run has decided by where it came from, which no sample tells.
+    fn least(&self, reader: &Reader, sample: usize, here: f64, miss: impl Fn(&[f64]) -> f64) -> f64 {
+        if !reader.jumps_at(sample) {
+            return here;
+        }
+        let beside = |&symbol: &Symbol| {
+            let by = BORDER * self.settled.of(self.scales.of(self.graph, symbol));
+            [by, -by].map(|by| reader.values(sample, Some((symbol, by))).map_or(here, |v| miss(&v)))
+        };
+        reader
+            .moves()
+            .iter()
+            .flat_map(beside)
+            .fold(here, |least, off| if off.abs() < least.abs() { off } else { least })
     }
 
     /// An expression that vanishes: relative to its terms where it has several, else to what its variables make of it.
@@ -378,12 +395,13 @@ impl Check<'_, '_> {
             let Some(found) = found else { continue };
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             let sum = |v: &[f64]| v.iter().sum::<f64>();
-            self.worst.note(sum(found), scale, settled, || {
+            let off = self.least(&reader, k, sum(found), sum);
+            self.worst.note(off, scale, settled, || {
                 let mut terms = vec![Term::of(Quantity::Number, natural)];
                 let all = sensitivities(graph, scales, settled, &reader, k, sum);
                 let term = |(quantity, weight)| Term { quantity, weight, beside: parts.len() > 1 };
                 terms.extend(all.into_iter().map(term));
-                raw(sum(found), self.values.times[k], name, what, terms)
+                raw(off, self.values.times[k], name, what, terms)
             });
         }
         Ok(())
@@ -393,6 +411,9 @@ impl Check<'_, '_> {
 pub(crate) fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Vec<Term>) -> Raw {
     Raw { miss, resolution: 0.0, time, place: format!("{name}: {what}"), terms }
 }
+
+/// Part of its scale by which a variable may lie beside the border at which a run has changed its branch: rounding.
+const BORDER: f64 = 1e-12;
 
 /// A law is a straight line if its slope differs by no more than this part over a distance of a variable's size.
 const STRAIGHT: f64 = 0.1;

@@ -278,6 +278,12 @@ impl Reader<'_, '_> {
         &self.moves
     }
 
+    /// Whether a sample stands behind a jump at its time, and a value jumps with the state.
+    pub fn jumps_at(&self, sample: usize) -> bool {
+        let times = self.values.times;
+        self.jumpy && (sample == 0 || times[sample] == times[sample - 1])
+    }
+
     /// The values at a sample, one symbol moved by so much; `None` where the law is not clear: at a switch the state stands
     /// just beyond the border while the old law still holds.
     pub fn values(&self, sample: usize, moved: Option<(Symbol, f64)>) -> Option<Vec<f64>> {

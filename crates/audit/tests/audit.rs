@@ -158,6 +158,44 @@ fn an_implicit_law_with_an_if_at_its_root_is_measured_by_what_its_variables_make
     assert!((1e-4..1e-2).contains(&found.residual.unwrap().value));
 }
 
+/// A force that changes where `x` passes 0: the sample behind the jump stands on the border, where the run has gone over and
+/// the condition by itself has not.
+#[test]
+fn a_condition_on_its_border_is_read_as_the_run_held_it() {
+    let graph = graph("model M\nSe:u(if x > 0 then 1 else 2) -> 1:v -> I:mass(1)\nstate x' = v.f from -1\n");
+    let jump = 0.5 * (5.0f64.sqrt() - 1.0);
+    let speed = 1.0 + 2.0 * jump;
+    let motion = |on_border: f64, force: f64| {
+        let (mut times, mut columns) = (Vec::new(), Columns::new());
+        let mut add = |t: f64, [force, speed, x]: [f64; 3]| {
+            times.push(t);
+            for name in ["u.e", "mass.e"] {
+                columns.entry(name.to_string()).or_default().push(force);
+            }
+            for name in ["u.f", "v.f", "mass.f", "mass.p"] {
+                columns.entry(name.to_string()).or_default().push(speed);
+            }
+            columns.entry("x".to_string()).or_default().push(x);
+        };
+        for k in 0..=40 {
+            let t = jump * f64::from(k) / 40.0;
+            add(t, [2.0, 1.0 + 2.0 * t, if k == 40 { on_border } else { -1.0 + t + t * t }]);
+        }
+        for k in 0..=40 {
+            let t = f64::from(k) / 40.0;
+            let x = if k == 0 { on_border } else { speed * t + 0.5 * t * t };
+            add(jump + t, [if k == 0 { force } else { 1.0 }, speed + t, x]);
+        }
+        check(&graph, &times, &columns)
+    };
+    for on_border in [0.0, -1e-16, 1e-16] {
+        let found = motion(on_border, 1.0);
+        assert!(found.unchecked.is_empty() && found.residual.as_ref().unwrap().value < 1e-13, "{on_border}: {found}");
+    }
+    assert!(motion(0.0, 1.5).residual.unwrap().value > 0.1);
+    assert!(motion(-1e-6, 1.0).residual.unwrap().value > 0.1);
+}
+
 #[test]
 fn a_run_in_parts_is_judged_as_the_whole() {
     let graph = graph(MODEL);

@@ -6,7 +6,6 @@ use halfarrow_compiler::compile::{Text, compile, to_equations};
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources, render};
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::textbook::show;
-use std::time::{Duration, Instant};
 
 fn elaborate(text: &str, set: &[(&str, &str)]) -> Elaborated {
     let mut sources = Sources::new();
@@ -261,18 +260,4 @@ fn cells_tell_where_elements_come_from() {
         all.join(" ")
     };
     assert_eq!(["x[2].r[2]", "x[1].w", "y.r[1]", "t"].map(around), ["x[2]i=2 k=2", "k=1", "yi=1", ""]);
-}
-
-#[test]
-fn large_rows_take_time_in_proportion_to_their_length() {
-    let time = |n: usize| {
-        let text = format!(
-            "model M\nparam n = {n}, r[n] = 1\n0:v[0]\nSe:s(1) -> v[0]\nfor i in 1..n {{\n1:w[i]\nv[i - 1] -> w[i] -> R:r[i](r[i])\nw[i] -> 0:v[i] -> C:c[i](1)\n}}\n"
-        );
-        let start = Instant::now();
-        assert_eq!(graph(&text, &[]).elements.len(), 4 * n + 2);
-        start.elapsed()
-    };
-    let (short, long) = (time(1000).max(Duration::from_millis(5)), time(10_000));
-    assert!(long < 30 * short, "1000 cells in {short:?}, 10000 in {long:?}");
 }

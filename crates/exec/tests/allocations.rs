@@ -4,8 +4,10 @@ mod common;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::bond_graph::NoFiles;
+use halfarrow_compiler::ast;
+use halfarrow_compiler::bond_graph::{self, NoFiles};
 use halfarrow_compiler::compile::{Text, compile};
+use halfarrow_compiler::diagnostic::Sources;
 use halfarrow_compiler::equations::EquationStep;
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::sparse::SparseMatrix;
@@ -142,4 +144,23 @@ fn takes_no_memory_at_events(text: &str, method: FixedMethod) {
     model.record(&["two.impulse", "k"]).unwrap();
     model.observe(0.499, &x, &mut values).unwrap();
     assert!(values[0] != 0.0 && values[1] >= 1.0, "all of them happen: {values:?}");
+}
+
+/// What it takes to elaborate a row of cells, counted in pieces of memory, grows with its length.
+#[test]
+fn large_rows_take_memory_in_proportion_to_their_length() {
+    let pieces = |n: usize| {
+        let text = format!(
+            "model M\nparam n = {n}, r[n] = 1\n0:v[0]\nSe:s(1) -> v[0]\nfor i in 1..n {{\n1:w[i]\nv[i - 1] -> w[i] -> R:r[i](r[i])\nw[i] -> 0:v[i] -> C:c[i](1)\n}}\n"
+        );
+        allocations_during(|| {
+            let mut sources = Sources::new();
+            let file = sources.add("main.bond", &text);
+            let parsed = ast::parse(&text, file);
+            let graph = bond_graph::elaborate(parsed.ast, sources, &NoFiles, &[]).graph;
+            assert_eq!(graph.map(|graph| graph.elements.len()), Some(4 * n + 2));
+        })
+    };
+    let (short, long) = (pieces(1_000), pieces(10_000));
+    assert!(long < 11 * short, "1,000 cells take {short} pieces, 10,000 take {long}");
 }

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::bond_graph::{BondGraph, Kind, Preference};
+use halfarrow_compiler::bond_graph::{BondGraph, Kind, Named, Preference};
 use halfarrow_compiler::causal_graph::assign_causality;
-use halfarrow_compiler::equations::{Form, derive_equations};
+use halfarrow_compiler::equations::{Equations, derive_minimal};
 use halfarrow_compiler::ids::Map;
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_compiler::span::Span;
@@ -14,7 +14,32 @@ use halfarrow_exec as exec;
 /// The bond graph of which programs are made.
 #[derive(Debug)]
 pub(crate) struct Alternatives {
-    pub graph: BondGraph,
+    graph: BondGraph,
+    /// How many states constants stand for, at most, in the branches of the start.
+    conserved: usize,
+}
+
+impl Alternatives {
+    /// Programs of `graph` that go on where one of these equations stops. What these have as states and the graph does not,
+    /// sums of stored quantities, has a value in all of them.
+    pub fn new(graph: &BondGraph, first: &Equations) -> Alternatives {
+        let mut graph = graph.clone();
+        for &(symbol, meaning) in &first.meanings {
+            let Some(state) = first.states.iter().find(|s| s.symbol == symbol) else { continue };
+            let known = graph.outputs.iter().chain(&graph.lets).any(|named| named.name == state.name);
+            if let (false, Some(value)) = (known, graph.exprs.taken_from(&first.graph.exprs, meaning)) {
+                graph.lets.push(Named {
+                    name: state.name.clone(),
+                    value,
+                    unit: state.unit.clone(),
+                    unit_is_written: false,
+                    doc: String::new(),
+                    span: state.span,
+                });
+            }
+        }
+        Alternatives { graph, conserved: first.conserved.len() }
+    }
 }
 
 impl exec::Alternatives for Alternatives {
@@ -42,7 +67,8 @@ impl exec::Alternatives for Alternatives {
             graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
         }
         let causal = assign_causality(&graph).ok()?;
-        let equations = derive_equations(&causal, Form::Minimal).ok()?;
+        let conserved = if branches.is_empty() { self.conserved } else { usize::MAX };
+        let equations = derive_minimal(&causal, conserved).ok()?;
         Some(schedule(&equations))
     }
 }

@@ -444,7 +444,7 @@ impl Model {
 
     pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
         let program = self.program_of(equations);
-        let alternatives = Arc::new(Alternatives { graph: self.graph.clone() });
+        let alternatives = Arc::new(Alternatives::new(&self.graph, equations));
         let code = || exec::Model::of(Arc::new(exec::Compiled::new(program).with_alternatives(alternatives)));
         self.watch.time("code", code).map_err(|failure| self.stopped(failure))
     }

@@ -3,6 +3,7 @@
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::table::TableId;
+use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
@@ -51,30 +52,66 @@ impl Exprs {
 
     /// The expression made anew from other parts.
     pub(super) fn rebuild(&mut self, e: Expr, part: &dyn Fn(Expr) -> Expr) -> Expr {
-        let all = |parts: &[Expr]| -> Vec<Expr> { parts.iter().map(|&p| part(p)).collect() };
         match self.node(e) {
             Node::Number(_) | Node::Pi | Node::Symbol(_) => e,
-            Node::Add(terms) => {
-                let terms = all(terms);
-                self.add(&terms)
+            node => {
+                let node = node.with_parts(part);
+                self.made(node)
             }
-            Node::Mul(factors) => {
-                let factors = all(factors);
-                self.mul(&factors)
-            }
-            &Node::Pow(base, n) => self.pow(part(base), part(n)),
-            Node::Call(f, x) => {
-                let (f, x) = (*f, all(x));
-                self.call(f, &x)
-            }
-            &Node::Compare(c, a, b) => self.compare(c, part(a), part(b)),
-            &Node::And(a, b) => self.and(part(a), part(b)),
-            &Node::Or(a, b) => self.or(part(a), part(b)),
-            &Node::Not(a) => self.not(part(a)),
-            &Node::Select(c, a, b) => self.select(part(c), part(a), part(b)),
-            &Node::Table(t, x) => self.table(t, part(x)),
-            &Node::TableSlope(t, x) => self.table_slope(t, part(x)),
         }
+    }
+
+    /// A node in canonical form.
+    fn made(&mut self, node: Node) -> Expr {
+        match node {
+            Node::Number(value) => self.number(value),
+            Node::Pi => self.pi(),
+            Node::Symbol(symbol) => self.sym(symbol),
+            Node::Add(terms) => self.add(&terms),
+            Node::Mul(factors) => self.mul(&factors),
+            Node::Pow(base, n) => self.pow(base, n),
+            Node::Call(f, x) => self.call(f, &x),
+            Node::Compare(c, a, b) => self.compare(c, a, b),
+            Node::And(a, b) => self.and(a, b),
+            Node::Or(a, b) => self.or(a, b),
+            Node::Not(a) => self.not(a),
+            Node::Select(c, a, b) => self.select(c, a, b),
+            Node::Table(t, x) => self.table(t, x),
+            Node::TableSlope(t, x) => self.table_slope(t, x),
+        }
+    }
+
+    /// An expression of a pool that has grown from a copy of this one, in this one. `None` if it reads what only that pool
+    /// has: symbols, tables.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{Exprs, Facts};
+    /// let mut x = Exprs::default();
+    /// let q = x.symbol("q", Facts::default());
+    /// let mut grown = x.clone();
+    /// let (square, p) = (grown.sym(q), grown.symbol("p", Facts::default()));
+    /// let (square, p) = (grown.powi(square, 2), grown.sym(p));
+    /// let own = x.sym(q);
+    /// assert_eq!(x.taken_from(&grown, square), Some(x.powi(own, 2)));
+    /// assert_eq!(x.taken_from(&grown, p), None);
+    /// ```
+    pub fn taken_from(&mut self, grown: &Exprs, e: Expr) -> Option<Expr> {
+        let common = self.len();
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in grown.below(&[e], &|part| part.index() >= common) {
+            let node = match grown.node(part) {
+                Node::Symbol(symbol) => {
+                    let symbol = grown.untwinned(*symbol);
+                    (symbol.index() < self.symbol_count()).then_some(Node::Symbol(symbol))?
+                }
+                Node::Table(table, _) | Node::TableSlope(table, _) if table.index() >= self.table_count() => {
+                    return None;
+                }
+                node => node.with_parts(&|part| new.get(&part).copied().unwrap_or(part)),
+            };
+            new.insert(part, self.made(node));
+        }
+        Some(new.get(&e).copied().unwrap_or(e))
     }
 
     fn slope(&self, e: Expr, symbol: Symbol) -> Expr {

@@ -190,6 +190,25 @@ pub enum Node {
 }
 
 impl Node {
+    /// The same node of other parts.
+    pub(super) fn with_parts(&self, part: &dyn Fn(Expr) -> Expr) -> Node {
+        let all = |parts: &Parts| -> Parts { parts.iter().map(|&p| part(p)).collect() };
+        match self {
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => self.clone(),
+            Node::Add(terms) => Node::Add(all(terms)),
+            Node::Mul(factors) => Node::Mul(all(factors)),
+            &Node::Pow(base, n) => Node::Pow(part(base), part(n)),
+            Node::Call(f, x) => Node::Call(*f, all(x)),
+            &Node::Compare(c, a, b) => Node::Compare(c, part(a), part(b)),
+            &Node::And(a, b) => Node::And(part(a), part(b)),
+            &Node::Or(a, b) => Node::Or(part(a), part(b)),
+            &Node::Not(a) => Node::Not(part(a)),
+            &Node::Select(c, a, b) => Node::Select(part(c), part(a), part(b)),
+            &Node::Table(t, x) => Node::Table(t, part(x)),
+            &Node::TableSlope(t, x) => Node::TableSlope(t, part(x)),
+        }
+    }
+
     /// Calls `visit` with each entry it is made of, in order.
     pub fn for_each_child(&self, mut visit: impl FnMut(Expr)) {
         match self {

@@ -17,23 +17,32 @@ struct BalanceRow {
     row: Combination,
 }
 
-/// Finds them, and makes each a constant in place of one state.
-pub fn eliminate(assembled: &mut Assembled) -> Vec<Conserved> {
-    let balances = entangled(assembled);
+/// Finds them, and makes each a constant in place of one state, at most so many.
+///
+/// With `exchanged`, as independent variables may change places while running, storages that follow others by ratios that
+/// vary keep their states: which constants can stand for a state would change with them.
+pub fn eliminate(assembled: &mut Assembled, most: usize, exchanged: bool) -> Vec<Conserved> {
+    let balances = entangled(assembled, exchanged);
     let rows = constant_rows(assembled, &balances);
     let columns: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|e| e.0).collect()).collect();
     let left = without_own(&columns);
     let core: Vec<usize> = (0..rows.len()).filter(|&r| left[r]).collect();
     let mut found = Vec::new();
     for vector in null_vectors(assembled, &rows, &core) {
+        if found.len() == most {
+            break;
+        }
         found.extend(replace(assembled, &balances, &vector, found.len() + 1));
     }
     found
 }
 
 /// The balances that may share all that changes them.
-fn entangled(assembled: &mut Assembled) -> Vec<BalanceRow> {
-    let balances = std::mem::take(&mut assembled.balances);
+fn entangled(assembled: &mut Assembled, exchanged: bool) -> Vec<BalanceRow> {
+    let mut balances = std::mem::take(&mut assembled.balances);
+    if exchanged {
+        balances.retain(|balance| assembled.follows_constantly(balance));
+    }
     let rates: Vec<[Symbol; 1]> = balances.iter().map(|balance| [balance.rate]).collect();
     let entangled = assembled.rows.entangled(&rates, |input| input.role != Role::Dependent);
     let open = balances.into_iter().zip(entangled).filter(|b| b.1);
@@ -114,12 +123,13 @@ fn replace(
     for &(b, _) in vector.iter().rev() {
         let state = balances[b].state;
         if let Some(solution) = assembled.d.solve_for(residual, state) {
-            assembled.states.retain(|s| s.symbol != state);
+            let chosen = assembled.states.iter().position(|s| s.symbol == state)?;
+            let replaced = assembled.states.remove(chosen).tracked;
             assembled.d.states.remove(&state);
             assembled.d.constants.insert(symbol);
             assembled.d.set(state, solution);
             let name = assembled.d.x.name(symbol).to_string();
-            return Some(Conserved { symbol, name, value, replaced: state });
+            return Some(Conserved { symbol, name, value, replaced });
         }
     }
     None

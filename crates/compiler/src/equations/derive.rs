@@ -7,7 +7,7 @@ use super::assumptions::assumptions;
 use super::blocks::{Insoluble, Ordered, order};
 use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
-use super::exchanges::{Exchanges, exchanges};
+use super::exchanges::{Exchanges, exchanges, may_exchange};
 use super::freedom::{self, Sum};
 use super::jumps::{margins, readable};
 use super::minimal::{Assembled, assemble};
@@ -34,7 +34,7 @@ use crate::unit::Unit;
 /// Source: `method.md`, sections 4 and 5.
 pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
     let equations = match form {
-        Form::Minimal | Form::Kane => minimal(causal, form),
+        Form::Minimal | Form::Kane => minimal(causal, form, usize::MAX),
         Form::Inverted => inverted(causal),
         Form::Break | Form::Relaxed => classical(causal, form),
         Form::Lagrange => lagrange(causal),
@@ -44,14 +44,24 @@ pub fn derive_equations(causal: &CausalGraph, form: Form) -> Result<Equations, D
     Ok(equations)
 }
 
+/// The minimal form, in which constants stand for at most so many states; others that are conserved stay states.
+///
+/// Errors: as [`derive_equations`].
+pub fn derive_minimal(causal: &CausalGraph, conserved: usize) -> Result<Equations, Diagnostics> {
+    let equations = minimal(causal, Form::Minimal, conserved)?;
+    debug_assert_eq!(verify(&equations), Ok(()), "{}", causal.graph.name);
+    Ok(equations)
+}
+
 /// Independent variables alone: one explicit equation each.
-fn minimal(causal: &CausalGraph, form: Form) -> Result<Equations, Diagnostics> {
+fn minimal(causal: &CausalGraph, form: Form, constants: usize) -> Result<Equations, Diagnostics> {
     let graph = &causal.graph;
     let momenta = form == Form::Minimal;
     let mut assembled =
         assemble(causal, momenta).map_err(|(symbol, reason)| needs_rate(graph, &graph.exprs, symbol, &reason))?;
     let positions = positions::eliminate(&mut assembled, causal);
-    let conserved = if momenta { conserved::eliminate(&mut assembled) } else { Vec::new() };
+    let exchanged = may_exchange(&assembled, causal);
+    let conserved = if momenta { conserved::eliminate(&mut assembled, constants, exchanged) } else { Vec::new() };
     let before = assembled.d.x.assumed();
     let relations = relations::relations(&mut assembled, causal);
     assembled.d.x.forget_unwatched(&before);
@@ -164,7 +174,7 @@ fn order_equations(
     let momenta = assembled.momenta(truth);
     let jumps = assembled.jumps(truth, form)?;
     let exchanges = match form {
-        Form::Minimal => exchanges(&mut assembled, truth),
+        Form::Minimal => exchanges(&mut assembled, truth, &conserved),
         _ => Exchanges::default(),
     };
     let Assembled { mut d, states, .. } = assembled;
@@ -205,8 +215,11 @@ fn order_equations(
         ordered.steps.push(EquationStep::Guard { pivot, elements: readers(&d, pivot) });
     }
     let momenta = known(&d, momenta).into_iter();
+    let of_the_bond = |d: &Definitions, symbol| of_the_bond(d, truth, symbol);
     let momenta = momenta.map(|m| Momentum { speed: of_the_bond(&d, m.speed), ..m }).collect();
     let tracked: Vec<Symbol> = states.iter().map(|s| of_the_bond(&d, s.tracked)).collect();
+    let conserved = conserved.into_iter();
+    let conserved = conserved.map(|c| Conserved { replaced: of_the_bond(&d, c.replaced), ..c }).collect();
     let free_rates: BTreeSet<Symbol> = rates.intersection(&d.free).copied().collect();
     let sums: Vec<Sum> = states.iter().filter(|s| s.meaning.is_some()).map(|s| Sum { speed: s.tracked }).collect();
     let meanings: Vec<_> = states.iter().filter_map(|s| s.meaning.map(|m| (s.symbol, m))).collect();
@@ -222,7 +235,7 @@ fn order_equations(
         })
         .collect();
     let positions: Vec<Position> = positions.iter().map(|computed| position(&mut d, computed)).collect();
-    let (algebraic, mut residuals) = unknowns(&d, &constraints);
+    let (algebraic, mut residuals) = unknowns(&d, truth, &constraints);
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
@@ -288,9 +301,17 @@ fn order_equations(
     })
 }
 
-/// The variable of the bond that two elements share, for the one that the second of them has of its own.
-fn of_the_bond(d: &Definitions, symbol: Symbol) -> Symbol {
-    d.x.untwinned(symbol)
+/// The variable of the graph: that of the bond that two elements share, for the one that the second of them has of its own;
+/// that of the bonds of a junction, for the one that is kept there without a storage.
+pub(super) fn of_the_bond(d: &Definitions, causal: &CausalGraph, symbol: Symbol) -> Symbol {
+    let kept = causal.ports.virtual_speeds.iter().find(|v| v.speed == symbol);
+    let common = |junction| {
+        let element = &d.graph.elements[junction];
+        let bond = d.graph.common.get(&junction).copied().or(element.ports.first().map(|p| p.bond));
+        let bond = &d.graph.bonds[bond?];
+        Some(if matches!(element.kind, Kind::One) { bond.flow } else { bond.effort })
+    };
+    kept.and_then(|v| common(v.junction)).unwrap_or_else(|| d.x.untwinned(symbol))
 }
 
 /// A position that constraints determine.
@@ -312,12 +333,12 @@ fn position(d: &mut Definitions, computed: &Computed) -> Position {
 }
 
 /// The algebraic unknowns, and what vanishes: for free rates first, then for these.
-fn unknowns(d: &Definitions, constraints: &[AlgebraicConstraint]) -> (Vec<Algebraic>, Vec<Expr>) {
+fn unknowns(d: &Definitions, truth: &CausalGraph, constraints: &[AlgebraicConstraint]) -> (Vec<Algebraic>, Vec<Expr>) {
     let mut algebraic = Vec::new();
     let mut residuals: Vec<Expr> = constraints.iter().filter(|c| c.unknown.is_none()).map(|c| c.residual).collect();
     for constraint in constraints {
         let Some((symbol, cause)) = constraint.unknown else { continue };
-        let tracked = of_the_bond(d, symbol);
+        let tracked = of_the_bond(d, truth, symbol);
         algebraic.push(Algebraic { symbol, tracked, name: name_of(d, symbol), cause, unit: unit_of(d.graph, symbol) });
         residuals.push(constraint.residual);
     }

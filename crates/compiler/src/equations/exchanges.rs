@@ -3,11 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::Conserved;
+use super::derive::of_the_bond;
 use super::minimal::{Assembled, rows_of};
 use crate::algebra::{Node, Symbol};
-use crate::bond_graph::Meaning;
+use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
-use crate::causal_graph::{CausalGraph, Role, magnitude_of_slope};
+use crate::causal_graph::{CausalGraph, PortState, Role, magnitude_of_slope};
 
 /// Larger tables of ratios are not looked at.
 const MOST: usize = 20_000;
@@ -26,6 +28,8 @@ pub struct Exchanges {
 pub struct Exchanged {
     /// The effort or flow.
     pub symbol: Symbol,
+    /// The variable that tells it where it is independent: itself, or what its storage holds.
+    pub told_by: Symbol,
     /// By what it is multiplied to be compared with others: the root of the slope of its storage. `None` without one.
     pub weight: Option<f64>,
 }
@@ -37,15 +41,27 @@ impl Exchanged {
     }
 }
 
+/// Whether a divisor may vanish while running, so that other variables would have to be independent.
+pub(super) fn may_exchange(assembled: &Assembled, causal: &CausalGraph) -> bool {
+    causal.ports.watched.iter().any(|&divisor| !assembled.d.is_constant(divisor))
+}
+
 /// The exchanges among what depends on each other by divisors that may vanish while running.
-pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph) -> Exchanges {
-    let d = &mut assembled.d;
-    let ports = &causal.ports;
-    if ports.watched.iter().all(|&divisor| d.is_constant(divisor)) {
+/// `conserved`: what is, in place of some states.
+pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserved: &[Conserved]) -> Exchanges {
+    if !may_exchange(assembled, causal) {
         return Exchanges::default();
     }
+    let d = &mut assembled.d;
+    let ports = &causal.ports;
     let mut rows = rows_of(d, causal);
-    let storages = ports.ports.iter().filter(|p| p.role == Role::Independent).map(|p| p.input);
+    let storages = ports.ports.iter().filter(|p| p.role == Role::Independent);
+    let stored = |p: &PortState| match &d.graph.elements[p.port.element].kind {
+        Kind::Inertance(storage) | Kind::Compliance(storage) => Some((p.input, storage.stored[p.port.port as usize])),
+        _ => None,
+    };
+    let stored: BTreeMap<Symbol, Symbol> = storages.clone().filter_map(stored).collect();
+    let storages = storages.map(|p| p.input);
     let independent: BTreeSet<Symbol> = storages.chain(ports.virtual_speeds.iter().map(|v| v.speed)).collect();
     let rates = d.computed.iter().filter_map(|&s| match d.meaning(s)? {
         Meaning::Signal(signal) => match *d.x.node(d.graph.signals[signal].rate) {
@@ -60,7 +76,16 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph) -> Exch
     let mut read: BTreeSet<Symbol> = BTreeSet::new();
     let mut seen: BTreeSet<Symbol> = BTreeSet::new();
     let weights = weights(d, causal);
-    let of = |symbol: Symbol| Exchanged { symbol, weight: weights.get(&symbol).copied() };
+    let tracked: BTreeSet<Symbol> =
+        assembled.states.iter().map(|s| s.tracked).chain(conserved.iter().map(|c| c.replaced)).collect();
+    let of = |d: &super::Definitions, symbol: Symbol| {
+        let told_by = stored.get(&symbol).copied().filter(|s| tracked.contains(s)).unwrap_or(symbol);
+        Exchanged {
+            symbol: of_the_bond(d, causal, symbol),
+            told_by: of_the_bond(d, causal, told_by),
+            weight: weights.get(&symbol).copied(),
+        }
+    };
     for symbol in dependent {
         if found.dependent.len() * independent.len() > MOST {
             return Exchanges::default();
@@ -71,9 +96,9 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph) -> Exch
             continue;
         }
         read.extend(ratios.iter().map(|t| t.0));
-        found.dependent.push(of(symbol));
+        found.dependent.push(of(d, symbol));
     }
-    found.independent.extend(read.into_iter().map(of));
+    found.independent.extend(read.into_iter().map(|symbol| of(d, symbol)));
     found
 }
 

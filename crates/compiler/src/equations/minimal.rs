@@ -408,6 +408,14 @@ impl<'a> Assembled<'a> {
         Some((self.d.x.add(&terms), row))
     }
 
+    /// Whether all dependent storages of its group follow by constant ratios.
+    pub fn follows_constantly(&mut self, balance: &Balance) -> bool {
+        balance.dependent.iter().all(|storage| {
+            let row = self.rows.of(&mut self.d.x, storage.z);
+            row.is_none_or(|row| row.0.iter().all(|t| self.d.is_constant(t.1)))
+        })
+    }
+
     /// The dependent storages of a group that read `z`.
     fn followers(&mut self, z: Symbol, dependent: &[DependentStorage]) -> Vec<Follower> {
         let follower = |c: &DependentStorage| {

@@ -40,7 +40,7 @@ pub use blocks::LinearRow;
 pub(crate) use blocks::{Ordered, substituted};
 pub use definitions::Definition;
 pub(crate) use definitions::Definitions;
-pub use derive::derive_equations;
+pub use derive::{derive_equations, derive_minimal};
 pub use exchanges::{Exchanged, Exchanges};
 pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
@@ -241,7 +241,7 @@ pub struct Conserved {
     pub name: String,
     /// What is conserved, in stored quantities.
     pub value: Expr,
-    /// The state in whose place it stands.
+    /// The variable of the graph that tells the state in whose place it stands.
     pub replaced: Symbol,
 }
 

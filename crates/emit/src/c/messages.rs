@@ -42,6 +42,12 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         all.push(text("what storages keep"));
         all
     };
+    let kept = match p.exchanges.independent.is_empty() {
+        true => "",
+        false => {
+            ", or where these variables do not tell the motion name others with `prefer`: exported code keeps its own"
+        }
+    };
     vec![
         ("VANISHED", p.pivot_guards.iter().map(vanished).collect()),
         ("SINGULAR", block(&singular)),
@@ -58,7 +64,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         (
             "OFF_MOTION",
             block(&|what| {
-                format!("the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or another motion leads through the same position; make the step shorter")
+                format!("the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or another motion leads through the same position; make the step shorter{kept}")
             }),
         ),
         ("BOUND", block(&|what| format!("the equations of {what} are not solved within the bound on evaluations"))),

@@ -28,8 +28,8 @@ const ITERATIONS: usize = 20;
 pub(super) struct Ratios {
     independent: Vec<Exchanged>,
     dependent: Vec<Exchanged>,
-    /// The states that tell the independent ones.
-    states: Vec<u32>,
+    /// The registers of the states, or constants, that tell the independent ones.
+    registers: Vec<u32>,
     /// Independent ones, then the dependent ones.
     routine: Routine,
 }
@@ -37,8 +37,12 @@ pub(super) struct Ratios {
 impl Ratios {
     pub fn of(program: &Program, layout: &Layout) -> Option<Ratios> {
         let value = |e: &Exchanged| program.variables.get(&e.symbol).copied();
-        let state = |e: &Exchanged| program.tracked.iter().position(|s| *s == e.symbol);
-        let known = program.exchanges.independent.iter().filter_map(|e| Some((*e, value(e)?, state(e)? as u32)));
+        let of = |symbols: &[Symbol], e: &Exchanged| symbols.iter().position(|s| *s == e.told_by).map(|k| k as u32);
+        let register = |e: &Exchanged| {
+            let state = of(&program.tracked, e).map(|k| layout.states + k);
+            state.or_else(|| of(&program.replaced, e).map(|k| layout.conserved + k))
+        };
+        let known = program.exchanges.independent.iter().filter_map(|e| Some((*e, value(e)?, register(e)?)));
         let known: Vec<(Exchanged, Value, u32)> = known.collect();
         let others = program.exchanges.dependent.iter().filter_map(|e| Some((*e, value(e)?)));
         let others: Vec<(Exchanged, Value)> = others.collect();
@@ -46,7 +50,7 @@ impl Ratios {
         let all = known.len() == program.exchanges.independent.len();
         let wanted: Vec<Value> = known.iter().map(|k| k.1).chain(others.iter().map(|o| o.1)).collect();
         (all && !known.is_empty() && !others.is_empty()).then(|| Ratios {
-            states: known.iter().map(|k| k.2).collect(),
+            registers: known.iter().map(|k| k.2).collect(),
             independent: known.into_iter().map(|k| k.0).collect(),
             dependent: others.into_iter().map(|o| o.0).collect(),
             routine: layout.routine(program, &wanted),
@@ -81,34 +85,39 @@ impl Model {
         };
         let values = self.values_of_all(t, x)?;
         let Some(mode) = self.compiled.with_independent(&code, &wanted, &values) else { return Ok(false) };
-        let before = self.clone();
+        let (before, at) = (self.clone(), x.to_vec());
         let changed = self.enter_at(mode, t, x, &values, before.recorded.chosen.len());
         match changed {
             Ok(true) => Ok(true),
             // Nothing has changed then.
             Ok(false) | Err(_) => {
                 *self = before;
+                x.copy_from_slice(&at);
                 Ok(false)
             }
         }
     }
 
-    /// How all of them move with one state, in the registers of the routine; whether they have a value.
-    fn move_by(&mut self, ratios: &Ratios, state: u32, t: f64, x: &[f64]) -> bool {
+    /// How all of them move with what one register holds, in those of the routine; whether they have a value.
+    fn move_by(&mut self, ratios: &Ratios, register: u32, t: f64, x: &[f64]) -> bool {
         self.place(t, x);
         self.still();
-        self.frame.d[(self.code.layout.states + state) as usize] = 1.0;
+        self.frame.d[register as usize] = 1.0;
         self.frame.run_along(&ratios.routine).is_ok()
     }
 
     /// Whether some variable may move `most` times as fast as all that are independent. Takes no memory.
     fn is_suspicious(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> bool {
         let n = ratios.independent.len();
-        ratios.states.iter().any(|&state| {
-            if !self.move_by(ratios, state, t, x) {
+        ratios.registers.iter().enumerate().any(|(k, &register)| {
+            if !self.move_by(ratios, register, t, x) {
                 return true;
             }
             let (own, others) = ratios.routine.outputs.split_at(n);
+            // A momentum, or what is conserved, moves several of them: what follows from each is not seen from that alone.
+            if own.iter().enumerate().any(|(i, &r)| i != k && self.frame.d[r as usize] != 0.0) {
+                return true;
+            }
             let fastest = |all: &[Exchanged], registers: &[u32]| {
                 let rates = registers.iter().map(|&r| self.frame.d[r as usize]);
                 all.iter().zip(rates).fold(0.0f64, |most, (e, rate)| most.max(e.weighs() * rate.abs()))
@@ -121,10 +130,10 @@ impl Model {
     /// The variables that should be independent instead of those that are, if some should.
     fn better(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> Option<Vec<Symbol>> {
         let (n, m) = (ratios.independent.len(), ratios.dependent.len());
-        // Column by column: how all of them move with each state.
+        // Column by column: how all of them move with each state or constant.
         let mut columns = Vec::with_capacity(n);
-        for &state in &ratios.states {
-            if !self.move_by(ratios, state, t, x) {
+        for &register in &ratios.registers {
+            if !self.move_by(ratios, register, t, x) {
                 return None;
             }
             let column: Vec<f64> = ratios.routine.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
