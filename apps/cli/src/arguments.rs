@@ -363,6 +363,9 @@ pub struct Simulate {
     /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
     #[arg(long, allow_negative_numbers = true)]
     pub atol: Option<f64>,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,

@@ -52,3 +52,5 @@ mod report;
 mod stiff_networks;
 #[path = "sweep.rs"]
 mod sweep;
+#[path = "velocity.rs"]
+mod velocity;

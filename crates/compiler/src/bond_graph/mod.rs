@@ -44,6 +44,7 @@ mod turns;
 mod two_ports;
 mod uses;
 mod value;
+mod velocity_relations;
 mod verify;
 mod warnings;
 mod wire;
@@ -52,6 +53,7 @@ pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
+pub use velocity_relations::{Integral, VelocityRelation, velocity_relations};
 pub use verify::verify;
 pub use warnings::warnings;
 

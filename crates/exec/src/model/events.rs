@@ -208,11 +208,21 @@ impl Events for Model {
     }
 
     fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.handle(t, x, &[])
+        let before = self.before_move(t, x)?;
+        self.handle(t, x, &[])?;
+        self.after_move(before, t, x)
     }
 
     fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        self.exchange(t, x, failed)
+        let exchanged = self.exchange(t, x, failed)?;
+        if exchanged {
+            self.renew_projection(t, x)?;
+        }
+        Ok(exchanged)
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
+        self.put_back(t, x)
     }
 
     fn try_end(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {

@@ -23,6 +23,7 @@ mod memory;
 mod minimum_norm;
 mod operations;
 mod positions;
+mod projection;
 mod recorded;
 mod setup;
 mod start;
@@ -48,6 +49,7 @@ use halfarrow_sim::{Failure, Leap};
 use inputs::InputSignal;
 use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
+use projection::Projection;
 use recorded::Recorded;
 use std::sync::Arc;
 
@@ -67,6 +69,8 @@ pub struct Model {
     frame: Frame,
     /// What is computed at events.
     events: EventWork,
+    /// How positions are put back onto the relations between them, in runs that do so.
+    projection: Option<Projection>,
     /// Whether another form of the model tells what happens at events.
     led: bool,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
@@ -129,6 +133,7 @@ impl Model {
             run,
             frame,
             events: EventWork::of(&code),
+            projection: None,
             led: false,
             scaled: true,
             dx: vec![0.0; n],
@@ -267,6 +272,7 @@ impl Model {
         if self.run.mode != ModeId::default() {
             self.enter(ModeId::default()).expect("it has run with these parameters");
         }
+        self.projection = None;
         self.run.begun = false;
         self.run.crossed = f64::NEG_INFINITY;
         self.run.signs_taken = None;

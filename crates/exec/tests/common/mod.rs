@@ -196,6 +196,8 @@ impl Sketch {
             conserved: self.conserved,
             positions: Vec::new(),
             relations: Default::default(),
+            position_relations: Vec::new(),
+            unkept_relations: Vec::new(),
             momenta: Vec::new(),
             jumps: None,
             exchanges: Default::default(),
