@@ -366,6 +366,9 @@ pub struct Simulate {
     /// Put positions that only speeds keep together back onto the relations between them after each step
     #[arg(long)]
     pub project: bool,
+    /// Record reactions that are not unique, of constraints that repeat others, as those of least norm
+    #[arg(long)]
+    pub minimum_norm: bool,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,

@@ -55,6 +55,9 @@ pub struct Run {
     /// Whether positions that only speeds keep together are put back onto the relations between them after each step, by
     /// the least change that does it.
     pub project: bool,
+    /// Whether reactions that are not unique, of constraints that repeat others, are recorded as those of least norm. In the
+    /// form `minimal`, by [`Model::simulate`].
+    pub minimum_norm: bool,
     /// Inputs that are given: their names and what they are over time. The others keep their defaults.
     pub inputs: Vec<(String, Input)>,
     /// Where to start.
@@ -101,6 +104,7 @@ impl Default for Run {
             rtol: 1e-6,
             atol: None,
             project: false,
+            minimum_norm: false,
             inputs: Vec::new(),
             start: Start::Given,
             record: Record::Default,
@@ -254,7 +258,7 @@ impl Model {
     /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
     pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
         let begun = Moment::now();
-        let compiled = self.compile(run.form)?;
+        let compiled = if run.minimum_norm { self.compile_sharing(run.form)? } else { self.compile(run.form)? };
         let equations = begun.elapsed().as_secs_f64();
         let mut done = compiled.simulate(run, progress);
         match &mut done {

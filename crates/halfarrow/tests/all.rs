@@ -48,6 +48,8 @@ mod names;
 mod repeated;
 #[path = "report.rs"]
 mod report;
+#[path = "shares.rs"]
+mod shares;
 #[path = "stiff_networks.rs"]
 mod stiff_networks;
 #[path = "sweep.rs"]

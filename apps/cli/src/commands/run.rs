@@ -65,6 +65,7 @@ fn run(arguments: &Simulate) -> Run {
         rtol: arguments.rtol,
         atol: arguments.atol,
         project: arguments.project,
+        minimum_norm: arguments.minimum_norm,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),

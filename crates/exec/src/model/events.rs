@@ -290,6 +290,7 @@ impl Events for Model {
 
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
+        self.place_shares(t)?;
         self.evaluate(What::Recorded, false, t)?;
         out.iter_mut().zip(&self.recorded.routine.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
         match out.iter().position(|value| value.is_nan()).or(out.iter().position(|value| value.is_infinite())) {

@@ -26,6 +26,7 @@ mod positions;
 mod projection;
 mod recorded;
 mod setup;
+mod shares;
 mod start;
 mod system;
 mod wide;
@@ -51,6 +52,7 @@ use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
 use projection::Projection;
 use recorded::Recorded;
+use shares::Shares;
 use std::sync::Arc;
 
 /// A model that runs: code, the values of its parameters, what is connected to its inputs, and what its run remembers.
@@ -71,6 +73,8 @@ pub struct Model {
     events: EventWork,
     /// How positions are put back onto the relations between them, in runs that do so.
     projection: Option<Projection>,
+    /// How reactions that are not unique are shared where they are recorded, if anybody asks for it.
+    shares: Option<Box<Shares>>,
     /// Whether another form of the model tells what happens at events.
     led: bool,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
@@ -134,6 +138,7 @@ impl Model {
             frame,
             events: EventWork::of(&code),
             projection: None,
+            shares: None,
             led: false,
             scaled: true,
             dx: vec![0.0; n],
