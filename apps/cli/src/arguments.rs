@@ -206,6 +206,8 @@ pub struct Show {
     pub stage: Stage,
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub branches: ModeArguments,
 }
 
 /// Stages that can be shown.
@@ -226,11 +228,21 @@ pub enum Stage {
     Program,
 }
 
+/// Branches of set-valued laws.
+#[derive(Debug, Args)]
+pub struct ModeArguments {
+    /// Branches of set-valued laws, as in `d1=on,d2=off`; the others have those with which runs begin
+    #[arg(long, value_name = "BRANCHES")]
+    pub mode: Vec<String>,
+}
+
 /// `loops`.
 #[derive(Debug, Args)]
 pub struct Loops {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub branches: ModeArguments,
     #[command(flatten)]
     pub page: PageArguments,
 }
@@ -270,6 +282,8 @@ pub enum Format {
 pub struct Equations {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub branches: ModeArguments,
     #[command(flatten)]
     pub page: PageArguments,
     /// The formulation
@@ -621,6 +635,8 @@ pub struct RunArguments {
 pub struct Draw {
     #[command(flatten)]
     pub model: ModelArguments,
+    #[command(flatten)]
+    pub branches: ModeArguments,
     /// Where to draw it: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,

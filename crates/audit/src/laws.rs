@@ -42,6 +42,12 @@ pub(crate) fn quotients(graph: &BondGraph, x: &mut Exprs) -> Quotients {
     all.filter(|(_, (_, under))| *under != ONE).collect()
 }
 
+/// The elements whose laws have one branch.
+fn fixed(graph: &BondGraph) -> impl Iterator<Item = &Element> {
+    let set_valued: Vec<_> = graph.set_valued.iter().map(|law| law.element).collect();
+    graph.elements.iter().filter(move |(id, _)| !set_valued.contains(id)).map(|(_, element)| element)
+}
+
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
     (graph, shares, quotients): (&BondGraph, &[Share], &Quotients),
@@ -55,7 +61,7 @@ pub(crate) fn residual(
         let of = scales.of(graph, *symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
     }
-    for element in graph.elements.values() {
+    for element in fixed(graph) {
         let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
         if laws.missing {
@@ -98,7 +104,7 @@ pub(crate) fn links(
 ) -> Vec<Link> {
     let mut links = Vec::new();
     let middle = values.times.len() / 2;
-    for element in graph.elements.values() {
+    for element in fixed(graph) {
         let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
         for law in laws.laws {
@@ -384,7 +390,7 @@ impl Check<'_, '_> {
     }
 }
 
-fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Vec<Term>) -> Raw {
+pub(crate) fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Vec<Term>) -> Raw {
     Raw { miss, resolution: 0.0, time, place: format!("{name}: {what}"), terms }
 }
 

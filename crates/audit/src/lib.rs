@@ -23,6 +23,7 @@ mod power;
 mod quadrature;
 mod regions;
 mod scales;
+mod set_valued;
 mod terms;
 mod values;
 mod worst;
@@ -165,6 +166,7 @@ impl Auditor {
         let scales = (&self.scales, &settled);
         power::power(graph, &values, scales, &mut self.power, &mut unchecked);
         laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
+        set_valued::residual(graph, &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
         for (name, gained) in balance.into_iter().flat_map(|b| b.by_impulses) {

@@ -209,6 +209,11 @@ impl<'a> Values<'a> {
         }
     }
 
+    /// Whether a sample stands before a jump at its time.
+    pub fn is_before_jump(&self, sample: usize) -> bool {
+        self.side(sample) == Side::Before
+    }
+
     /// Whether an expression jumps where something for which `moves` holds crosses a border.
     fn jumps(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
         let x = &self.graph.exprs;

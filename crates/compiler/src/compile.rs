@@ -95,7 +95,7 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
     match elaborated.graph {
         Some(ir) if !found.diagnostics.has_errors() => {
             found.diagnostics.0.extend(told_once(bond_graph::warnings(&ir), &ir));
-            Ok(Reached { ir, found })
+            Ok(Reached { ir: causal_graph::in_first_mode(ir), found })
         }
         _ => Err(found),
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use halfarrow_compiler::algebra::{Expr, PlainNames, unicode};
-use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef};
+use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, SetValuedLaw};
 use halfarrow_compiler::causal_graph::{CausalGraph, Stroke, kept_junctions};
 use halfarrow_compiler::causal_paths::{CausalPaths, Path};
 use halfarrow_compiler::ids::Id;
@@ -45,10 +45,12 @@ pub fn path_count(paths: &CausalPaths) -> usize {
 }
 
 fn glyph(graph: &BondGraph, element: &Element, derivative: bool, law: bool, long: &mut Vec<String>) -> Glyph {
-    let kind = kind_word(graph, &element.kind);
+    let branch = set_valued(graph, element);
+    let kind = branch.map_or_else(|| kind_word(graph, &element.kind), |law| law.word.to_string());
     let text = if law { typeset(&element.label) } else { String::new() };
     let mut law = wrap(&text, LAW);
-    let name = element.name.clone();
+    let own = &element.name;
+    let name = branch.map_or_else(|| own.clone(), |law| format!("{own} ({})", law.branch().name));
     if law.len() > LINES {
         long.push(format!("({})  {name}:  {text}", long.len() + 1));
         law = vec![format!("law ({})", long.len())];
@@ -60,8 +62,16 @@ fn glyph(graph: &BondGraph, element: &Element, derivative: bool, law: bool, long
     };
     let value = if element.label.is_empty() { String::new() } else { format!(" ({})", element.label) };
     let causality = if derivative { ", derivative causality" } else { "" };
-    let tip = format!("{}:{}{value}{causality}", element.kind.word(), element.name);
-    Glyph { kind, name, law, tip, form: form(element), derivative, kept: false }
+    let word = branch.map_or_else(|| element.kind.word(), |law| law.word);
+    let tip = format!("{word}:{}{value}{causality}", element.name);
+    let form = if branch.is_some() { Form::OnePort } else { form(element) };
+    Glyph { kind, name, law, tip, form, derivative, kept: false }
+}
+
+/// The set-valued law of an element that stands in the text, if it has one.
+fn set_valued<'g>(graph: &'g BondGraph, element: &Element) -> Option<&'g SetValuedLaw> {
+    let own = |law: &&SetValuedLaw| std::ptr::eq(&graph.elements[law.element], element);
+    graph.set_valued.iter().find(own).filter(|law| law.constraint.is_none())
 }
 
 fn form(element: &Element) -> Form {

@@ -18,8 +18,11 @@ pub(crate) struct Alternatives {
 }
 
 impl exec::Alternatives for Alternatives {
-    fn program(&self, independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
-        let mut graph = self.graph.clone();
+    fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
+        let mut graph = match branches.is_empty() {
+            true => self.graph.clone(),
+            false => self.graph.in_mode(&branches.iter().map(|&b| b as usize).collect::<Vec<_>>()),
+        };
         let wanted = independent.iter().map(|&symbol| Preference {
             name: graph.exprs.name(symbol).to_string(),
             symbol: graph.exprs.untwinned(symbol),
@@ -27,7 +30,9 @@ impl exec::Alternatives for Alternatives {
         });
         // What the modeller prefers is next.
         graph.preferences = wanted.chain(graph.preferences.iter().cloned()).collect();
-        graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
+        if !point.is_empty() {
+            graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
+        }
         let causal = assign_causality(&graph).ok()?;
         let equations = derive_equations(&causal, Form::Minimal).ok()?;
         Some(schedule(&equations))

@@ -78,6 +78,11 @@ impl Model {
         if form != Form::Minimal {
             return Err(bad(format!("minimum-norm is for the form minimal, not {}", form.name())));
         }
+        if !self.graph.set_valued.is_empty() {
+            return Err(bad(
+                "minimum-norm is not for models with set-valued laws, of which each branch has other reactions".into(),
+            ));
+        }
         let Some(shared) = shared_reactions(&self.graph).map_err(|errors| self.fault(errors))? else {
             return Err(bad("minimum-norm has nothing to do: the reactions of this model are unique".into()));
         };

@@ -144,6 +144,14 @@ impl Model {
         if export.real == Real::Float && export.target != Target::C {
             return Err(not_single(export.target));
         }
+        if let (Some(law), true) = (self.graph.set_valued.first(), export.target != Target::Latex) {
+            let name = &self.graph.elements[law.element].name;
+            let reason = format!(
+                "`{name}` has a set-valued law, whose branch changes while the model runs: code and FMUs do not follow that \
+                 yet; give it a law with a finite slope, such as a steep resistance"
+            );
+            return Err(Problem::BadOption { reason }.into());
+        }
         match export.target {
             Target::C => self.export_c(export),
             Target::Fmu2 => self.export_fmu(export, Version::V2),

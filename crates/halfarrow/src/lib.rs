@@ -43,6 +43,7 @@ mod linear_algebra;
 mod linearize;
 mod loops;
 mod model;
+mod modes;
 mod names;
 mod quantity;
 #[cfg(feature = "real_time")]

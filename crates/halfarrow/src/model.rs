@@ -84,6 +84,11 @@ impl Model {
         Model::read(source.clone(), Arc::clone(files), all)
     }
 
+    /// The same model with another graph.
+    pub(crate) fn with_graph(&self, graph: BondGraph) -> Model {
+        Model { graph, ..self.clone() }
+    }
+
     /// Its text, and the files that it read: the same model can be made of them elsewhere.
     pub fn source(&self) -> Source {
         let Origin { source, files, .. } = &*self.origin;

@@ -430,6 +430,14 @@ impl Model {
 
     /// A form beside the minimal one.
     pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
+        if let Some(law) = self.graph.set_valued.first() {
+            let name = &self.graph.elements[law.element].name;
+            let reason = format!(
+                "`{name}` has a set-valued law, whose branch changes while the model runs: only the form minimal follows \
+                 that, leave out --form"
+            );
+            return Err(Problem::BadOption { reason }.into());
+        }
         let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
         let program = self.program_of(equations);
         self.watch.time("code", || exec::ImplicitModel::new(program, minimal)).map_err(|failure| self.stopped(failure))

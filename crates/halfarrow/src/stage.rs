@@ -65,6 +65,17 @@ impl Stage {
         }
     }
 
+    /// What it makes of a source with these branches of its set-valued laws: see [`Model::in_mode`].
+    ///
+    /// # Errors
+    /// As [`show`](Stage::show) and [`Model::in_mode`].
+    pub fn show_in(self, source: Source, set: &[Override], branches: &[String]) -> Result<String, Error> {
+        match branches.is_empty() {
+            true => self.show(source, set),
+            false => self.show_model(&Model::new(source, set)?.in_mode(branches)?),
+        }
+    }
+
     /// What it makes of a model, as text. The syntax tree of a model is that of its main file.
     ///
     /// # Errors

@@ -352,8 +352,8 @@ impl<'a> Copies<'a> {
         let mut system = structure.system.clone();
         // That there is machine code where it is asked for was made sure of before. Evaluations of all sets count together.
         let _ = system.execute(work.execution, None);
-        // Lanes share their code: each would have to go on in other variables at another time.
-        let alike = !structure.system.may_exchange();
+        // Lanes share their code: each would have to change its mode at another time.
+        let alike = !structure.system.may_change_mode();
         let wide = is_wide(work.options.method) && work.execution != Execution::Machine && alike;
         let wide = wide.then(|| exec::WideModel::new(&structure.system));
         Copies { model: &structure.model, wide, system }

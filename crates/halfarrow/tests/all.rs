@@ -48,6 +48,8 @@ mod names;
 mod repeated;
 #[path = "report.rs"]
 mod report;
+#[path = "set_valued.rs"]
+mod set_valued;
 #[path = "shares.rs"]
 mod shares;
 #[path = "stiff_networks.rs"]

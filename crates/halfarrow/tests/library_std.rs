@@ -61,6 +61,21 @@ Se:l(-2 V) -> LeakyDiode:m(g = 1 mS) -> Se:o(0 V)
 }
 
 #[test]
+fn ideal_diodes_and_switches() {
+    let text = "import std.electrical
+Se:a(5 V) -> Resistor:r(r = 1 kohm) -> IdealDiode:d(v_f = 0.7 V) -> Se:b(0 V)
+Se:c(-5 V) -> Resistor:s(r = 1 kohm) -> IdealDiode:e -> Se:f(0 V)
+Se:g(5 V) -> Resistor:h(r = 1 kohm) -> Switch:k(on = if t < 1 s then 0 else 1) -> Se:o(0 V)
+Se:p(5 V) -> Resistor:q(r = 1 kohm) -> Switch:u(on = if t < 1 s then 1 else 0) -> Se:w(0 V)
+";
+    let names = ["d.i", "d.v", "e.i", "e.v", "k.i", "k.v", "u.i", "u.v"];
+    let ends = at(2.0, text, &names);
+    for (found, expected) in ends.iter().zip([4.3e-3, 0.7, 0.0, -5.0, 5e-3, 0.0, 0.0, 5.0]) {
+        assert!((found - expected).abs() < 1e-15, "{ends:?}");
+    }
+}
+
+#[test]
 fn operational_amplifier() {
     let text = "import std.electrical
 OpAmp:a(gbw = 1 kHz, v_max = 1e6 V)
@@ -215,6 +230,29 @@ fn slip(w: f64, w_0: f64, rate: f64, t: f64) -> f64 {
 }
 
 #[test]
+fn dry_friction_clutch_brake_and_stop() {
+    let text = "import std.mechanical
+1:u -> I:sledge(2 kg, f0 = 1)
+u -> DryFriction:f(f_c = 1 N, f_s = 1.5 N) -> Sf:floor(0 m/s)
+Se:pull(if t < 3 s then 0 N else 1.4 N) -> u
+1:a -> I:j1(1 kg.m2, f0 = 3)
+a -> DryClutch:c(t_max = 1 N.m) -> 1:b -> I:j2(2 kg.m2)
+1:w -> I:j3(1 kg.m2, f0 = 3)
+w -> DryBrake:brake(t_max = 1 N.m, press = 0.5)
+1:v -> I:m(1 kg, f0 = 1)
+v -> HardStop:h(gap = 0.5 m, restitution = 0.5) -> Sf:wall(0 m/s)
+";
+    let early = at(1.0, text, &["sledge.f", "j1.f", "j2.f", "j3.f", "m.f", "h.force"]);
+    for (found, expected) in early.iter().zip([0.5, 2.0, 0.5, 2.5, -0.5, 0.0]) {
+        assert!((found - expected).abs() < 1e-12, "{early:?}");
+    }
+    let late = at(8.0, text, &["sledge.f", "f.force", "j1.f", "j2.f", "c.torque", "j3.f", "brake.torque"]);
+    for (found, expected) in late.iter().zip([0.0, 1.4, 1.0, 1.0, 0.0, 0.0, 0.0]) {
+        assert!((found - expected).abs() < 1e-12, "{late:?}");
+    }
+}
+
+#[test]
 fn friction_clutch_brake() {
     let text = "import std.mechanical
 1:body -> Mass:m(m = 2 kg, v0 = 3 m/s)
@@ -257,6 +295,17 @@ Sf:w(0.3 rad/s*sin(t)) -> StribeckBearing:g(t_c = 2 N.m, t_s = 5 N.m, w_s = 0.1 
 /// The flow through an orifice of 1 mm² whose transition is at 1 kPa.
 fn through(p: f64) -> f64 {
     1e-6 * 0.62 * (2.0f64 / 870.0).sqrt() * p / (p * p + 1e6).powf(0.25)
+}
+
+#[test]
+fn ideal_check_valve() {
+    let text = "import std.hydraulic
+Se:a(2 bar) -> IdealCheckValve:v(g = 1e-9 m3/s/Pa, cracking = 0.5 bar) -> Se:b(0 bar)
+Se:c(0.4 bar) -> IdealCheckValve:w(g = 1e-9 m3/s/Pa, cracking = 0.5 bar) -> Se:d(0 bar)
+";
+    let [open, closed] = at(1.0, text, &["v.flow", "w.flow"])[..] else { panic!() };
+    close(open, 1.5e-4, 1e-14);
+    assert_eq!(closed, 0.0);
 }
 
 #[test]
@@ -394,6 +443,19 @@ lamp -> PseudoHeatCapacity:c(c = 5 J/K, t0 = 290 K)
 }
 
 // Signals
+
+#[test]
+fn hysteresis() {
+    let text = "import std.signals
+Hysteresis:h(lower = -0.5, upper = 0.5, u = sin(t/(1 s)))
+state changes' = h.y from 0
+1:a -> I:none(1)
+";
+    // High from the sixth part of pi on until one and one sixth of pi.
+    let [y, time] = at(2.0 * PI, text, &["h.y", "changes"])[..] else { panic!() };
+    assert_eq!(y, 0.0);
+    close(time, PI, 1e-10);
+}
 
 #[test]
 fn steps_ramps_pulses_chirps_limits() {

@@ -129,6 +129,13 @@ pub enum Failure {
         /// Why it cannot be.
         reason: String,
     },
+    /// Set-valued laws have no branches that hold together.
+    NoMode {
+        /// When, in s.
+        time: f64,
+        /// The laws whose branches end there, with these branches.
+        what: String,
+    },
     /// An option of the run makes no sense.
     BadOption {
         /// Name of the option.
@@ -224,6 +231,7 @@ impl Failure {
             | Failure::Accumulation { time, .. }
             | Failure::Conflict { time, .. }
             | Failure::Reset { time, .. }
+            | Failure::NoMode { time, .. }
             | Failure::Branch { time, .. }
             | Failure::OffMotion { time, .. }
             | Failure::Bound { time, .. }
@@ -324,6 +332,11 @@ impl fmt::Display for Failure {
                 by[0].0, by[0].1, by[1].0, by[1].1
             ),
             Failure::Reset { time, what, reason } => write!(f, "at t = {time} s {what} cannot be reset: {reason}"),
+            Failure::NoMode { time, what } => write!(
+                f,
+                "at t = {time} s {what} ends, and no branches of the set-valued laws hold together beyond that: look whether \
+                 sources are joined with nothing between them, or a current or speed is cut off that nothing takes over"
+            ),
             Failure::BadOption { option, value, expected } => {
                 write!(f, "{option} is {value}, but it must be {expected}")
             }

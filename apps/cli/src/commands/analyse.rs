@@ -52,18 +52,19 @@ pub fn show(arguments: &arguments::Show) -> u8 {
         arguments::Stage::Program => Stage::Program,
     };
     let shown = source(&arguments.model.model).map_err(Error::from);
-    let printed = match shown.and_then(|source| stage.show(source, &overrides(&arguments.model))) {
-        Ok(text) if arguments.model.model.json => screen::print_json(&json!({"stage": stage.name(), "text": text})),
-        Ok(text) => screen::print(&text),
-        Err(error) => return screen::fail(&error, arguments.model.model.json),
-    };
+    let printed =
+        match shown.and_then(|source| stage.show_in(source, &overrides(&arguments.model), &arguments.branches.mode)) {
+            Ok(text) if arguments.model.model.json => screen::print_json(&json!({"stage": stage.name(), "text": text})),
+            Ok(text) => screen::print(&text),
+            Err(error) => return screen::fail(&error, arguments.model.model.json),
+        };
     screen::printed(printed, 0)
 }
 
 /// Zero-order causal paths and their fate.
 pub fn loops(arguments: &arguments::Loops) -> u8 {
     with_model(&arguments.model, |model| {
-        let report = model.loops()?;
+        let report = model.in_mode(&arguments.branches.mode)?.loops()?;
         match arguments.model.model.json {
             true => screen::print_json(&json!(report)),
             false => {
@@ -153,7 +154,9 @@ fn counts_text(report: &LoopsReport, page: Page) -> String {
 /// The equations.
 pub fn equations(arguments: &arguments::Equations) -> u8 {
     with_model(&arguments.model, |model: &Model| -> Result<u8, Error> {
-        let report = model.equations_for(form(arguments.form), &all_listed(&arguments.only))?;
+        let report = model
+            .in_mode(&arguments.branches.mode)?
+            .equations_for(form(arguments.form), &all_listed(&arguments.only))?;
         match (arguments.model.model.json, arguments.format) {
             (true, _) | (_, Format::Json) => screen::print_json(&json!(report)),
             (_, Format::Text) => screen::print(&Page::of(&arguments.page).lines(&equations_text(&report))),

@@ -13,7 +13,7 @@ use crate::screen;
 /// The bond graph.
 pub fn draw(arguments: &arguments::Draw) -> u8 {
     with_model(&arguments.model, |model| {
-        let picture = model.draw(&options(arguments)?)?;
+        let picture = model.in_mode(&arguments.branches.mode)?.draw(&options(arguments)?)?;
         arguments.out.iter().try_for_each(|path| write_picture(&picture, path))?;
         match arguments.model.model.json {
             true => screen::print_json(&json!({"written": arguments.out})),

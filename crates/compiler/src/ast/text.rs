@@ -59,7 +59,16 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
         StatementKind::Constraint(c) => {
             *out += &format!("constraint {}", c.name.text);
             write_indices(out, &c.indices);
-            *out += &format!(": {} = {}", shown(&c.left), shown(&c.right));
+            let sign = match c.sides {
+                Sides::Equal => "=",
+                Sides::AtLeast => ">=",
+                Sides::AtMost => "<=",
+            };
+            *out += &format!(": {} {sign} {}", shown(&c.left), shown(&c.right));
+            if !c.args.is_empty() {
+                *out += " ";
+                write_args(out, &c.args);
+            }
             write_doc(out, &c.doc);
         }
         StatementKind::Domain(d) => {

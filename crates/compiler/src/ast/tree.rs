@@ -244,7 +244,18 @@ pub enum StrokeBond {
     Named(PathPart),
 }
 
-/// `constraint name: left = right "doc"`.
+/// What a constraint says of its two sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    /// `left = right`
+    Equal,
+    /// `left >= right`
+    AtLeast,
+    /// `left <= right`
+    AtMost,
+}
+
+/// `constraint name: left = right "doc"`, or `left >= right (restitution = 0.8)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constraint {
     /// Its name; `name.e` is the multiplier.
@@ -253,8 +264,12 @@ pub struct Constraint {
     pub indices: Vec<Expr>,
     /// Left of the equals sign.
     pub left: Expr,
+    /// What is said of the two.
+    pub sides: Sides,
     /// Right of it, mostly 0.
     pub right: Expr,
+    /// What happens where sides meet that may differ.
+    pub args: Vec<Arg>,
     /// What it is.
     pub doc: Option<Doc>,
 }

@@ -9,6 +9,7 @@ use super::dimension::Quantity;
 use super::flatten::Word;
 use super::repeat::Turn;
 use super::scope::{DeclId, Here, ScopeId, TurnId};
+use super::set_valued::SetValuedLaw;
 use super::structure::Structure;
 use super::{
     BondGraph, Cell, CellId, Clause, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input,
@@ -58,6 +59,7 @@ pub(super) struct Laws {
     pub lets: Vec<Named>,
     pub outputs: Vec<Named>,
     pub constraints: Vec<Constraint>,
+    pub set_valued: Vec<SetValuedLaw>,
 }
 
 /// The declarations whose units their variables have.
@@ -80,6 +82,7 @@ impl Laws {
         self.clauses.iter_mut().for_each(|c| c.for_each_expr(visit));
         self.lets.iter_mut().chain(&mut self.outputs).for_each(|n| visit(&mut n.value));
         self.constraints.iter_mut().for_each(|c| visit(&mut c.expr));
+        self.set_valued.iter_mut().for_each(|law| law.for_each_expr(visit));
         for guess in guesses {
             visit(&mut guess.what);
             visit(&mut guess.value);
@@ -105,7 +108,7 @@ impl Builder<'_, '_> {
         let variables = self.variables(&tables);
         self.replace_symbols(&mut laws, &mut asked.guesses, rates);
         self.replace_symbols(&mut laws, &mut asked.guesses, repeated);
-        Some(BondGraph {
+        let graph = BondGraph {
             name: title.name.clone(),
             doc: title.doc.clone(),
             exprs: self.exprs,
@@ -126,10 +129,12 @@ impl Builder<'_, '_> {
             forced_strokes: asked.forced_strokes,
             guesses: asked.guesses,
             constraints: laws.constraints,
+            set_valued: laws.set_valued,
             time: self.time,
             repetitions,
             cells,
-        })
+        };
+        Some(if graph.set_valued.is_empty() { graph } else { graph.in_mode(&graph.mode()) })
     }
 
     /// Parameters that shape the model cannot change when it is compiled.

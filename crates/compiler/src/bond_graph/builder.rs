@@ -12,6 +12,7 @@ use super::files::Files;
 use super::flatten::{Flat, Part};
 use super::repeat::Repeats;
 use super::scope::{DeclId, Here};
+use super::set_valued::SetValuedLaw;
 use super::uses::Uses;
 use super::wire::Wiring;
 use super::{BondId, ElementId, HeldId, HeldKind, InputId, Meaning, Parameter, ParameterId, PortRef, SignalId};
@@ -206,6 +207,8 @@ pub(super) struct Builder<'a, 'f> {
     pub rate_symbols: FxHashMap<Symbol, SignalId>,
     /// Integrated signals and stored quantities that an event changes: they go ways of their own.
     pub reset: BTreeSet<Symbol>,
+    /// Set-valued laws that have been read.
+    pub set_valued: Vec<SetValuedLaw>,
     /// Whether a bond carries no power.
     pub pseudo: Vec<bool>,
     /// Columns of the tables that were read.
@@ -253,6 +256,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             open_blocks: Vec::new(),
             rate_symbols: FxHashMap::default(),
             reset: BTreeSet::new(),
+            set_valued: Vec::new(),
             pseudo: Vec::new(),
             csv: FxHashMap::default(),
             uses: Uses::default(),

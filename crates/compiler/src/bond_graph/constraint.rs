@@ -8,11 +8,13 @@ use std::collections::BTreeMap;
 
 use super::assemble::cell_of;
 use super::builder::{Builder, Pair, Role};
+use super::dimension::Quantity;
 use super::flatten::Held;
 use super::structure::Structure;
 use super::value::Reading;
 use super::{BondId, Constraint, ElementId, Kind, Meaning};
 use crate::algebra::{Expr, Facts, MINUS_ONE, ONE, Symbol};
+use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::span::Span;
@@ -21,8 +23,10 @@ use crate::span::Span;
 pub(super) struct Sides {
     /// Index into the constraints of the model.
     at: usize,
-    /// Left side less right side.
+    /// Left side less right side; of an inequality the greater side less the other.
     expr: Expr,
+    /// The coefficient of restitution, of an inequality.
+    restitution: Option<Expr>,
     span: Span,
 }
 
@@ -35,6 +39,8 @@ pub(super) struct Relation {
     terms: Vec<(Symbol, Expr)>,
     /// What is left without flows.
     rest: Expr,
+    /// The coefficient of restitution, of an inequality.
+    restitution: Option<Expr>,
     span: Span,
 }
 
@@ -45,7 +51,7 @@ impl Relation {
     }
 }
 
-impl Builder<'_, '_> {
+impl<'a> Builder<'a, '_> {
     /// Reads the sides of all constraints.
     pub fn constraint_sides(&mut self) -> Vec<Sides> {
         let flat = self.flat;
@@ -56,11 +62,49 @@ impl Builder<'_, '_> {
             let (left, right) = (self.number(&cx, &c.left), self.number(&cx, &c.right));
             if let (Some(left), Some(right)) = (left, right) {
                 self.equal(&left.quantity, &right.quantity, *span, "the two sides");
-                all.push(Sides { at, expr: self.exprs.sub(left.expr, right.expr), span: *span });
+                let (greater, smaller) = match c.sides {
+                    ast::Sides::AtMost => (right.expr, left.expr),
+                    _ => (left.expr, right.expr),
+                };
+                let expr = self.exprs.sub(greater, smaller);
+                if let Some(restitution) = self.restitution(&cx, c) {
+                    all.push(Sides { at, expr, restitution, span: *span });
+                }
             }
             self.met_in(*here, before);
         }
         all
+    }
+
+    /// The coefficient of restitution of an inequality, 0 if none is given. The outer `None`: at fault.
+    #[allow(clippy::option_option)]
+    fn restitution(&mut self, cx: &Reading<'_>, c: &'a ast::Constraint) -> Option<Option<Expr>> {
+        const HINT: &str = "write a number from 0 to 1: `(restitution = 0.8)`";
+        if c.sides == ast::Sides::Equal {
+            return Some(None);
+        }
+        let title = "a constraint on one side that cannot be read";
+        let mut found = self.exprs.int(0);
+        for (number, arg) in c.args.iter().enumerate() {
+            let known = arg.label.as_ref().is_some_and(|l| l.port.is_none() && l.name.text == "restitution");
+            if !known || number > 0 {
+                let why = if known { "this is given twice" } else { "it takes no such value" };
+                self.fault(Diagnostic::error(codes::L014, title, arg.span, why).hint(HINT));
+                return None;
+            }
+            let value = self.number(cx, &arg.value)?;
+            self.equal(&value.quantity, &Quantity::NONE, arg.span, "a coefficient and a number");
+            if !self.only_parameters(value.expr, arg.value.span, "a coefficient of restitution") {
+                return None;
+            }
+            if self.value_of(value.expr).is_some_and(|e| !(0.0..=1.0).contains(&e)) {
+                let why = "at the given parameters it is not between 0 and 1";
+                self.fault(Diagnostic::error(codes::L014, title, arg.span, why).hint(HINT));
+                return None;
+            }
+            found = value.expr;
+        }
+        Some(Some(found))
     }
 
     /// The relations between flows that constraints ask for, with the rates of signals put in.
@@ -101,7 +145,7 @@ impl Builder<'_, '_> {
             self.fault(d.hint("name displacements of elements (`spring.q`), or states whose rate is a flow"));
             return None;
         }
-        Some(Relation { at: sides.at, expr, holonomic, terms, rest, span: sides.span })
+        Some(Relation { at: sides.at, expr, holonomic, terms, rest, restitution: sides.restitution, span: sides.span })
     }
 
     /// The rate of an expression of displacements.
@@ -195,7 +239,12 @@ impl Builder<'_, '_> {
         let cell = cell_of(self.flat.names.turn_around(*here));
         (first..structure.elements.len()).for_each(|at| structure.elements[ElementId::new(at)].cell = cell);
         let multiplier = self.exprs.sym(effort);
-        Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span }
+        let constraint =
+            Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span };
+        if let Some(restitution) = r.restitution {
+            self.one_sided(&constraint, r.rest, flow, restitution);
+        }
+        constraint
     }
 
     /// The 1-junctions whose flows a relation reads, with their coefficients.

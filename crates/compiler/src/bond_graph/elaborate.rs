@@ -140,9 +140,10 @@ fn finished(
     let constraints = b.build_constraints(&mut structure, relations);
     let (signals, repeated) = b.recognise_storages(&structure, rates)?;
     let held = b.whole_held()?;
+    let set_valued = std::mem::take(&mut b.set_valued);
     let (lets, outputs) = (std::mem::take(&mut b.lets), std::mem::take(&mut b.outputs));
     let (lets, outputs) = (b.whole_named(lets), b.whole_named(outputs));
-    let laws = Laws { structure, signals, held, lets, outputs, constraints, clauses };
+    let laws = Laws { structure, signals, held, lets, outputs, constraints, set_valued, clauses };
     b.assemble(title, asked, laws, [rates, &repeated])
 }
 

@@ -3,6 +3,7 @@
 use super::builder::{Builder, Value};
 use super::dimension::Quantity;
 use super::flatten::{Part, Word};
+use super::set_valued::is_set_valued;
 use super::value::Reading;
 use super::{Initial, Kind, ResistorLaw, Storage, StorageLaw};
 use crate::algebra::{Expr, Symbol};
@@ -61,7 +62,9 @@ impl<'a> Builder<'a, '_> {
             Word::Gy => self.modulus(part, ["r", "e_out", "f_out"]).map(|modulus| Kind::Gyrator { modulus }),
             Word::I => self.storage(part).map(Kind::Inertance),
             Word::C => self.storage(part).map(Kind::Compliance),
+            Word::R if is_set_valued(&p.ast.args) => self.set_valued_resistor(part),
             Word::R => self.resistor(part).map(Kind::Resistor),
+            Word::Sw => self.switch(part),
         }
     }
 

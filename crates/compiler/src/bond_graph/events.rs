@@ -56,7 +56,7 @@ impl<'a> Builder<'a, '_> {
         let read: Vec<Option<Action>> = written.ast.actions.iter().map(|a| self.action(&cx, a, impulses)).collect();
         let actions: Vec<Action> = read.into_iter().collect::<Option<_>>()?;
         self.refuse_twice(&actions);
-        Some(Clause { name, trigger: trigger?, actions, span: written.span })
+        Some(Clause { name, trigger: trigger?, actions, bound: None, span: written.span })
     }
 
     /// A condition that can become true as time goes on.
@@ -109,6 +109,11 @@ impl<'a> Builder<'a, '_> {
             self.reset.insert(symbol);
         }
         Some(Action { name, target: symbol, value: value.expr, impulse, span: action.span })
+    }
+
+    /// The variable that tells the impulse of a law.
+    pub(super) fn impulse_of(&mut self, name: &str, target: Symbol, span: Span) -> Symbol {
+        self.impulse(name, target, span, &mut BTreeMap::new())
     }
 
     /// The variable that tells the impulse of a reset: `ball.impulse` of `ball.f` and `ball.p`.

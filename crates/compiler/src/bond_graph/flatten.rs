@@ -28,6 +28,7 @@ pub(super) enum Word {
     I,
     C,
     R,
+    Sw,
     Tf,
     Gy,
     Zc,
@@ -38,7 +39,7 @@ pub(super) enum Word {
 }
 
 /// All words for kinds, as written.
-pub(super) const WORDS: [(&str, Word); 18] = [
+pub(super) const WORDS: [(&str, Word); 19] = [
     ("0", Word::Zero),
     ("1", Word::One),
     ("Se", Word::Se),
@@ -46,6 +47,7 @@ pub(super) const WORDS: [(&str, Word); 18] = [
     ("I", Word::I),
     ("C", Word::C),
     ("R", Word::R),
+    ("Sw", Word::Sw),
     ("TF", Word::Tf),
     ("GY", Word::Gy),
     ("ZC", Word::Zc),
@@ -70,11 +72,13 @@ impl Word {
     }
     /// The word with its article.
     pub fn with_article(self) -> String {
-        let article = if matches!(self, Word::I | Word::R | Word::Se | Word::Sf | Word::ResidualSe | Word::ResidualSf) {
-            "an"
-        } else {
-            "a"
-        };
+        let article =
+            if matches!(self, Word::I | Word::R | Word::Se | Word::Sf | Word::Sw | Word::ResidualSe | Word::ResidualSf)
+            {
+                "an"
+            } else {
+                "a"
+            };
         format!("{article} {}", self.text())
     }
     /// Whether it is a junction.
@@ -89,9 +93,9 @@ impl Word {
     pub fn is_inner(self) -> bool {
         self.is_junction() || self.is_two_port()
     }
-    /// Whether it is an `I`, `C` or `R`: power is positive into it, and it may be a field.
+    /// Whether it is an `I`, `C`, `R` or `Sw`: power is positive into it. The first three may be fields.
     pub fn is_law(self) -> bool {
-        matches!(self, Word::I | Word::C | Word::R)
+        matches!(self, Word::I | Word::C | Word::R | Word::Sw)
     }
 }
 

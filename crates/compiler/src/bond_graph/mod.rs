@@ -38,6 +38,7 @@ mod print;
 mod recognise;
 mod repeat;
 mod scope;
+mod set_valued;
 mod structure;
 mod symbols;
 mod turns;
@@ -53,6 +54,7 @@ pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
+pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};
 pub use velocity_relations::{Integral, VelocityRelation, velocity_relations};
 pub use verify::verify;
 pub use warnings::warnings;
@@ -142,6 +144,9 @@ pub struct BondGraph {
     pub guesses: Vec<Guess>,
     /// `constraint`.
     pub constraints: Vec<Constraint>,
+    /// Set-valued laws, in the order of the text. Their elements have the kind of the present branch, and the last clauses
+    /// tell where it ends: see [`in_mode`](BondGraph::in_mode).
+    pub set_valued: Vec<SetValuedLaw>,
     /// Time, as a symbol.
     pub time: Symbol,
     /// The repetitions of statements (`for`).
@@ -488,6 +493,8 @@ pub struct Clause {
     pub trigger: Trigger,
     /// What changes.
     pub actions: Vec<Action>,
+    /// The set-valued law of which a branch ends there, and which of its bounds that is: then nothing else changes.
+    pub bound: Option<(usize, usize)>,
     /// Where it stands.
     pub span: Span,
 }
@@ -640,6 +647,7 @@ impl BondGraph {
             forced_strokes: self.forced_strokes.clone(),
             guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
+            set_valued: self.set_valued.clone(),
             time: self.time,
             repetitions: self.repetitions.clone(),
             cells: self.cells.clone(),

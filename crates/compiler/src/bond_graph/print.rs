@@ -3,7 +3,8 @@
 use std::fmt::{self, Display, Formatter};
 
 use super::{
-    BondGraph, Element, HeldKind, Initial, Kind, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw, Trigger,
+    BondGraph, BoundKind, Element, HeldKind, Initial, Kind, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw,
+    Trigger,
 };
 use crate::algebra::{Expr, PlainNames, Symbol, ascii};
 use crate::ids::Id;
@@ -157,10 +158,11 @@ impl BondGraph {
                 HeldKind::Impulse => writeln!(f, "  {}, of resets", h.name)?,
             }
         }
-        if !self.clauses.is_empty() {
+        let own = || self.clauses.iter().filter(|clause| clause.bound.is_none());
+        if own().next().is_some() {
             writeln!(f, "\nevents")?;
         }
-        for clause in &self.clauses {
+        for clause in own() {
             match clause.trigger {
                 Trigger::Becomes(condition) => writeln!(f, "  when {}", self.text(condition))?,
                 Trigger::Every(period) => writeln!(f, "  every {}", self.text(period))?,
@@ -168,6 +170,29 @@ impl BondGraph {
             for action in &clause.actions {
                 let word = if action.impulse.is_some() { "reset " } else { "" };
                 writeln!(f, "    {word}{} = {}", self.exprs.name(action.target), self.text(action.value))?;
+            }
+        }
+        if !self.set_valued.is_empty() {
+            writeln!(f, "\nset-valued laws")?;
+        }
+        for law in &self.set_valued {
+            let name = &self.elements[law.element].name;
+            for (number, branch) in law.branches.iter().enumerate() {
+                let here = if number == law.present { "  (here)" } else { "" };
+                let own = Element { kind: branch.kind.clone(), ..self.elements[law.element].clone() };
+                writeln!(f, "  {name} {}: {}{here}", branch.name, self.laws(&own).join("; "))?;
+                for bound in &branch.bounds {
+                    let next = law.branches[bound.next].name;
+                    match bound.kind {
+                        BoundKind::Margin(margin) => writeln!(f, "    while 0 <= {}, then {next}", self.text(margin))?,
+                        BoundKind::Command(ends) => writeln!(f, "    until {}, then {next}", self.text(ends))?,
+                    }
+                    if let Some(impact) = &bound.impact {
+                        let action = &impact.action;
+                        let (flow, value) = (self.exprs.name(action.target), self.text(action.value));
+                        writeln!(f, "      reset {flow} = {value}")?;
+                    }
+                }
             }
         }
         for (title, list) in [("lets", &self.lets), ("outputs", &self.outputs)] {

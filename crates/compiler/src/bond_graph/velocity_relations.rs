@@ -72,7 +72,8 @@ fn is_fixed(x: &Exprs, e: Expr) -> bool {
 /// Finds the relations of a graph whose moduli read positions; the expressions are made in the pool. Parts whose ratios are
 /// all constant are left out: what they relate every method keeps.
 ///
-/// What sources impose counts as free: it is followed at the accuracy of the method.
+/// What sources impose counts as free: it is followed at the accuracy of the method. So does what set-valued laws hold: they
+/// let go.
 pub fn velocity_relations(x: &mut Exprs, graph: &BondGraph) -> Vec<VelocityRelation> {
     if !has_moving_ratios(x, graph) {
         return Vec::new();
@@ -125,7 +126,8 @@ impl Rows {
         let mut rows = Rows::default();
         let constraints: BTreeMap<_, _> =
             graph.constraints.iter().enumerate().filter(|(_, c)| c.holonomic).map(|(k, c)| (c.element, k)).collect();
-        for (id, element) in graph.elements.iter() {
+        let branching: BTreeSet<_> = graph.set_valued.iter().map(|law| law.element).collect();
+        for (id, element) in graph.elements.iter().filter(|(id, _)| !branching.contains(id)) {
             let minus = x.int(-1);
             let flow = |port: usize| graph.bonds[element.ports[port].bond].flow;
             match element.kind {

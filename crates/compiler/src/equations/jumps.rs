@@ -16,6 +16,8 @@ use crate::span::Span;
 pub struct Jumps {
     /// What storages keep, port by port.
     pub stored: Vec<Symbol>,
+    /// The variables of the bond graph that these are.
+    pub storages: Vec<Symbol>,
     /// For each independent variable what follows it: places in `stored` with a factor.
     pub balances: Vec<Vec<(usize, Expr)>>,
     /// The impulses that resets take.
@@ -52,7 +54,8 @@ impl Assembled<'_> {
         let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);
         let acts = actions().next().is_some();
-        if reset.is_none() && !(depend && (acts || graph.has_leaping_ratios())) {
+        let switches = !graph.set_valued.is_empty();
+        if reset.is_none() && !switches && !(depend && (acts || graph.has_leaping_ratios())) {
             return Ok(None);
         }
         if let (Form::Stiff, true) = (form, depend) {
@@ -72,26 +75,35 @@ impl Assembled<'_> {
             }
         }
         let leaps = balances.iter().flatten().any(|t| self.d.x.may_leap(t.1));
-        if !(acts || leaps) {
+        if !(acts || leaps || switches) {
             return Ok(None);
         }
         let mut impulses: Vec<Impulse> = Vec::new();
-        for action in actions() {
+        let all = graph.clauses.iter().flat_map(|c| c.actions.iter().map(move |a| (c.bound.is_some(), a)));
+        for (of_bound, action) in all {
             let Some(symbol) = action.impulse.filter(|s| impulses.iter().all(|i| i.symbol != *s)) else { continue };
-            let along = match moving.storage_of(graph, action.target) {
+            let along: Vec<(usize, Expr)> = match moving.storage_of(graph, action.target) {
                 Some(k) => {
                     let of = |row: &[(usize, Expr)]| row.iter().find(|t| t.0 == k).map(|t| t.1);
                     balances.iter().enumerate().filter_map(|(b, row)| Some((b, of(row)?))).collect()
                 }
-                None => self.along(truth, &moving, &mut rows, action)?,
+                None => match self.along(truth, &moving, &mut rows, action) {
+                    // What no storage resists takes no impulse to move.
+                    Err(_) if of_bound => continue,
+                    along => along?,
+                },
             };
+            if along.is_empty() && of_bound {
+                continue;
+            }
             if along.is_empty() {
                 return Err(refused(action, "a source sets it, or nothing that keeps an impulse stands there"));
             }
             impulses.push(Impulse { symbol, along });
         }
-        let stored = ports.iter().map(|p| p.stored).collect();
-        Ok(Some(Jumps { stored, balances, impulses, leaps }))
+        let stored: Vec<Symbol> = ports.iter().map(|p| p.stored).collect();
+        let storages = stored.iter().map(|&s| self.d.x.untwinned(s)).collect();
+        Ok(Some(Jumps { stored, storages, balances, impulses, leaps }))
     }
 
     /// What an impulse moves that acts on an effort or flow between storages.

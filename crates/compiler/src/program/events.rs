@@ -4,7 +4,7 @@ use super::dependence::Dependence;
 use super::lower::Lowering;
 use super::{Dataflow, Value};
 use crate::algebra::Symbol;
-use crate::bond_graph::{self, BondGraph, Meaning};
+use crate::bond_graph::{self, BondGraph, BoundKind, Meaning};
 use crate::equations::{self, Equations, StateKind};
 use crate::ids::Id;
 use crate::span::Span;
@@ -18,8 +18,36 @@ pub struct Clause {
     pub trigger: Trigger,
     /// What changes.
     pub actions: Vec<Action>,
+    /// The bound of a set-valued law that this is, if it is one.
+    pub bound: Option<Bound>,
     /// Where it stands.
     pub span: Span,
+}
+
+/// Where the present branch of a set-valued law ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bound {
+    /// The law, an entry of [`Program::set_valued`](super::Program).
+    pub law: u32,
+    /// The branch beyond it.
+    pub next: u32,
+    /// What is never negative while the branch holds; none where a condition ends it.
+    pub margin: Option<Value>,
+    /// Where the margin is a gap: its rate, and the flow of the element with which it stays as it is.
+    pub gap: Option<(Value, Value)>,
+}
+
+/// A set-valued law.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SetValued {
+    /// Its element.
+    pub name: String,
+    /// The names of its branches.
+    pub branches: Vec<&'static str>,
+    /// The branch to which this program belongs.
+    pub present: u32,
+    /// The branch that it has while impulses are shared out, where it would take part in them otherwise.
+    pub released: Option<u32>,
 }
 
 /// When an event happens.
@@ -72,6 +100,8 @@ pub enum Target {
 pub struct Jumps {
     /// What storages keep, `X`.
     pub stored: Vec<Value>,
+    /// The variables of the bond graph that these are: the same in all modes of a graph.
+    pub storages: Vec<Symbol>,
     /// For each independent variable places in `stored`, with their factors.
     pub balances: Vec<Vec<(u32, Value)>>,
     /// The states by which storages tell what they keep and, after all states, conserved constants, ascending.
@@ -106,7 +136,9 @@ impl Clause {
             Target::Moved { what, .. } => [Some(a.value), Some(what)],
             _ => [Some(a.value), None],
         };
-        std::iter::once(self.trigger.value()).chain(self.actions.iter().flat_map(of).flatten())
+        let gap = self.bound.and_then(|b| b.gap).into_iter().flat_map(|(rate, still)| [rate, still]);
+        let margin = self.bound.and_then(|b| b.margin).into_iter().chain(gap);
+        std::iter::once(self.trigger.value()).chain(margin).chain(self.actions.iter().flat_map(of).flatten())
     }
 }
 
@@ -124,7 +156,16 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
             let Some(target) = target(lower, equations, action) else { continue };
             actions.push(Action { name: action.name.clone(), target, value: lower.value(action.value) });
         }
-        clauses.push(Clause { name: clause.name.clone(), trigger, actions, span: clause.span });
+        let bound = clause.bound.map(|(law, number)| {
+            let bound = &graph.set_valued[law].branch().bounds[number];
+            let margin = match bound.kind {
+                BoundKind::Margin(margin) => Some(lower.value(margin)),
+                BoundKind::Command(_) => None,
+            };
+            let gap = bound.impact.as_ref().map(|i| (lower.value(i.rate), lower.value(i.still)));
+            Bound { law: law as u32, next: bound.next as u32, margin, gap }
+        });
+        clauses.push(Clause { name: clause.name.clone(), trigger, actions, bound, span: clause.span });
     }
     clauses
 }
@@ -146,6 +187,17 @@ fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {
     graph.variables.get(&symbol).map(|v| v.meaning)
 }
 
+/// The set-valued laws of a graph.
+pub(super) fn set_valued(graph: &BondGraph) -> Vec<SetValued> {
+    let law = |law: &bond_graph::SetValuedLaw| SetValued {
+        name: graph.elements[law.element].name.clone(),
+        branches: law.branches.iter().map(|b| b.name).collect(),
+        present: law.present as u32,
+        released: law.branch().released.map(|branch| branch as u32),
+    };
+    graph.set_valued.iter().map(law).collect()
+}
+
 /// The balances as values; which unknowns they have is told by [`with_unknowns`].
 pub(super) fn jumps(lower: &mut Lowering, equations: &Equations) -> Option<Jumps> {
     let jumps = equations.jumps.as_ref()?;
@@ -162,7 +214,8 @@ pub(super) fn jumps(lower: &mut Lowering, equations: &Equations) -> Option<Jumps
         Impulse { held, along: row(&i.along) }
     };
     let impulses = jumps.impulses.iter().map(impulse).collect();
-    Some(Jumps { stored, balances, unknowns: Vec::new(), impulses, leaps: jumps.leaps })
+    let storages = jumps.storages.clone();
+    Some(Jumps { stored, storages, balances, unknowns: Vec::new(), impulses, leaps: jumps.leaps })
 }
 
 /// The same with the states and constants by which storages tell what they keep.

@@ -23,6 +23,7 @@ mod dependence;
 mod derive;
 pub mod elimination;
 mod events;
+mod idle;
 mod jacobian;
 mod kept;
 mod lower;
@@ -36,7 +37,7 @@ mod triggers;
 mod values;
 mod verify;
 
-pub use events::{Action, Clause, Impulse, Jumps, Target, Trigger};
+pub use events::{Action, Bound, Clause, Impulse, Jumps, SetValued, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
@@ -95,6 +96,8 @@ pub struct Program {
     pub held: Vec<HeldSignal>,
     /// What happens at events.
     pub clauses: Vec<Clause>,
+    /// Set-valued laws, in the order of the text; bounds of their branches are the last clauses.
+    pub set_valued: Vec<SetValued>,
     /// How storages change at events, where they do and another form does not tell.
     pub jumps: Option<Jumps>,
     /// States; in implicit form all unknowns, states before algebraic ones.

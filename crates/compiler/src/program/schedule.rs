@@ -300,6 +300,7 @@ impl Schedule<'_> {
             kept: kept(flow, equations, &momenta),
             jumps: jumps.map(|jumps| events::with_unknowns(jumps, flow, equations)),
             clauses,
+            set_valued: events::set_valued(&equations.graph),
             start: start(equations, &conditions, &at_start),
             guesses: placed(equations, &guesses, &at_start),
             conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),

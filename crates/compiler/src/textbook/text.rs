@@ -76,7 +76,27 @@ pub fn print_events(shown: &Shown, style: Style) -> Vec<String> {
     let line = |clause: &Clause| {
         let when = expression(clause.trigger.expr(), &names, style);
         let word = if matches!(clause.trigger, Trigger::Every(_)) { "every" } else { "when" };
-        let changes: Vec<String> = clause.actions.iter().map(after).collect();
+        let mut changes: Vec<String> = clause.actions.iter().map(after).collect();
+        if let Some((law, bound)) = clause.bound {
+            let law = &graph.set_valued[law];
+            let (element, present) = (&graph.elements[law.element].name, law.branch());
+            let next = law.branches[present.bounds[bound].next].name;
+            let (from, to) = (format!("{element} is {} until ", present.name), format!("it is {next}"));
+            return match style {
+                Style::Ascii | Style::Unicode => {
+                    changes.push(to);
+                    format!("{from}{when}: {}", changes.join(", "))
+                }
+                Style::Latex => {
+                    changes.push(format!("\\text{{{to}}}"));
+                    format!("\\text{{{from}}} {when}: \\quad {}", changes.join(", \\; "))
+                }
+                Style::MathMl => {
+                    changes.push(format!("<mtext>{to}</mtext>"));
+                    format!("<mtext>{from}&#xa0;</mtext>{when}<mo>:</mo>{}", changes.join("<mo>,</mo>"))
+                }
+            };
+        }
         match style {
             Style::Ascii | Style::Unicode => format!("{word} {when}: {}", changes.join(", ")),
             Style::Latex => format!("\\text{{{word} }} {when}: \\quad {}", changes.join(", \\; ")),

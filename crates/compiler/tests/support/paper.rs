@@ -67,6 +67,7 @@ pub fn empty(name: &str) -> BondGraph {
         signals: Table::new(),
         held: Table::new(),
         clauses: Vec::new(),
+        set_valued: Vec::new(),
         lets: Vec::new(),
         outputs: Vec::new(),
         point: None,

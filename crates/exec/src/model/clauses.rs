@@ -8,7 +8,7 @@ use super::compiled::Mode;
 use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Layout, Routine};
+use crate::bytecode::{Hold, Layout, Routine};
 use halfarrow_compiler::program::{Program, Target, Trigger, Value};
 use halfarrow_sim::{Affected, Failure};
 
@@ -26,6 +26,8 @@ pub(super) struct Clauses {
     values: Vec<Routine>,
     /// Where those of each begin among all.
     first: Vec<usize>,
+    /// Of contacts the register of the value with which they are at rest.
+    still: Vec<Option<u32>>,
 }
 
 impl Clauses {
@@ -39,9 +41,17 @@ impl Clauses {
             Trigger::Becomes(_) => None,
             Trigger::Every(period) => layout.registers.get(&period).copied(),
         };
+        let still = |c: &halfarrow_compiler::program::Clause| c.bound.and_then(|b| b.gap).map(|(_, still)| still);
         let values = |c: &halfarrow_compiler::program::Clause| {
-            layout.routine(program, &c.actions.iter().map(|a| a.value).collect::<Vec<_>>())
+            let own = c.actions.iter().map(|a| a.value);
+            layout.routine(program, &own.chain(still(c).filter(|_| !c.actions.is_empty())).collect::<Vec<_>>())
         };
+        let values: Vec<Routine> = program.clauses.iter().map(values).collect();
+        let still = program
+            .clauses
+            .iter()
+            .zip(&values)
+            .map(|(c, routine)| still(c).and_then(|_| routine.outputs.get(c.actions.len()).copied()));
         let lengths = program.clauses.iter().map(|c| c.actions.len());
         let first = lengths.scan(0, |sum, n| {
             *sum += n;
@@ -51,9 +61,15 @@ impl Clauses {
             conditional,
             becomes: layout.routine(program, &conditions),
             periods: program.clauses.iter().map(|c| period(c.trigger)).collect(),
-            values: program.clauses.iter().map(values).collect(),
+            still: still.collect(),
+            values,
             first: first.collect(),
         }
+    }
+
+    /// Where the new value of an action of a clause stands among all.
+    pub fn place(&self, clause: usize, action: usize) -> usize {
+        self.first[clause] + action
     }
 
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
@@ -71,6 +87,10 @@ pub(super) struct EventWork {
     pub impulses: ImpulseWork,
     /// By how much constraints on displacements are missed before the round.
     pub misses: Vec<f64>,
+    /// Contacts that come to rest, since their impacts accumulate.
+    pub at_rest: Vec<bool>,
+    /// The clauses of contacts that take part in impulses.
+    pub contacts: Vec<usize>,
 }
 
 impl EventWork {
@@ -78,6 +98,8 @@ impl EventWork {
         let clauses = &mode.program.clauses;
         EventWork {
             fired: vec![false; clauses.len()],
+            at_rest: vec![false; clauses.len()],
+            contacts: Vec::new(),
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
             misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],
             impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),
@@ -153,15 +175,26 @@ impl Model {
             return Ok(becoming);
         }
         self.place(t, x);
-        let held = std::mem::replace(&mut self.frame.conditions.state, crate::bytecode::Hold::Follow);
+        let true_now = self.truth_of_clauses(t, Hold::Follow)?;
+        for &clause in &code.clauses.conditional {
+            let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
+            becoming[clause] = true_now[clause] && !condition.holds;
+        }
+        Ok(becoming)
+    }
+
+    /// Which conditions of clauses are true at what is placed.
+    pub(super) fn truth_of_clauses(&mut self, t: f64, hold: Hold) -> Result<Vec<bool>, Failure> {
+        let code = self.code.clone();
+        let held = std::mem::replace(&mut self.frame.conditions.state, hold);
         let run = self.frame.run(&code.clauses.becomes);
         self.frame.conditions.state = held;
         run.map_err(|error| self.failure(t, error))?;
+        let mut truth = vec![false; code.program.clauses.len()];
         for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
-            let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
-            becoming[clause] = self.frame.r[register as usize] != 0.0 && !condition.holds;
+            truth[clause] = self.frame.r[register as usize] != 0.0;
         }
-        Ok(becoming)
+        Ok(truth)
     }
 
     /// Lets happen what has been found to happen, and what follows from that at the same instant.
@@ -173,7 +206,9 @@ impl Model {
             if !self.events.fired.contains(&true) {
                 return Ok(());
             }
+            self.release(t, x)?;
             self.notice(t)?;
+            self.events.contacts = self.contacts(t, x)?;
             self.new_values(t, x)?;
             self.refuse_conflicts(t)?;
             self.change(t, x, round == 0)?;
@@ -210,10 +245,18 @@ impl Model {
     /// Looks whether events accumulate.
     fn notice(&mut self, t: f64) -> Result<(), Failure> {
         let Model { run, events, code, .. } = self;
-        for (i, memory) in run.clauses.iter_mut().enumerate().filter(|(i, _)| events.fired[*i]) {
+        events.at_rest.fill(false);
+        for (i, memory) in run.clauses.iter_mut().enumerate() {
+            if !events.fired[i] {
+                continue;
+            }
             if let ClauseMemory::Becomes(condition) = memory
                 && let Some((interval, end)) = condition.happens(t)
             {
+                if code.program.clauses[i].bound.is_some_and(|b| b.gap.is_some()) {
+                    events.at_rest[i] = true;
+                    continue;
+                }
                 let what = code.program.clauses[i].name.clone();
                 return Err(Failure::Accumulation { time: t, what, interval, end });
             }
@@ -226,12 +269,13 @@ impl Model {
         let code = self.code.clone();
         self.place(t, x);
         for (i, routine) in code.clauses.values.iter().enumerate() {
-            if !self.events.fired[i] {
+            if !(self.events.fired[i] || self.events.contacts.contains(&i)) {
                 continue;
             }
             self.frame.run(routine).map_err(|error| self.failure(t, error))?;
-            for (k, &register) in routine.outputs.iter().enumerate() {
-                let value = self.frame.r[register as usize];
+            for (k, &register) in routine.outputs.iter().take(code.program.clauses[i].actions.len()).enumerate() {
+                let still = code.clauses.still[i].filter(|_| self.events.at_rest[i]);
+                let value = self.frame.r[still.unwrap_or(register) as usize];
                 if !value.is_finite() {
                     let clause = &code.program.clauses[i];
                     let what = format!("the value that `{}` gives {}", clause.name, clause.actions[k].name);

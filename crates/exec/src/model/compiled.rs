@@ -6,6 +6,7 @@ use super::exchanges::Ratios;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
+use super::modes::Bounds;
 use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
@@ -20,9 +21,9 @@ pub struct ModeId(pub u32);
 
 /// Makes programs of a model in which other variables stay independent.
 pub trait Alternatives: std::fmt::Debug + Send + Sync {
-    /// The program in which these stay independent, as far as they can, decided at these values of the variables of the
-    /// graph. `None` if there is none.
-    fn program(&self, independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
+    /// The program in which set-valued laws have these branches and these variables stay independent, as far as they can,
+    /// decided at these values of the variables of the graph. `None` if there is none.
+    fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
 }
 
 /// A model as code: the same for all threads, lanes and runs, whatever their parameters, inputs and states.
@@ -40,8 +41,8 @@ pub struct Compiled {
 #[derive(Debug, Default)]
 struct Others {
     modes: Vec<Arc<Mode>>,
-    /// The mode in which these stay independent; `None` where there is none.
-    of: BTreeMap<Vec<Symbol>, Option<ModeId>>,
+    /// The mode with these branches in which these stay independent; `None` where there is none.
+    of: BTreeMap<(Vec<u32>, Vec<Symbol>), Option<ModeId>>,
 }
 
 impl Compiled {
@@ -90,13 +91,34 @@ impl Compiled {
         }
     }
 
-    /// The mode in which these variables stay independent, made at a point if it is not there yet.
-    pub(super) fn with_independent(&self, wanted: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
-        if let Some(known) = self.others().of.get(wanted) {
+    /// The mode in which these variables stay independent, made at a point if it is not there yet; the branches of set-valued
+    /// laws are those of `present`.
+    pub(super) fn with_independent(
+        &self,
+        present: &Mode,
+        wanted: &[Symbol],
+        point: &BTreeMap<Symbol, f64>,
+    ) -> Option<ModeId> {
+        let branches = present.program.set_valued.iter().map(|law| law.present).collect();
+        self.mode_of((branches, wanted.to_vec()), point)
+    }
+
+    /// The mode in which set-valued laws have these branches, made if it is not there yet.
+    pub(super) fn in_mode(&self, branches: &[u32]) -> Option<ModeId> {
+        if self.first.program.set_valued.iter().map(|law| law.present).eq(branches.iter().copied()) {
+            return Some(ModeId::default());
+        }
+        self.mode_of((branches.to_vec(), Vec::new()), &BTreeMap::new())
+    }
+
+    fn mode_of(&self, key: (Vec<u32>, Vec<Symbol>), point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
+        if let Some(known) = self.others().of.get(&key) {
             return *known;
         }
-        let program = self.alternatives.as_ref()?.program(wanted, point);
-        let program = program.filter(|p| p.states.len() == self.first.program.states.len());
+        let states = self.first.program.states.len();
+        let program = self.alternatives.as_ref()?.program(&key.0, &key.1, point);
+        let fits = |p: &Program| p.states.len() == states || !p.set_valued.is_empty() && p.states.len() < states;
+        let program = program.filter(fits).map(|program| program.with_idle_states(states));
         let mode = program.map(|program| match self.first.jacobian {
             None => Mode::new(program, None),
             Some(_) => {
@@ -109,7 +131,7 @@ impl Compiled {
             others.modes.push(Arc::new(mode));
             ModeId(others.modes.len() as u32)
         });
-        others.of.insert(wanted.to_vec(), id);
+        others.of.insert(key, id);
         id
     }
 
@@ -152,6 +174,8 @@ pub(super) struct Mode {
     pub motion: Option<Motion>,
     /// Variables that could be independent in place of others, where some could.
     pub exchanges: Option<Ratios>,
+    /// Where the branches of set-valued laws end.
+    pub bounds: Option<Bounds>,
 }
 
 impl Mode {
@@ -186,6 +210,7 @@ impl Mode {
             positions: PositionConstraints::of(&program, &layout),
             motion,
             exchanges: Ratios::of(&program, &layout),
+            bounds: Bounds::of(&program, &layout),
             layout,
             program,
         }
@@ -204,7 +229,8 @@ impl Mode {
             .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
             .chain(self.positions.as_ref().map(PositionConstraints::routine))
             .chain(self.motion.as_ref().map(|motion| &motion.rates))
-            .chain(self.exchanges.as_ref().map(Ratios::routine));
+            .chain(self.exchanges.as_ref().map(Ratios::routine))
+            .chain(self.bounds.as_ref().map(Bounds::routine));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
 }

@@ -155,6 +155,8 @@ pub enum EquilibriumError {
     None(Vec<(String, f64)>),
     /// Where all is at rest, this constraint is missed by so much.
     Missed(String, f64),
+    /// Where all is at rest, branches of these set-valued laws have ended.
+    Ended(Vec<String>),
     /// The relations that the structure implies among its states are too long to be written out.
     Relations,
     /// The model has no value on the way.
@@ -174,6 +176,12 @@ impl fmt::Display for EquilibriumError {
             EquilibriumError::Missed(constraint, miss) => write!(
                 f,
                 "no equilibrium was found: where all rates vanish the constraint {constraint} is missed by {miss:e}; start nearer to the position that is meant, by start values or `guess`"
+            ),
+            EquilibriumError::Ended(laws) => write!(
+                f,
+                "no equilibrium was found: where the branches with which the model begins are at rest, {} would have another; \
+                 let it come to rest in a run, and start there",
+                laws.join(", ")
             ),
             EquilibriumError::Relations => write!(
                 f,

@@ -162,6 +162,11 @@ impl Model {
             self.find_fired(t, x, told)?;
         }
         self.run_clauses(t, x)?;
+        while self.settle_mode(t, x)? {
+            self.switched = true;
+            self.find_fired(t, x, &[])?;
+            self.run_clauses(t, x)?;
+        }
         if self.has_delays() {
             self.run_sources(t, x)?;
             for i in 0..self.run.delays_and_samples.len() {
@@ -172,6 +177,17 @@ impl Model {
             }
         }
         self.follow_solutions(t, x)
+    }
+
+    /// Goes on in another mode: where the present one has ended, or with other independent variables.
+    fn exchange_or_settle(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        if std::mem::take(&mut self.switched) {
+            return Ok(true);
+        }
+        if !failed && self.has_mode_ended(t, x)? && self.settle_mode(t, x)? {
+            return Ok(true);
+        }
+        self.exchange(t, x, failed)
     }
 
     pub(super) fn has_delays(&self) -> bool {
@@ -214,7 +230,7 @@ impl Events for Model {
     }
 
     fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        let exchanged = self.exchange(t, x, failed)?;
+        let exchanged = self.exchange_or_settle(t, x, failed)?;
         if exchanged {
             self.renew_projection(t, x)?;
         }

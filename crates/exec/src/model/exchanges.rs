@@ -59,9 +59,10 @@ impl Ratios {
 }
 
 impl Model {
-    /// Whether a run may go on in other independent variables.
-    pub fn may_exchange(&self) -> bool {
-        self.compiled.has_alternatives() && self.compiled.first().exchanges.is_some()
+    /// Whether a run may go on in another mode: in other independent variables, or with other branches of set-valued laws.
+    pub fn may_change_mode(&self) -> bool {
+        let first = self.compiled.first();
+        self.compiled.has_alternatives() && (first.exchanges.is_some() || first.bounds.is_some())
     }
 
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
@@ -79,7 +80,7 @@ impl Model {
             return Ok(false);
         };
         let values = self.values_of_all(t, x)?;
-        let Some(mode) = self.compiled.with_independent(&wanted, &values) else { return Ok(false) };
+        let Some(mode) = self.compiled.with_independent(&code, &wanted, &values) else { return Ok(false) };
         let before = self.clone();
         let changed = self.enter_at(mode, t, x, &values, before.recorded.chosen.len());
         match changed {
@@ -153,7 +154,7 @@ impl Model {
     }
 
     /// All variables of the graph at `(t, x)`.
-    fn values_of_all(&mut self, t: f64, x: &[f64]) -> Result<BTreeMap<Symbol, f64>, Failure> {
+    pub(super) fn values_of_all(&mut self, t: f64, x: &[f64]) -> Result<BTreeMap<Symbol, f64>, Failure> {
         let code = self.code.clone();
         let (symbols, wanted): (Vec<Symbol>, Vec<Value>) = code.program.variables.iter().map(|(s, v)| (*s, *v)).unzip();
         let routine = self.routine_for(&wanted);
@@ -233,7 +234,7 @@ impl Model {
     }
 
     /// Solutions of laws, and positions, are sought from where they are.
-    fn start_solutions_at(&mut self, values: &BTreeMap<Symbol, f64>) {
+    pub(super) fn start_solutions_at(&mut self, values: &BTreeMap<Symbol, f64>) {
         let code = self.code.clone();
         for (symbol, &value) in &code.program.variables {
             let (Op::Solution(block, i), Some(&found)) = (code.program.values.op(value), values.get(symbol)) else {
@@ -256,7 +257,9 @@ impl Model {
         let mut open: Vec<(u32, Value, f64)> = Vec::new();
         let told = program.tracked.iter().chain(&program.replaced);
         let registers = (layout.states..).take(x.len()).chain(layout.conserved..);
-        for (k, (symbol, register)) in told.zip(registers).enumerate() {
+        let idle = program.tracked.len()..x.len();
+        let registers = registers.enumerate().filter(|(k, _)| !idle.contains(k));
+        for (symbol, (k, register)) in told.zip(registers) {
             let (Some(&value), Some(&known)) = (program.variables.get(symbol), values.get(symbol)) else {
                 return Ok(false);
             };

@@ -89,6 +89,18 @@ impl ImpulseBalance {
     }
 }
 
+impl ImpulseWork {
+    /// What storages kept when that was noted last, in the order of [`Jumps::storages`].
+    pub fn stored(&self) -> &[f64] {
+        &self.stored
+    }
+
+    /// Notes it.
+    pub fn keep_stored(&mut self, stored: &[f64]) {
+        self.stored.copy_from_slice(stored);
+    }
+}
+
 impl Model {
     /// Keeps in mind what storages keep.
     pub(super) fn take_stored(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
@@ -108,8 +120,7 @@ impl Model {
         let code = self.code.clone();
         let Some(balance) = &code.impulses else { return Ok(()) };
         let mut work = std::mem::take(&mut self.events.impulses);
-        self.take_asked(balance, &mut work.asked);
-        let done = self.solve_balance(t, x, balance, &mut work);
+        let done = self.share_out(t, x, balance, &mut work);
         self.events.impulses = work;
         done?;
         if first {
@@ -137,6 +148,54 @@ impl Model {
         let done = self.solve_balance(t, x, balance, &mut work);
         self.events.impulses = work;
         done
+    }
+
+    /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact, by
+    /// exchanging the one with the least number that is broken (Murty's principal pivoting).
+    fn share_out(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        balance: &ImpulseBalance,
+        work: &mut ImpulseWork,
+    ) -> Result<(), Failure> {
+        let contacts = self.events.contacts.clone();
+        let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
+        contacts.iter().for_each(|&contact| self.events.fired[contact] = false);
+        let mut tried: Vec<Vec<bool>> = Vec::new();
+        loop {
+            self.take_asked(balance, &mut work.asked);
+            self.solve_balance(t, x, balance, work)?;
+            let Some(broken) = contacts.iter().copied().find(|&c| self.is_broken(c, balance, work)) else {
+                return Ok(());
+            };
+            let active: Vec<bool> = contacts.iter().map(|&c| self.events.fired[c]).collect();
+            if tried.contains(&active) {
+                return Err(self.unmet_resets(t));
+            }
+            tried.push(active);
+            self.events.fired[broken] = !self.events.fired[broken];
+            x.copy_from_slice(&start);
+            self.run.conserved.clone_from(&conserved);
+        }
+    }
+
+    /// Whether a contact pulls, or gives way, after what has been solved last.
+    fn is_broken(&self, contact: usize, balance: &ImpulseBalance, work: &ImpulseWork) -> bool {
+        let first = balance.all.outputs.len() - balance.moved.len();
+        let clause = &self.code.program.clauses[contact];
+        let Some((Target::Moved { what, impulse }, k)) = clause.actions.first().map(|a| (a.target, 0)) else {
+            return false;
+        };
+        let target = self.events.values[self.code.clauses.place(contact, k)];
+        if self.events.fired[contact] {
+            let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
+            let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse as usize);
+            return own.is_some_and(|(_, p)| *p < -MET * most);
+        }
+        let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
+        let flow = self.frame.r[balance.all.outputs[output] as usize];
+        flow - target < -MET * flow.abs().max(target.abs())
     }
 
     /// Newton on the unknowns and the impulses; whether any unknown has changed.

@@ -5,6 +5,7 @@ use super::clause_memory::ClauseMemory;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
+use super::modes::Extents;
 use crate::bytecode::{Followed, HeldConditions};
 use halfarrow_compiler::bond_graph::HeldKind;
 
@@ -51,6 +52,8 @@ pub(super) struct Remembered {
     pub delays_and_samples: Vec<DelayOrSample>,
     /// Of each clause of the program.
     pub clauses: Vec<ClauseMemory>,
+    /// How great margins of set-valued laws have been.
+    pub extents: Extents,
     /// The piece of each input that holds.
     pub pieces: Vec<Option<PointRange>>,
 }

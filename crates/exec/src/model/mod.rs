@@ -21,6 +21,7 @@ mod linear;
 mod machine;
 mod memory;
 mod minimum_norm;
+mod modes;
 mod operations;
 mod positions;
 mod projection;
@@ -50,6 +51,7 @@ use halfarrow_sim::{Failure, Leap};
 use inputs::InputSignal;
 use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
+use modes::Extents;
 use projection::Projection;
 use recorded::Recorded;
 use shares::Shares;
@@ -82,6 +84,8 @@ pub struct Model {
     dx: Vec<f64>,
     /// A state beside another one.
     beside: Vec<f64>,
+    /// Whether the mode has changed at the last event.
+    switched: bool,
     /// The number of the first assumption that the parameters break.
     broken: Option<usize>,
     /// The time of the rates that stand in the registers, those of the states that stand there, if nothing has been done
@@ -128,6 +132,7 @@ impl Model {
             scales: vec![0.0; n],
             delays_and_samples: Vec::new(),
             clauses: Vec::new(),
+            extents: Extents::default(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -143,6 +148,7 @@ impl Model {
             scaled: true,
             dx: vec![0.0; n],
             beside: vec![0.0; n],
+            switched: false,
             broken: None,
             rated: None,
             compiled,
@@ -287,6 +293,7 @@ impl Model {
         self.forget_solutions();
         self.run.delays_and_samples = self.empty_delays_and_samples();
         self.run.clauses = self.clauses_at_rest();
+        self.run.extents = Extents::default();
     }
 
     fn follow(&mut self) {

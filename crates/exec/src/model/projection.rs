@@ -87,7 +87,7 @@ impl Model {
 
     /// What the relations come to before an event, which may move positions or what the relations read.
     pub(super) fn before_move(&mut self, t: f64, x: &[f64]) -> Result<Option<Vec<f64>>, Failure> {
-        match self.projection.is_some() {
+        match self.projection.as_ref().is_some_and(|p| p.mode == self.run.mode) {
             true => self.relations_at(t, x).map(Some),
             false => Ok(None),
         }
@@ -96,6 +96,9 @@ impl Model {
     /// From here on the relations keep what the event has made of them.
     pub(super) fn after_move(&mut self, before: Option<Vec<f64>>, t: f64, x: &[f64]) -> Result<(), Failure> {
         let Some(before) = before else { return Ok(()) };
+        if self.projection.as_ref().is_some_and(|p| p.mode != self.run.mode) {
+            return self.renew_projection(t, x);
+        }
         let after = self.relations_at(t, x)?;
         let rows = self.projection.iter_mut().flat_map(|p| &mut p.relations);
         for ((row, before), after) in rows.zip(before).zip(after).filter(|((row, _), _)| !row.vanishes) {

@@ -173,6 +173,7 @@ impl Sketch {
             signals: Table::new(),
             held: self.held.into_iter().collect(),
             clauses: Vec::new(),
+            set_valued: Vec::new(),
             lets: Vec::new(),
             outputs: Vec::new(),
             point: None,

@@ -7,7 +7,7 @@ mod structure;
 mod symbolic;
 mod zeros;
 
-use halfarrow_compiler::bond_graph::{self, BondGraph, HeldKind, InputId, Kind, Meaning, Variable};
+use halfarrow_compiler::bond_graph::{self, BondGraph, ElementId, HeldKind, InputId, Kind, Meaning, Variable};
 use halfarrow_compiler::equations::{Equations, Form, Position};
 use halfarrow_compiler::program::{Observed, Program};
 use halfarrow_exec::{self as exec, Linearised};
@@ -174,8 +174,8 @@ impl Model {
     fn with_inputs(&self, wanted: Option<&[String]>) -> Result<(Vec<String>, Model), Error> {
         let declared = || self.graph.inputs.values().map(|i| i.name.clone()).collect::<Vec<_>>();
         let sources = || {
-            let source = |e: &&halfarrow_compiler::bond_graph::Element| is_source(&e.kind);
-            self.graph.elements.values().filter(source).map(|e| e.name.clone()).collect::<Vec<_>>()
+            let sources = self.graph.elements.iter().filter(|(id, _)| is_source(&self.graph, *id));
+            sources.map(|(_, e)| e.name.clone()).collect::<Vec<_>>()
         };
         let names = match wanted {
             Some(names) => names.to_vec(),
@@ -204,7 +204,16 @@ impl Model {
         let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
         system.record(&names).map_err(|error| crate::run::refused(&system, error))?;
         let mut notes = Vec::new();
-        let (at, t, x) = self.go_to(&mut system, wanted.at, &mut notes)?;
+        let (at, t, mut x) = self.go_to(&mut system, wanted.at, &mut notes)?;
+        // From here on in the mode of that point.
+        let present = self.as_in(&system);
+        let equations =
+            if self.graph.set_valued.is_empty() { equations } else { present.equations_in(Form::Minimal)? };
+        x.truncate(system.program().tracked.len());
+        if !self.graph.set_valued.is_empty() {
+            notes
+                .push(format!("set-valued laws keep the branches that they have there: {}", present.graph.mode_name()));
+        }
         let of = |name: &String| system.program().inputs.iter().position(|i| i.name == *name);
         let places: Vec<usize> = inputs.iter().filter_map(of).collect();
         let linear = system.linearise(t, &x, &places).map_err(|failure| self.stopped(failure))?;
@@ -218,7 +227,7 @@ impl Model {
             if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
         let positions = positions(&mut system, &equations, t, &x).map_err(|failure| self.stopped(failure))?;
         let program = system.program();
-        let (controllability, observability) = self.reaches(&linear, inputs, &outputs)?;
+        let (controllability, observability) = present.reaches(&linear, inputs, &outputs)?;
         Ok(LinearizeReport {
             model: self.name().to_string(),
             at,
@@ -330,13 +339,14 @@ fn delay(name: &str) -> String {
     )
 }
 
-fn is_source(kind: &Kind) -> bool {
-    matches!(kind, Kind::EffortSource { .. } | Kind::FlowSource { .. })
+fn is_source(graph: &BondGraph, element: ElementId) -> bool {
+    let imposes = matches!(graph.elements[element].kind, Kind::EffortSource { .. } | Kind::FlowSource { .. });
+    imposes && graph.set_valued.iter().all(|law| law.element != element)
 }
 
 /// Adds an input to the value of a source; whether there is such a source.
 fn add_input(graph: &mut BondGraph, name: &str) -> bool {
-    let Some(element) = graph.elements.iter().find(|(_, e)| e.name == name && is_source(&e.kind)).map(|(id, _)| id)
+    let Some(element) = graph.elements.iter().find(|(id, e)| e.name == name && is_source(graph, *id)).map(|(id, _)| id)
     else {
         return false;
     };

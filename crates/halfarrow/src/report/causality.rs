@@ -48,7 +48,13 @@ fn one(causal: &CausalGraph, loops: &LoopsReport, state: &PortState, on_paths: &
         _ => ("-".to_string(), String::new()),
     };
     let why = if forced { format!("forced by the model; {why}") } else { why };
-    Decided { name: graph.port_name(state.port), kind: element.kind.word(), law: element.label.clone(), causality, why }
+    Decided {
+        name: graph.port_name(state.port),
+        kind: graph.word(state.port.element),
+        law: element.label.clone(),
+        causality,
+        why,
+    }
 }
 
 fn given(kind: &Kind) -> (String, String) {

@@ -130,7 +130,9 @@ impl<'a> Run<'a> {
         while self.time < self.to {
             let stop = self.next_stop(&mut *stepper.events());
             if S::DENSE && is_at(self.time, stop.time, self.time) {
-                self.skip_to(stepper, stop, point)?;
+                if self.skip_to(stepper, stop, point)? == Flow::HandOver {
+                    return Ok(Flow::HandOver);
+                }
             } else if self.drive_to_stop(stepper, stop, point)? == Flow::HandOver {
                 return Ok(Flow::HandOver);
             }
@@ -145,11 +147,13 @@ impl<'a> Run<'a> {
     }
 
     /// Over to a stop that is where the run stands, to rounding.
-    fn skip_to<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<(), Failure> {
+    fn skip_to<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<Flow, Failure> {
         let reason = self.arrive(&mut *stepper.events(), stop.time, stop, false, point)?;
         self.report_progress()?;
         stepper.forget();
-        self.handle_stop(&mut *stepper.events(), reason, point)
+        self.handle_stop(&mut *stepper.events(), reason, point)?;
+        let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
+        Ok(if exchanged { Flow::HandOver } else { Flow::GoOn })
     }
 
     /// From here to the stop, or to a zero crossing before it.
@@ -262,6 +266,9 @@ impl<'a> Run<'a> {
 
     fn handle(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
         events.handle_event(self.time, point)?;
+        if self.signs.len() != events.indicators() {
+            self.signs = Signs::new(events.indicators());
+        }
         self.handled = true;
         self.show(events, point)?;
         self.signs.take(events, self.time, point)

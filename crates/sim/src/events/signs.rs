@@ -24,7 +24,7 @@ impl Signs {
         Signs { held: vec![held], ..Signs::new(1) }
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.held.len()
     }
 

@@ -492,14 +492,29 @@ impl Parser<'_> {
         let PathPart { name, indices } = self.indexed("the name of the constraint")?;
         self.expect(TokenKind::Colon, "`:`");
         let left = self.expr();
-        let right = if self.eat(TokenKind::Assign) {
-            self.expr()
-        } else {
-            self.expected("`=`");
-            Expr { span: self.gap(), kind: ExprKind::Missing }
+        let (left, sides, right, args) = match left.kind {
+            ExprKind::Binary(b) if matches!(b.op, BinaryOp::Ge | BinaryOp::Le) => {
+                let sides = if b.op == BinaryOp::Ge { Sides::AtLeast } else { Sides::AtMost };
+                let mut right = *b.right;
+                let mut args = split_arguments(&mut right);
+                if args.is_empty() && self.is(TokenKind::LParen) {
+                    args = self.args().0;
+                }
+                (*b.left, sides, right, args)
+            }
+            kind => {
+                let left = Expr { kind, ..left };
+                let right = if self.eat(TokenKind::Assign) {
+                    self.expr()
+                } else {
+                    self.expected("`=`, `>=` or `<=`");
+                    Expr { span: self.gap(), kind: ExprKind::Missing }
+                };
+                (left, Sides::Equal, right, Vec::new())
+            }
         };
         let doc = self.doc();
-        Some(Constraint { name, indices, left, right, doc })
+        Some(Constraint { name, indices, left, sides, right, args, doc })
     }
 
     fn domain(&mut self) -> Option<DomainBlock> {
@@ -651,5 +666,22 @@ fn spread_docs(items: &mut [Declaration]) {
         } else {
             doc = item.doc.clone();
         }
+    }
+}
+
+/// What reads as a call with named arguments at the end of an expression is a name, with arguments of something else behind
+/// it: `h (restitution = 0.8)`.
+fn split_arguments(e: &mut Expr) -> Vec<Arg> {
+    match &mut e.kind {
+        ExprKind::Binary(b) => split_arguments(&mut b.right),
+        ExprKind::Unary(u) => split_arguments(&mut u.operand),
+        ExprKind::Call(call) if !call.args.is_empty() && call.args.iter().all(|a| a.label.is_some()) => {
+            let (name, args) = (call.function.clone(), std::mem::take(&mut call.args));
+            let span = name.span;
+            let path = Path { parts: vec![PathPart { name, indices: Vec::new() }], span };
+            *e = Expr { span, kind: ExprKind::Path(path) };
+            args
+        }
+        _ => Vec::new(),
     }
 }

@@ -69,12 +69,18 @@ impl Model {
         }
         self.restart();
         let before = self.run.positions.clone();
-        let found = self.search_equilibrium(t, x);
+        let found = self.search_equilibrium(t, x).and_then(|found| self.in_this_mode(t, found));
         if found.is_err() {
             self.run.positions = before;
             self.start_at_positions();
         }
         found
+    }
+
+    /// What was found, if no branch of a set-valued law has ended there.
+    fn in_this_mode(&mut self, t: f64, found: Equilibrium) -> Result<Equilibrium, EquilibriumError> {
+        let ended = self.laws_ended(t, &found.x).map_err(EquilibriumError::Failure)?;
+        if ended.is_empty() { Ok(found) } else { Err(EquilibriumError::Ended(ended)) }
     }
 
     fn search_equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {

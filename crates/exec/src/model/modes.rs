@@ -1,0 +1,448 @@
+//! The mode of set-valued laws: which branch each of them has. A mode is kept until a branch ends; then a mode is sought in
+//! which no branch has ended, from what storages keep, by exchanging the branch with the least number that has (Murty's
+//! principal pivoting), and where that leads in a circle or to a mode that cannot be, by the number of exchanges.
+//! Source: K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974).
+
+use super::Model;
+use super::clause_memory::{ClauseMemory, Condition};
+use super::compiled::ModeId;
+use crate::bytecode::{Hold, Layout, Routine};
+use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::program::{Bound, Clause, Program, Target, Value};
+use halfarrow_sim::Failure;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+/// Modes that are tried at one instant at most.
+const MOST_TRIED: usize = 2000;
+/// Exchanges beyond which no mode is sought any more once one is known to which storages leap.
+const FAR: usize = 2;
+/// A margin that is zero, as part of the greatest that it has been.
+const ROUNDING: f64 = 1e-9;
+/// What storages change by without a leap, as part of the most that they have kept.
+const NO_LEAP: f64 = 1e-7;
+
+/// The bounds of the branches of a mode.
+#[derive(Debug, Clone)]
+pub(super) struct Bounds {
+    /// Each with the number of its clause and its place among the margins; the rate of a gap stands behind it.
+    all: Vec<(usize, Bound, Option<usize>)>,
+    /// Computes the margins.
+    margins: Routine,
+    /// The branches of the mode.
+    branches: Vec<u32>,
+}
+
+impl Bounds {
+    pub fn of(program: &Program, layout: &Layout) -> Option<Bounds> {
+        if program.set_valued.is_empty() {
+            return None;
+        }
+        let bounds = program.clauses.iter().enumerate().filter_map(|(i, c)| Some((i, c.bound?)));
+        let mut values: Vec<Value> = Vec::new();
+        let place = |(clause, bound): (usize, Bound)| {
+            let place = bound.margin.map(|margin| {
+                values.push(margin);
+                let place = values.len() - 1;
+                values.extend(bound.gap.map(|(rate, _)| rate));
+                place
+            });
+            (clause, bound, place)
+        };
+        let all = bounds.map(place).collect();
+        let branches = program.set_valued.iter().map(|law| law.present).collect();
+        Some(Bounds { all, margins: layout.routine(program, &values), branches })
+    }
+
+    pub fn routine(&self) -> &Routine {
+        &self.margins
+    }
+}
+
+/// What a run remembers of set-valued laws: how great things have been.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Extents {
+    /// Of margins, of their rates and of the rates of these, by law, branch and bound.
+    margins: BTreeMap<(u32, u32, usize), [f64; 3]>,
+    /// Of what storages keep.
+    stored: BTreeMap<Symbol, f64>,
+}
+
+/// Where a run stands when its mode ends.
+struct Instant<'m> {
+    model: &'m Model,
+    t: f64,
+    x: &'m [f64],
+    values: BTreeMap<Symbol, f64>,
+    stored: BTreeMap<Symbol, f64>,
+}
+
+/// A mode that has been tried.
+enum Tried {
+    /// It can be: the model in it, the state there, and by how much storages leap.
+    Fits(Box<(Model, Vec<f64>)>, f64),
+    /// These branches have ended in it: the law with the branch beyond.
+    Ended(Vec<(u32, u32)>),
+    /// It has no equations, or none that can be entered.
+    Impossible,
+}
+
+impl Model {
+    /// Goes on in another mode if a branch of a set-valued law has ended at `(t, x)`; then what storages keep is what it was,
+    /// or has changed by what the junction structure lets through. Whether the mode is another.
+    pub(super) fn settle_mode(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
+        if self.code.bounds.is_none() {
+            return Ok(false);
+        }
+        let ended = self.ended(t, x, true)?;
+        if ended.is_empty() {
+            return Ok(false);
+        }
+        self.take_stored(t, x)?;
+        let stored = self.stored_now();
+        let values = self.values_of_all(t, x)?;
+        let instant = Instant { model: self, t, x, values, stored };
+        let Some((next, point)) = instant.search(&ended) else { return Err(self.no_mode(t, &ended)) };
+        *self = next;
+        x.copy_from_slice(&point);
+        Ok(true)
+    }
+
+    /// Whether a branch has ended between events, which no event has told.
+    pub(super) fn has_mode_ended(&mut self, t: f64, x: &[f64]) -> Result<bool, Failure> {
+        if self.code.bounds.is_none() {
+            return Ok(false);
+        }
+        self.note_extents(t, x)?;
+        Ok(!self.ended(t, x, false)?.is_empty())
+    }
+
+    /// The set-valued laws of which a branch has ended at `(t, x)`, by name.
+    pub(super) fn laws_ended(&mut self, t: f64, x: &[f64]) -> Result<Vec<String>, Failure> {
+        let ended = self.ended(t, x, true)?;
+        let mut names: Vec<String> =
+            ended.into_iter().map(|(law, _)| self.code.program.set_valued[law as usize].name.clone()).collect();
+        names.dedup();
+        Ok(names)
+    }
+
+    /// What storages keep, as it was noted last.
+    fn stored_now(&self) -> BTreeMap<Symbol, f64> {
+        let symbols = self.code.program.jumps.iter().flat_map(|jumps| &jumps.storages);
+        symbols.copied().zip(self.events.impulses.stored().iter().copied()).collect()
+    }
+
+    /// Keeps in mind how great margins and what storages keep have been.
+    fn note_extents(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.take_stored(t, x)?;
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        let Model { run, frame, events, .. } = self;
+        for (number, (_, bound, place)) in bounds.all.iter().enumerate() {
+            let Some(place) = place else { continue };
+            let value = |place: usize| frame.r[bounds.margins.outputs[place] as usize].abs();
+            let most = run.extents.margins.entry(key(bounds, bound, number)).or_default();
+            most[0] = most[0].max(value(*place));
+            if bound.gap.is_some() {
+                most[1] = most[1].max(value(place + 1));
+            }
+        }
+        let storages = code.program.jumps.iter().flat_map(|jumps| &jumps.storages);
+        for (&symbol, stored) in storages.zip(events.impulses.stored()) {
+            let most = run.extents.stored.entry(symbol).or_default();
+            *most = most.max(stored.abs());
+        }
+        Ok(())
+    }
+
+    /// The branches that have ended at `(t, x)`, with those beyond. `at_event`: those that end there are among them.
+    fn ended(&mut self, t: f64, x: &[f64], at_event: bool) -> Result<Vec<(u32, u32)>, Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
+        let holds = if at_event { self.becoming_from_none(t, x)? } else { Vec::new() };
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        let margins: Vec<f64> = bounds.margins.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
+        let mut ended = Vec::new();
+        let mut open = Vec::new();
+        for (number, (clause, bound, place)) in bounds.all.iter().enumerate() {
+            let beyond = (bound.law, bound.next);
+            let Some(place) = place else {
+                if holds.get(*clause).copied().unwrap_or(false) {
+                    ended.push(beyond);
+                }
+                continue;
+            };
+            let margin = margins[*place];
+            let most = self.run.extents.margins.get(&key(bounds, bound, number)).copied().unwrap_or_default();
+            if margin.is_nan() || margin < -ROUNDING * most[0] {
+                ended.push(beyond);
+            } else if at_event && margin <= ROUNDING * most[0] {
+                match bound.gap.map(|_| margins[place + 1]) {
+                    None => open.push((number, *bound, *place, 1)),
+                    Some(rate) if rate < -ROUNDING * most[1] => ended.push(beyond),
+                    Some(rate) if rate <= ROUNDING * most[1] => open.push((number, *bound, place + 1, 2)),
+                    Some(_) => {}
+                }
+            }
+        }
+        if !open.is_empty() {
+            self.rates_at(t, x)?;
+            self.place(t, x);
+            self.still();
+            self.let_time_pass(t);
+            let Model { frame, code, dx, .. } = self;
+            frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
+            let along = self.frame.run_along(&bounds.margins);
+            along.map_err(|error| self.failure(t, error))?;
+            for (number, bound, place, level) in open {
+                let rate = self.frame.d[bounds.margins.outputs[place] as usize];
+                let most = self.run.extents.margins.entry(key(bounds, &bound, number)).or_default();
+                most[level] = most[level].max(rate.abs());
+                if rate < -ROUNDING * most[level] {
+                    ended.push((bound.law, bound.next));
+                }
+            }
+        }
+        ended.sort_unstable();
+        ended.dedup();
+        Ok(ended)
+    }
+
+    /// No mode can be.
+    fn no_mode(&self, time: f64, ended: &[(u32, u32)]) -> Failure {
+        let laws = &self.code.program.set_valued;
+        let name = |&(law, _): &(u32, u32)| {
+            let law = &laws[law as usize];
+            format!("{} (`{}`)", law.name, law.branches[law.present as usize])
+        };
+        let mut what: Vec<String> = ended.iter().map(name).collect();
+        what.dedup();
+        Failure::NoMode { time, what: what.join(", ") }
+    }
+
+    /// Opens contacts and lets go what sticks, before impulses are shared out among all that move: what they take of it is
+    /// found then.
+    pub(super) fn release(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        let laws = &code.program.set_valued;
+        let free: Vec<u32> = laws.iter().map(|law| law.released.unwrap_or(law.present)).collect();
+        let impulses = code.program.clauses.iter().zip(&self.events.fired).any(|(clause, fired)| {
+            *fired && clause.actions.iter().any(|action| matches!(action.target, Target::Moved { .. }))
+        });
+        if !impulses || free == bounds.branches {
+            return Ok(());
+        }
+        self.take_stored(t, x)?;
+        let (stored, values) = (self.stored_now(), self.values_of_all(t, x)?);
+        let fired = std::mem::take(&mut self.events.fired);
+        let (mut model, mut point) = (self.clone(), x.to_vec());
+        let mode = self.compiled.in_mode(&free);
+        let entered = match mode {
+            Some(mode) => Instant { model: self, t, x, values, stored }.enter(&mut model, mode, &mut point)?,
+            None => None,
+        };
+        if entered.is_none_or(|leap| leap > NO_LEAP) {
+            let what = "what is stuck or in contact there".to_string();
+            return Err(Failure::NoMode { time: t, what });
+        }
+        for (clause, fired) in code.program.clauses.iter().zip(fired).filter(|(_, fired)| *fired) {
+            let same = |c: &&Clause| match (c.bound, clause.bound) {
+                (Some(own), Some(other)) => (own.law, own.next) == (other.law, other.next),
+                (None, None) => c.span == clause.span && c.name == clause.name,
+                _ => false,
+            };
+            if let Some(place) = model.code.program.clauses.iter().position(|c| same(&c)) {
+                model.events.fired[place] = fired;
+            }
+        }
+        model.switched = true;
+        *self = model;
+        x.copy_from_slice(&point);
+        Ok(())
+    }
+
+    /// The clauses of contacts whose gap is closed: what an impulse may act through.
+    pub(super) fn contacts(&mut self, t: f64, x: &[f64]) -> Result<Vec<usize>, Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        let mut contacts = Vec::new();
+        for (number, (clause, bound, place)) in bounds.all.iter().enumerate() {
+            let (Some(place), Some(_)) = (place, bound.gap) else { continue };
+            let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
+            let gap = self.frame.r[bounds.margins.outputs[*place] as usize];
+            let moved = code.program.clauses[*clause].actions.iter().any(|a| matches!(a.target, Target::Moved { .. }));
+            if moved && (gap <= ROUNDING * most || self.events.fired[*clause]) {
+                contacts.push(*clause);
+            }
+        }
+        Ok(contacts)
+    }
+
+    /// Clauses of another mode: those of the modeller go on, bounds begin anew.
+    fn begin_bounds(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let own = code.program.clauses.iter().filter(|c| c.bound.is_none()).count();
+        self.run.clauses.truncate(own);
+        let fresh = ClauseMemory::Becomes(Condition::begin(false, t));
+        self.run.clauses.resize(code.program.clauses.len(), fresh);
+        let holds = self.held_true(t, x)?;
+        for (memory, holds) in self.run.clauses.iter_mut().zip(holds).skip(own) {
+            *memory = ClauseMemory::Becomes(Condition::begin(holds, t));
+        }
+        Ok(())
+    }
+}
+
+fn key(bounds: &Bounds, bound: &Bound, number: usize) -> (u32, u32, usize) {
+    let first = bounds.all.iter().position(|(_, b, _)| b.law == bound.law).unwrap_or(0);
+    (bound.law, bounds.branches[bound.law as usize], number - first)
+}
+
+impl Instant<'_> {
+    /// The mode in which the run goes on.
+    fn search(&self, ended: &[(u32, u32)]) -> Option<(Model, Vec<f64>)> {
+        let bounds = self.model.code.bounds.as_ref()?;
+        let commanded = |law: u32| bounds.all.iter().any(|(_, b, place)| b.law == law && place.is_none());
+        let counts: Vec<u32> = self.model.code.program.set_valued.iter().map(|l| l.branches.len() as u32).collect();
+        // Commands are obeyed by whatever mode.
+        let mut first = bounds.branches.clone();
+        ended.iter().filter(|(law, _)| commanded(*law)).for_each(|&(law, next)| first[law as usize] = next);
+        let mut next = first.clone();
+        ended.iter().rev().for_each(|&(law, beyond)| next[law as usize] = beyond);
+        let mut tried: BTreeSet<Vec<u32>> = BTreeSet::from([bounds.branches.clone()]);
+        let mut queue = VecDeque::from([first.clone()]);
+        let mut seen: BTreeSet<Vec<u32>> = BTreeSet::from([first.clone()]);
+        let mut leaping: Option<(f64, Box<(Model, Vec<f64>)>)> = None;
+        let mut pivot = Some(next);
+        while tried.len() < MOST_TRIED {
+            let mode = match pivot.take() {
+                Some(mode) => mode,
+                None => {
+                    let mode = queue.pop_front()?;
+                    let distance = mode.iter().zip(&first).filter(|(a, b)| a != b).count();
+                    if leaping.is_some() && distance > FAR {
+                        break;
+                    }
+                    for law in (0..mode.len()).filter(|&law| !commanded(law as u32)) {
+                        for branch in 0..counts[law] {
+                            let mut other = mode.clone();
+                            other[law] = branch;
+                            if seen.insert(other.clone()) {
+                                queue.push_back(other);
+                            }
+                        }
+                    }
+                    if tried.contains(&mode) {
+                        if queue.is_empty() {
+                            break;
+                        }
+                        continue;
+                    }
+                    mode
+                }
+            };
+            tried.insert(mode.clone());
+            match self.try_mode(&mode) {
+                Tried::Fits(found, leap) if leap <= NO_LEAP => return Some(*found),
+                Tried::Fits(found, leap) => {
+                    if self.may_leap(&mode, bounds) && leaping.as_ref().is_none_or(|(least, _)| leap < *least) {
+                        leaping = Some((leap, found));
+                    }
+                }
+                Tried::Ended(ended) => {
+                    let exchanged = ended.first().map(|&(law, beyond)| {
+                        let mut other = mode.clone();
+                        other[law as usize] = beyond;
+                        other
+                    });
+                    pivot = exchanged.filter(|other| !tried.contains(other));
+                }
+                Tried::Impossible => {}
+            }
+            if pivot.is_none() && queue.is_empty() {
+                break;
+            }
+        }
+        leaping.map(|(_, found)| *found)
+    }
+
+    /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.
+    fn may_leap(&self, mode: &[u32], bounds: &Bounds) -> bool {
+        let Some(id) = self.model.compiled.in_mode(mode) else { return false };
+        let code = self.model.compiled.mode(id);
+        let laws = code.program.set_valued.iter().zip(&bounds.branches);
+        laws.clone().all(|(law, before)| law.released.is_none() || law.present == *before)
+    }
+
+    fn try_mode(&self, branches: &[u32]) -> Tried {
+        let Some(mode) = self.model.compiled.in_mode(branches) else { return Tried::Impossible };
+        let mut model = self.model.clone();
+        let mut x = self.x.to_vec();
+        match self.enter(&mut model, mode, &mut x) {
+            Ok(Some(leap)) => match model.ended(self.t, &x, true) {
+                Ok(ended) if ended.is_empty() => Tried::Fits(Box::new((model, x)), leap),
+                Ok(ended) => Tried::Ended(ended),
+                Err(_) => Tried::Impossible,
+            },
+            Ok(None) | Err(_) => Tried::Impossible,
+        }
+    }
+
+    /// Goes on in a mode from what storages keep; by how much that changes. `None` if that cannot be.
+    fn enter(&self, model: &mut Model, mode: ModeId, x: &mut [f64]) -> Result<Option<f64>, Failure> {
+        let t = self.t;
+        let recorded = model.recorded.chosen.len();
+        model.enter(mode)?;
+        if model.broken.is_some() || model.recorded.chosen.len() != recorded {
+            return Ok(None);
+        }
+        model.frame.conditions.clock = Hold::Follow;
+        model.frame.conditions.state = Hold::Follow;
+        let code = model.code.clone();
+        code.clock.handle_time_event(&mut model.frame, model.run.crossed, &mut model.run.clock_event);
+        model.start_solutions_at(&self.values);
+        let value = |symbol: &Symbol| self.values.get(symbol).copied().filter(|v| v.is_finite()).unwrap_or(0.0);
+        x.fill(0.0);
+        x.iter_mut().zip(&code.program.tracked).for_each(|(x, symbol)| *x = value(symbol));
+        model.run.conserved = code.program.replaced.iter().map(value).collect();
+        let Some(jumps) = &code.program.jumps else { return Ok(None) };
+        let kept: Option<Vec<f64>> = jumps.storages.iter().map(|s| self.stored.get(s).copied()).collect();
+        let Some(kept) = kept else { return Ok(None) };
+        model.events.impulses.keep_stored(&kept);
+        model.balance_leaps(t, x)?;
+        model.take_signs(t, x)?;
+        model.follow_solutions(t, x)?;
+        model.run.scales = model.magnitudes(t, x);
+        model.follow_solutions(t, x)?;
+        model.take_stored(t, x)?;
+        let most = |symbol: &Symbol| model.run.extents.stored.get(symbol).copied().unwrap_or(0.0);
+        let pairs = jumps.storages.iter().zip(&kept).zip(model.events.impulses.stored());
+        let leaps = pairs.map(|((symbol, before), after)| {
+            let size = most(symbol).max(before.abs()).max(after.abs());
+            if size == 0.0 { 0.0 } else { (after - before).abs() / size }
+        });
+        let leap = leaps.fold(0.0, f64::max);
+        model.begin_bounds(t, x)?;
+        Ok(Some(leap))
+    }
+}
+
+impl Model {
+    /// Whether conditions of clauses are true now, whatever they were.
+    fn becoming_from_none(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
+        self.place(t, x);
+        self.truth_of_clauses(t, Hold::Follow)
+    }
+
+    /// The same, as conditions are held.
+    fn held_true(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
+        self.place(t, x);
+        let hold = self.frame.conditions.state;
+        self.truth_of_clauses(t, hold)
+    }
+}
