@@ -8,6 +8,9 @@ use super::{Position, State};
 use crate::algebra::{Expr, PlainNames, Symbol, ascii};
 use crate::bond_graph::{HeldKind, Integral, Meaning, VelocityRelation, velocity_relations};
 
+/// Positions that follow from others, one after the other, at most.
+const DEEP: usize = 32;
+
 /// A relation between states that keeps its value, known in closed form.
 #[derive(Debug, Clone)]
 pub struct PositionRelation {
@@ -113,7 +116,8 @@ fn relation_of(d: &mut Definitions, states: &[State], value: Expr, vanishes: boo
 
 /// An expression of positions in states, time, what is set from outside and what events set; what it reads else, if it does.
 fn in_states(d: &mut Definitions, states: &[State], mut e: Expr) -> Result<Expr, String> {
-    loop {
+    // Definitions may read each other in a circle.
+    for _ in 0..DEEP {
         let mut known = BTreeMap::new();
         for symbol in d.x.symbols_of(e) {
             let outside = match d.meaning(symbol) {
@@ -121,9 +125,11 @@ fn in_states(d: &mut Definitions, states: &[State], mut e: Expr) -> Result<Expr,
                 Some(Meaning::Held(held)) => d.graph.held[held].kind != HeldKind::Delay,
                 _ => d.constants.contains(&symbol) || states.iter().any(|s| s.symbol == symbol),
             };
+            // What a position follows from are positions; efforts and flows follow from laws.
+            let position = matches!(d.meaning(symbol), Some(Meaning::Signal(_) | Meaning::Stored(_)));
             match d.of.get(&symbol) {
                 _ if outside => {}
-                Some(Definition::Explicit(value)) => _ = known.insert(symbol, *value),
+                Some(Definition::Explicit(value)) if position => _ = known.insert(symbol, *value),
                 _ => return Err(d.x.name(symbol).to_string()),
             }
         }
@@ -132,4 +138,5 @@ fn in_states(d: &mut Definitions, states: &[State], mut e: Expr) -> Result<Expr,
         }
         e = d.x.substitute(e, &known);
     }
+    Err("positions that follow from each other".into())
 }
