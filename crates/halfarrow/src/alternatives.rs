@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::bond_graph::{BondGraph, Preference};
+use halfarrow_compiler::bond_graph::{BondGraph, Kind, Preference};
 use halfarrow_compiler::causal_graph::assign_causality;
 use halfarrow_compiler::equations::{Form, derive_equations};
 use halfarrow_compiler::ids::Map;
@@ -18,6 +18,14 @@ pub(crate) struct Alternatives {
 }
 
 impl exec::Alternatives for Alternatives {
+    fn most_states(&self) -> usize {
+        let ports = self.graph.elements.values().map(|element| match &element.kind {
+            Kind::Inertance(storage) | Kind::Compliance(storage) => storage.laws.len(),
+            _ => 0,
+        });
+        ports.sum::<usize>() + self.graph.signals.len()
+    }
+
     fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
         let mut graph = match branches.is_empty() {
             true => self.graph.clone(),

@@ -92,7 +92,7 @@ pub use model::{Model, format_text, read_text};
 pub use names::{Name, Place, listed};
 pub use quantity::{duration, frequency};
 #[cfg(feature = "real_time")]
-pub use real_time::{Durations, Feed, RealTimeReport, RealTimeRun};
+pub use real_time::{Durations, Feed, ModesReport, RealTimeReport, RealTimeRun};
 pub use report::{Page, Report};
 pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance, Stopped, Timings};
 pub use source::{Disk, Source};

@@ -30,6 +30,8 @@ use crate::wall_clock::WallClock;
 const MOST_EVALUATIONS: usize = 50;
 /// Steps that are audited before a run.
 const REHEARSED: f64 = 100.0;
+/// Modes of set-valued laws that are made before a run at most.
+const MOST_MODES: usize = 256;
 /// The clock spins for this long before a tick.
 const SPIN: Duration = Duration::from_micros(200);
 /// Ticks over which the stops that delays and samples ask for are counted.
@@ -109,6 +111,8 @@ pub struct RealTimeReport {
     pub machine: bool,
     /// Names of the values sent, after `t`.
     pub outputs: Vec<String>,
+    /// The modes of set-valued laws, if there are any.
+    pub modes: Option<ModesReport>,
     /// What the audit found in the first steps, taken before the run and without its live inputs.
     pub audit: AuditReport,
     /// Why it stopped before its end, if it did.
@@ -129,6 +133,18 @@ pub struct Durations {
     pub max: f64,
     /// Upper ends of classes, and how many are in each.
     pub histogram: Vec<(f64, u64)>,
+}
+
+/// The modes of set-valued laws in a run against the clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ModesReport {
+    /// How many set-valued laws there are.
+    pub laws: usize,
+    /// How many modes these can have; `None` if they are too many to be made before the run: each is made where the run first
+    /// comes to it, and that tick is late.
+    pub all: Option<usize>,
+    /// How many of them have equations.
+    pub possible: Option<usize>,
 }
 
 impl Durations {
@@ -166,6 +182,7 @@ impl Model {
         cost::held(&system, TICKS / run.rate)?;
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
+        let modes = self.prepared_modes(&system);
         let audit = self.rehearse(&system, run, &x)?;
         let machine = make_ready(&mut system, run)?;
         let mut ports = Channels::open(run, &system, stop)?;
@@ -198,8 +215,18 @@ impl Model {
             lost: ports.lost,
             machine,
             outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
+            modes,
             audit,
             error,
+        })
+    }
+
+    /// Makes the modes that set-valued laws can have, before the clock runs; what is to be known of them.
+    fn prepared_modes(&self, system: &exec::Model) -> Option<ModesReport> {
+        let laws = self.graph.set_valued.len();
+        (laws > 0).then(|| match system.prepare_modes(MOST_MODES) {
+            Some((all, possible)) => ModesReport { laws, all: Some(all), possible: Some(possible) },
+            None => ModesReport { laws, all: None, possible: None },
         })
     }
 

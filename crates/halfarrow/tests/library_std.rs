@@ -449,7 +449,6 @@ fn hysteresis() {
     let text = "import std.signals
 Hysteresis:h(lower = -0.5, upper = 0.5, u = sin(t/(1 s)))
 state changes' = h.y from 0
-1:a -> I:none(1)
 ";
     // High from the sixth part of pi on until one and one sixth of pi.
     let [y, time] = at(2.0 * PI, text, &["h.y", "changes"])[..] else { panic!() };

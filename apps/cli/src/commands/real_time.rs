@@ -138,6 +138,14 @@ fn text(report: &RealTimeReport, page: Page) -> String {
         text += &format!(" ({} left out)", report.skipped);
     }
     text += "\n";
+    if let Some(modes) = report.modes {
+        text += &match (modes.all, modes.possible) {
+            (Some(all), Some(possible)) => {
+                format!("modes: {possible} of the {all} that the set-valued laws can have have equations, made before the run\n")
+            }
+            _ => format!("modes: those of {} set-valued laws are too many to be made before the run\n", modes.laws),
+        };
+    }
     if report.received + report.rejected > 0 {
         text += &format!("inputs: {} taken, {} could not be read\n", report.received, report.rejected);
     }

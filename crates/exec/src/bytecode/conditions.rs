@@ -98,6 +98,11 @@ impl Conditions {
         value
     }
 
+    /// Holds this value from now on.
+    pub fn take(&mut self, condition: ConditionId, value: f64) {
+        self.held[condition.0 as usize] = value;
+    }
+
     /// How far the operand is beyond the borders that end the held value: two numbers, above 0 beyond, the second minus
     /// infinity where there is one border only. For a sign the first is the operand itself.
     pub fn beyond(&self, condition: ConditionId, operand: f64, tables: &[Table1d]) -> [f64; 2] {

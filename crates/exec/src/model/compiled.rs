@@ -24,6 +24,9 @@ pub trait Alternatives: std::fmt::Debug + Send + Sync {
     /// The program in which set-valued laws have these branches and these variables stay independent, as far as they can,
     /// decided at these values of the variables of the graph. `None` if there is none.
     fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
+
+    /// How many states a mode has at most.
+    fn most_states(&self) -> usize;
 }
 
 /// A model as code: the same for all threads, lanes and runs, whatever their parameters, inputs and states.
@@ -71,7 +74,12 @@ impl Compiled {
     /// The same where runs may change to other independent variables.
     #[must_use]
     pub fn with_alternatives(self, alternatives: Arc<dyn Alternatives>) -> Compiled {
-        Compiled { alternatives: Some(alternatives), ..self }
+        let program = &self.first.program;
+        let first = match program.set_valued.is_empty() || program.states.len() >= alternatives.most_states() {
+            true => self.first,
+            false => Arc::new(Mode::of(program.clone().with_idle_states(alternatives.most_states()), &self.first)),
+        };
+        Compiled { first, alternatives: Some(alternatives), others: self.others }
     }
 
     /// Whether runs may change to other independent variables.
@@ -119,13 +127,7 @@ impl Compiled {
         let program = self.alternatives.as_ref()?.program(&key.0, &key.1, point);
         let fits = |p: &Program| p.states.len() == states || !p.set_valued.is_empty() && p.states.len() < states;
         let program = program.filter(fits).map(|program| program.with_idle_states(states));
-        let mode = program.map(|program| match self.first.jacobian {
-            None => Mode::new(program, None),
-            Some(_) => {
-                let differentiated = program.jacobian();
-                Mode::new(differentiated.program, Some(differentiated.entries))
-            }
-        });
+        let mode = program.map(|program| Mode::of(program, &self.first));
         let mut others = self.others();
         let id = mode.map(|mode| {
             others.modes.push(Arc::new(mode));
@@ -179,6 +181,17 @@ pub(super) struct Mode {
 }
 
 impl Mode {
+    /// A program as code, with all derivatives at once where `other` has them.
+    fn of(program: Program, other: &Mode) -> Mode {
+        match other.jacobian {
+            None => Mode::new(program, None),
+            Some(_) => {
+                let differentiated = program.jacobian();
+                Mode::new(differentiated.program, Some(differentiated.entries))
+            }
+        }
+    }
+
     fn new(program: Program, entries: Option<Vec<JacobianEntry>>) -> Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let kept = program.position_relations.iter().flat_map(|r| r.values());

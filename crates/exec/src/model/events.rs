@@ -52,13 +52,18 @@ impl Model {
         Ok(())
     }
 
-    /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
-    fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.rates_at(t, x)?;
+    /// Sets the direction of derivatives to that of the run, with the rates that were computed last.
+    pub(super) fn move_along(&mut self, t: f64) {
         self.still();
         self.let_time_pass(t);
         let Model { frame, code, dx, .. } = self;
         frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
+    }
+
+    /// Values and rates of what is delayed or sampled, in the registers of `sources`; the rates of `dx` along the run.
+    fn run_sources(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.rates_at(t, x)?;
+        self.move_along(t);
         let run = self.frame.run_along(&self.code.sources);
         run.map_err(|error| self.failure(t, error))
     }
@@ -108,12 +113,16 @@ impl Model {
             self.frame.conditions.state = Hold::Keep;
             return Ok(());
         }
+        // What stands at the end of a branch is on the side to which it moves.
+        let sides = self.sides_of_bounds(t, x)?;
+        self.place(t, x);
         self.frame.conditions.state = Hold::Take;
         let run = self.frame.run(&self.code.indicators);
         let frame = &mut self.frame;
         for (&condition, &register) in self.code.switching.iter().zip(&self.code.indicators.outputs) {
             frame.conditions.value(condition, frame.r[register as usize], &frame.tables);
         }
+        sides.into_iter().for_each(|(condition, ended)| frame.conditions.take(condition, f64::from(ended)));
         frame.conditions.state = Hold::Keep;
         self.run.signs_taken = Some(t);
         run.map_err(|error| self.failure(t, error))

@@ -8,7 +8,7 @@ use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::ModeId;
 use crate::bytecode::{Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Bound, Clause, Program, Target, Value};
+use halfarrow_compiler::program::{Bound, Clause, ConditionId, EventTrigger, Op, Program, Target, Value};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -18,6 +18,8 @@ const MOST_TRIED: usize = 2000;
 const FAR: usize = 2;
 /// A margin that is zero, as part of the greatest that it has been.
 const ROUNDING: f64 = 1e-9;
+/// What rounding may leave of a sum that is zero, as part of its greatest term.
+const NOISE: f64 = 1e-13;
 /// What storages change by without a leap, as part of the most that they have kept.
 const NO_LEAP: f64 = 1e-7;
 
@@ -26,6 +28,8 @@ const NO_LEAP: f64 = 1e-7;
 pub(super) struct Bounds {
     /// Each with the number of its clause and its place among the margins; the rate of a gap stands behind it.
     all: Vec<(usize, Bound, Option<usize>)>,
+    /// Of each the condition that its margin is below zero.
+    conditions: Vec<Option<ConditionId>>,
     /// Computes the margins.
     margins: Routine,
     /// The branches of the mode.
@@ -48,9 +52,16 @@ impl Bounds {
             });
             (clause, bound, place)
         };
-        let all = bounds.map(place).collect();
+        let all: Vec<(usize, Bound, Option<usize>)> = bounds.map(place).collect();
+        let condition = |clause: usize| match program.values.op(program.clauses[clause].trigger.value()) {
+            Op::Sign(condition, _) => {
+                Some(condition).filter(|c| program.conditions[*c].trigger == EventTrigger::State)
+            }
+            _ => None,
+        };
+        let conditions = all.iter().map(|(clause, bound, _)| bound.margin.and_then(|_| condition(*clause))).collect();
         let branches = program.set_valued.iter().map(|law| law.present).collect();
-        Some(Bounds { all, margins: layout.routine(program, &values), branches })
+        Some(Bounds { all, conditions, margins: layout.routine(program, &values), branches })
     }
 
     pub fn routine(&self) -> &Routine {
@@ -65,6 +76,8 @@ pub(super) struct Extents {
     margins: BTreeMap<(u32, u32, usize), [f64; 3]>,
     /// Of what storages keep.
     stored: BTreeMap<Symbol, f64>,
+    /// Of states, by the variables that they are.
+    states: BTreeMap<Symbol, f64>,
 }
 
 /// Where a run stands when its mode ends.
@@ -148,6 +161,10 @@ impl Model {
                 most[1] = most[1].max(value(place + 1));
             }
         }
+        for (&symbol, x) in code.program.tracked.iter().zip(x) {
+            let most = run.extents.states.entry(symbol).or_default();
+            *most = most.max(x.abs());
+        }
         let storages = code.program.jumps.iter().flat_map(|jumps| &jumps.storages);
         for (&symbol, stored) in storages.zip(events.impulses.stored()) {
             let most = run.extents.stored.entry(symbol).or_default();
@@ -160,54 +177,98 @@ impl Model {
     fn ended(&mut self, t: f64, x: &[f64], at_event: bool) -> Result<Vec<(u32, u32)>, Failure> {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
-        let holds = if at_event { self.becoming_from_none(t, x)? } else { Vec::new() };
+        self.place(t, x);
+        let holds = if at_event { self.truth_of_clauses(t, Hold::Follow)? } else { Vec::new() };
+        let margins = self.margins_ended(t, x, at_event)?;
+        let ended = |(bound, margin): (&(usize, Bound, Option<usize>), Option<bool>)| match margin {
+            Some(ended) => ended,
+            None => holds.get(bound.0).copied().unwrap_or(false),
+        };
+        let all = bounds.all.iter().zip(margins).filter(|(bound, margin)| ended((bound, *margin)));
+        let mut ended: Vec<(u32, u32)> = all.map(|((_, bound, _), _)| (bound.law, bound.next)).collect();
+        ended.sort_unstable();
+        ended.dedup();
+        Ok(ended)
+    }
+
+    /// On which side of their border the conditions of margins are at `(t, x)`.
+    pub(super) fn sides_of_bounds(&mut self, t: f64, x: &[f64]) -> Result<Vec<(ConditionId, bool)>, Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
+        let margins = self.margins_ended(t, x, true)?;
+        let sides = bounds.conditions.iter().zip(margins);
+        Ok(sides.filter_map(|(condition, ended)| Some(((*condition)?, ended?))).collect())
+    }
+
+    /// Of each bound whether its margin is below zero, or is zero and falls: of what is a gap its rate is looked at, then how
+    /// that changes. `None` of conditions.
+    fn margins_ended(&mut self, t: f64, x: &[f64], at_event: bool) -> Result<Vec<Option<bool>>, Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
         self.place(t, x);
         self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
         let margins: Vec<f64> = bounds.margins.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
-        let mut ended = Vec::new();
+        let sizes = self.magnitudes_of_margins(bounds, t, x, x)?;
+        let zero = |place: usize, most: f64| ROUNDING * most + NOISE * sizes[place];
+        let mut ended: Vec<Option<bool>> = Vec::with_capacity(bounds.all.len());
         let mut open = Vec::new();
-        for (number, (clause, bound, place)) in bounds.all.iter().enumerate() {
-            let beyond = (bound.law, bound.next);
-            let Some(place) = place else {
-                if holds.get(*clause).copied().unwrap_or(false) {
-                    ended.push(beyond);
-                }
+        for (number, (_, bound, place)) in bounds.all.iter().enumerate() {
+            let Some(place) = *place else {
+                ended.push(None);
                 continue;
             };
-            let margin = margins[*place];
             let most = self.run.extents.margins.get(&key(bounds, bound, number)).copied().unwrap_or_default();
-            if margin.is_nan() || margin < -ROUNDING * most[0] {
-                ended.push(beyond);
-            } else if at_event && margin <= ROUNDING * most[0] {
+            let margin = margins[place];
+            let mut over = margin.is_nan() || margin < -zero(place, most[0]);
+            if at_event && !over && margin <= zero(place, most[0]) {
                 match bound.gap.map(|_| margins[place + 1]) {
-                    None => open.push((number, *bound, *place, 1)),
-                    Some(rate) if rate < -ROUNDING * most[1] => ended.push(beyond),
-                    Some(rate) if rate <= ROUNDING * most[1] => open.push((number, *bound, place + 1, 2)),
+                    None => open.push((number, place, 1)),
+                    Some(rate) if rate < -zero(place + 1, most[1]) => over = true,
+                    Some(rate) if rate <= zero(place + 1, most[1]) => open.push((number, place + 1, 2)),
                     Some(_) => {}
                 }
             }
+            ended.push(Some(over));
         }
         if !open.is_empty() {
             self.rates_at(t, x)?;
             self.place(t, x);
-            self.still();
-            self.let_time_pass(t);
-            let Model { frame, code, dx, .. } = self;
-            frame.d[code.layout.states as usize..][..dx.len()].copy_from_slice(dx);
+            self.move_along(t);
             let along = self.frame.run_along(&bounds.margins);
             along.map_err(|error| self.failure(t, error))?;
-            for (number, bound, place, level) in open {
-                let rate = self.frame.d[bounds.margins.outputs[place] as usize];
-                let most = self.run.extents.margins.entry(key(bounds, &bound, number)).or_default();
+            let rates: Vec<f64> = bounds.margins.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
+            let dx = self.dx.clone();
+            let sizes = self.magnitudes_of_margins(bounds, t, x, &dx)?;
+            for (number, place, level) in open {
+                let rate = rates[place];
+                let bound = &bounds.all[number].1;
+                let most = self.run.extents.margins.entry(key(bounds, bound, number)).or_default();
                 most[level] = most[level].max(rate.abs());
-                if rate < -ROUNDING * most[level] {
-                    ended.push((bound.law, bound.next));
-                }
+                ended[number] = Some(rate < -ROUNDING * most[level] - NOISE * sizes[place]);
             }
         }
-        ended.sort_unstable();
-        ended.dedup();
         Ok(ended)
+    }
+
+    /// How great the terms are that margins are the sum of, one for each state moved by its `way`.
+    fn magnitudes_of_margins(
+        &mut self,
+        bounds: &Bounds,
+        t: f64,
+        x: &[f64],
+        way: &[f64],
+    ) -> Result<Vec<f64>, Failure> {
+        let mut sizes = vec![0.0f64; bounds.margins.outputs.len()];
+        for (state, way) in way.iter().enumerate().filter(|(_, way)| **way != 0.0) {
+            self.place(t, x);
+            self.still();
+            self.frame.d[self.code.layout.states as usize + state] = *way;
+            self.frame.run_along(&bounds.margins).map_err(|error| self.failure(t, error))?;
+            for (size, &register) in sizes.iter_mut().zip(&bounds.margins.outputs) {
+                *size = size.max(self.frame.d[register as usize].abs());
+            }
+        }
+        Ok(sizes)
     }
 
     /// No mode can be.
@@ -220,6 +281,24 @@ impl Model {
         let mut what: Vec<String> = ended.iter().map(name).collect();
         what.dedup();
         Failure::NoMode { time, what: what.join(", ") }
+    }
+
+    /// Makes all modes that set-valued laws can have, so that none is made while a run goes on, if they are no more than `most`:
+    /// how many there are and how many of them have equations.
+    pub fn prepare_modes(&self, most: usize) -> Option<(usize, usize)> {
+        let laws = &self.code.program.set_valued;
+        let counts: Vec<usize> = laws.iter().map(|law| law.branches.len()).collect();
+        let all = counts.iter().try_fold(1usize, |all, count| all.checked_mul(*count)).filter(|all| *all <= most)?;
+        let mode = |number: usize| {
+            let mut rest = number;
+            let branch = |count: &usize| {
+                let branch = rest % count;
+                rest /= count;
+                branch as u32
+            };
+            counts.iter().map(branch).collect::<Vec<u32>>()
+        };
+        Some((all, (0..all).filter(|&number| self.compiled.in_mode(&mode(number)).is_some()).count()))
     }
 
     /// Opens contacts and lets go what sticks, before impulses are shared out among all that move: what they take of it is
@@ -418,6 +497,9 @@ impl Instant<'_> {
         model.take_signs(t, x)?;
         model.follow_solutions(t, x)?;
         model.run.scales = model.magnitudes(t, x);
+        // What a state has been tells its size, not what it begins with.
+        let known = code.program.tracked.iter().map(|s| model.run.extents.states.get(s).copied().unwrap_or(0.0));
+        model.run.scales.iter_mut().zip(known).for_each(|(scale, known)| *scale = scale.max(known));
         model.follow_solutions(t, x)?;
         model.take_stored(t, x)?;
         let most = |symbol: &Symbol| model.run.extents.stored.get(symbol).copied().unwrap_or(0.0);
@@ -433,13 +515,7 @@ impl Instant<'_> {
 }
 
 impl Model {
-    /// Whether conditions of clauses are true now, whatever they were.
-    fn becoming_from_none(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
-        self.place(t, x);
-        self.truth_of_clauses(t, Hold::Follow)
-    }
-
-    /// The same, as conditions are held.
+    /// Which conditions of clauses are true now, as conditions are held.
     fn held_true(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
         self.place(t, x);
         let hold = self.frame.conditions.state;
