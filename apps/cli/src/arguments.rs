@@ -377,6 +377,12 @@ pub struct Simulate {
     /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
     #[arg(long, allow_negative_numbers = true)]
     pub atol: Option<f64>,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
+    /// Record reactions that are not unique, of constraints that repeat others, as those of least norm
+    #[arg(long)]
+    pub minimum_norm: bool,
     /// Give an input by a CSV file: a column `t` and one named as the input, linear between its rows; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod constraints;
+mod drift;
 mod energy;
 mod laws;
 mod power;
@@ -32,6 +33,7 @@ use halfarrow_compiler::bond_graph::BondGraph;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+pub use drift::{Drift, DriftKind};
 pub use values::wanted;
 
 /// What is audited: samples of a run, with the variables of [`wanted`] that have a value.
@@ -69,6 +71,8 @@ pub struct Audit {
     pub residual: Option<Finding>,
     /// Stored quantities and integrated signals against the integrals of their rates, relative to their range.
     pub rates: Option<Finding>,
+    /// How far positions have drifted from relations that their speeds keep.
+    pub drift: Vec<Drift>,
     /// Storages that make or eat energy, and why.
     pub notes: Vec<String>,
     /// What storages have gained by the events of the model, in J, by their names; below 0 what they have lost.
@@ -108,6 +112,7 @@ pub struct Auditor {
     graph: BondGraph,
     shares: Vec<constraints::Share>,
     quotients: laws::Quotients,
+    relations: Vec<drift::Relation>,
     scales: scales::Scales,
     power: worst::Worst,
     energy: worst::Worst,
@@ -125,12 +130,14 @@ impl Auditor {
         let mut x = graph.exprs.clone();
         let shares = constraints::shares(graph, &mut x);
         let quotients = laws::quotients(graph, &mut x);
+        let relations = drift::relations(graph, &mut x);
         let graph = graph.with_exprs(x);
         Auditor {
             scales: scales::Scales::new(&graph),
             graph,
             shares,
             quotients,
+            relations,
             power: none(),
             energy: none(),
             residual: none(),
@@ -148,6 +155,7 @@ impl Auditor {
         assert!(run.columns.values().all(|c| c.len() == run.times.len()), "every column has one value a sample");
         let graph = &self.graph;
         let values = values::Values::new(graph, run);
+        self.relations.iter_mut().for_each(|relation| relation.take(graph, &values));
         let mut unchecked = Vec::new();
         let balance = energy::balance(graph, &values, &mut unchecked);
         self.scales.absorb(graph, &values);
@@ -186,6 +194,7 @@ impl Auditor {
             energy: self.energy.finding(&settled),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
+            drift: self.relations.into_iter().map(drift::Relation::finish).collect(),
             notes,
             events,
             unchecked: self.unchecked.into_iter().collect(),

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::bond_graph::Override;
+use halfarrow_compiler::causal_graph::shared_reactions;
 use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 
@@ -32,6 +34,8 @@ pub struct Compiled {
     model: Model,
     form: Form,
     ready: Ready,
+    /// Whether reactions that are not unique are shared.
+    shares: bool,
     /// What was set, in SI units.
     set: BTreeMap<String, f64>,
 }
@@ -63,7 +67,34 @@ impl Model {
                 Ready::Form { system, explicit: equations.residuals.is_empty() }
             }
         };
-        Ok(Compiled { model: self.clone(), form, ready, set: BTreeMap::new() })
+        Ok(Compiled { model: self.clone(), form, ready, shares: false, set: BTreeMap::new() })
+    }
+}
+
+impl Model {
+    /// The same with the reactions of constraints that repeat others shared as those of least norm.
+    pub(crate) fn compile_sharing(&self, form: Form) -> Result<Compiled, Error> {
+        let bad = |reason: String| Error::from(Problem::BadOption { reason });
+        if form != Form::Minimal {
+            return Err(bad(format!("minimum-norm is for the form minimal, not {}", form.name())));
+        }
+        if !self.graph.set_valued.is_empty() {
+            return Err(bad(
+                "minimum-norm is not for models with set-valued laws, of which each branch has other reactions".into(),
+            ));
+        }
+        let Some(shared) = shared_reactions(&self.graph).map_err(|errors| self.fault(errors))? else {
+            return Err(bad("minimum-norm has nothing to do: the reactions of this model are unique".into()));
+        };
+        let inputs = shared.shares.iter().map(|share| share.index()).collect();
+        let mut model = self.clone();
+        model.graph = shared.graph;
+        let mut compiled = model.compile(form)?;
+        compiled.shares = true;
+        if let Ready::Explicit(system) = &mut compiled.ready {
+            system.share_reactions(inputs, shared.reactions);
+        }
+        Ok(compiled)
     }
 }
 
@@ -133,6 +164,10 @@ impl Compiled {
     pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
         if run.form != self.form {
             let reason = format!("the model was compiled in the form {}, not {}", self.form.name(), run.form.name());
+            return Err(Problem::BadOption { reason }.into());
+        }
+        if run.minimum_norm && !self.shares {
+            let reason = "a compiled model is not prepared for minimum-norm: simulate the model itself".into();
             return Err(Problem::BadOption { reason }.into());
         }
         self.model.simulate_with(self.ready.clone(), run, progress)

@@ -60,7 +60,7 @@ mod verdict;
 mod wall_clock;
 mod watch;
 
-pub use audited::{AuditReport, Deviation};
+pub use audited::{AuditReport, Deviation, DriftReport};
 pub use check::CheckReport;
 pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
 pub use compiled::Compiled;

@@ -9,7 +9,7 @@ use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{Element, Kind, ParameterKind, PortRef, Storage};
 use halfarrow_compiler::diagnostic::{Diagnostic, codes, nearest};
 use halfarrow_compiler::equations::{Equations, Form};
-use halfarrow_compiler::program::Program;
+use halfarrow_compiler::program::{Program, Unkept, UnkeptRelation};
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, EquilibriumError, Execution, StartError};
 use halfarrow_sim::{
@@ -52,6 +52,12 @@ pub struct Run {
     pub rtol: f64,
     /// Absolute error allowed in a step, in the unit of each state; `None`: scaled to each state.
     pub atol: Option<f64>,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step, by
+    /// the least change that does it.
+    pub project: bool,
+    /// Whether reactions that are not unique, of constraints that repeat others, are recorded as those of least norm. In the
+    /// form `minimal`, by [`Model::simulate`].
+    pub minimum_norm: bool,
     /// Inputs that are given: their names and what they are over time. The others keep their defaults.
     pub inputs: Vec<(String, Input)>,
     /// Where to start.
@@ -97,6 +103,8 @@ impl Default for Run {
             step: None,
             rtol: 1e-6,
             atol: None,
+            project: false,
+            minimum_norm: false,
             inputs: Vec::new(),
             start: Start::Given,
             record: Record::Default,
@@ -137,6 +145,8 @@ pub struct RunReport {
     pub switches: usize,
     /// How often other variables became independent, near positions where the first ones do not tell the motion.
     pub exchanges: usize,
+    /// How often positions were put back onto relations that their speeds keep.
+    pub projections: usize,
     /// Whether the stiff method took over.
     pub stiff: bool,
     /// What ran as machine code, and why.
@@ -248,7 +258,7 @@ impl Model {
     /// The model has errors, something is asked that cannot be, or the run stops; what was computed so far is kept.
     pub fn simulate(&self, run: &Run, progress: &mut dyn FnMut(Progress<'_>) -> bool) -> Result<Simulated, Error> {
         let begun = Moment::now();
-        let compiled = self.compile(run.form)?;
+        let compiled = if run.minimum_norm { self.compile_sharing(run.form)? } else { self.compile(run.form)? };
         let equations = begun.elapsed().as_secs_f64();
         let mut done = compiled.simulate(run, progress);
         match &mut done {
@@ -296,6 +306,7 @@ impl Model {
         }
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
         let mut notes = choose(&mut system, &run.record)?;
+        notes.extend(projected(system.program(), run)?);
         let start = self.start(&mut system, run.start)?;
         timings.start = begun.elapsed().as_secs_f64();
         let options = options(run)?;
@@ -318,7 +329,18 @@ impl Model {
     ) -> Result<Simulated, Error> {
         let begun = Moment::now();
         set_up(&mut system, run)?;
-        let notes = choose(&mut system, &run.record)?;
+        let mut notes = choose(&mut system, &run.record)?;
+        match explicit {
+            true => notes.extend(projected(system.program(), run)?),
+            false if run.project => {
+                let reason = format!(
+                    "project is for explicit equations: the form {} holds its constraints itself (try minimal)",
+                    run.form.name()
+                );
+                return Err(Problem::BadOption { reason }.into());
+            }
+            false => {}
+        }
         let x = self.start(system.reference_mut(), run.start)?;
         set_spring_rate(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
@@ -433,6 +455,7 @@ impl Model {
             corners: summary.corners,
             switches: summary.crossings,
             exchanges: summary.exchanges,
+            projections: summary.projections,
             stiff: summary.stiff,
             execution: Vec::new(),
             audit,
@@ -738,7 +761,34 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
         step: run.step,
         rtol: run.rtol,
         atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),
+        project: run.project,
     })
+}
+
+/// What is to be known of the relations onto which positions are put back, if that is asked for.
+fn projected(program: &Program, run: &Run) -> Result<Vec<String>, Problem> {
+    if !run.project {
+        return Ok(Vec::new());
+    }
+    if run.method == Method::Bdf {
+        let reason = "project does not go with bdf, whose steps go on with their history: take radau or another solver";
+        return Err(Problem::BadOption { reason: reason.into() });
+    }
+    let left = |r: &&UnkeptRelation| r.reason != Unkept::Nonholonomic;
+    if let Some(relation) = program.unkept_relations.iter().find(left) {
+        let reason = format!(
+            "positions cannot be put back onto `{}`: {}; leave project out, or write the relation of the positions as a \
+             constraint",
+            relation.text, relation.reason
+        );
+        return Err(Problem::BadOption { reason });
+    }
+    let said = |r: &UnkeptRelation| format!("nothing is put back onto `{} = 0`: {}", r.text, r.reason);
+    let mut notes: Vec<String> = program.unkept_relations.iter().map(said).collect();
+    if program.position_relations.is_empty() {
+        notes.push("project has nothing to do: no positions of this model are known by their speeds only".into());
+    }
+    Ok(notes)
 }
 
 /// Springs of the form `stiff` have to be faster than what the model does at its start, which its structure alone does

@@ -50,7 +50,11 @@ mod repeated;
 mod report;
 #[path = "set_valued.rs"]
 mod set_valued;
+#[path = "shares.rs"]
+mod shares;
 #[path = "stiff_networks.rs"]
 mod stiff_networks;
 #[path = "sweep.rs"]
 mod sweep;
+#[path = "velocity.rs"]
+mod velocity;

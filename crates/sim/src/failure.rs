@@ -352,7 +352,7 @@ impl fmt::Display for Failure {
                 write!(
                     f,
                     "of {tried} modes tried, in {ended} a branch ends at once, and {} have no equations",
-                    tried - ended
+                    tried.saturating_sub(*ended)
                 )?;
                 f.write_str(
                     " (sources joined with nothing between them, a flow with nowhere to go); give what has to yield a \

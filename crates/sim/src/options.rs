@@ -71,6 +71,9 @@ pub struct Options {
     pub rtol: f64,
     /// Absolute error allowed in a step of a variable-step method.
     pub atol: AbsoluteTolerance,
+    /// Whether the point is [projected](crate::Events::project) where a step ends. Backward differentiation formulas, which
+    /// go on with their history, do not: `Auto` then takes `Radau` for systems that are stiff.
+    pub project: bool,
 }
 
 impl Default for Options {
@@ -84,6 +87,7 @@ impl Default for Options {
             step: None,
             rtol: 1e-6,
             atol: AbsoluteTolerance::Scaled,
+            project: false,
         }
     }
 }
@@ -100,6 +104,9 @@ impl Options {
         }
         if !(self.to.is_finite() && self.to > self.from) {
             return bad("to", self.to, "a finite time after the start");
+        }
+        if self.project && self.method == Method::Bdf {
+            return bad("project", f64::NAN, "left out with bdf, whose steps go on with their history: take radau");
         }
         if let Some(every) = self.every.filter(|&every| !(every.is_finite() && every > 0.0)) {
             return bad("every", every, "a positive time");

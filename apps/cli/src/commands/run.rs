@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, Deviation, DrawOptions, Error, Execution, FixedMethod, Method, Model, Problem, Record, Run, RunReport,
-    Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
+    AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Method, Model, Problem, Record,
+    Run, RunReport, Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -64,6 +64,8 @@ fn run(arguments: &Simulate) -> Run {
         step: arguments.step,
         rtol: arguments.rtol,
         atol: arguments.atol,
+        project: arguments.project,
+        minimum_norm: arguments.minimum_norm,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),
@@ -263,6 +265,9 @@ fn summary(report: &RunReport) -> String {
     if report.exchanges > 0 {
         text += &format!(", {} exchanges of independent variables", report.exchanges);
     }
+    if report.projections > 0 {
+        text += &format!(", positions put back {} times", report.projections);
+    }
     if report.corners > 0 {
         text += &format!(", {} corners of inputs", report.corners);
     }
@@ -271,7 +276,26 @@ fn summary(report: &RunReport) -> String {
         true => String::new(),
         false => format!("; events changed the energy by {gained:.6} J"),
     };
-    text + &format!("\naudit: {}{events}\n", misses(&report.audit))
+    text + &format!("\naudit: {}{events}\n{}", misses(&report.audit), drifts(&report.audit))
+}
+
+/// How far positions have drifted from what only their speeds keep.
+fn drifts(audit: &AuditReport) -> String {
+    let line = |drift: &DriftReport| {
+        let open = match drift.kind {
+            "nonholonomic" => return format!("nonholonomic: {} = 0 binds speeds and no positions\n", drift.relation),
+            "closed" => "",
+            "open" => " = 0, of positions without a closed form,",
+            _ => " = 0, which may or may not bind positions,",
+        };
+        let end = match drift.value {
+            None => "is not known".into(),
+            Some(value) if value.abs() < drift.resolution => format!("below {:.0e}", drift.resolution),
+            Some(value) => format!("{value:.1e} at the end, {:.1e} at most", drift.greatest.unwrap_or(f64::NAN)),
+        };
+        format!("drift: {}{open} {end}\n", drift.relation)
+    };
+    audit.drift.iter().map(line).collect()
 }
 
 /// The greatest miss of each kind.

@@ -3,6 +3,7 @@
 //! Every stage keeps its formulas in one pool, [`Exprs`], in which equal expressions are one entry. Numbers are exact;
 //! floats occur in values of tables and in [`Evaluator`] only.
 
+mod antiderivative;
 mod assumptions;
 mod calculus;
 mod construct;

@@ -265,9 +265,17 @@ impl<'t> Layout<'t> {
             (Star | Slash | Caret, _) => self.after_unit(i - 1),
             (Plus | Minus, _) if self.is_sign(i - 1) => false,
             (LBrace, RBrace) => false,
+            // What happens where two sides meet stands apart from them: `x >= h (restitution = 0.8)`.
+            (Ident, LParen) if self.colon == self::Colon::After && self.begins_arguments(i) => true,
             (_, LParen | LBracket) => !matches!(l, Ident | RBracket) || is_word(left.text),
             _ => !closes_up(r),
         }
+    }
+
+    /// Whether a name and an equals sign come after the parenthesis `i`.
+    fn begins_arguments(&self, i: usize) -> bool {
+        let is = |at: usize, kind: TokenKind| self.pieces.get(at).is_some_and(|piece| piece.is(kind));
+        is(i + 1, TokenKind::Ident) && is(i + 2, TokenKind::Assign)
     }
 
     /// Whether the operator `i` stands after a unit, which it would become part of without a space.

@@ -45,6 +45,7 @@ mod turns;
 mod two_ports;
 mod uses;
 mod value;
+mod velocity_relations;
 mod verify;
 mod warnings;
 mod wire;
@@ -54,6 +55,7 @@ pub use files::{FileError, Files, NoFiles};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
 pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};
+pub use velocity_relations::{Integral, VelocityRelation, velocity_relations};
 pub use verify::verify;
 pub use warnings::warnings;
 

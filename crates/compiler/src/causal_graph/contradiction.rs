@@ -225,7 +225,7 @@ fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>)
                 "it agrees with them",
             )
             .note("how they share the reaction is not determined; everything else is")
-            .hint(format!("leave {} out", element.name)),
+            .hint(format!("leave {} out, or take the reactions of least norm: simulate --minimum-norm", element.name)),
         );
     }
     for &constraint in &causal.ports.repeated {
@@ -238,7 +238,7 @@ fn redundant(graph: &BondGraph, causal: &CausalGraph, all: &mut Vec<Diagnostic>)
                 "it takes nothing of the motion",
             )
             .note("how they share the reaction is not determined: the others carry all of it, this one nothing")
-            .hint("leave it out, or let something give way where the reaction is asked for"),
+            .hint("leave it out, or take the reactions of least norm: simulate --minimum-norm"),
         );
     }
 }

@@ -17,6 +17,7 @@ mod rank;
 mod repeated;
 mod roles;
 mod rules;
+mod shares;
 pub mod signals;
 pub(crate) mod start_point;
 mod strokes;
@@ -38,6 +39,7 @@ pub use ports::Virtual;
 pub(crate) use ports::{circuits, imposes_effort, rank_given};
 pub use rank::{Reach, StateRank, control_reach, observe_reach, state_rank};
 pub use rules::{in_order, kept_in, kept_junctions};
+pub use shares::{SharedReactions, shared_reactions};
 pub use verify::verify;
 
 /// Where the causal stroke of a bond sits: at the end that the effort runs towards.

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::start_point::{least_step, start_values};
 use crate::algebra::{Expr, Exprs, Symbol};
-use crate::bond_graph::{BondGraph, Kind, Meaning};
+use crate::bond_graph::{BondGraph, Constraint, Kind, Meaning};
 use crate::ids::Map;
 
 /// A row that is so much shorter without what the others have of it depends on them.
@@ -44,7 +44,9 @@ struct Loops<'a> {
 }
 
 fn repeated(x: &mut Exprs, graph: &BondGraph) -> BTreeSet<usize> {
-    let numbers: Vec<usize> = (0..graph.constraints.len()).filter(|&c| graph.constraints[c].holonomic).collect();
+    let held = |c: &Constraint| matches!(graph.elements[c.element].kind, Kind::ZeroCompliance { .. });
+    let acts = |c: &usize| graph.constraints[*c].holonomic && held(&graph.constraints[*c]);
+    let numbers: Vec<usize> = (0..graph.constraints.len()).filter(acts).collect();
     if !(2..=MOST).contains(&numbers.len()) {
         return BTreeSet::new();
     }

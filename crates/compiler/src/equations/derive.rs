@@ -12,6 +12,7 @@ use super::freedom::{self, Sum};
 use super::jumps::{margins, readable};
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
+use super::position_relations::position_relations;
 use super::positions::{self, Computed, found_by_iteration};
 use super::stiff::parameters;
 use super::verify::verify;
@@ -265,6 +266,10 @@ fn order_equations(
     let index::Indices { index, indices, counts } =
         index::indices(&mut d, &states, &algebraic, &ordered.steps, &residuals);
     let assumptions = assumptions(&mut d.x, graph);
+    let (position_relations, unkept_relations) = match residuals.is_empty() {
+        true => position_relations(&mut d, &states, &positions),
+        false => Default::default(),
+    };
     Ok(Equations {
         form,
         graph: graph.with_exprs(d.x),
@@ -274,6 +279,8 @@ fn order_equations(
         residuals,
         conserved,
         relations,
+        position_relations,
+        unkept_relations,
         steps: ordered.steps,
         observed,
         conditions,

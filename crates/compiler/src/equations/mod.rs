@@ -19,6 +19,7 @@ mod jumps;
 mod minimal;
 mod momenta;
 mod observed;
+mod position_relations;
 mod positions;
 mod relations;
 mod rows;
@@ -46,6 +47,7 @@ pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
 pub use jumps::{Impulse, Jumps};
 pub use momenta::Momentum;
+pub use position_relations::{PositionRelation, Unkept, UnkeptRelation};
 pub use relations::{Moved, Relations};
 pub use verify::verify;
 
@@ -77,6 +79,10 @@ pub struct Equations {
     pub conserved: Vec<Conserved>,
     /// How states move together whatever laws say, for the search of equilibria.
     pub relations: Relations,
+    /// Relations between positions that the rates of the states keep, and nothing else: they drift.
+    pub position_relations: Vec<PositionRelation>,
+    /// Relations between speeds that are not among these, with the reason.
+    pub unkept_relations: Vec<UnkeptRelation>,
     /// The steps.
     pub steps: Vec<EquationStep>,
     /// What can be recorded: every effort, flow, `q`, `p` under element names, junction variables, signals, lets and outputs.

@@ -52,7 +52,7 @@ use std::sync::Arc;
 pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::{HeldKind, ParameterKind};
-pub use crate::equations::{DomainKind, Exchanged, Exchanges, ObservedKind, Unavailable};
+pub use crate::equations::{DomainKind, Exchanged, Exchanges, ObservedKind, Unavailable, Unkept, UnkeptRelation};
 use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::sparse::{SparseMatrix, SymbolicFactors};
@@ -125,6 +125,10 @@ pub struct Program {
     pub exchanges: Exchanges,
     /// How states move together whatever laws say.
     pub relations: Relations,
+    /// Relations between positions that the rates of the states keep, and nothing else: they drift.
+    pub position_relations: Vec<PositionRelation>,
+    /// Relations between speeds that are not among these, with the reason.
+    pub unkept_relations: Vec<UnkeptRelation>,
     /// What can be recorded.
     pub observed: Vec<Observed>,
     /// What the start of a run has to satisfy.
@@ -234,6 +238,24 @@ impl Relations {
     pub fn values(&self) -> impl Iterator<Item = Value> + '_ {
         let quantities = self.rows.iter().flat_map(|r| r.quantity.iter().flat_map(|&(factor, x)| [factor, x]));
         quantities.chain(self.rows.iter().flat_map(|r| r.by.iter().map(|b| b.1)))
+    }
+}
+
+/// A relation between states that keeps its value.
+#[derive(Debug, Clone)]
+pub struct PositionRelation {
+    /// It vanishes, or keeps the value that it has at the start.
+    pub value: Value,
+    /// Whether it vanishes: it is a constraint.
+    pub vanishes: bool,
+    /// The states that it reads, by their numbers, with its derivatives by them.
+    pub slopes: Vec<(u32, Value)>,
+}
+
+impl PositionRelation {
+    /// Everything that it is made of: its value first.
+    pub fn values(&self) -> impl Iterator<Item = Value> + '_ {
+        std::iter::once(self.value).chain(self.slopes.iter().map(|s| s.1))
     }
 }
 

@@ -12,7 +12,7 @@ use super::start::place_guesses;
 use super::values::Reads;
 use super::{
     Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Position,
-    Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
+    PositionRelation, Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
@@ -280,6 +280,7 @@ impl Schedule<'_> {
         let assumptions = assumed.filter_map(|a| assumption(lower, graph, &self.pivot_guards, a)).collect();
         let relations = relations(lower, graph, &equations.relations);
         let positions = positions(lower, equations);
+        let position_relations = position_relations(lower, equations);
         let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
 
         let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
@@ -320,6 +321,8 @@ impl Schedule<'_> {
             domains,
             assumptions,
             relations,
+            position_relations,
+            unkept_relations: equations.unkept_relations.clone(),
             tables,
             parameters,
             blocks,
@@ -462,6 +465,17 @@ fn positions(lower: &mut Lowering, equations: &Equations) -> Vec<Position> {
         Position { name: p.name.clone(), symbol: p.symbol, rate, value, block, unknown }
     };
     equations.positions.iter().filter(|p| p.by_iteration).map(position).collect()
+}
+
+/// The relations between positions, with the numbers of the states that they read.
+fn position_relations(lower: &mut Lowering, equations: &Equations) -> Vec<PositionRelation> {
+    let number = |s: Symbol| equations.states.iter().position(|state| state.symbol == s);
+    let relation = |r: &equations::PositionRelation| PositionRelation {
+        value: lower.value(r.value),
+        vanishes: r.vanishes,
+        slopes: r.slopes.iter().filter_map(|&(s, e)| Some((number(s)? as u32, lower.value(e)))).collect(),
+    };
+    equations.position_relations.iter().map(relation).collect()
 }
 
 /// The rows of which all is evaluated.

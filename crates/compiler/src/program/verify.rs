@@ -207,7 +207,13 @@ fn outside(p: &Program) -> Result<(), String> {
         all(fine, || format!("{value:?} is wanted and no value of its own"))?;
     }
     let carried = p.implicit.iter().flat_map(|of| of.carried.iter().map(|c| c.2));
-    let told = p.relations.values().chain(p.variables.values().copied()).chain(p.kept.iter().map(|k| k.1));
+    let told = p
+        .position_relations
+        .iter()
+        .flat_map(|r| r.values())
+        .chain(p.relations.values())
+        .chain(p.variables.values().copied())
+        .chain(p.kept.iter().map(|k| k.1));
     for value in told.chain(carried) {
         all(known(value), || format!("{value:?} is told and no value"))?;
     }

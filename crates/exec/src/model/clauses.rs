@@ -175,21 +175,26 @@ impl Model {
             return Ok(becoming);
         }
         self.place(t, x);
-        let true_now = self.truth_of_clauses(t, Hold::Follow)?;
-        for &clause in &code.clauses.conditional {
+        self.run_becomes(t, Hold::Follow)?;
+        for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
             let ClauseMemory::Becomes(condition) = self.run.clauses[clause] else { continue };
-            becoming[clause] = true_now[clause] && !condition.holds;
+            becoming[clause] = self.frame.r[register as usize] != 0.0 && !condition.holds;
         }
         Ok(becoming)
+    }
+
+    /// Computes the conditions of clauses at what is placed.
+    fn run_becomes(&mut self, t: f64, hold: Hold) -> Result<(), Failure> {
+        let held = std::mem::replace(&mut self.frame.conditions.state, hold);
+        let run = self.frame.run(&self.code.clauses.becomes);
+        self.frame.conditions.state = held;
+        run.map_err(|error| self.failure(t, error))
     }
 
     /// Which conditions of clauses are true at what is placed.
     pub(super) fn truth_of_clauses(&mut self, t: f64, hold: Hold) -> Result<Vec<bool>, Failure> {
         let code = self.code.clone();
-        let held = std::mem::replace(&mut self.frame.conditions.state, hold);
-        let run = self.frame.run(&code.clauses.becomes);
-        self.frame.conditions.state = held;
-        run.map_err(|error| self.failure(t, error))?;
+        self.run_becomes(t, hold)?;
         let mut truth = vec![false; code.program.clauses.len()];
         for (&clause, &register) in code.clauses.conditional.iter().zip(&code.clauses.becomes.outputs) {
             truth[clause] = self.frame.r[register as usize] != 0.0;

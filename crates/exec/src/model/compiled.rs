@@ -194,7 +194,9 @@ impl Mode {
 
     fn new(program: Program, entries: Option<Vec<JacobianEntry>>) -> Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
-        let layout = Layout::new(&program, &derivatives.chain(program.relations.values()).collect::<Vec<_>>());
+        let kept = program.position_relations.iter().flat_map(|r| r.values());
+        let layout =
+            Layout::new(&program, &derivatives.chain(program.relations.values()).chain(kept).collect::<Vec<_>>());
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = layout.guarded_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();

@@ -189,6 +189,17 @@ impl Model {
         self.follow_solutions(t, x)
     }
 
+    /// Goes on in another mode: where the present one has ended, or with other independent variables.
+    fn exchange_or_settle(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        if std::mem::take(&mut self.switched) {
+            return Ok(true);
+        }
+        if !failed && self.has_mode_ended(t, x)? && self.settle_mode(t, x)? {
+            return Ok(true);
+        }
+        self.exchange(t, x, failed)
+    }
+
     pub(super) fn has_delays(&self) -> bool {
         self.run.delays_and_samples.iter().any(|h| matches!(h, DelayOrSample::Delay(_)))
     }
@@ -223,17 +234,21 @@ impl Events for Model {
     }
 
     fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.handle(t, x, &[])
+        let before = self.before_move(t, x)?;
+        self.handle(t, x, &[])?;
+        self.after_move(before, t, x)
     }
 
     fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        if std::mem::take(&mut self.switched) {
-            return Ok(true);
+        let exchanged = self.exchange_or_settle(t, x, failed)?;
+        if exchanged {
+            self.renew_projection(t, x)?;
         }
-        if !failed && self.has_mode_ended(t, x)? && self.settle_mode(t, x)? {
-            return Ok(true);
-        }
-        self.exchange(t, x, failed)
+        Ok(exchanged)
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
+        self.put_back(t, x)
     }
 
     fn try_end(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
@@ -301,6 +316,7 @@ impl Events for Model {
 
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.place(t, x);
+        self.place_shares(t)?;
         self.evaluate(What::Recorded, false, t)?;
         out.iter_mut().zip(&self.recorded.routine.outputs).for_each(|(out, &r)| *out = self.frame.r[r as usize]);
         match out.iter().position(|value| value.is_nan()).or(out.iter().position(|value| value.is_infinite())) {

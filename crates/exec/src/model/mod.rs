@@ -24,8 +24,10 @@ mod minimum_norm;
 mod modes;
 mod operations;
 mod positions;
+mod projection;
 mod recorded;
 mod setup;
+mod shares;
 mod start;
 mod system;
 mod wide;
@@ -50,7 +52,9 @@ use inputs::InputSignal;
 use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
 use modes::Extents;
+use projection::Projection;
 use recorded::Recorded;
+use shares::Shares;
 use std::sync::Arc;
 
 /// A model that runs: code, the values of its parameters, what is connected to its inputs, and what its run remembers.
@@ -69,6 +73,10 @@ pub struct Model {
     frame: Frame,
     /// What is computed at events.
     events: EventWork,
+    /// How positions are put back onto the relations between them, in runs that do so.
+    projection: Option<Projection>,
+    /// How reactions that are not unique are shared where they are recorded, if anybody asks for it.
+    shares: Option<Box<Shares>>,
     /// Whether another form of the model tells what happens at events.
     led: bool,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
@@ -134,6 +142,8 @@ impl Model {
             run,
             frame,
             events: EventWork::of(&code),
+            projection: None,
+            shares: None,
             led: false,
             scaled: true,
             dx: vec![0.0; n],
@@ -273,6 +283,7 @@ impl Model {
         if self.run.mode != ModeId::default() {
             self.enter(ModeId::default()).expect("it has run with these parameters");
         }
+        self.projection = None;
         self.run.begun = false;
         self.run.crossed = f64::NEG_INFINITY;
         self.run.signs_taken = None;

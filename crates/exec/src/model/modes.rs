@@ -97,10 +97,13 @@ struct Instant<'m> {
     stored: BTreeMap<Symbol, f64>,
 }
 
+/// A model in another mode, and its state there.
+type Entered = Box<(Model, Vec<f64>)>;
+
 /// A mode that has been tried.
 enum Tried {
     /// It can be: the model in it, the state there, and by how much storages leap.
-    Fits(Box<(Model, Vec<f64>)>, f64),
+    Fits(Entered, f64),
     /// These branches have ended in it: the law with the branch beyond.
     Ended(Vec<(u32, u32)>),
     /// It has no equations, or none that can be entered.
@@ -425,10 +428,10 @@ impl Instant<'_> {
         ended.iter().filter(|(law, _)| commanded(*law)).for_each(|&(law, next)| first[law as usize] = next);
         let mut next = first.clone();
         ended.iter().rev().for_each(|&(law, beyond)| next[law as usize] = beyond);
-        let mut tried: BTreeSet<Vec<u32>> = BTreeSet::from([bounds.branches.clone()]);
+        let mut tried: BTreeSet<Vec<u32>> = BTreeSet::new();
         let mut queue = VecDeque::from([first.clone()]);
         let mut seen: BTreeSet<Vec<u32>> = BTreeSet::from([first.clone()]);
-        let mut leaping: Option<(f64, Box<(Model, Vec<f64>)>)> = None;
+        let mut leaping: Option<(f64, Entered)> = None;
         let mut pivot = Some(next);
         while tried.len() < MOST_TRIED {
             let mode = match pivot.take() {
@@ -480,7 +483,7 @@ impl Instant<'_> {
                 break;
             }
         }
-        leaping.map(|(_, found)| *found).ok_or([tried.len() - 1, short])
+        leaping.map(|(_, found)| *found).ok_or([tried.len(), short])
     }
 
     /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.

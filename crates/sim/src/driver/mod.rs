@@ -120,6 +120,7 @@ impl<'a> Run<'a> {
     /// The start counts as an event.
     pub(crate) fn start(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
         self.handle(events, point)?;
+        self.project(events, self.time, point)?;
         self.accept(events, point)?;
         self.settle(events, point)
     }
@@ -185,6 +186,7 @@ impl<'a> Run<'a> {
         };
         self.counts.steps += 1;
         let (end, crossed) = self.accept_step(stepper, end, point)?;
+        self.project(&mut *stepper.events(), end, point)?;
         let reason = self.arrive(&mut *stepper.events(), end, stop, crossed, point)?;
         self.report_progress()?;
         if S::DENSE {
@@ -199,6 +201,14 @@ impl<'a> Run<'a> {
         }
         let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
         Ok(if exchanged { StopReason::Exchange } else { reason })
+    }
+
+    /// Puts the point back onto what its rates keep, if the run is to do so.
+    fn project(&mut self, events: &mut dyn Events, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        if self.options.project && events.project(t, point)? {
+            self.counts.projections += 1;
+        }
+        Ok(())
     }
 
     /// Goes on in other variables if these tell the motion better.

@@ -88,6 +88,8 @@ pub struct Summary {
     pub crossings: usize,
     /// How often other variables have become independent.
     pub exchanges: usize,
+    /// How often the point was put back onto relations that its rates keep.
+    pub projections: usize,
     /// Whether `auto` changed to the stiff method.
     pub stiff: bool,
 }

@@ -95,6 +95,17 @@ pub trait Events {
         Ok(())
     }
 
+    /// Puts the point where a step has ended back onto relations that its rates alone keep, and from which it drifts. Called
+    /// where [`Options::project`](crate::Options::project) asks for it; the first call, where a run starts, notes what is kept.
+    /// `true` if the point has moved.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators), or no point near is on them.
+    fn project(&mut self, t: f64, point: &mut [f64]) -> Result<bool, Failure> {
+        let _ = (t, point);
+        Ok(false)
+    }
+
     /// The longest step with dense output from where the run stands that lets all be seen that moves, in s: what moves no
     /// state has no error that makes steps short.
     fn longest_step(&self) -> f64 {

@@ -151,6 +151,17 @@ impl<'i, 's> Controlled<'i, 's> {
         self.method.restart(time, x, &rates, step)
     }
 
+    /// Goes on from a point that was moved where the last step ended.
+    fn take_over(&mut self, time: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.method.state() == x {
+            return Ok(());
+        }
+        let mut rates = vec![0.0; x.len()];
+        self.shared.system().rates(time, x, &mut rates)?;
+        let step = self.method.next_step();
+        self.method.resume(time, x, &rates, step)
+    }
+
     /// Whether the step that ended at `x` would not have told `rates` from its own.
     fn is_corner(&self, rates: &[f64], x: &[f64]) -> bool {
         let jump: Vec<f64> = self.end_rates.iter().zip(rates).map(|(before, after)| after - before).collect();
@@ -211,7 +222,8 @@ impl Stepper for Controlled<'_, '_> {
         self.begin(run.time, stop, x).map(|()| Flow::GoOn)
     }
 
-    fn step(&mut self, from: f64, _: f64, stop: f64, _: &[f64]) -> Result<f64, Failure> {
+    fn step(&mut self, from: f64, _: f64, stop: f64, x: &[f64]) -> Result<f64, Failure> {
+        self.take_over(from, x)?;
         let stop_now = self.most.map_or(stop, |most| stop.min(from + most));
         let (rejected, tried) = (self.method.rejected(), self.method.next_step());
         self.method.step(stop_now)?;

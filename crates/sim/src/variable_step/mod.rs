@@ -82,7 +82,7 @@ trait Integrator {
 pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) -> Result<(), Failure> {
     run.start(&mut *shared.events(), x)?;
     let mut tolerances = Tolerances::new(run.options, &*shared.system(), x);
-    let method = run.options.method;
+    let (method, project) = (run.options.method, run.options.project);
     let mut stiff = method == Method::Bdf && !x.is_empty();
     // A step to go on with where only the tolerances have changed.
     let mut step = None;
@@ -100,7 +100,7 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
             stepper.add_work(&mut run.counts);
             end.map(|flow| (flow, stepper.reason()))
         };
-        let end = if method == Method::Radau {
+        let end = if method == Method::Radau || (stiff && project) {
             drive(&mut radau::OnStates::new(shared, &atol), kept, None)
         } else if stiff {
             library::with_bdf(shared, &atol, |integrator| drive(integrator, None, None))

@@ -1,5 +1,6 @@
 //! Laws of the kernel, one line each. Names that start with a capital are positive parameters.
 
+mod antiderivative;
 mod assumptions;
 mod eliminate;
 mod laws;
