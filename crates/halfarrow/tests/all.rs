@@ -50,6 +50,8 @@ mod repeated;
 mod report;
 #[path = "set_valued.rs"]
 mod set_valued;
+#[path = "set_valued_random.rs"]
+mod set_valued_random;
 #[path = "shares.rs"]
 mod shares;
 #[path = "stiff_networks.rs"]

@@ -89,6 +89,8 @@ pub(super) struct EventWork {
     pub misses: Vec<f64>,
     /// Contacts that come to rest, since their impacts accumulate.
     pub at_rest: Vec<bool>,
+    /// Of each condition the magnitude below which its operand is on the side that is held.
+    pub floors: Vec<f64>,
     /// The clauses of contacts that take part in impulses.
     pub contacts: Vec<usize>,
 }
@@ -100,6 +102,7 @@ impl EventWork {
             fired: vec![false; clauses.len()],
             at_rest: vec![false; clauses.len()],
             contacts: Vec::new(),
+            floors: vec![0.0; mode.program.conditions.len()],
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
             misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],
             impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),

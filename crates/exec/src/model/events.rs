@@ -267,6 +267,10 @@ impl Events for Model {
         longest.fold(f64::INFINITY, f64::min)
     }
 
+    fn looks_between(&self) -> bool {
+        self.code.bounds.is_some()
+    }
+
     fn locates_crossings(&self) -> bool {
         !self.code.clauses.conditional.is_empty()
     }
@@ -296,7 +300,8 @@ impl Events for Model {
         let mut next = 0;
         for (&condition, &register) in self.code.switching.iter().zip(&self.code.indicators.outputs) {
             let mut beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
-            if self.run.signs_taken == Some(t) {
+            let floor = self.events.floors[condition.0 as usize];
+            if self.run.signs_taken == Some(t) || floor > 0.0 && beyond[0].abs() <= floor {
                 frame.conditions.confirm(condition, &mut beyond);
             }
             let count = self.code.program.conditions[condition].kind.switches();

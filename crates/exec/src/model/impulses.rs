@@ -39,6 +39,8 @@ pub(super) struct ImpulseWork {
     equations: Elimination,
     /// The magnitude of what each equation adds up.
     sizes: Vec<f64>,
+    /// The greatest term of what is reset.
+    greatest: Vec<f64>,
 }
 
 /// A reset of the round: the place of what it changes among the outputs, the value that it asks for, its impulse.
@@ -85,6 +87,7 @@ impl ImpulseBalance {
             impulses: Vec::with_capacity(asked),
             equations: Elimination::new(rows + asked, unknowns + asked),
             sizes: Vec::with_capacity(rows + asked),
+            greatest: Vec::with_capacity(asked),
         }
     }
 }
@@ -275,13 +278,15 @@ impl Model {
     /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
     fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
         let jumps = &balance.jumps;
-        let ImpulseWork { stored: before, asked, impulses, equations, sizes } = work;
+        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
         let rows = jumps.balances.len();
         equations.clear(rows + asked.len(), m);
         sizes.clear();
         sizes.resize(rows + asked.len(), 0.0);
         let Elimination { matrix, residual, .. } = equations;
+        greatest.clear();
+        greatest.resize(asked.len(), 0.0);
         for column in 0..n.max(1) {
             self.place(t, x);
             self.still();
@@ -334,6 +339,20 @@ impl Model {
                     matrix[(rows + k) * m + column] = slope;
                 }
             }
+            // What is reset may be a small difference of what storages keep.
+            if let Some(&unknown) = jumps.unknowns.get(column) {
+                let value = match (unknown as usize).checked_sub(x.len()) {
+                    None => x[unknown as usize],
+                    Some(constant) => self.run.conserved[constant],
+                };
+                for (k, a) in asked.iter().enumerate() {
+                    let slope = self.frame.d[balance.all.outputs[a.output] as usize];
+                    greatest[k] = greatest[k].max((slope * value).abs());
+                }
+            }
+        }
+        for (size, greatest) in sizes[rows..].iter_mut().zip(greatest.iter()) {
+            *size = size.max(*greatest);
         }
         Ok(())
     }

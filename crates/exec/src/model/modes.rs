@@ -22,6 +22,10 @@ const ROUNDING: f64 = 1e-9;
 const NOISE: f64 = 1e-13;
 /// By what sides of a contact may overlap where a run begins, as part of what their displacements are.
 const OVERLAP: f64 = 1e-9;
+/// A margin below zero by less, as part of the greatest that it has been, has not ended.
+const FLOOR: f64 = 1e-12;
+/// The rate with which sides meet that do not part again, as part of the greatest that the gap has had.
+const AT_REST: f64 = 1e-9;
 /// What storages change by without a leap, as part of the most that they have kept.
 const NO_LEAP: f64 = 1e-7;
 
@@ -213,6 +217,11 @@ impl Model {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
         let margins = self.margins_ended(t, x, true)?;
+        for (number, (_, bound, _)) in bounds.all.iter().enumerate() {
+            let Some(condition) = bounds.conditions[number] else { continue };
+            let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
+            self.events.floors[condition.0 as usize] = FLOOR * most;
+        }
         let sides = bounds.conditions.iter().zip(margins);
         Ok(sides.filter_map(|(condition, ended)| Some(((*condition)?, ended?))).collect())
     }
@@ -261,7 +270,9 @@ impl Model {
                 let bound = &bounds.all[number].1;
                 let most = self.run.extents.margins.entry(key(bounds, bound, number)).or_default();
                 most[level] = most[level].max(rate.abs());
-                ended[number] = Some(rate < -ROUNDING * most[level] - NOISE * sizes[place]);
+                // What would not show in as much time as has passed is none.
+                let slow = if t == 0.0 { 0.0 } else { ROUNDING * most[level - 1] / t.abs() };
+                ended[number] = Some(rate < -ROUNDING * most[level] - NOISE * sizes[place] - slow);
             }
         }
         Ok(ended)
@@ -363,10 +374,13 @@ impl Model {
         let mut contacts = Vec::new();
         for (number, (clause, bound, place)) in bounds.all.iter().enumerate() {
             let (Some(place), Some(_)) = (place, bound.gap) else { continue };
-            let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
+            let greatest = self.run.extents.margins.get(&key(bounds, bound, number)).copied().unwrap_or_default();
+            let most = greatest[0];
             let gap = self.frame.r[bounds.margins.outputs[*place] as usize];
             let moved = code.program.clauses[*clause].actions.iter().any(|a| matches!(a.target, Target::Moved { .. }));
             if moved && (gap <= ROUNDING * most || self.events.fired[*clause]) {
+                let rate = self.frame.r[bounds.margins.outputs[place + 1] as usize].abs();
+                self.events.at_rest[*clause] |= rate <= AT_REST * greatest[1];
                 contacts.push(*clause);
             }
         }

@@ -21,8 +21,8 @@ const MOST_LOOKS: usize = 240;
 /// `crossed` says for a time inside the step what [`Signs::crossed`] says of the state there. The time returned is just
 /// past the crossing, by a rounding error.
 ///
-/// Two crossings of one function inside one part of the step are found where its values bend towards 0 there: the part is
-/// halved until they do not any more.
+/// Two crossings of one function inside one part of the step are found where its values bend towards 0 there, at the vertex
+/// of a parabola or, where systems ask for it, by halving the part until they do not bend so any more.
 pub(crate) fn first_crossing(
     signs: &mut Signs,
     start: f64,
@@ -33,37 +33,73 @@ pub(crate) fn first_crossing(
         return Ok(None);
     }
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
+    let finest = FINEST * (end - start);
+    let (thorough, mut looks) = (signs.thorough, 0);
     crossed(signs, start)?;
-    // Values at the begin of what is looked at stand in place 0, those at the ends of what is left of a part behind it.
     signs.keep(0);
-    let (mut before, mut looks) = (start, 0);
-    let mut ends = [0.0; PLACES];
     for part in 1..=PARTS {
-        let finest = FINEST * (end - start);
         let found = crossed(signs, time(part))?;
         if found.is_some() {
-            return bisect(signs, (before, time(part)), finest, found, &mut crossed);
+            return bisect(signs, (time(part - 1), time(part)), finest, found, &mut crossed);
         }
-        signs.keep(1);
-        let mut open = 1;
-        ends[open] = time(part);
-        while open > 0 {
-            let middle = before + 0.5 * (ends[open] - before);
-            let inside = middle > before && middle < ends[open] && looks < MOST_LOOKS;
-            let found = if inside { crossed(signs, middle)? } else { None };
-            looks += 1;
+        signs.keep(part);
+        if thorough {
+            let ends = (part, time(part - 1), time(part));
+            if let Some((before, middle, found)) = hidden(signs, ends, &mut looks, &mut crossed)? {
+                return bisect(signs, (before, middle), finest, Some(found), &mut crossed);
+            }
+            continue;
+        }
+        for indicator in 0..signs.len() {
+            let Some(turn) = signs.turn(indicator, part) else { continue };
+            let extremum = start + (end - start) * turn / PARTS as f64;
+            let found = crossed(signs, extremum)?;
             if found.is_some() {
-                return bisect(signs, (before, middle), finest, found, &mut crossed);
+                let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
+                return bisect(signs, (before, extremum), finest, found, &mut crossed);
             }
-            if inside && open + 1 < PLACES && signs.may_hide(0, open) {
-                open += 1;
-                signs.keep(open);
-                ends[open] = middle;
-            } else {
-                before = ends[open];
-                signs.keep_as(open, 0);
-                open -= 1;
+        }
+    }
+    Ok(None)
+}
+
+/// A crossing inside a part of a step at whose ends there is none, found by halving the part wherever an indicator may hide
+/// one: it lies between the two times.
+#[allow(clippy::type_complexity, reason = "two times and an indicator")]
+fn hidden(
+    signs: &mut Signs,
+    (part, begin, end): (usize, f64, f64),
+    looks: &mut usize,
+    crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
+) -> Result<Option<(f64, f64, usize)>, Failure> {
+    // Values at the begin of what is left stand in one place, those between in the next, those at ends behind them.
+    const BEGIN: usize = PARTS + 1;
+    const MIDDLE: usize = BEGIN + 1;
+    const FIRST: usize = MIDDLE + 1;
+    let mut before = begin;
+    let mut ends = [0.0; PLACES];
+    signs.keep_as(part - 1, BEGIN);
+    signs.keep_as(part, FIRST);
+    let mut open = FIRST;
+    ends[open] = end;
+    while open >= FIRST {
+        let middle = before + 0.5 * (ends[open] - before);
+        let inside = middle > before && middle < ends[open] && *looks < MOST_LOOKS;
+        if inside {
+            *looks += 1;
+            if let Some(found) = crossed(signs, middle)? {
+                return Ok(Some((before, middle, found)));
             }
+            signs.keep(MIDDLE);
+        }
+        if inside && open + 1 < PLACES && signs.may_hide(BEGIN, MIDDLE, open) {
+            open += 1;
+            signs.keep_as(MIDDLE, open);
+            ends[open] = middle;
+        } else {
+            before = ends[open];
+            signs.keep_as(open, BEGIN);
+            open -= 1;
         }
     }
     Ok(None)

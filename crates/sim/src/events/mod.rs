@@ -80,6 +80,12 @@ pub trait Events {
         Ok(false)
     }
 
+    /// Whether steps are searched for two crossings of one indicator between the points that are looked at anyway, as where
+    /// a law holds for a short while only.
+    fn looks_between(&self) -> bool {
+        false
+    }
+
     /// Whether methods of fixed step locate zero crossings too, by shorter steps: what happens there may depend on their
     /// times. Else they count from the end of the step.
     fn locates_crossings(&self) -> bool {

@@ -4,7 +4,7 @@ use super::Events;
 use crate::{Affected, Failure};
 
 /// Points of a step of which values are kept.
-pub(super) const PLACES: usize = 12;
+pub(super) const PLACES: usize = 18;
 /// What an indicator bends by less, as part of its greatest magnitude, is rounding.
 const NOISE: f64 = 1e-12;
 
@@ -17,13 +17,15 @@ pub(crate) struct Signs {
     seen: Vec<f64>,
     /// The greatest finite magnitude of each value.
     most: Vec<f64>,
+    /// Whether steps are searched for two crossings of one indicator.
+    pub(super) thorough: bool,
 }
 
 impl Signs {
     pub(crate) fn new(indicators: usize) -> Signs {
         let values = vec![0.0; indicators];
         let (seen, most) = (vec![0.0; indicators * PLACES], values.clone());
-        Signs { held: vec![false; indicators], seen, most, values }
+        Signs { held: vec![false; indicators], seen, most, values, thorough: false }
     }
 
     /// One held sign, for tests.
@@ -48,16 +50,26 @@ impl Signs {
         self.seen.copy_within(from * n..(from + 1) * n, to * n);
     }
 
-    /// Whether an indicator may have been zero twice between two points whose values were kept, as the values between them,
-    /// which are those seen last, tell: it bends there by more than half of its least magnitude.
-    pub(super) fn may_hide(&self, before: usize, after: usize) -> bool {
+    /// Whether an indicator may have been zero twice between two points, as one between them tells: it bends there by more than half of its least magnitude.
+    pub(super) fn may_hide(&self, before: usize, middle: usize, after: usize) -> bool {
         let n = self.values.len();
         let at = |place: usize, indicator: usize| self.seen[place * n + indicator];
         (0..n).any(|i| {
-            let (a, m, b) = (at(before, i), self.values[i], at(after, i));
+            let (a, m, b) = (at(before, i), at(middle, i), at(after, i));
             let bend = (m - 0.5 * (a + b)).abs();
             bend > 0.5 * a.abs().min(m.abs()).min(b.abs()) && bend > NOISE * self.most[i]
         })
+    }
+
+    /// Where, in parts, the values of an indicator turn round on their way to 0, judged by the parabola through those kept of
+    /// the ends of the last parts.
+    pub(super) fn turn(&self, indicator: usize, part: usize) -> Option<f64> {
+        let n = self.values.len();
+        let middle = part.checked_sub(1).filter(|middle| *middle > 0)?;
+        let [a, b, c] = [middle - 1, middle, part].map(|part| self.seen[part * n + indicator]);
+        let (slope, bend) = (0.5 * (c - a), a - 2.0 * b + c);
+        let turn = (bend * b > 0.0).then(|| -slope / bend).filter(|turn| turn.abs() <= 1.0)?;
+        Some(middle as f64 + turn)
     }
 
     /// Whether there is nothing to watch.
@@ -70,6 +82,7 @@ impl Signs {
         if self.is_empty() {
             return Ok(());
         }
+        self.thorough = events.looks_between();
         events.event_indicators(t, point, &mut self.values)?;
         self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
         Ok(())

@@ -3,8 +3,8 @@
 use super::tolerances::Tolerances;
 use crate::{Failure, System};
 
-/// A trial step that is shorter than this part of the time is none.
-const LEAST: f64 = 1e4 * f64::EPSILON;
+/// A state that changes by itself in this part of the time is zero but for rounding.
+const LEAST: f64 = 4.0 * f64::EPSILON;
 /// Times the trial step is shortened tenfold because the system fails there.
 const MOST_TRIALS: usize = 30;
 
@@ -22,7 +22,7 @@ pub(super) fn first_step(
     system.rates(t, x, rates)?;
     let (size, speed) = (tolerances.norm(x, x), tolerances.norm(rates, x));
     // A state that is zero but for rounding says nothing about the time in which it changes.
-    let unknown = size < 1e-5 || speed < 1e-5 || 0.01 * size / speed <= LEAST * t.abs();
+    let unknown = size < 1e-5 || speed < 1e-5 || size / speed <= LEAST * t.abs();
     let mut trial = if unknown { 1e-6 * longest } else { 0.01 * size / speed }.min(longest);
     for _ in 0..MOST_TRIALS {
         if let Some(bend) = bend(system, tolerances, t, x, trial, rates) {

@@ -492,8 +492,9 @@ impl Parser<'_> {
         let PathPart { name, indices } = self.indexed("the name of the constraint")?;
         self.expect(TokenKind::Colon, "`:`");
         let left = self.expr();
+        let equality = self.is(TokenKind::Assign);
         let (left, sides, right, args) = match left.kind {
-            ExprKind::Binary(b) if matches!(b.op, BinaryOp::Ge | BinaryOp::Le) => {
+            ExprKind::Binary(b) if !equality && matches!(b.op, BinaryOp::Ge | BinaryOp::Le) => {
                 let sides = if b.op == BinaryOp::Ge { Sides::AtLeast } else { Sides::AtMost };
                 let mut right = *b.right;
                 let mut args = split_arguments(&mut right);

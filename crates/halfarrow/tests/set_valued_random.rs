@@ -1,0 +1,158 @@
+//! Random machines with set-valued laws: circuits of diodes, switches and voltage limits, and rows of bodies that meet.
+//! At every step the audit checks that a branch of each law holds, every other law and the energy; methods that share
+//! nothing but the modes come to the same end.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
+use halfarrow::{Method, Model, Record, Run};
+
+/// SplitMix, of Steele, Lea and Flood.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n as u64) as usize
+    }
+
+    fn one<'t>(&mut self, of: &[&'t str]) -> &'t str {
+        of[self.below(of.len())]
+    }
+
+    fn in_ten(&mut self, n: usize) -> bool {
+        self.below(10) < n
+    }
+}
+
+/// Nodes with a leakage each, joined by branches of all kinds.
+fn circuit(seed: u64) -> (String, Vec<String>) {
+    let mut random = Random(seed);
+    let r = &mut random;
+    let nodes = 2 + r.below(3);
+    let mut text = String::from("model Circuit\nSe:gnd(0) -> 0:n0\nn0 -> R:leak0(1000)\n");
+    for k in 1..=nodes {
+        text += &format!("0:n{k}\nn{k} -> R:leak{k}({})\n", r.one(&["50", "200", "1000"]));
+        if r.in_ten(5) {
+            text += &format!("n{k} -> C:cg{k}({}, e0 = {})\n", r.one(&["0.01", "0.05"]), r.one(&["0", "1", "-2"]));
+        }
+    }
+    let drive = |b: usize, r: &mut Random| {
+        let (size, rate, phase) = (r.one(&["3", "5", "10"]), r.one(&["1", "2.3", "3.7"]), r.one(&["0", "1"]));
+        format!("Se:s{b}({size}*sin({rate}*t + {phase})) -> b{b}\n")
+    };
+    let branches = nodes + r.below(nodes + 2);
+    for b in 0..branches {
+        let from = r.below(nodes + 1);
+        let to = (from + 1 + r.below(nodes)) % (nodes + 1);
+        text += &format!("n{from} -> 1:b{b} -> n{to}\nb{b} -> R:r{b}({})\n", r.one(&["1", "2", "5"]));
+        text += &match r.below(8) {
+            0 => drive(b, r),
+            1 => format!("b{b} -> C:c{b}({})\n", r.one(&["0.02", "0.1"])),
+            2 => format!("b{b} -> I:l{b}({}, f0 = {})\n", r.one(&["0.3", "1"]), r.one(&["0", "1"])),
+            3 => format!("b{b} -> R:d{b}(0 <= f, 0 <= -e)\n"),
+            4 => format!("b{b} -> R:d{b}(0 <= f, 0 <= 0.7 - e)\n"),
+            5 => format!("b{b} -> R:d{b}(0 <= f, 0 <= -e)\nb{b} -> I:l{b}({})\n", r.one(&["0.3", "1"])),
+            6 => {
+                let half = r.one(&["0.5", "1.1"]);
+                format!("b{b} -> Sw:w{b}(on = mod(t, 2*{half}) < {half})\n")
+            }
+            _ => format!("b{b} -> R:p{b}(friction = {})\n", r.one(&["0.5", "1", "2"])),
+        };
+    }
+    text += "n0 -> 1:bz -> n1\nSe:sz(8*sin(2*t)) -> bz\nbz -> R:rz(1)\n";
+    (text, (1..=nodes).map(|k| format!("n{k}.e")).collect())
+}
+
+/// Bodies in a row between two walls, with friction, springs and forces.
+fn row(seed: u64) -> (String, Vec<String>) {
+    let mut random = Random(seed);
+    let r = &mut random;
+    let n = 2 + r.below(3);
+    let back = r.one(&["0", "0.5", "0.8", "1"]);
+    let mut text = String::from("model Row\n");
+    for k in 0..n {
+        text += &format!("1:v{k} -> I:m{k}({}, f0 = {})\n", r.one(&["1", "2", "3"]), r.one(&["0", "1", "-1", "2"]));
+        text += &format!("state x{k}' = v{k}.f from {}\n", 0.5 * k as f64);
+        text += &match r.below(3) {
+            0 => format!("v{k} -> R:fr{k}(friction = {})\n", r.one(&["0.5", "1", "3"])),
+            1 => format!("v{k} -> R:b{k}({})\n", r.one(&["0.1", "0.5"])),
+            _ => String::new(),
+        };
+        if r.in_ten(5) {
+            text += &format!("Se:p{k}({}*sin({}*t + {k})) -> v{k}\n", r.one(&["1", "3", "6"]), r.one(&["1", "2.7"]));
+        }
+        if r.in_ten(3) {
+            text += &format!("v{k} -> C:k{k}(k = {})\n", r.one(&["1", "5"]));
+        }
+    }
+    for k in 1..n {
+        text += &format!("constraint c{k}: x{k} - x{} >= 0 (restitution = {back})\n", k - 1);
+    }
+    text += &format!("constraint left: x0 >= -1 (restitution = {back})\n");
+    text += &format!("constraint right: x{} <= {} (restitution = {back})\n", n - 1, 0.5 * n as f64 + 0.5);
+    (text, (0..n).map(|k| format!("x{k}")).collect())
+}
+
+/// What a machine comes to by a method, or why not.
+fn end(text: &str, names: &[String], to: f64, method: Method) -> Result<Vec<f64>, String> {
+    let model = Model::from_text("random.bond", text, &[]).map_err(|e| e.render(false))?;
+    let run = Run { to, rtol: 1e-9, method, record: Record::Names(names.to_vec()), ..Run::default() };
+    let result = model.simulate(&run, &mut |_| true).map_err(|e| e.render(false))?;
+    if !result.report.audit.warnings.is_empty() {
+        return Err(result.report.audit.warnings.join("; "));
+    }
+    Ok(result.trace.columns.iter().map(|c| *c.values.last().expect("a value")).collect())
+}
+
+/// What is wrong about a machine.
+fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<String> {
+    let found = match end(&text, &names, to, Method::Explicit) {
+        Ok(found) => found,
+        Err(why) => return Some(format!("{why}\n{text}")),
+    };
+    let other = match end(&text, &names, to, Method::Radau) {
+        Ok(other) => other,
+        Err(why) => return Some(format!("radau: {why}\n{text}")),
+    };
+    let off = found.iter().zip(&other).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+    (off > within).then(|| format!("explicit {found:?}, radau {other:?}\n{text}"))
+}
+
+#[test]
+fn circuits_hold_their_laws() {
+    for seed in 0..60 {
+        assert_eq!(wrong(circuit(seed), 4.0, 1e-5), None, "seed {seed}");
+    }
+}
+
+/// To a time at which rows with many impacts have not become chaotic.
+#[test]
+fn rows_of_bodies_hold_their_laws() {
+    for seed in 0..60 {
+        assert_eq!(wrong(row(seed), 4.0, 1e-4), None, "seed {seed}");
+    }
+}
+
+/// As many as `GRAPHS`, from the seed `FROM` on.
+#[test]
+#[ignore = "a campaign"]
+fn many() {
+    let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
+    let (from, count) = (number("FROM").unwrap_or(0), number("GRAPHS").unwrap_or(1000));
+    let mut faults = 0;
+    for seed in from..from + count {
+        for (kind, fault) in [("circuit", wrong(circuit(seed), 4.0, 1e-5)), ("row", wrong(row(seed), 4.0, 1e-4))] {
+            if let Some(fault) = fault {
+                faults += 1;
+                println!("{kind} {seed}: {fault}");
+            }
+        }
+    }
+    assert_eq!(faults, 0);
+}
