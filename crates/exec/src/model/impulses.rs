@@ -13,6 +13,8 @@ const ITERATIONS: usize = 50;
 const NOISE: f64 = 1e-9;
 /// A relative step that is rounding.
 const SETTLED: f64 = 4.0 * f64::EPSILON;
+/// What is a difference of what storages keep and below this part of it is rounding.
+const ROUNDING: f64 = 1e-11;
 /// How well the resets are met, as part of what is asked for.
 const MET: f64 = 1e-9;
 
@@ -39,7 +41,7 @@ pub(super) struct ImpulseWork {
     equations: Elimination,
     /// The magnitude of what each equation adds up.
     sizes: Vec<f64>,
-    /// The greatest term of what is reset.
+    /// The greatest term of what is reset, on the way.
     greatest: Vec<f64>,
 }
 
@@ -198,11 +200,12 @@ impl Model {
         if self.events.fired[contact] {
             let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
             let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse as usize);
-            return own.is_some_and(|(_, p)| *p < -MET * most);
+            let kept = work.sizes[..balance.jumps.balances.len()].iter().fold(0.0f64, |most, size| most.max(*size));
+            return own.is_some_and(|(_, p)| *p < -MET * most - ROUNDING * kept);
         }
         let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
         let flow = self.frame.r[balance.all.outputs[output] as usize];
-        flow - target < -MET * flow.abs().max(target.abs())
+        flow - target < -ROUNDING * self.greatest_rate(contact)
     }
 
     /// Newton on the unknowns and the impulses; whether any unknown has changed.
@@ -216,6 +219,8 @@ impl Model {
         let (n, m) = (balance.unknowns(), balance.unknowns() + work.asked.len());
         work.impulses.clear();
         work.impulses.resize(work.asked.len(), 0.0);
+        work.greatest.clear();
+        work.greatest.resize(work.asked.len(), 0.0);
         if m == 0 {
             return Ok(false);
         }
@@ -285,8 +290,6 @@ impl Model {
         sizes.clear();
         sizes.resize(rows + asked.len(), 0.0);
         let Elimination { matrix, residual, .. } = equations;
-        greatest.clear();
-        greatest.resize(asked.len(), 0.0);
         for column in 0..n.max(1) {
             self.place(t, x);
             self.still();

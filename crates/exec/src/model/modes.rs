@@ -217,10 +217,17 @@ impl Model {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
         let margins = self.margins_ended(t, x, true)?;
-        for (number, (_, bound, _)) in bounds.all.iter().enumerate() {
-            let Some(condition) = bounds.conditions[number] else { continue };
+        self.place(t, x);
+        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
+        for (number, (_, bound, place)) in bounds.all.iter().enumerate() {
+            let (Some(condition), Some(place)) = (bounds.conditions[number], place) else { continue };
             let most = self.run.extents.margins.get(&key(bounds, bound, number)).map_or(0.0, |most| most[0]);
-            self.events.floors[condition.0 as usize] = FLOOR * most;
+            let margin = self.frame.r[bounds.margins.outputs[*place] as usize];
+            // What is zero as it stands does not end a little further on. A gap opens from where it is: a floor below it
+            // would feed the next impact.
+            let stands = if margins[number] == Some(false) { 4.0 * (-margin).max(0.0) } else { 0.0 };
+            let floor = if bound.gap.is_some() { 0.0 } else { stands.max(FLOOR * most) };
+            self.events.floors[condition.0 as usize] = floor;
         }
         let sides = bounds.conditions.iter().zip(margins);
         Ok(sides.filter_map(|(condition, ended)| Some(((*condition)?, ended?))).collect())
@@ -408,6 +415,14 @@ impl Model {
             self.events.fired[*clause] = self.frame.r[bounds.margins.outputs[place + 1] as usize] < 0.0;
         }
         Ok(())
+    }
+
+    /// The greatest rate that the gap of a contact has had.
+    pub(super) fn greatest_rate(&self, contact: usize) -> f64 {
+        let Some(bounds) = &self.code.bounds else { return 0.0 };
+        let of = bounds.all.iter().enumerate().find(|(_, (clause, ..))| *clause == contact);
+        let most = of.and_then(|(number, (_, bound, _))| self.run.extents.margins.get(&key(bounds, bound, number)));
+        most.map_or(0.0, |most| most[1])
     }
 
     /// Clauses of another mode: those of the modeller go on, bounds begin anew.
