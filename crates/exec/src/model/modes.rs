@@ -241,7 +241,11 @@ impl Model {
         self.place(t, x);
         self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
         let margins: Vec<f64> = bounds.margins.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
-        let sizes = self.magnitudes_of_margins(bounds, t, x, x)?;
+        // While a run steps, a margin that is not below zero has not ended, however small it is.
+        let sizes = match at_event || margins.iter().any(|margin| margin.is_nan() || *margin < 0.0) {
+            true => self.magnitudes_of_margins(bounds, t, x, x)?,
+            false => vec![0.0; margins.len()],
+        };
         let zero = |place: usize, most: f64| ROUNDING * most + NOISE * sizes[place];
         let mut ended: Vec<Option<bool>> = Vec::with_capacity(bounds.all.len());
         let mut open = Vec::new();
@@ -400,8 +404,6 @@ impl Model {
         let Some(bounds) = &code.bounds else { return Ok(()) };
         self.note_extents(t, x)?;
         let ended = self.margins_ended(t, x, true)?;
-        self.place(t, x);
-        self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;
         let sizes = self.magnitudes_of_margins(bounds, t, x, x)?;
         self.place(t, x);
         self.frame.run(&bounds.margins).map_err(|error| self.failure(t, error))?;

@@ -50,7 +50,8 @@ impl Signs {
         self.seen.copy_within(from * n..(from + 1) * n, to * n);
     }
 
-    /// Whether an indicator may have been zero twice between two points, as one between them tells: it bends there by more than half of its least magnitude.
+    /// Whether an indicator may have been zero twice between two points, as one between them tells: it bends there by more
+    /// than half of its least magnitude.
     pub(super) fn may_hide(&self, before: usize, middle: usize, after: usize) -> bool {
         let n = self.values.len();
         let at = |place: usize, indicator: usize| self.seen[place * n + indicator];
