@@ -6,7 +6,7 @@ use crate::terms::Terms;
 use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
-use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw};
+use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw, TwoPortRow};
 use std::collections::BTreeMap;
 
 /// A law in values: what stands against what, and the quantity that it is about.
@@ -25,6 +25,8 @@ enum Law<'a> {
         what: &'static str,
         of: Quantity,
     },
+    /// A column is a sum of expressions times columns.
+    Row { left: &'a [f64], factors: Vec<Expr>, right: Vec<(&'a [f64], Quantity)>, what: &'static str, of: Quantity },
     /// An expression vanishes.
     Zero { expr: Expr, what: &'static str },
 }
@@ -133,6 +135,17 @@ pub(crate) fn links(
                     let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
+                Law::Row { factors, right, of, .. } => {
+                    let Ok(reader) = values.reader(&factors) else { continue };
+                    let weights = reader.values(middle, None);
+                    for (k, (_, from)) in right.iter().enumerate() {
+                        let weight = weights.as_ref().map_or(0.0, |v| v[k].abs());
+                        links.push(Link { of, from: *from, weight, straight: true });
+                    }
+                    let made = |v: &[f64]| v.iter().zip(&right).map(|(f, (column, _))| f * column[middle]).sum();
+                    let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
+                    links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
+                }
                 Law::Sum { .. } | Law::Zero { .. } => {}
             }
         }
@@ -186,7 +199,12 @@ impl<'a> Laws<'a, '_> {
             Kind::Gyrator { modulus } => {
                 self.two_port(bond(0), bond(1), *modulus, true);
             }
-            Kind::Resistor(laws) => {
+            Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+                for row in element.kind.two_port_rows() {
+                    self.row(element, &row);
+                }
+            }
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => {
                 for (port, law) in laws.iter().enumerate() {
                     match *law {
                         ResistorLaw::Resistive(e) => self.value(bond(port), false, e, "its law"),
@@ -261,6 +279,23 @@ impl<'a> Laws<'a, '_> {
         }
     }
 
+    /// One equation of a wide two-port.
+    fn row(&mut self, element: &Element, row: &TwoPortRow) {
+        let bond = |port: usize| element.ports[port].bond;
+        let left = self.column(bond(row.port), !row.effort);
+        let terms = row.terms.iter().map(|&(port, _)| {
+            let of = self.scales.of_bond(bond(port), !row.of_efforts);
+            self.column(bond(port), !row.of_efforts).map(|column| (column, of))
+        });
+        let right: Option<Vec<(&[f64], Quantity)>> = terms.collect();
+        if let (Some(left), Some(right)) = (left, right) {
+            let what = if row.effort { "its efforts" } else { "its flows" };
+            let factors = row.terms.iter().map(|t| t.1).collect();
+            let of = self.scales.of_bond(bond(row.port), !row.effort);
+            self.laws.push(Law::Row { left, factors, right, what, of });
+        }
+    }
+
     /// `e_in = m e_out, f_out = m f_in`, or `e_in = r f_out, e_out = r f_in`.
     fn two_port(&mut self, input: BondId, output: BondId, factor: Expr, gyrator: bool) {
         let rows = match gyrator {
@@ -321,6 +356,17 @@ impl Check<'_, '_> {
                     }
                 };
                 self.read(name, what, *of, &reader, &miss, &|_, v| vec![Term::beside(*other, v[0].abs())]);
+                Ok(())
+            }
+            Law::Row { left, factors, right, what, of } => {
+                let reader = self.values.reader(factors)?;
+                let miss = |k: usize, v: &[f64]| {
+                    left[k] - v.iter().zip(right).map(|(factor, (column, _))| factor * column[k]).sum::<f64>()
+                };
+                let more = |_: usize, v: &[f64]| {
+                    v.iter().zip(right).map(|(factor, (_, other))| Term::beside(*other, factor.abs())).collect()
+                };
+                self.read(name, what, *of, &reader, &miss, &more);
                 Ok(())
             }
             Law::Zero { expr, what } => self.zero(name, *expr, what),

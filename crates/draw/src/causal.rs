@@ -78,6 +78,7 @@ fn form(element: &Element) -> Form {
     match element.kind {
         Kind::Zero | Kind::One => Form::Junction,
         Kind::Transformer { .. } | Kind::Gyrator { .. } => Form::TwoPort,
+        Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => Form::TwoPort,
         _ if element.ports.len() > 1 => Form::Field,
         Kind::EffortSource { .. } | Kind::FlowSource { .. } => Form::Source,
         _ => Form::OnePort,
@@ -92,11 +93,8 @@ fn kind_word(graph: &BondGraph, kind: &Kind) -> String {
         symbols.iter().filter_map(|s| graph.variables.get(s)).any(|v| !fixed(v.meaning))
     };
     let modulated = match *kind {
-        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
-            follows(modulus, &|m| matches!(m, Meaning::Parameter(_)))
-        }
         Kind::EffortSource { value } | Kind::FlowSource { value } => follows(value, &outside),
-        _ => false,
+        _ => kind.moduli().into_iter().any(|modulus| follows(modulus, &|m| matches!(m, Meaning::Parameter(_)))),
     };
     if modulated { format!("M{}", kind.word()) } else { kind.word().to_string() }
 }

@@ -243,10 +243,12 @@ fn laws(kind: &Kind) -> Vec<Expr> {
     match kind {
         Kind::Zero | Kind::One | Kind::EffortDetector | Kind::FlowDetector => Vec::new(),
         Kind::EffortSource { value: e } | Kind::FlowSource { value: e } | Kind::ZeroCompliance { flow: e } => vec![*e],
-        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => vec![*modulus],
+        Kind::Transformer { .. } | Kind::Gyrator { .. } | Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+            kind.moduli()
+        }
         Kind::ResidualEffort { residual } | Kind::ResidualFlow { residual } => residual.iter().copied().collect(),
         Kind::Inertance(storage) | Kind::Compliance(storage) => stored_by(storage),
-        Kind::Resistor(laws) => laws
+        Kind::Resistor(laws) | Kind::SkewGyrator(laws) => laws
             .iter()
             .map(|law| match law {
                 ResistorLaw::Resistive(e) | ResistorLaw::Conductive(e) | ResistorLaw::Implicit(e) => *e,

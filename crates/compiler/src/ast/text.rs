@@ -77,6 +77,17 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
             write_block(out, &d.body, level);
         }
         StatementKind::Chain(c) => write_chain(out, c),
+        StatementKind::PortKind(k) => {
+            *out += &format!("port {} {{", k.name.text);
+            for (i, (word, list)) in [("bond", &k.bonds), ("in", &k.signals)].into_iter().enumerate() {
+                if !list.is_empty() {
+                    *out += if i == 0 || k.bonds.is_empty() { " " } else { "; " };
+                    write_declarations(out, word, list);
+                }
+            }
+            *out += " }";
+            write_doc(out, &k.doc);
+        }
         StatementKind::Discrete(list) => write_declarations(out, "discrete", list),
         StatementKind::When(w) => write_when(out, w),
         StatementKind::For(l) => {
@@ -123,6 +134,9 @@ fn write_block(out: &mut String, body: &[Statement], level: usize) {
 fn write_declarations(out: &mut String, word: &str, list: &[Declaration]) {
     *out += word;
     separated(out, " ", list, |out, d| {
+        if let Some(owner) = &d.owner {
+            *out += &format!("{}.", owner.text);
+        }
         *out += &d.name.text;
         write_indices(out, &d.indices);
         write_unit(out, &d.unit);
@@ -206,15 +220,18 @@ fn write_node(out: &mut String, node: &Node) {
     match node {
         Node::Declared(element) => write_element(out, element),
         Node::Named(path) => write_path(out, path),
+        Node::Joined(nodes, _) => {
+            out.push('[');
+            separated(out, "", nodes, write_node);
+            out.push(']');
+        }
         Node::Missing(_) => *out += "<missing>",
     }
 }
 
 fn write_element(out: &mut String, e: &Element) {
     *out += &e.kind.text;
-    if let Some(width) = &e.width {
-        *out += &format!("[{}]", shown(width));
-    }
+    write_indices(out, &e.widths);
     *out += &format!(":{}", e.name.text);
     write_indices(out, &e.indices);
     if !e.ports.is_empty() {

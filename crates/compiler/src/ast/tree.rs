@@ -85,6 +85,8 @@ pub enum StatementKind {
     Import(Import),
     /// `component Name(...) { ... }`.
     Component(Box<Component>),
+    /// `port frame { bond twist[6]; in R[3, 3] }`: a kind of port.
+    PortKind(Box<PortKind>),
     /// `prefer w.f, spring`: what stays independent.
     Prefer(Vec<Path>),
     /// `causality m2 derivative, R1 conductive`.
@@ -112,11 +114,13 @@ pub enum StatementKind {
 /// A named value: `name : unit = value "doc"` (or the unit after the value).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declaration {
+    /// The port in `let b.R = ...`, whose signal is given.
+    pub owner: Option<Name>,
     /// What is declared.
     pub name: Name,
     /// What stands in brackets behind the name: indices, or how many elements there are.
     pub indices: Vec<Expr>,
-    /// The unit after `:`.
+    /// The unit after `:`; in the head of a component also the kind of a port.
     pub unit: Option<UnitText>,
     /// The expression after `=`.
     pub value: Option<Expr>,
@@ -200,6 +204,19 @@ pub struct Component {
     pub doc: Option<Doc>,
     /// What stands between the braces.
     pub body: Vec<Statement>,
+}
+
+/// `port frame { bond twist[6]; in R[3, 3]; in r[3] } "doc"`: a kind of port, of several bonds and directed signals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PortKind {
+    /// Its name.
+    pub name: Name,
+    /// Its bonds, in brackets how many there are.
+    pub bonds: Vec<Declaration>,
+    /// The signals that go along the half arrows.
+    pub signals: Vec<Declaration>,
+    /// What it is.
+    pub doc: Option<Doc>,
 }
 
 /// One entry of a `causality` statement.
@@ -316,6 +333,8 @@ pub enum Node {
     Declared(Box<Element>),
     /// `name`, `inst.port` or `field.port`, declared elsewhere.
     Named(Path),
+    /// `[v, w]`: the bonds of several nodes side by side.
+    Joined(Vec<Node>, Span),
     /// Nothing that can be read; an error has been reported here.
     Missing(Span),
 }
@@ -325,8 +344,8 @@ pub enum Node {
 pub struct Element {
     /// `0`, `1`, `Se`, ..., or the name of a component.
     pub kind: Name,
-    /// The number of bonds in `I[3]:body`: reserved; an error of the parser says so.
-    pub width: Option<Expr>,
+    /// The width in `I[3]:body`, the rows and columns in `TF[6,1]:axis`, the kind of port in `1[frame]:hub`.
+    pub widths: Vec<Expr>,
     /// Its name.
     pub name: Name,
     /// The indices in `C:cell[i + 1](...)`, also `C:cell[i][x, y](...)`.

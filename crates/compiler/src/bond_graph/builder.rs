@@ -14,6 +14,7 @@ use super::repeat::Repeats;
 use super::scope::{DeclId, Here};
 use super::set_valued::SetValuedLaw;
 use super::uses::Uses;
+use super::vectors::Shaped;
 use super::wire::Wiring;
 use super::{BondId, ElementId, HeldId, HeldKind, InputId, Meaning, Parameter, ParameterId, PortRef, SignalId};
 use crate::algebra::{Expr, Exprs, Facts, Symbol};
@@ -191,6 +192,8 @@ pub(super) struct Builder<'a, 'f> {
     pub stored: Vec<Vec<Symbol>>,
     /// Values of the declarations; `None` before they are known and where they are at fault.
     pub values: Vec<Option<Value>>,
+    /// Values of the declarations that are vectors or matrices.
+    pub shapes: FxHashMap<DeclId, Shaped>,
     /// Functions: their formal arguments and value.
     pub functions: FxHashMap<DeclId, (Vec<Symbol>, Expr)>,
     pub parameters: Table<ParameterId, Parameter>,
@@ -244,6 +247,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             reactions: Vec::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
+            shapes: FxHashMap::default(),
             functions: FxHashMap::default(),
             parameters: Table::new(),
             numbers: Vec::new(),

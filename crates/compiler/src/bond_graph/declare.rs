@@ -8,6 +8,7 @@ use super::repeat::MAX_TURNS;
 use super::scope::{Decl, DeclId, DeclKind, Here, Node, ScopeId, Valued};
 use super::uses::Used;
 use crate::ast;
+use crate::diagnostic::{Diagnostic, codes};
 
 impl<'a> Flat<'a> {
     /// Parameters, also whole arrays of them.
@@ -25,7 +26,9 @@ impl<'a> Flat<'a> {
         kind: impl Fn(Option<&'a ast::Expr>) -> DeclKind<'a>,
     ) {
         for d in list {
-            if let Some(indices) = self.indices(here, &d.indices) {
+            if let Some(owner) = &d.owner {
+                self.give_signal(here, owner, d);
+            } else if let Some(indices) = self.indices(here, &d.indices) {
                 let (unit, doc) = (d.unit.as_ref(), d.doc.as_ref());
                 self.declare(here, here, (&d.name, &indices), kind(d.value.as_ref()), unit, doc);
             }
@@ -35,6 +38,12 @@ impl<'a> Flat<'a> {
     /// Declares a value, or all elements of an array: brackets that read a loop variable are the indices of one element,
     /// others tell how many elements there are.
     pub fn declare_whole(&mut self, here: Here, reads: Here, d: &'a ast::Declaration, kind: DeclKind<'a>) {
+        if let Some(owner) = &d.owner {
+            let title = format!("`{}.{}` cannot be declared here", owner.text, d.name.text);
+            let fault = Diagnostic::error(codes::N014, title, owner.span, "a name without a dot is needed");
+            self.faults.push(fault.hint("signals of ports are given by `let`"));
+            return;
+        }
         let (unit, doc) = (d.unit.as_ref(), d.doc.as_ref());
         let one = d.indices.iter().any(|e| arrays::reads_variable(&self.repeats, here.turn, e));
         let Some(indices) = self.indices(here, &d.indices) else { return };

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use super::builder::{Builder, HeldDraft, InputDraft, NamedDraft, OpenSignal, Role, SignalDraft, Value};
 use super::dimension::Quantity;
+use super::families::{FamilyId, spelled};
 use super::scope::{self, DeclId, DeclKind, Here, Valued};
 use super::value::Reading;
+use super::vectors::Shaped;
 use super::{HeldId, HeldKind, InputId, Meaning, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts, Node};
 use crate::ast::{self, ExprKind};
@@ -149,6 +151,7 @@ impl<'a> Builder<'a, '_> {
                 self.collect(d.reads, &f.body, (&formals, &[]), &mut found);
             }
             DeclKind::State(_) => {}
+            DeclKind::Joined(_) => found.extend(self.source_of_joined(decl)),
             _ => {
                 if let Some(value) = d.kind.value() {
                     self.collect(d.reads, value, (&[], &d.item), &mut found);
@@ -163,10 +166,14 @@ impl<'a> Builder<'a, '_> {
     fn collect(&mut self, here: Here, e: &'a ast::Expr, own: (&[&str], &[i64]), found: &mut Vec<(DeclId, Span)>) {
         match &e.kind {
             ExprKind::Path(path) => {
-                if let Some(decl) = self.decl_of(here, path, own)
-                    && !self.flat.names.decls[decl].kind.is_known_before()
-                {
-                    found.push((decl, path.span));
+                if let Some(decl) = self.decl_of(here, path, own) {
+                    if !self.flat.names.decls[decl].kind.is_known_before() {
+                        found.push((decl, path.span));
+                    }
+                } else if let Some(family) = self.family_of(here, path, own.0) {
+                    let whole = &self.flat.names.value_families[family];
+                    let known = |decl: &DeclId| self.flat.names.decls[*decl].kind.is_known_before();
+                    found.extend(whole.all().filter(|decl| !known(decl)).map(|decl| (*decl, path.span)));
                 }
             }
             ExprKind::Call(call) => {
@@ -246,6 +253,26 @@ impl<'a> Builder<'a, '_> {
         names.decl_of(&mut self.repeats, here, value, part, item).ok()
     }
 
+    /// The array that a path names as a whole, if it names one.
+    fn family_of(&mut self, here: Here, path: &'a ast::Path, formals: &[&str]) -> Option<FamilyId> {
+        let names = &self.flat.names;
+        let value = match path.parts.as_slice() {
+            [one] if !one.indices.is_empty() || self.is_bound(here, formals, &one.name.text) => return None,
+            [one] => names.value(here.scope, &one.name.text)?,
+            [.., last] if last.indices.is_empty() => match names.node(&mut self.repeats, here, path) {
+                Ok((scope::Node::Instance(inner), used)) if used + 1 == path.parts.len() => {
+                    *names.scopes[inner].values.get(last.name.text.as_str())?
+                }
+                _ => return None,
+            },
+            _ => return None,
+        };
+        match value {
+            Valued::Family(family) => Some(family),
+            Valued::One(_) => None,
+        }
+    }
+
     /// Whether a name is a formal argument or the variable of a repetition.
     fn is_bound(&self, here: Here, formals: &[&str], name: &str) -> bool {
         formals.contains(&name) || self.repeats.variable(here.turn, name).is_some()
@@ -268,6 +295,9 @@ impl<'a> Builder<'a, '_> {
             DeclKind::Output(value) => self.named(decl, value, true),
             DeclKind::Function(f) => self.function(decl, f),
             DeclKind::State(_) => {}
+            DeclKind::Joined(_) => {
+                self.joined_signal(decl);
+            }
         }
     }
 
@@ -410,10 +440,29 @@ impl<'a> Builder<'a, '_> {
     fn named(&mut self, decl: DeclId, value: Option<&'a ast::Expr>, output: bool) {
         let Some(e) = value else { return self.missing_value(decl) };
         let d = &self.flat.names.decls[decl];
-        let Some(value) = self.number(&d.reading(), e) else { return };
-        let value = self.with_unit(value, d.unit, e.span);
+        if !d.item.is_empty() {
+            let Some(value) = self.number(&d.reading(), e) else { return };
+            self.values[decl] = Some(self.name_value(decl, value, &[], e.span, output));
+            return;
+        }
+        let Some(found) = self.shaped(&d.reading(), e) else { return };
+        if found.shape.is_empty() {
+            let Some(value) = found.items.into_iter().next() else { return };
+            self.values[decl] = Some(self.name_value(decl, value, &[], e.span, output));
+            return;
+        }
+        let indices = found.indices();
+        let entries = found.items.into_iter().zip(&indices);
+        let items = entries.map(|(value, at)| self.name_value(decl, value, at, e.span, output)).collect();
+        self.shapes.insert(decl, Shaped { shape: found.shape, items });
+    }
+
+    /// Gives a name to a value, or to an entry of a vector or matrix.
+    fn name_value(&mut self, decl: DeclId, value: Value, indices: &[i64], span: Span, output: bool) -> Value {
+        let d = &self.flat.names.decls[decl];
+        let value = self.with_unit(value, d.unit, span);
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
-        let (name, doc) = (d.name.clone(), d.doc.to_string());
+        let (name, doc) = (spelled(&d.name, indices), d.doc.to_string());
         let unit_is_written = unit.is_some();
         let quantity = value.quantity.clone();
         let place = (d.span, decl);
@@ -423,7 +472,7 @@ impl<'a> Builder<'a, '_> {
         } else {
             self.lets.push(named)
         }
-        self.values[decl] = Some(value);
+        value
     }
 
     fn function(&mut self, decl: DeclId, f: &'a ast::Function) {

@@ -3,10 +3,11 @@
 use super::builder::{Builder, Value};
 use super::dimension::Quantity;
 use super::flatten::{Part, Word};
+use super::multibonds::Width;
 use super::set_valued::is_set_valued;
 use super::value::Reading;
-use super::{Initial, Kind, ResistorLaw, Storage, StorageLaw};
-use crate::algebra::{Expr, Symbol};
+use super::{Initial, Kind, Matrix, ResistorLaw, Storage, StorageLaw};
+use crate::algebra::{Expr, Symbol, ZERO};
 use crate::ast::{self, Arg, ArgLabel, ExprKind};
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
@@ -58,6 +59,13 @@ impl<'a> Builder<'a, '_> {
             Word::Zc => self.only_value(part, "f", false).map(|flow| Kind::ZeroCompliance { flow }),
             Word::ResidualSe => self.residual(part).map(|residual| Kind::ResidualEffort { residual }),
             Word::ResidualSf => self.residual(part).map(|residual| Kind::ResidualFlow { residual }),
+            Word::Tf if matches!(p.width, Width::Matrix { .. }) => {
+                self.matrix_modulus(part, &["m", "f_out"]).map(Kind::MatrixTransformer)
+            }
+            Word::Gy if matches!(p.width, Width::Matrix { .. }) => {
+                self.matrix_modulus(part, &["r", "e_out"]).map(Kind::MatrixGyrator)
+            }
+            Word::Skew => self.skew_gyrator(part).map(Kind::SkewGyrator),
             Word::Tf => self.modulus(part, ["m", "f_out", "e_out"]).map(|modulus| Kind::Transformer { modulus }),
             Word::Gy => self.modulus(part, ["r", "e_out", "f_out"]).map(|modulus| Kind::Gyrator { modulus }),
             Word::I => self.storage(part).map(Kind::Inertance),
@@ -92,7 +100,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn refuse_ports(&mut self, p: &Part<'_>) {
-        if let Some(port) = p.ports.first() {
+        if let Some(port) = p.ports.first().filter(|_| p.width == Width::One) {
             let title = format!("only I, C and R have a list of ports, not {}", p.word.text());
             self.fault(Diagnostic::error(codes::N007, title, port.span, "no list here"));
         }
@@ -102,7 +110,22 @@ impl<'a> Builder<'a, '_> {
     fn arg(&mut self, part: usize, e: &'a ast::Expr, law: bool) -> Option<Value> {
         let p = self.part(part);
         let cx = Reading { own: Some(part), law, ..Reading::of(p.here, &p.name) };
-        self.number(&cx, e)
+        match p.width {
+            Width::Strand(at, of) => self.strand_of(&cx, e, at, of),
+            _ => self.number(&cx, e),
+        }
+    }
+
+    /// Reads what is given for one port of an element: of a wide one, the entry of a vector, or a number for all.
+    fn arg_at(&mut self, part: usize, e: &'a ast::Expr, slot: usize, law: bool) -> Option<Value> {
+        let p = self.part(part);
+        match p.width {
+            Width::Field(of) => {
+                let cx = Reading { own: Some(part), law, ..Reading::of(p.here, &p.name) };
+                self.strand_of(&cx, e, slot, of)
+            }
+            _ => self.arg(part, e, law),
+        }
     }
 
     /// The single argument of a part, positional or under one of its names.
@@ -205,6 +228,141 @@ impl<'a> Builder<'a, '_> {
         Some(value.expr)
     }
 
+    /// The matrix of a wide two-port; a number stands for its multiple of the unit matrix.
+    fn matrix_modulus(&mut self, part: usize, names: &[&'static str]) -> Option<Matrix> {
+        let p = self.part(part);
+        let Width::Matrix { rows, columns } = p.width else { return None };
+        let Some(arg) = self.single(part, names).ok()? else {
+            let title = format!("{} `{}` has no matrix", p.word.text(), p.name);
+            let law = match p.word {
+                Word::Tf => "f_out = M f_in, e_in = Mᵀ e_out",
+                _ => "e_out = M f_in, e_in = Mᵀ f_out",
+            };
+            let d = Diagnostic::error(codes::N009, title, p.ast.span, "which ratios?").note(law);
+            self.fault(d.hint(format!("write `{}[{rows}, {columns}]:{}( … )`", p.ast.kind.text, p.ast.name.text)));
+            return None;
+        };
+        let values = self.square_or_not(part, &arg.value, (rows, columns), true)?;
+        for (row, entries) in values.chunks(columns).enumerate() {
+            for (column, value) in entries.iter().enumerate().filter(|(_, v)| v.expr != ZERO) {
+                let (input, output) = (self.wire_at(part, column)?, self.wire_at(part, columns + row)?);
+                let (a, b) = (self.pairs[input].clone(), self.pairs[output].clone());
+                let ratio = match p.word {
+                    Word::Tf => b.flow_in.over(&a.flow_in),
+                    _ => b.effort_in.over(&a.flow_in),
+                };
+                self.equal_by_law(&ratio, &value.quantity, part);
+            }
+        }
+        Some(Matrix { rows, columns, entries: values.into_iter().map(|v| v.expr).collect() })
+    }
+
+    /// The entries of a matrix of this shape, row by row. What is a number stands for its multiple of the unit matrix, a
+    /// vector for a diagonal, where those may be.
+    fn square_or_not(
+        &mut self,
+        part: usize,
+        e: &'a ast::Expr,
+        (rows, columns): (usize, usize),
+        law: bool,
+    ) -> Option<Vec<Value>> {
+        let p = self.part(part);
+        let cx = Reading { own: Some(part), law: law && !p.word.is_two_port(), ..Reading::of(p.here, &p.name) };
+        let found = self.shaped(&cx, e)?;
+        let zero = Value::number(ZERO, Quantity::Any);
+        let diagonal = |entry: &dyn Fn(usize) -> Value| -> Vec<Value> {
+            let entry_at = |at: usize| if at / columns == at % columns { entry(at / columns) } else { zero.clone() };
+            (0..rows * columns).map(entry_at).collect()
+        };
+        match found.shape.as_slice() {
+            [r, c] if (*r, *c) == (rows, columns) => Some(found.items),
+            [] if rows == columns => Some(diagonal(&|_| found.items[0].clone())),
+            [n] if rows == columns && *n == rows => Some(diagonal(&|at| found.items[at].clone())),
+            [n] if (columns == 1 && *n == rows) || (rows == 1 && *n == columns) => Some(found.items),
+            _ => {
+                let title = format!("{} needs a matrix of {rows} by {columns}, not {}", what(p), found.words());
+                let d = Diagnostic::error(codes::L009, title, e.span, found.words());
+                let d = match p.word {
+                    Word::Tf => {
+                        d.note("f_out = M f_in: it has a row for each bond at `out`, a column for each at `in`")
+                    }
+                    Word::Gy => {
+                        d.note("e_out = M f_in: it has a row for each bond at `out`, a column for each at `in`")
+                    }
+                    _ => d,
+                };
+                let turned = found.shape == [columns, rows];
+                self.fault(if turned { d.hint("write `transpose( … )`") } else { d });
+                None
+            }
+        }
+    }
+
+    /// A gyrator of one side: its matrix is skew.
+    fn skew_gyrator(&mut self, part: usize) -> Option<Vec<ResistorLaw>> {
+        let p = self.part(part);
+        let Width::Field(n) = p.width else { return None };
+        let args: Vec<&'a Arg> = p.ast.args.iter().collect();
+        let [arg] = args.as_slice() else {
+            let title = format!("{} of one side takes a skew matrix", what(p));
+            let d = Diagnostic::error(codes::N009, title, p.ast.span, "which one?").note("e = Sᵀ f");
+            self.fault(d.hint(format!(
+                "write `GY[{n}]:{}(skew(body.p))`; one between two sides is `GY[{n}, {n}]`",
+                p.ast.name.text
+            )));
+            return None;
+        };
+        if let Some(label) = arg.label.as_ref().filter(|l| l.name.text != "r" || l.port.is_some()) {
+            self.unknown_label(p, Some(label), &["r"]);
+            return None;
+        }
+        let values = self.square_or_not(part, &arg.value, (n, n), false)?;
+        let symbols: Option<Vec<Symbol>> =
+            (0..n).map(|port| self.wire_at(part, port).map(|w| self.pairs[w].flow)).collect();
+        let symbols = symbols?;
+        let mut laws = Vec::with_capacity(n);
+        for i in 0..n {
+            let mut terms = Vec::new();
+            for j in 0..n {
+                let (below, above) = (values[j * n + i].expr, values[i * n + j].expr);
+                let sum = self.exprs.add(&[below, above]);
+                if !self.exprs.is_zero(sum) {
+                    return self.not_skew(part, arg, (i, j));
+                }
+                if below != ZERO {
+                    let (row, column) = (self.wire_at(part, i)?, self.wire_at(part, j)?);
+                    let ratio = self.pairs[row].effort_in.over(&self.pairs[column].flow_in);
+                    self.equal_by_law(&ratio, &values[j * n + i].quantity.clone(), part);
+                    let flow = self.exprs.sym(symbols[j]);
+                    terms.push(self.exprs.mul(&[below, flow]));
+                }
+            }
+            laws.push(ResistorLaw::Resistive(self.exprs.add(&terms)));
+        }
+        Some(laws)
+    }
+
+    fn not_skew<T>(&mut self, part: usize, arg: &Arg, (i, j): (usize, usize)) -> Option<T> {
+        let title = format!("the matrix of {} is not skew", what(self.part(part)));
+        let (i, j) = (i + 1, j + 1);
+        let label = match i == j {
+            true => format!("its entry {i}, {i} is not zero"),
+            false => format!("its entries {i}, {j} and {j}, {i} are not opposite"),
+        };
+        let d = Diagnostic::error(codes::L009, title, arg.value.span, label);
+        let d = d.note("a gyrator of one side neither takes nor gives power: its matrix is opposite to its transpose");
+        self.fault(
+            d.hint("write `skew(h)` of a vector h; what dissipates is an R, what is between two sides a `GY[n, m]`"),
+        );
+        None
+    }
+
+    /// The coefficients of a wide `I`, `C` or `R`: a number or a vector stands for a diagonal.
+    fn wide_coefficients(&mut self, part: usize, arg: &'a Arg, of: usize) -> Option<Vec<Vec<Value>>> {
+        let values = self.square_or_not(part, &arg.value, (of, of), false)?;
+        Some(values.chunks(of).map(<[Value]>::to_vec).collect())
+    }
+
     /// Sorts the arguments of an `I`, `C` or `R`.
     fn law_args(&mut self, part: usize) -> Option<LawArgs<'a>> {
         let p = self.part(part);
@@ -245,14 +403,16 @@ impl<'a> Builder<'a, '_> {
             args.energy = Some(arg);
             return true;
         }
-        let letter = name.chars().next().unwrap_or(' ');
+        let (letter, mut fine) = (name.chars().next().unwrap_or(' '), false);
         if p.word != Word::R && is_start(name) {
             return self.sort_start(p, letter, label, arg, args);
         }
         if name.len() == 1 && (gives.contains(letter) || letter == '0') {
-            let Some(slot) = self.slot(p, label, letter == '0', args) else { return false };
-            args.laws[slot].push(LawArg { gives: letter, value: &arg.value, span: arg.span });
-            return true;
+            for slot in self.slots_of(p, label, letter == '0', args) {
+                args.laws[slot].push(LawArg { gives: letter, value: &arg.value, span: arg.span });
+                fine = true;
+            }
+            return fine;
         }
         self.odd_label(p, label, coefficients, gives);
         false
@@ -297,14 +457,25 @@ impl<'a> Builder<'a, '_> {
             self.fault(d.hint(format!("give `{has}`, `e0` or `f0`")));
             return false;
         }
-        let Some(slot) = self.slot(p, label, false, args) else { return false };
-        if let Some((_, _, first)) = args.starts.iter().find(|(l, s, _)| *l == letter && *s == slot) {
-            let d = Diagnostic::error(codes::I002, format!("`{}` is given twice", label.name.text), arg.span, "again");
-            self.fault(d.also(first.span, "given first").hint("remove one of them"));
-            return false;
+        let slots = self.slots_of(p, label, false, args);
+        for &slot in &slots {
+            if let Some((_, _, first)) = args.starts.iter().find(|(l, s, _)| *l == letter && *s == slot) {
+                let title = format!("`{}` is given twice", label.name.text);
+                let d = Diagnostic::error(codes::I002, title, arg.span, "again");
+                self.fault(d.also(first.span, "given first").hint("remove one of them"));
+                return false;
+            }
+            args.starts.push((letter, slot, arg));
         }
-        args.starts.push((letter, slot, arg));
-        true
+        !slots.is_empty()
+    }
+
+    /// The ports that a label speaks of: all of a wide element, where it names none.
+    fn slots_of(&mut self, p: &Part<'_>, label: &ArgLabel, free: bool, args: &LawArgs<'_>) -> Vec<usize> {
+        match (p.width, &label.port) {
+            (Width::Field(of), None) => (0..of).collect(),
+            _ => self.slot(p, label, free, args).into_iter().collect(),
+        }
     }
 
     /// The port that a label speaks of.
@@ -420,7 +591,7 @@ impl<'a> Builder<'a, '_> {
     fn port_laws(&mut self, part: usize, slot: usize, given: &[LawArg<'a>]) -> Option<Vec<PortLaw>> {
         let mut laws = Vec::new();
         for law in given {
-            let value = self.arg(part, law.value, true)?;
+            let value = self.arg_at(part, law.value, slot, true)?;
             if law.gives != '0' {
                 let own = self.port_variable(part, slot, law.gives.encode_utf8(&mut [0; 4]))?;
                 self.equal(&value.quantity, &own.quantity, law.span, "the two sides of this law");
@@ -581,7 +752,13 @@ impl<'a> Builder<'a, '_> {
         for (letter, slot, arg) in starts {
             let own = self.port_variable(part, *slot, letter.encode_utf8(&mut [0; 4]));
             let p = self.part(part);
-            let value = self.number(&Reading::of(p.here, &p.name), &arg.value);
+            let cx = Reading::of(p.here, &p.name);
+            let value = match p.width {
+                Width::Field(of) if arg.label.as_ref().is_some_and(|l| l.port.is_none()) => {
+                    self.strand_of(&cx, &arg.value, *slot, of)
+                }
+                _ => self.number(&cx, &arg.value),
+            };
             let (Some(own), Some(value)) = (own, value) else {
                 fine = false;
                 continue;
@@ -646,7 +823,9 @@ impl<'a> Builder<'a, '_> {
     fn coefficients(&mut self, part: usize, args: &LawArgs<'a>) -> Option<Option<Coefficients>> {
         let Some((letter, arg, bare)) = args.coefficient else { return Some(None) };
         let ports = args.laws.len();
-        let rows = if ports == 1 && !matches!(arg.value.kind, ExprKind::List(_)) {
+        let rows = if let Width::Field(of) = self.part(part).width {
+            self.wide_coefficients(part, arg, of)?
+        } else if ports == 1 && !matches!(arg.value.kind, ExprKind::List(_)) {
             vec![vec![self.arg(part, &arg.value, false)?]]
         } else {
             self.matrix(part, arg, ports)?
@@ -654,7 +833,8 @@ impl<'a> Builder<'a, '_> {
         let mut fine = true;
         for (i, row) in rows.iter().enumerate() {
             for (j, value) in row.iter().enumerate() {
-                fine &= self.coefficient_units(part, letter, bare, (i, j), value, arg);
+                let absent = value.expr == ZERO && matches!(self.part(part).width, Width::Field(_));
+                fine &= absent || self.coefficient_units(part, letter, bare, (i, j), value, arg);
             }
         }
         if ports == 1 && fine {
@@ -774,12 +954,20 @@ struct Coefficients {
 }
 
 impl Coefficients {
+    /// Whether the bonds of a wide element have nothing to do with each other.
+    fn is_diagonal(&self, b: &Builder<'_, '_>, part: usize) -> bool {
+        let entries =
+            self.entries.iter().enumerate().flat_map(|(i, row)| row.iter().enumerate().map(move |(j, e)| (i, j, e)));
+        let wide = matches!(b.part(part).width, Width::Field(_));
+        wide && entries.filter(|(i, j, _)| i != j).all(|(_, _, e)| *e == ZERO)
+    }
+
     /// The law of a port of a storage.
     fn law(&self, b: &mut Builder<'_, '_>, part: usize, slot: usize) -> Option<StorageLaw> {
         let direct = self.letter != "k";
-        if self.entries.len() == 1 {
+        if self.entries.len() == 1 || self.is_diagonal(b, part) {
             let (_, x, _) = b.storage_variables(part, slot)?;
-            let (x, value) = (b.exprs.sym(x), self.entries[0][0]);
+            let (x, value) = (b.exprs.sym(x), self.entries[slot][slot]);
             let expr = if direct { b.exprs.div(x, value) } else { b.exprs.mul(&[value, x]) };
             return Some(StorageLaw::Integral(expr));
         }

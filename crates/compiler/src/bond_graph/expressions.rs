@@ -6,10 +6,7 @@ use crate::algebra::Expr;
 impl BondGraph {
     /// Whether a ratio of the graph may leap: a modulus with a condition, a constraint with a corner.
     pub fn has_leaping_ratios(&self) -> bool {
-        self.elements.values().any(|element| match element.kind {
-            Kind::Transformer { modulus, .. } | Kind::Gyrator { modulus, .. } => self.exprs.may_leap(modulus),
-            _ => false,
-        })
+        self.elements.values().any(|element| element.kind.moduli().into_iter().any(|m| self.exprs.may_leap(m)))
     }
 
     /// The expressions of laws, signals, named values, constraints and guesses.
@@ -56,9 +53,10 @@ impl Kind {
                 visit(e)
             }
             Kind::Transformer { modulus: e } | Kind::Gyrator { modulus: e } => visit(e),
+            Kind::MatrixTransformer(m) | Kind::MatrixGyrator(m) => m.entries.iter_mut().for_each(visit),
             Kind::ResidualEffort { residual } | Kind::ResidualFlow { residual } => residual.iter_mut().for_each(visit),
             Kind::Inertance(s) | Kind::Compliance(s) => s.for_each_expr(visit),
-            Kind::Resistor(laws) => laws.iter_mut().for_each(|law| match law {
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => laws.iter_mut().for_each(|law| match law {
                 ResistorLaw::Resistive(e) | ResistorLaw::Conductive(e) | ResistorLaw::Implicit(e) => {
                     visit(e);
                 }

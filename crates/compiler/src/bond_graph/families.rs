@@ -34,6 +34,38 @@ impl<T> Family<T> {
         self.elements.get(indices)
     }
 
+    /// Whether its elements have the indices 1 to 3 at most, and at least so many.
+    pub fn is_row(&self, least: usize) -> bool {
+        self.row().is_some_and(|length| (least..=3).contains(&length))
+    }
+
+    /// How many elements there are, if they stand in a row from 1.
+    pub fn row(&self) -> Option<usize> {
+        match self.ranges.as_slice() {
+            [(1, last)] if *last == self.elements.len() as i64 => Some(self.elements.len()),
+            _ => None,
+        }
+    }
+
+    /// How many elements there are each way, if all of them are there from 1.
+    pub fn shape(&self) -> Option<Vec<usize>> {
+        let whole = self.ranges.iter().map(|(_, high)| usize::try_from(*high).ok()).collect::<Option<Vec<_>>>()?;
+        let full = whole.iter().product::<usize>() == self.elements.len();
+        (full && self.ranges.iter().all(|(low, _)| *low == 1)).then_some(whole)
+    }
+
+    /// How many indices it has.
+    pub fn rank(&self) -> usize {
+        self.ranges.len()
+    }
+
+    /// All its elements, in the order of their indices.
+    pub fn all(&self) -> impl Iterator<Item = &T> {
+        let mut all: Vec<_> = self.elements.iter().collect();
+        all.sort_by(|a, b| a.0.cmp(b.0));
+        all.into_iter().map(|(_, element)| element)
+    }
+
     /// One of its elements, that of the least indices.
     pub fn first(&self) -> Option<&T> {
         self.elements.iter().min_by(|a, b| a.0.cmp(b.0)).map(|(_, element)| element)

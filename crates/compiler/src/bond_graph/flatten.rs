@@ -1,11 +1,15 @@
 //! From statements to flat lists: every instance of a component becomes a scope with its own elements and bonds.
 
+use std::borrow::Cow;
+
 use rustc_hash::FxHashMap;
 
 use super::families::{Indices, spell};
 use super::faults::Faults;
 use super::files::Files;
+use super::multibonds::Width;
 use super::overrides::Given;
+use super::port_kinds::Frame;
 use super::repeat::{MAX_TURNS, Repeats};
 use super::scope::{DeclKind, Here, Names, Node, Scope, ScopeId};
 use super::uses::Uses;
@@ -31,6 +35,8 @@ pub(super) enum Word {
     Sw,
     Tf,
     Gy,
+    /// A gyrator of one port, with a skew matrix as modulus: `GY[3]`.
+    Skew,
     Zc,
     ResidualSe,
     ResidualSf,
@@ -68,6 +74,9 @@ impl Word {
     }
     /// The word as people write it.
     pub fn text(self) -> &'static str {
+        if self == Word::Skew {
+            return Word::Gy.text();
+        }
         WORDS.iter().find(|(_, kind)| *kind == self).map_or("", |(word, _)| word)
     }
     /// The word with its article.
@@ -93,9 +102,10 @@ impl Word {
     pub fn is_inner(self) -> bool {
         self.is_junction() || self.is_two_port()
     }
-    /// Whether it is an `I`, `C`, `R` or `Sw`: power is positive into it. The first three may be fields.
+    /// Whether it is an `I`, `C`, `R`, `Sw` or a gyrator of one port: power is positive into it. The first three may be
+    /// fields.
     pub fn is_law(self) -> bool {
-        matches!(self, Word::I | Word::C | Word::R | Word::Sw)
+        matches!(self, Word::I | Word::C | Word::R | Word::Sw | Word::Skew)
     }
 }
 
@@ -108,7 +118,9 @@ pub(super) struct Part<'a> {
     /// Its kind.
     pub word: Word,
     /// The ports of a field, empty when none are listed.
-    pub ports: &'a [ast::Name],
+    pub ports: Cow<'a, [ast::Name]>,
+    /// How many bonds side by side end at it.
+    pub width: Width,
     /// As written.
     pub ast: &'a ast::Element,
     /// Whether it stands in a `domain … pseudo`.
@@ -123,6 +135,8 @@ pub(super) struct Joint {
     pub name: String,
     /// Where it is declared.
     pub span: Span,
+    /// Whether nothing needs to be joined to it.
+    pub open: bool,
 }
 
 /// A `constraint`.
@@ -181,6 +195,8 @@ pub(super) enum At {
     Outside(usize),
     /// A port of the component, from inside.
     Inside(usize),
+    /// Nothing: a port of an instance that is left open.
+    Open,
     /// Nothing that is known; said already.
     Broken,
 }
@@ -206,6 +222,8 @@ pub(super) struct Flat<'a> {
     /// Whether it is not known what there is: the rest of the model cannot be judged.
     pub lost: bool,
     pub chains: Vec<(Here, &'a ast::Chain, bool)>,
+    /// The ports with signals, and the junctions of such, by their scopes.
+    pub frames: FxHashMap<ScopeId, Frame<'a>>,
     pub full: bool,
     /// Where libraries come from.
     pub files: Option<&'a dyn Files>,
@@ -271,6 +289,7 @@ impl<'a> Flat<'a> {
                     self.names.ahead.extend(plain.map(|d| ((scope, d.name.text.as_str()), d)));
                 }
                 StatementKind::Component(c) => self.component(scope, c),
+                StatementKind::PortKind(k) => self.port_kind(k),
                 StatementKind::Domain(d) => self.components(scope, &d.body),
                 _ => {}
             }
@@ -366,7 +385,7 @@ impl<'a> Flat<'a> {
                 StatementKind::Guess(list) => self.guesses.extend(list.iter().map(|g| (here, g))),
                 StatementKind::Constraint(c) => self.constraint(here, c, statement.span),
                 StatementKind::Chain(chain) => self.chain(here, chain, pseudo),
-                StatementKind::Import(_) | StatementKind::Component(_) => {}
+                StatementKind::Import(_) | StatementKind::Component(_) | StatementKind::PortKind(_) => {}
                 StatementKind::Discrete(list) => {
                     list.iter().for_each(|d| self.declare_whole(here, here, d, DeclKind::Discrete(d.value.as_ref())));
                 }
@@ -385,12 +404,16 @@ impl<'a> Flat<'a> {
     /// Declares the nodes of a chain and keeps its bonds for later, when all nodes are known.
     fn chain(&mut self, here: Here, chain: &'a ast::Chain, pseudo: bool) {
         let nodes = std::iter::once(&chain.first).chain(chain.bonds.iter().map(|b| &b.to));
-        for node in nodes {
-            if let ast::Node::Declared(element) = node {
-                self.element(here, element, pseudo);
-            }
-        }
+        nodes.for_each(|node| self.declare_node(here, node, pseudo));
         self.chains.push((here, chain, pseudo));
+    }
+
+    fn declare_node(&mut self, here: Here, node: &'a ast::Node, pseudo: bool) {
+        match node {
+            ast::Node::Declared(element) => self.element(here, element, pseudo),
+            ast::Node::Joined(nodes, _) => nodes.iter().for_each(|node| self.declare_node(here, node, pseudo)),
+            ast::Node::Named(_) | ast::Node::Missing(_) => {}
+        }
     }
 
     fn element(&mut self, here: Here, element: &'a ast::Element, pseudo: bool) {
@@ -400,12 +423,17 @@ impl<'a> Flat<'a> {
         }
         let Some((indices, ports)) = self.indices_and_ports(here, element) else { return };
         let Some(word) = Word::of(&element.kind.text) else {
+            self.refuse_width(element);
             return self.instance(here, element, &indices, ports, pseudo);
         };
+        if !element.widths.is_empty() {
+            return self.wide_element(here, element, word, (&indices, ports), pseudo);
+        }
         let node = Node::Part(self.parts.len());
         let name = full_name(&self.names.scopes[here.scope].prefix, &element.name.text, &indices);
         if self.place(here.scope, &element.name, &indices, node) {
-            self.parts.push(Part { name, here, word, ports, ast: element, pseudo });
+            let (ports, width) = (Cow::Borrowed(ports), Width::One);
+            self.parts.push(Part { name, here, word, ports, width, ast: element, pseudo });
         }
     }
 

@@ -5,10 +5,11 @@ use rustc_hash::FxHashMap;
 use super::arrays::Extents;
 use super::families::spelled;
 use super::flatten::{Flat, Joint, WORDS, full_name};
+use super::port_kinds::Way;
 use super::repeat::MAX_TURNS;
 use super::scope::{DeclKind, Here, Node, Scope, ScopeId};
 use super::uses::Used;
-use crate::ast::{self, StatementKind};
+use crate::ast::{self, ExprKind, StatementKind};
 use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::{FileId, Span};
@@ -163,6 +164,10 @@ impl<'a> Flat<'a> {
             labelled.map(|a| &a.value).next()
         };
         for d in component.params.iter().chain(&component.ins) {
+            if let Some(kind) = self.kind_of_port(d) {
+                self.port_of_kind(id, d, kind, Way::Arrives);
+                continue;
+            }
             let (value, reads) = match given(&d.name.text) {
                 Some(value) => (Some(value), user),
                 None => (d.value.as_ref(), own),
@@ -178,8 +183,12 @@ impl<'a> Flat<'a> {
             self.declare_whole(own, reads, d, kind);
         }
         self.labels_use(id, element);
-        for d in component.outs.iter().filter(|d| d.value.is_some()) {
-            self.declare_whole(own, own, d, DeclKind::Let(d.value.as_ref()));
+        for d in &component.outs {
+            match (self.kind_of_port(d), d.value.as_ref()) {
+                (Some(kind), _) => self.port_of_kind(id, d, kind, Way::Leaves),
+                (None, Some(value)) => self.declare_whole(own, own, d, DeclKind::Let(Some(value))),
+                (None, None) => {}
+            }
         }
         for d in &component.ports {
             let Some(indices) = self.indices(own, &d.indices) else { continue };
@@ -190,10 +199,28 @@ impl<'a> Flat<'a> {
             for indices in extents {
                 let joint = self.joints.len();
                 let name = spelled(&d.name.text, &indices);
-                self.joints.push(Joint { instance: id, name, span: d.name.span });
+                let open = self.is_open(d);
+                self.joints.push(Joint { instance: id, name, span: d.name.span, open });
                 self.place(id, &d.name, &indices, Node::Joint(joint));
             }
         }
+    }
+
+    /// Whether a port may be left alone: `port axis = open`.
+    fn is_open(&mut self, d: &ast::Declaration) -> bool {
+        let Some(value) = &d.value else { return false };
+        if let ExprKind::Path(path) = &value.kind
+            && let [one] = path.parts.as_slice()
+            && one.name.text == "open"
+        {
+            return true;
+        }
+        let fault = Diagnostic::error(codes::N007, "a port has no value", value.span, "not known here");
+        let fault = fault.hint(format!("write `port {0} = open` if nothing needs to be joined to it", d.name.text));
+        if !self.faults.contains(&fault) {
+            self.faults.push(fault);
+        }
+        false
     }
 
     /// The label of an argument names what the instance declares.
@@ -217,6 +244,9 @@ impl<'a> Flat<'a> {
     /// Says which outputs of a component have no value.
     fn check_outs(&mut self, id: ScopeId, component: &'a ast::Component) {
         for d in component.outs.iter().filter(|d| d.value.is_none()) {
+            if self.kind_of_port(d).is_some() {
+                continue;
+            }
             if let Some(&value) = self.names.scopes[id].values.get(d.name.text.as_str()) {
                 self.uses.add(Used::of(value), d.name.span);
             } else {

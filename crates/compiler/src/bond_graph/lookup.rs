@@ -3,10 +3,13 @@
 use super::Meaning;
 use super::builder::{Builder, Role, Value};
 use super::dimension::Quantity;
+use super::families::spelled;
 use super::flatten::Word;
+use super::multibonds::{Width, strand_of};
 use super::scope::{DeclId, DeclKind, Node, ScopeId, Valued, no_indices};
 use super::uses::Used;
 use super::value::Reading;
+use super::vectors::Shaped;
 use crate::algebra::{Expr, Symbol, SymbolKind};
 use crate::ast;
 use crate::diagnostic::nearest;
@@ -63,6 +66,11 @@ impl<'a> Builder<'a, '_> {
         {
             return self.unlike(part, names.value_families[family].words(&part.name.text));
         }
+        if let Valued::One(decl) = value
+            && let Some(shaped) = self.shapes.get(&decl)
+        {
+            return self.entry_of(cx, shaped.clone(), part);
+        }
         match names.decl_of(&mut self.repeats, cx.here, value, part, cx.item) {
             Ok(decl) => self.declared(decl, part.name.span),
             Err(fault) => {
@@ -70,6 +78,36 @@ impl<'a> Builder<'a, '_> {
                 None
             }
         }
+    }
+
+    /// An entry of a named vector or matrix, by its indices.
+    fn entry_of(&mut self, cx: &Reading<'_>, shaped: Shaped, part: &'a ast::PathPart) -> Option<Value> {
+        let (name, span) = (&part.name.text, part.name.span);
+        let indices = match self.repeats.indices(&self.flat.names, cx.here, &part.indices) {
+            Ok(indices) => indices,
+            Err(fault) => {
+                self.fault(*fault);
+                return None;
+            }
+        };
+        let found = shaped.entry(&indices).cloned();
+        if found.is_none() {
+            let d = match indices.is_empty() {
+                true => Diagnostic::error(
+                    codes::N017,
+                    "a number is needed here",
+                    span,
+                    format!("this is {}", shaped.words()),
+                ),
+                false => {
+                    let title = format!("there is no `{}`", spelled(name, &indices));
+                    Diagnostic::error(codes::N021, title, span, format!("`{name}` is {}", shaped.words()))
+                }
+            };
+            let example = spelled(name, &vec![1; shaped.shape.len()]);
+            self.fault(d.hint(format!("write one of its entries, such as `{example}`")));
+        }
+        found
     }
 
     fn unlike(&mut self, part: &ast::PathPart, words: String) -> Option<Value> {
@@ -188,7 +226,11 @@ impl<'a> Builder<'a, '_> {
         }
         let uses = &mut self.uses;
         let visit = &mut |node, span| uses.add(Used::Node(node), span);
-        let (node, used) = match self.flat.names.walk(&mut self.repeats, cx.here, path, visit) {
+        let (node, used) = match self.flat.names.walk_wide(&mut self.repeats, cx.here, path, visit) {
+            Ok((Node::Family(family), used)) => {
+                self.not_one(family, path, used);
+                return None;
+            }
             Ok(found) => found,
             Err(fault) => {
                 self.fault(*fault);
@@ -199,6 +241,11 @@ impl<'a> Builder<'a, '_> {
         if let (Node::Instance(inner), [part]) = (node, rest) {
             return self.inner_value(cx, inner, part);
         }
+        if let (Node::Part(part), [side, rest @ ..]) = (node, rest)
+            && let (Width::Matrix { .. }, Some(index)) = (self.part(part).width, side.indices.first())
+        {
+            return self.one_of_side(cx, part, side, index, rest);
+        }
         if let Some((part, index)) = rest.iter().find_map(|p| Some((p, p.indices.first()?))) {
             self.fault(no_indices(&part.name, index.span));
             return None;
@@ -208,10 +255,9 @@ impl<'a> Builder<'a, '_> {
             (Node::Broken, _) => None,
             (Node::Part(part), [port]) if self.is_port(part, &port.text) => self.incomplete_port(port, path),
             (Node::Part(part), [variable]) => self.element_variable(part, variable),
+            (Node::Part(part), [side, strand, variable]) => self.strand_of_side(part, side, strand, variable),
             (Node::Part(part), [port, variable]) => self.named_port_variable(part, port, variable),
-            (Node::Joint(joint), [variable]) => self.pair_variable(self.wiring.of_joint[joint], variable),
-            (Node::Bond(drawn), [variable]) => self.pair_variable(self.wiring.of_drawn[drawn], variable),
-            (Node::Constraint(c), [variable]) => self.reaction_variable(c, variable),
+            (_, [variable]) if !matches!(node, Node::Instance(_)) => self.variable_of(node, variable),
             (_, []) => self.incomplete(node, path),
             (_, [.., last]) => {
                 self.fault(
@@ -224,6 +270,105 @@ impl<'a> Builder<'a, '_> {
                     .hint("an element's variables are e, f, q and p"),
                 );
                 None
+            }
+        }
+    }
+
+    /// A variable of a node with one bond, of a named bond or of a constraint.
+    pub fn variable_of(&mut self, node: Node, variable: &ast::Name) -> Option<Value> {
+        match node {
+            Node::Part(part) => self.element_variable(part, variable),
+            Node::Port(part, port) => self.variable_at(part, port, variable),
+            Node::Joint(joint) => {
+                let wire = self.wiring.of_joint[joint];
+                if wire.is_none() && self.flat.joints[joint].open {
+                    let title = format!("nothing is joined to the port `{}`", self.flat.joints[joint].name);
+                    let d = Diagnostic::error(codes::N018, title, variable.span, "it has no variables then");
+                    self.fault(d.hint("ask for the variable of the junction that it leads to"));
+                }
+                self.pair_variable(wire, variable)
+            }
+            Node::Bond(drawn) => self.pair_variable(self.wiring.of_drawn[drawn], variable),
+            Node::Constraint(c) => self.reaction_variable(c, variable),
+            Node::Instance(_) | Node::Family(_) | Node::Broken => None,
+        }
+    }
+
+    /// A variable at one port of an element.
+    fn variable_at(&mut self, part: usize, port: usize, variable: &ast::Name) -> Option<Value> {
+        let word = self.part(part).word;
+        let fits = match variable.text.as_str() {
+            "e" | "f" => true,
+            "q" => word == Word::C,
+            "p" => word == Word::I,
+            _ => false,
+        };
+        if !fits {
+            self.no_such_variable(part, variable);
+            return None;
+        }
+        self.port_variable(part, port, &variable.text)
+    }
+
+    /// `axis.out[2].f` of a wide two-port.
+    fn one_of_side(
+        &mut self,
+        cx: &Reading<'_>,
+        part: usize,
+        side: &'a ast::PathPart,
+        index: &'a ast::Expr,
+        rest: &'a [ast::PathPart],
+    ) -> Option<Value> {
+        let at = self.whole(cx, index, "an index")?;
+        let mut ports = self.part(part).side(side.name.text == "in");
+        let port = usize::try_from(at - 1).ok().and_then(|at| ports.nth(at));
+        match (port, rest, matches!(side.name.text.as_str(), "in" | "out")) {
+            (Some(port), [variable], true) => self.variable_at(part, port, &variable.name),
+            _ => {
+                let title = format!("there is no `{}[{at}]` of `{}`", side.name.text, self.part(part).name);
+                let d = Diagnostic::error(codes::N021, title, side.name.span, "no such bond");
+                self.fault(d.hint("write `in[1].f`, `out[1].e` and so on"));
+                None
+            }
+        }
+    }
+
+    /// `axis.out.x.f` of a wide two-port.
+    fn strand_of_side(
+        &mut self,
+        part: usize,
+        side: &ast::Name,
+        strand: &ast::Name,
+        variable: &ast::Name,
+    ) -> Option<Value> {
+        let ports = self.part(part).side(side.text == "in");
+        let port =
+            strand_of(&strand.text).filter(|at| ports.len() <= 3 && *at < ports.len()).map(|at| ports.start + at);
+        match port.filter(|_| self.is_port(part, &side.text)) {
+            Some(port) => self.variable_at(part, port, variable),
+            None => {
+                let title = format!("`{}` has no `{}.{}`", self.part(part).name, side.text, strand.text);
+                self.fault(Diagnostic::error(codes::N001, title, strand.span, "not known"));
+                None
+            }
+        }
+    }
+
+    /// Several side by side where one is needed.
+    fn not_one(&mut self, family: super::families::FamilyId, path: &'a ast::Path, used: usize) {
+        let part = &path.parts[used - 1];
+        let row = self.flat.names.node_families[family].row();
+        match (row, path.parts.get(used)) {
+            (Some(n), Some(variable)) if path.parts.len() == used + 1 => {
+                let (name, variable) = (&part.name.text, &variable.name.text);
+                let title = format!("a number is needed here, `{name}.{variable}` is a vector of {n}");
+                let d = Diagnostic::error(codes::N017, title, path.span, "a vector");
+                self.fault(d.hint(format!("name one of its entries: `{name}[1].{variable}`")));
+            }
+            _ => {
+                if let Err(fault) = self.flat.names.node_families.get(family, &part.name, &[]) {
+                    self.fault(*fault);
+                }
             }
         }
     }
@@ -401,6 +546,11 @@ impl<'a> Builder<'a, '_> {
     /// `x'`: the rate of an expression.
     pub fn rate(&mut self, cx: &Reading<'_>, inner: &'a ast::Expr, span: Span) -> Option<Value> {
         let value = self.number(cx, inner)?;
+        self.rate_of_value(cx, &value, span)
+    }
+
+    /// The rate of a number that has been read.
+    pub fn rate_of_value(&mut self, cx: &Reading<'_>, value: &Value, span: Span) -> Option<Value> {
         if cx.plain {
             self.fault(
                 Diagnostic::error(codes::L004, "a function cannot differentiate in time", span, "here")

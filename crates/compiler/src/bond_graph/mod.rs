@@ -32,8 +32,10 @@ mod intent;
 mod load;
 mod lookup;
 mod measure;
+mod multibonds;
 mod names;
 mod overrides;
+mod port_kinds;
 mod print;
 mod recognise;
 mod repeat;
@@ -45,6 +47,7 @@ mod turns;
 mod two_ports;
 mod uses;
 mod value;
+mod vectors;
 mod velocity_relations;
 mod verify;
 mod warnings;
@@ -298,6 +301,44 @@ pub enum Kind {
         /// The modulus `r`.
         modulus: Expr,
     },
+    /// A wide `TF`: `f_out = M f_in`, `e_in = Mᵀ e_out`. Its ports are those at `in`, then those at `out`.
+    MatrixTransformer(Matrix),
+    /// A wide `GY` of two sides: `e_out = M f_in`, `e_in = Mᵀ f_out`. Its ports are those at `in`, then those at `out`.
+    MatrixGyrator(Matrix),
+    /// A wide `GY` of one side, with a skew matrix `S`: `e = Sᵀ f`, without power; `S` from a momentum `h` by `skew(h)` makes
+    /// it an Eulerian junction structure, `e = w × h`. One law a port.
+    SkewGyrator(Vec<ResistorLaw>),
+}
+
+/// A matrix of expressions.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Matrix {
+    /// Number of rows: the ports at `out`.
+    pub rows: usize,
+    /// Number of columns: the ports at `in`.
+    pub columns: usize,
+    /// The entries, row by row.
+    pub entries: Vec<Expr>,
+}
+
+impl Matrix {
+    /// An entry.
+    pub fn at(&self, row: usize, column: usize) -> Expr {
+        self.entries[row * self.columns + column]
+    }
+}
+
+/// One equation of a wide two-port: a variable at one side is a sum over the other side.
+#[derive(Debug, Clone)]
+pub struct TwoPortRow {
+    /// The port whose variable it gives.
+    pub port: usize,
+    /// Whether that is its effort.
+    pub effort: bool,
+    /// The ports that it is a sum over, with the coefficients of their variables, which are efforts or not.
+    pub terms: Vec<(usize, Expr)>,
+    /// Whether these are efforts.
+    pub of_efforts: bool,
 }
 
 /// Laws and start values of a storage, one entry a port.
@@ -684,9 +725,61 @@ impl BondGraph {
 }
 
 impl Kind {
+    /// The equations of a wide two-port, but for terms that are zero whatever happens; none of other kinds.
+    pub fn two_port_rows(&self) -> Vec<TwoPortRow> {
+        let (matrix, gyrator) = match self {
+            Kind::MatrixTransformer(matrix) => (matrix, false),
+            Kind::MatrixGyrator(matrix) => (matrix, true),
+            _ => return Vec::new(),
+        };
+        let (rows, columns) = (matrix.rows, matrix.columns);
+        let nonzero = |term: &(usize, Expr)| term.1 != crate::algebra::ZERO;
+        // A transformer gives the flows at `out` by those at `in`, a gyrator the efforts.
+        let at_out = (0..rows).map(|row| TwoPortRow {
+            port: columns + row,
+            effort: gyrator,
+            terms: (0..columns).map(|c| (c, matrix.at(row, c))).filter(nonzero).collect(),
+            of_efforts: false,
+        });
+        let at_in = (0..columns).map(|column| TwoPortRow {
+            port: column,
+            effort: true,
+            terms: (0..rows).map(|r| (columns + r, matrix.at(r, column))).filter(nonzero).collect(),
+            of_efforts: !gyrator,
+        });
+        at_out.chain(at_in).collect()
+    }
+
+    /// The moduli of a two-port: one, or the entries of its matrix that are not zero whatever happens; none of other kinds.
+    pub fn moduli(&self) -> Vec<Expr> {
+        match self {
+            Kind::Transformer { modulus } | Kind::Gyrator { modulus } => vec![*modulus],
+            Kind::MatrixTransformer(m) | Kind::MatrixGyrator(m) => {
+                m.entries.iter().copied().filter(|e| *e != crate::algebra::ZERO).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The laws of a resistor, or of a gyrator of one side.
+    pub fn resistor_laws(&self) -> Option<&[ResistorLaw]> {
+        match self {
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => Some(laws),
+            _ => None,
+        }
+    }
+
     /// Whether it belongs to the junction structure: 0, 1, TF, GY.
     pub fn is_inner(&self) -> bool {
-        matches!(self, Kind::Zero | Kind::One | Kind::Transformer { .. } | Kind::Gyrator { .. })
+        matches!(
+            self,
+            Kind::Zero
+                | Kind::One
+                | Kind::Transformer { .. }
+                | Kind::Gyrator { .. }
+                | Kind::MatrixTransformer(_)
+                | Kind::MatrixGyrator(_)
+        )
     }
     /// Its keyword in the language.
     pub fn word(&self) -> &'static str {
@@ -703,8 +796,8 @@ impl Kind {
             Kind::Inertance(_) => "I",
             Kind::Compliance(_) => "C",
             Kind::Resistor(_) => "R",
-            Kind::Transformer { .. } => "TF",
-            Kind::Gyrator { .. } => "GY",
+            Kind::Transformer { .. } | Kind::MatrixTransformer(_) => "TF",
+            Kind::Gyrator { .. } | Kind::MatrixGyrator(_) | Kind::SkewGyrator(_) => "GY",
         }
     }
 }

@@ -179,7 +179,7 @@ fn kind_of(decl: &Decl<'_>) -> NameKind {
         DeclKind::Parameter { constant: false, .. } => NameKind::Parameter,
         DeclKind::Parameter { constant: true, .. } => NameKind::Constant,
         DeclKind::Input(_) => NameKind::Input,
-        DeclKind::Let(_) => NameKind::Let,
+        DeclKind::Let(_) | DeclKind::Joined(_) => NameKind::Let,
         DeclKind::Output(_) => NameKind::Output,
         DeclKind::State(_) => NameKind::State,
         DeclKind::Discrete(_) => NameKind::Discrete,
@@ -200,7 +200,7 @@ fn nodes_of(flat: &Flat<'_>, scope: &Scope<'_>, uses: &mut dyn FnMut(Used) -> Ve
         };
         let kind = match one {
             Some(Node::Part(part)) if flat.parts[part].word.is_junction() => NameKind::Junction,
-            Some(Node::Part(_)) => NameKind::Element,
+            Some(Node::Part(_) | Node::Port(..)) => NameKind::Element,
             Some(Node::Instance(_)) => NameKind::Instance,
             Some(Node::Joint(_)) => NameKind::Port,
             Some(Node::Bond(_)) => NameKind::Bond,

@@ -4,7 +4,7 @@ use std::fmt::{self, Display, Formatter};
 
 use super::{
     BondGraph, BoundKind, Element, HeldKind, Initial, Kind, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw,
-    Trigger,
+    Trigger, TwoPortRow,
 };
 use crate::algebra::{Expr, PlainNames, Symbol, ascii};
 use crate::ids::Id;
@@ -94,7 +94,8 @@ impl BondGraph {
             }
             Kind::Transformer { modulus } => vec![format!("m = {}", self.text(*modulus))],
             Kind::Gyrator { modulus } => vec![format!("r = {}", self.text(*modulus))],
-            Kind::Resistor(laws) => laws
+            Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => self.two_port_rows(e),
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => laws
                 .iter()
                 .enumerate()
                 .map(|(port, law)| match law {
@@ -106,6 +107,28 @@ impl BondGraph {
             Kind::Inertance(s) => self.storage(s, &flow),
             Kind::Compliance(s) => self.storage(s, &effort),
         }
+    }
+
+    /// The equations of a wide two-port, as they are written.
+    fn two_port_rows(&self, e: &Element) -> Vec<String> {
+        let name = |port: usize, effort: bool| {
+            let bond = &self.bonds[e.ports[port].bond];
+            self.exprs.name(if effort { bond.effort } else { bond.flow }).to_string()
+        };
+        let rows = e.kind.two_port_rows();
+        let row = |row: &TwoPortRow| {
+            let terms: Vec<String> = row
+                .terms
+                .iter()
+                .map(|&(port, factor)| match self.exprs.is_number(factor).is_some_and(|n| n.is_one()) {
+                    true => name(port, row.of_efforts),
+                    false => format!("({})*{}", self.text(factor), name(port, row.of_efforts)),
+                })
+                .collect();
+            let sum = if terms.is_empty() { "0".to_string() } else { terms.join(" + ") };
+            format!("{} = {sum}", name(row.port, row.effort))
+        };
+        rows.iter().map(row).collect()
     }
 
     fn storage(&self, s: &Storage, z: &dyn Fn(usize) -> Symbol) -> Vec<String> {

@@ -3,6 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::families::{Families, FamilyId, Indices, spelled};
+use super::multibonds::strand_of;
 use super::repeat::Repeats;
 use super::uses::Used;
 use super::value::Reading;
@@ -103,6 +104,8 @@ pub(super) struct Scope<'a> {
 pub(super) enum Node {
     /// An element or junction: index into the parts.
     Part(usize),
+    /// A bond of a wide element: index into the parts, and the place of its port.
+    Port(usize, usize),
     /// An instance of a component: its scope.
     Instance(ScopeId),
     /// A port of the component whose scope this is: index into the joints.
@@ -164,6 +167,8 @@ pub(super) enum DeclKind<'a> {
     State(&'a ast::State),
     /// `discrete`, with its value at the start.
     Discrete(Option<&'a ast::Expr>),
+    /// A signal that comes along half arrows: the scope of the port or junction that gives it. `None` where nothing does.
+    Joined(Option<ScopeId>),
     /// `let f(x) = …`.
     Function(&'a ast::Function),
 }
@@ -174,7 +179,7 @@ impl<'a> DeclKind<'a> {
         match *self {
             DeclKind::Parameter { value, .. } | DeclKind::Input(value) => value,
             DeclKind::Let(value) | DeclKind::Output(value) | DeclKind::Discrete(value) => value,
-            DeclKind::State(_) | DeclKind::Function(_) => None,
+            DeclKind::State(_) | DeclKind::Function(_) | DeclKind::Joined(_) => None,
         }
     }
 
@@ -206,6 +211,8 @@ pub(super) struct Names<'a> {
     pub node_families: Families<(Node, Span)>,
     /// New values of parameters, by full name.
     pub overrides: FxHashMap<&'a str, &'a ast::Expr>,
+    /// Kinds of ports, by name.
+    pub port_kinds: FxHashMap<&'a str, &'a ast::PortKind>,
     /// Values that are declared further down, by scope and name.
     pub ahead: FxHashMap<(ScopeId, &'a str), &'a ast::Declaration>,
 }
@@ -403,6 +410,21 @@ impl<'a> Names<'a> {
         path: &'a ast::Path,
         visit: &mut dyn FnMut(Node, Span),
     ) -> Result<(Node, usize), Box<Diagnostic>> {
+        let (node, used) = self.walk_wide(repeats, from, path, visit)?;
+        match node {
+            Node::Family(_) => Ok((self.with_indices(repeats, from, node, &path.parts[used - 1])?, used)),
+            node => Ok((node, used)),
+        }
+    }
+
+    /// The same, where several nodes side by side have one name.
+    pub fn walk_wide(
+        &self,
+        repeats: &mut Repeats<'a>,
+        from: Here,
+        path: &'a ast::Path,
+        visit: &mut dyn FnMut(Node, Span),
+    ) -> Result<(Node, usize), Box<Diagnostic>> {
         let mut scope = from.scope;
         let mut at = 0;
         loop {
@@ -411,8 +433,17 @@ impl<'a> Names<'a> {
                 return Err(Box::new(self.unknown_node(scope, &part.name, at > 0)));
             };
             visit(named, part.name.span);
-            let node = self.with_indices(repeats, from, named, part)?;
             at += 1;
+            let node = match named {
+                Node::Family(family) if part.indices.is_empty() => match self.strand(family, path.parts.get(at)) {
+                    Some(strand) => {
+                        at += 1;
+                        strand
+                    }
+                    None => return Ok((named, at)),
+                },
+                _ => self.with_indices(repeats, from, named, part)?,
+            };
             match node {
                 Node::Instance(inner) if at < path.parts.len() => {
                     let next = path.parts[at].name.text.as_str();
@@ -424,6 +455,14 @@ impl<'a> Names<'a> {
                 node => return Ok((node, at)),
             }
         }
+    }
+
+    /// The node that `x`, `y` or `z` behind the name of several side by side stands for.
+    fn strand(&self, family: FamilyId, next: Option<&ast::PathPart>) -> Option<Node> {
+        let next = next.filter(|next| next.indices.is_empty())?;
+        let at = strand_of(&next.name.text)?;
+        let family = &self.node_families[family];
+        family.is_row(at + 1).then(|| family.element(&[at as i64 + 1]).map(|(node, _)| *node))?
     }
 
     /// The node that a name with its indices stands for.

@@ -28,13 +28,9 @@ impl Builder<'_, '_> {
 
     fn element(&self, part: usize, kind: Kind) -> Element {
         let p = self.part(part);
-        let name_of = |port: usize| match p.word {
-            w if w.is_two_port() => ["in", "out"][port].to_string(),
-            _ => p.ports.get(port).map_or(String::new(), |n| n.text.clone()),
-        };
         let ports = self.wiring.ports[part].iter().flatten().enumerate();
         let ports = ports.map(|(port, (wire, inward))| Port {
-            name: name_of(port),
+            name: p.port_name(port),
             bond: Self::bond_id(*wire),
             inward: *inward,
         });

@@ -6,6 +6,7 @@ use super::Meaning;
 use super::builder::{Builder, Pair, Role};
 use super::dimension::Quantity;
 use super::flatten::Word;
+use super::multibonds::part_name;
 use crate::algebra::Facts;
 use crate::unit::Dimension as Dim;
 
@@ -58,10 +59,7 @@ impl Builder<'_, '_> {
             };
             let mut symbols = Vec::new();
             for port in 0..self.wiring.ports[part].len() {
-                let name = match p.ports.get(port) {
-                    Some(n) => [&p.name, ".", &n.text, ".", letter].concat(),
-                    None => [&p.name, ".", letter].concat(),
-                };
+                let name = [&part_name(&p.name, &p.port_name(port)), ".", letter].concat();
                 let symbol = self.fresh(&name, Facts::default());
                 let rate = self.wire_at(part, port).map(|w| match p.word {
                     Word::I => self.pairs[w].effort_in.clone(),
@@ -108,11 +106,12 @@ impl Builder<'_, '_> {
 
     fn bond_name(&self, wire: usize) -> (String, String) {
         let w = &self.wiring.wires[wire];
-        let two_port = |end: (usize, usize), side: &str| {
-            self.part(end.0).word.is_two_port().then(|| format!("{}.{side}", self.part(end.0).name))
+        let two_port = |(part, port): (usize, usize)| {
+            let p = self.part(part);
+            p.word.is_two_port().then(|| part_name(&p.name, &p.port_name(port)))
         };
         let named = (!w.name.is_empty()).then(|| w.name.clone());
-        let base = self.outer_end(wire).or(named).or_else(|| two_port(w.to, "in")).or_else(|| two_port(w.from, "out"));
+        let base = self.outer_end(wire).or(named).or_else(|| two_port(w.to)).or_else(|| two_port(w.from));
         match base {
             Some(base) => ([&base, ".e"].concat(), [&base, ".f"].concat()),
             None => (self.unused(format!("e{}", wire + 1)), self.unused(format!("f{}", wire + 1))),
@@ -135,10 +134,7 @@ impl Builder<'_, '_> {
             if p.word.is_junction() || p.word.is_two_port() {
                 return None;
             }
-            Some(match p.ports.get(port) {
-                Some(n) => format!("{}.{}", p.name, n.text),
-                None => p.name.clone(),
-            })
+            Some(part_name(&p.name, &p.port_name(port)))
         })
     }
 

@@ -6,6 +6,7 @@ use super::families::FamilyId;
 use super::repeat::too_long;
 use super::scope::{DeclKind, FUNCTIONS, Here, ScopeId, Valued};
 use super::uses::Used;
+use super::vectors::VECTOR_FUNCTIONS;
 use crate::algebra::{Comparison, Expr, Function, Symbol};
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
 use crate::diagnostic::{Diagnostic, codes};
@@ -68,6 +69,9 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn read(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Value> {
+        if let Some(found) = self.entry_of_shaped(cx, e) {
+            return found;
+        }
         match &e.kind {
             ExprKind::Number(n) => self.literal(cx, n, e.span),
             ExprKind::Path(path) => self.path(cx, path),
@@ -93,6 +97,70 @@ impl<'a> Builder<'a, '_> {
                 self.incomplete = true;
                 None
             }
+        }
+    }
+
+    /// What is made of vectors or matrices: a number, or the entry that is asked for. The outer `None`: it is a number, or
+    /// made of arrays entry by entry.
+    #[allow(clippy::option_option)]
+    fn entry_of_shaped(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> Option<Option<Value>> {
+        let of_vectors = match &e.kind {
+            ExprKind::Call(call) => {
+                let declared = self.flat.names.value(cx.here.scope, &call.function.text).is_some();
+                !declared && VECTOR_FUNCTIONS.iter().any(|f| f.0 == call.function.text)
+            }
+            ExprKind::Binary(b) if !cx.item.is_empty() && b.op == BinaryOp::Mul => {
+                self.has_other_shape(cx, &b.left) || self.has_other_shape(cx, &b.right)
+            }
+            ExprKind::Path(_) if cx.item.is_empty() => false,
+            ExprKind::Path(path) => self.names_vector(cx, path),
+            _ => false,
+        };
+        if !of_vectors {
+            return None;
+        }
+        let Some(found) = self.shaped(&Reading { item: &[], array: None, ..*cx }, e) else { return Some(None) };
+        if found.shape.is_empty() {
+            return Some(found.items.into_iter().next());
+        }
+        let entry = found.entry(cx.item).cloned();
+        if entry.is_none() {
+            let needed = match cx.item.len() {
+                0 => "a number".to_string(),
+                1 => "another vector".to_string(),
+                _ => "another array".to_string(),
+            };
+            let title = format!("{needed} is needed here, not {}", found.words());
+            self.fault(Diagnostic::error(codes::L009, title, e.span, found.words()));
+        }
+        Some(entry)
+    }
+
+    /// Whether a name without indices is that of a vector or matrix, not of an array.
+    fn names_vector(&self, cx: &Reading<'_>, path: &'a ast::Path) -> bool {
+        let [one] = path.parts.as_slice() else { return false };
+        let value = self.flat.names.value(cx.here.scope, &one.name.text).filter(|_| one.indices.is_empty());
+        matches!(value, Some(Valued::One(decl)) if self.shapes.contains_key(&decl))
+    }
+
+    /// Whether an expression has an array of another number of indices than the one it is read for.
+    fn has_other_shape(&mut self, cx: &Reading<'_>, e: &'a ast::Expr) -> bool {
+        match &e.kind {
+            ExprKind::Path(path) => match path.parts.as_slice() {
+                [one] if one.indices.is_empty() => match self.flat.names.value(cx.here.scope, &one.name.text) {
+                    Some(Valued::Family(family)) => self.flat.names.value_families[family].rank() != cx.item.len(),
+                    Some(Valued::One(decl)) => self.shapes.contains_key(&decl),
+                    None => false,
+                },
+                _ => false,
+            },
+            ExprKind::Call(call) => {
+                let own = VECTOR_FUNCTIONS.iter().any(|f| f.0 == call.function.text);
+                own && !matches!(call.function.text.as_str(), "dot" | "norm")
+            }
+            ExprKind::Unary(u) => self.has_other_shape(cx, &u.operand),
+            ExprKind::Binary(b) => self.has_other_shape(cx, &b.left) || self.has_other_shape(cx, &b.right),
+            _ => false,
         }
     }
 
@@ -131,7 +199,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// A whole number that shapes the model; says so if it is none.
-    fn whole(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, what: &str) -> Option<i64> {
+    pub fn whole(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, what: &str) -> Option<i64> {
         match self.repeats.whole(&self.flat.names, cx.here, e, what) {
             Ok(value) => Some(value),
             Err(fault) => {
@@ -198,7 +266,7 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn sum(&mut self, l: &Value, r: &Value, minus: bool, span: Span) -> Value {
+    pub fn sum(&mut self, l: &Value, r: &Value, minus: bool, span: Span) -> Value {
         self.equal(&l.quantity, &r.quantity, span, if minus { "what is subtracted" } else { "the terms of this sum" });
         let expr = if minus { self.exprs.sub(l.expr, r.expr) } else { self.exprs.add(&[l.expr, r.expr]) };
         Value::number(expr, known_of(&l.quantity, &r.quantity))
@@ -213,7 +281,7 @@ impl<'a> Builder<'a, '_> {
         Some(Value::number(self.exprs.div(l.expr, r.expr), l.quantity.over(&r.quantity)))
     }
 
-    fn power(&mut self, base: &Value, exponent: &Value, span: Span) -> Value {
+    pub fn power(&mut self, base: &Value, exponent: &Value, span: Span) -> Value {
         self.no_dimension(&exponent.quantity, span, "an exponent");
         let sixtieths = self.exprs.is_number(exponent.expr).and_then(|n| {
             let scaled = n.to_f64() * f64::from(WHOLE);
@@ -287,7 +355,8 @@ impl<'a> Builder<'a, '_> {
         let title = format!("there is no function `{}`", name.text);
         let d =
             Diagnostic::error(codes::N006, title, name.span, if is_value { "this is a value" } else { "not known" });
-        let known = FUNCTIONS.iter().map(|f| f.0).chain(self.visible_functions(cx.here.scope));
+        let known = FUNCTIONS.iter().map(|f| f.0).chain(VECTOR_FUNCTIONS.iter().map(|f| f.0));
+        let known = known.chain(self.visible_functions(cx.here.scope));
         self.fault(match crate::diagnostic::nearest(&name.text, known) {
             _ if is_value => d.hint(format!("write `{}*( … )` for a product", name.text)),
             _ if matches!(name.text.as_str(), "der" | "ddt" | "dot" | "derivative") => {
@@ -350,8 +419,14 @@ impl<'a> Builder<'a, '_> {
         }
         let args: Vec<Option<Value>> = call.args.iter().map(|a| self.number(cx, &a.value)).collect();
         let args: Vec<Value> = args.into_iter().collect::<Option<_>>()?;
+        self.elementary_of(&args, call, span)
+    }
+
+    /// An elementary function of these numbers.
+    pub fn elementary_of(&mut self, args: &[Value], call: &'a ast::Call, span: Span) -> Option<Value> {
+        let name = call.function.text.as_str();
         let f = Function::named(if name == "ln" { "log" } else { name })?;
-        let quantity = self.function_units(f, &args, call, span);
+        let quantity = self.function_units(f, args, call, span);
         let exprs: Vec<Expr> = args.iter().map(|a| a.expr).collect();
         let expr = match exprs.as_slice() {
             [first, rest @ ..] if matches!(f, Function::Min | Function::Max) => {

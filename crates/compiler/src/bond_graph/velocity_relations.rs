@@ -92,7 +92,8 @@ pub fn velocity_relations(x: &mut Exprs, graph: &BondGraph) -> Vec<VelocityRelat
 /// Whether a ratio of flows reads what moves.
 fn has_moving_ratios(x: &Exprs, graph: &BondGraph) -> bool {
     let moves = |s: Symbol| is_position(graph, s);
-    let modulus = |kind: &Kind| matches!(kind, Kind::Transformer { modulus } if x.depends_on_any(*modulus, &moves));
+    let ratio = |kind: &Kind| matches!(kind, Kind::Transformer { .. } | Kind::MatrixTransformer(_));
+    let modulus = |kind: &Kind| ratio(kind) && kind.moduli().into_iter().any(|e| x.depends_on_any(e, &moves));
     graph.elements.values().any(|e| modulus(&e.kind))
         || graph.signals.values().any(|s| {
             let flow = |s: Symbol| matches!(meaning(graph, s), Some(Meaning::Flow(_)));
@@ -145,6 +146,13 @@ impl Rows {
                     let (over, under) = x.over_and_under(modulus);
                     let over = x.neg(over);
                     rows.push(x, vec![(flow(1), under), (flow(0), over)]);
+                }
+                Kind::MatrixTransformer(_) => {
+                    for row in element.kind.two_port_rows().into_iter().filter(|row| !row.effort) {
+                        let terms = row.terms.into_iter().map(|(port, e)| (flow(port), x.neg(e)));
+                        let terms = std::iter::once((flow(row.port), ONE)).chain(terms).collect();
+                        rows.push(x, terms);
+                    }
                 }
                 Kind::EffortDetector => rows.push(x, vec![(flow(0), ONE)]),
                 Kind::ZeroCompliance { .. } if constraints.contains_key(&id) => {

@@ -57,10 +57,16 @@ fn elements(graph: &BondGraph) -> Result<(), String> {
             Kind::Transformer { .. } | Kind::Gyrator { .. } => {
                 ports == 2 && element.ports[0].inward && !element.ports[1].inward
             }
+            Kind::MatrixTransformer(m) | Kind::MatrixGyrator(m) => {
+                let (inputs, outputs) = element.ports.split_at(m.columns.min(ports));
+                ports == m.columns + m.rows && inputs.iter().all(|p| p.inward) && !outputs.iter().any(|p| p.inward)
+            }
             Kind::Inertance(s) | Kind::Compliance(s) => {
                 ports > 0 && s.laws.len() == ports && s.stored.len() == ports && element.ports.iter().all(|p| p.inward)
             }
-            Kind::Resistor(laws) => ports > 0 && laws.len() == ports && element.ports.iter().all(|p| p.inward),
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => {
+                ports > 0 && laws.len() == ports && element.ports.iter().all(|p| p.inward)
+            }
             _ => ports == 1,
         };
         if !fine {

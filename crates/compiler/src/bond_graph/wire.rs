@@ -2,6 +2,7 @@
 
 use super::faults::Faults;
 use super::flatten::{At, Drawn, End, Flat, Part, Word};
+use super::multibonds::Width;
 use super::scope::{Here, Names};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
@@ -78,7 +79,7 @@ pub(super) fn wire(flat: &Flat<'_>) -> Wiring {
 fn slots(part: &Part<'_>) -> usize {
     match part.word {
         w if w.is_junction() => 0,
-        w if w.is_two_port() => 2,
+        w if w.is_two_port() => part.side(true).len() + part.side(false).len(),
         _ => part.ports.len().max(1),
     }
 }
@@ -147,6 +148,7 @@ impl Wiring {
                 );
             }
             (Some(_), Some(_)) => {}
+            (None, None) if port.open => sides.broken = true,
             (_, None) => {
                 sides.broken = true;
                 let title = format!("port `{name}` of component `{}` leads nowhere", component.name.text);
@@ -155,6 +157,7 @@ impl Wiring {
                         .hint(format!("write `{name} -> …` or `… -> {name}` in the component")),
                 );
             }
+            (None, Some(_)) if port.open => {}
             (None, Some(_)) => {
                 sides.broken = true;
                 let title = format!("port `{instance}.{name}` is not connected");
@@ -198,6 +201,9 @@ impl Wiring {
         let (Some(from), Some(to)) = (from, to) else {
             return self.circle(flat, &chain, from.is_none() && to.is_none());
         };
+        if from.at == At::Open || to.at == At::Open {
+            return self.left_open(flat, from, to);
+        }
         let (At::Part(a, from_port), At::Part(b, to_port)) = (from.at, to.at) else {
             self.broken = true;
             return;
@@ -222,6 +228,19 @@ impl Wiring {
             }
         }
         self.wires.push(wire_of(flat, &chain, (a, a_port), (b, b_port), i));
+    }
+
+    /// A bond to a port that is left open: at a junction it is not there.
+    fn left_open(&mut self, flat: &Flat<'_>, from: End, to: End) {
+        let end = if from.at == At::Open { to } else { from };
+        if let At::Part(part, _) = end.at
+            && !flat.parts[part].word.is_junction()
+        {
+            let title = format!("a port that may be left open leads to `{}`", flat.parts[part].name);
+            let d = Diagnostic::error(codes::B005, title, end.span, "no junction");
+            let d = d.note("where nothing is joined to it, the bond is left out");
+            self.fault(d.hint("put a junction before the port"));
+        }
     }
 
     fn circle(&mut self, flat: &Flat<'_>, chain: &[usize], closed: bool) {
@@ -265,7 +284,13 @@ impl Wiring {
             return Some(self.ports[part].len() - 1);
         }
         let slot = match p.word {
-            w if w.is_two_port() => self.two_port_slot(p, named, inward, end)?,
+            w if w.is_two_port() => match (p.width, named) {
+                (Width::Matrix { .. }, Some(port)) if p.side(inward).contains(&port) => port,
+                (_, named) => {
+                    let named = named.map(|port| usize::from(!p.side(true).contains(&port)));
+                    self.two_port_slot(p, named, inward, end)?
+                }
+            },
             _ => self.outer_slot(p, named, inward, end)?,
         };
         match self.ports[part][slot] {
@@ -338,8 +363,15 @@ impl Wiring {
             let before = self.faults.len();
             if !touched[i] && found == 0 {
                 self.fault(unconnected(p, &flat.names));
-            } else if p.word.is_two_port() && found == 1 && !self.crowded_parts.contains(&i) {
+            } else if p.word.is_two_port() && p.width == Width::One && found == 1 && !self.crowded_parts.contains(&i) {
                 self.fault(half_connected(p, self.ports[i][0].is_none()));
+            } else if matches!(p.width, Width::Matrix { .. } | Width::Field(_)) && found > 0 {
+                let of = self.ports[i].len();
+                let empty = (0..of).filter(|&port| self.ports[i][port].is_none()).map(|port| p.port_name(port));
+                let names: Vec<String> = empty.collect();
+                let title = format!("{} of the {of} bonds of {} `{}` are missing", names.len(), p.word.text(), p.name);
+                let d = Diagnostic::error(codes::B011, title, p.ast.span, format!("no bond at {}", names.join(", ")));
+                self.fault(d.hint("join what is as wide, `v -> …`, or every strand of it"));
             } else if p.ports.len() > 1 && found > 0 {
                 let ports = self.ports[i].clone();
                 let empty = p.ports.iter().zip(&ports).enumerate().filter(|(_, (_, found))| found.is_none());
@@ -392,6 +424,9 @@ fn follow(flat: &Flat<'_>, sides: &[Sides], start: usize, backward: bool, chain:
                 at = next;
             }
             Some((next, _)) if !sides.broken && next == start => return None,
+            None if !sides.broken && !outside && flat.joints[joint].open => {
+                return Some(End { at: At::Open, span: end.span });
+            }
             _ => return Some(End { at: At::Broken, span: end.span }),
         }
     }

@@ -149,7 +149,7 @@ impl ConnectedPart<'_> {
         let ports = outer_ports(self.graph, self.members);
         let on_loop = |p: &PortRef| {
             let bond = self.graph.bond_of(*p);
-            matches!(self.graph.elements[p.element].kind, Kind::Resistor(_))
+            matches!(self.graph.elements[p.element].kind, Kind::Resistor(_) | Kind::SkewGyrator(_))
                 && [NodeId::effort(bond), NodeId::flow(bond)].iter().any(|n| looped.contains(&n.index()))
         };
         let found: Vec<PortRef> = ports.into_iter().filter(on_loop).collect();
@@ -158,7 +158,9 @@ impl ConnectedPart<'_> {
 
     /// Whether a law is linear; `None` if it cannot be used in both causalities.
     fn linear_if_invertible(&mut self, port: PortRef) -> Option<bool> {
-        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return None };
+        let (Kind::Resistor(laws) | Kind::SkewGyrator(laws)) = &self.graph.elements[port.element].kind else {
+            return None;
+        };
         let bond = &self.graph.bonds[self.graph.bond_of(port)];
         let (given, law, wanted) = match laws[port.port as usize] {
             ResistorLaw::Resistive(e) => (bond.effort, e, bond.flow),
@@ -213,7 +215,8 @@ impl ConnectedPart<'_> {
     ) -> Option<Loops> {
         let mark = strokes.mark();
         let mut fine = contradiction::force_strokes(self.graph, strokes, self.members).is_ok();
-        let is_law = |p: &PortRef| matches!(self.graph.elements[p.element].kind, Kind::Resistor(_));
+        let is_law =
+            |p: &PortRef| matches!(self.graph.elements[p.element].kind, Kind::Resistor(_) | Kind::SkewGyrator(_));
         fine = fine && strokes.keep(&self.kept).is_ok();
         fine = fine && drawn.iter().filter(|(p, _)| !is_law(p)).all(|(&p, &here)| strokes.set_at(p, here).is_ok());
         fine = fine && choice.iter().all(|(&p, &here)| strokes.set_at(p, here).is_ok());
@@ -282,7 +285,7 @@ fn loop_size(graph: &BondGraph, table: &Table<BondId, Stroke>, turned: usize) ->
     let mut successors = signal_graph(graph, table).algebraic_successors();
     let size = |s: &[Vec<u32>]| break_set::cyclic_components(s).iter().map(Vec::len).sum();
     let (breaks, looped) = (break_set::count(&successors), size(&successors));
-    for element in graph.elements.values().filter(|e| matches!(e.kind, Kind::Resistor(_))) {
+    for element in graph.elements.values().filter(|e| matches!(e.kind, Kind::Resistor(_) | Kind::SkewGyrator(_))) {
         for port in &element.ports {
             successors[NodeId::effort(port.bond).index()].clear();
             successors[NodeId::flow(port.bond).index()].clear();
@@ -411,8 +414,8 @@ fn gives(graph: &BondGraph, port: PortRef, flow: bool) -> bool {
 fn integrated_in_moduli(x: &Exprs, graph: &BondGraph) -> Vec<Symbol> {
     let mut found = Vec::new();
     for element in graph.elements.values() {
-        let (Kind::Transformer { modulus } | Kind::Gyrator { modulus }) = element.kind else { continue };
-        for symbol in x.symbols_of(modulus) {
+        let moduli = element.kind.moduli();
+        for symbol in moduli.into_iter().flat_map(|modulus| x.symbols_of(modulus)) {
             let Some(Meaning::Signal(signal)) = graph.variables.get(&symbol).map(|v| v.meaning) else { continue };
             let read = x.symbols_of(graph.signals[signal].rate);
             let bonds = |s: &Symbol| {
@@ -458,7 +461,9 @@ impl ConnectedPart<'_> {
     /// Whether a nonlinear law in its written causality determines the common variable of its junction. Such laws come first,
     /// so that other laws read a variable of their own junction, not one at the end of a causal chain.
     fn leads(&mut self, port: PortRef) -> bool {
-        let Kind::Resistor(laws) = &self.graph.elements[port.element].kind else { return false };
+        let (Kind::Resistor(laws) | Kind::SkewGyrator(laws)) = &self.graph.elements[port.element].kind else {
+            return false;
+        };
         let bond = &self.graph.bonds[self.graph.bond_of(port)];
         let other = if bond.from == port { bond.to } else { bond.from };
         let (law, read) = match (laws[port.port as usize], &self.graph.elements[other.element].kind) {
@@ -571,7 +576,7 @@ pub(super) fn imposes(graph: &BondGraph, port: PortRef) -> Option<bool> {
 /// The preferred causality of an algebraic law: the one in which it is written.
 pub(super) fn preferred(graph: &BondGraph, port: PortRef) -> PortCausality {
     match &graph.elements[port.element].kind {
-        Kind::Resistor(laws) => match laws[port.port as usize] {
+        Kind::Resistor(laws) | Kind::SkewGyrator(laws) => match laws[port.port as usize] {
             ResistorLaw::Conductive(_) => PortCausality::Conductive,
             _ => PortCausality::Resistive,
         },
@@ -579,10 +584,11 @@ pub(super) fn preferred(graph: &BondGraph, port: PortRef) -> PortCausality {
     }
 }
 
-/// Whether the part has nothing that requires exact elimination: residual sinks, or moduli that vanish.
+/// Whether the part has nothing that requires exact elimination: residual sinks, matrices, or moduli that vanish.
 fn is_plain(x: &mut Exprs, graph: &BondGraph, members: &[ElementId]) -> bool {
     members.iter().all(|&m| match graph.elements[m].kind {
         Kind::ResidualEffort { .. } | Kind::ResidualFlow { .. } => false,
+        Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => false,
         Kind::Transformer { modulus } | Kind::Gyrator { modulus } => {
             let (over, under) = x.over_and_under(modulus);
             !x.is_zero_given(over) && !x.is_zero_given(under)

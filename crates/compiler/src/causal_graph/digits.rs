@@ -34,7 +34,7 @@ pub(super) fn slope(x: &Exprs, graph: &BondGraph, point: &NumericPoint, port: Po
     let bond = &graph.bonds[graph.bond_of(port)];
     let index = port.port as usize;
     let (law, by, inverse) = match &element.kind {
-        Kind::Resistor(laws) => match laws[index] {
+        Kind::Resistor(laws) | Kind::SkewGyrator(laws) => match laws[index] {
             ResistorLaw::Resistive(e) => (e, bond.flow, false),
             ResistorLaw::Conductive(f) => (f, bond.effort, true),
             ResistorLaw::Implicit(_) => return None,

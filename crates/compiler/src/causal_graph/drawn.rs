@@ -180,7 +180,7 @@ pub fn by_hand(causal: &CausalGraph) -> Table<BondId, Stroke> {
 const TURNED_SINGLY: usize = 40;
 
 fn resistors(graph: &BondGraph, members: &[ElementId]) -> Vec<PortRef> {
-    let laws = members.iter().filter(|&&m| matches!(graph.elements[m].kind, Kind::Resistor(_)));
+    let laws = members.iter().filter(|&&m| matches!(graph.elements[m].kind, Kind::Resistor(_) | Kind::SkewGyrator(_)));
     laws.flat_map(|&element| {
         let ports = 0..graph.elements[element].ports.len() as u32;
         ports.map(move |port| PortRef { element, port })

@@ -1,6 +1,7 @@
 //! Definitions from strokes in a part without rings: each variable by those of the element that sets it.
 
 use super::ports::{Virtual, imposes_effort};
+use super::two_ports::{self, Given};
 use super::{Combination, PortState, Role};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
@@ -75,6 +76,40 @@ pub fn definitions(
                 all.push((a, Combination(vec![(b, factor)])));
                 all.push((c, Combination(vec![(d, factor)])));
             }
+            Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+                let rows = graph.elements[element].kind.two_port_rows();
+                let of = |port: usize, effort: bool| if effort { pair(port).0 } else { pair(port).1 };
+                let given = two_ports::given(&rows, &|port| Some(!at(port)));
+                for (row, given) in rows.iter().zip(given) {
+                    let own = of(row.port, row.effort);
+                    let terms = row.terms.iter().map(|&(port, e)| (of(port, row.of_efforts), e));
+                    let (set, mut sum): (Symbol, Vec<(Symbol, Expr)>) = match given {
+                        Some(Given::Own) => (own, terms.collect()),
+                        Some(Given::Term(k)) => {
+                            let divisor = row.terms[k].1;
+                            if !x.nonzero(divisor) {
+                                divisors.push(divisor);
+                                x.assume_nonzero(divisor);
+                            }
+                            let set = of(row.terms[k].0, row.of_efforts);
+                            let others: Vec<_> = terms.filter(|t| t.0 != set).collect();
+                            let mut sum: Vec<_> = others
+                                .into_iter()
+                                .map(|(symbol, e)| {
+                                    let e = x.neg(e);
+                                    (symbol, x.div(e, divisor))
+                                })
+                                .collect();
+                            let one = x.int(1);
+                            sum.push((own, x.div(one, divisor)));
+                            (set, sum)
+                        }
+                        None => continue,
+                    };
+                    sum.sort_by_key(|t| t.0);
+                    all.push((set, Combination(sum)));
+                }
+            }
             _ => {}
         }
     }
@@ -92,8 +127,8 @@ pub fn roles(graph: &BondGraph, members: &[ElementId], drawn: Drawn) -> Vec<Port
             let role = match (&graph.elements[element].kind, effort_in) {
                 (Kind::Inertance(_), true) | (Kind::Compliance(_), false) => Role::Independent,
                 (Kind::Inertance(_), false) | (Kind::Compliance(_), true) => Role::Dependent,
-                (Kind::Resistor(_), true) => Role::Algebraic(PortCausality::Conductive),
-                (Kind::Resistor(_), false) => Role::Algebraic(PortCausality::Resistive),
+                (Kind::Resistor(_) | Kind::SkewGyrator(_), true) => Role::Algebraic(PortCausality::Conductive),
+                (Kind::Resistor(_) | Kind::SkewGyrator(_), false) => Role::Algebraic(PortCausality::Resistive),
                 _ => Role::Source,
             };
             let role = match imposes_effort(graph, port) {

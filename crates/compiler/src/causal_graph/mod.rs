@@ -22,6 +22,7 @@ pub mod signals;
 pub(crate) mod start_point;
 mod strokes;
 mod text;
+mod two_ports;
 mod verify;
 
 use std::collections::BTreeMap;

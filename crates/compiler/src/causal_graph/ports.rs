@@ -304,6 +304,15 @@ impl Net {
                 self.push(vec![(columns[0].0, under), (columns[1].1, r)]);
                 self.push(vec![(columns[1].0, under), (columns[0].1, r)]);
             }
+            Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+                let column = |port: usize, effort: bool| if effort { columns[port].0 } else { columns[port].1 };
+                for row in graph.elements[element].kind.two_port_rows() {
+                    let own = (column(row.port, row.effort), one);
+                    let terms = row.terms.into_iter().map(|(port, e)| (column(port, row.of_efforts), x.neg(e)));
+                    let terms = std::iter::once(own).chain(terms).collect();
+                    self.push(terms);
+                }
+            }
             _ => {}
         }
     }

@@ -238,10 +238,13 @@ fn is_linear(x: &mut Exprs, graph: &BondGraph) -> bool {
         let bonds = element.ports.iter().map(|p| &graph.bonds[p.bond]);
         let mut variables: Vec<Symbol> = bonds.flat_map(|b| [b.effort, b.flow]).collect();
         let laws: Vec<Expr> = match &element.kind {
-            Kind::Transformer { modulus } | Kind::Gyrator { modulus } => return constant(x, *modulus),
+            kind @ (Kind::Transformer { .. }
+            | Kind::Gyrator { .. }
+            | Kind::MatrixTransformer(_)
+            | Kind::MatrixGyrator(_)) => return kind.moduli().into_iter().all(|e| constant(x, e)),
             Kind::EffortSource { value } | Kind::FlowSource { value } => return outside(x, *value),
             Kind::ZeroCompliance { flow } => return outside(x, *flow),
-            Kind::Resistor(laws) => laws
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => laws
                 .iter()
                 .map(|law| match *law {
                     ResistorLaw::Resistive(e) | ResistorLaw::Conductive(e) | ResistorLaw::Implicit(e) => e,

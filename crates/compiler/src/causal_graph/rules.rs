@@ -16,6 +16,9 @@ pub fn in_order(kind: &Kind, here: usize, away: usize, kept: bool) -> bool {
         Kind::One => away == usize::from(!kept),
         Kind::Transformer { .. } => (here, away) == (1, 1),
         Kind::Gyrator { .. } => matches!((here, away), (2, 0) | (0, 2)),
+        // As many variables are given as there are equations: where one at `in` changes sides one at `out` does.
+        Kind::MatrixTransformer(m) => (here, away) == (m.rows, m.columns),
+        Kind::MatrixGyrator(_) => here % 2 == 0,
         _ => true,
     }
 }

@@ -7,9 +7,10 @@
 use std::collections::BTreeMap;
 
 use super::Stroke;
+use super::two_ports::{self, Given};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{
-    BondGraph, BondId, Element, ElementId, Kind, Meaning, Port, PortRef, ResistorLaw, Storage, StorageLaw,
+    BondGraph, BondId, Element, ElementId, Kind, Meaning, Port, PortRef, ResistorLaw, Storage, StorageLaw, TwoPortRow,
 };
 use crate::ids::{Id, Table, id};
 
@@ -313,7 +314,10 @@ impl Builder<'_> {
             Kind::One => self.junction(id, &element.ports, false),
             Kind::Transformer { modulus } => self.transformer(id, &element.ports, *modulus),
             Kind::Gyrator { modulus } => self.gyrator(id, &element.ports, *modulus),
-            Kind::Resistor(laws) => self.resistor(id, &element.ports, laws),
+            Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+                self.wide_two_port(id, &element.ports, &element.kind.two_port_rows());
+            }
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => self.resistor(id, &element.ports, laws),
             Kind::Inertance(storage) => self.storage(id, element, storage),
             Kind::Compliance(storage) => self.storage(id, element, storage),
             Kind::EffortSource { value } => self.source(id, &element.ports[0], *value, true),
@@ -386,6 +390,43 @@ impl Builder<'_> {
         for (read, set) in pairs {
             let (read, set) = if into { (set, read) } else { (read, set) };
             self.modulated(id, read, set, modulus, into);
+        }
+    }
+
+    /// Sums over one side for each variable of the other, some of them solved for one of their terms.
+    fn wide_two_port(&mut self, id: ElementId, ports: &[Port], rows: &[TwoPortRow]) {
+        let given = two_ports::given(rows, &|port| self.effort_in(&ports[port]).map(|into| !into));
+        let node = |port: usize, effort: bool| match effort {
+            true => NodeId::effort(ports[port].bond),
+            false => NodeId::flow(ports[port].bond),
+        };
+        for (row, given) in rows.iter().zip(given) {
+            let own = node(row.port, row.effort);
+            let (set, before) = match given {
+                None => continue,
+                Some(Given::Own) => (own, Vec::new()),
+                Some(Given::Term(at)) => {
+                    let (port, coefficient) = row.terms[at];
+                    let set = node(port, row.of_efforts);
+                    self.push(id, own, set, EdgeKind::Structure, Gain::Inverse(coefficient));
+                    (set, vec![Gain::Minus, Gain::Inverse(coefficient)])
+                }
+            };
+            let through = |gain: Gain| match before.is_empty() {
+                true => gain,
+                false => Gain::Product(before.iter().cloned().chain([gain]).collect()),
+            };
+            for &(port, coefficient) in &row.terms {
+                let read = node(port, row.of_efforts);
+                if read != set {
+                    self.push(id, read, set, EdgeKind::Structure, through(Gain::Modulus(coefficient)));
+                }
+                let by = read.symbol(self.graph);
+                for reading in self.readings_of(coefficient) {
+                    let slope = Gain::ModulusSlope { modulus: coefficient, inverse: false, read: reading.symbol, by };
+                    self.push(id, reading.node, set, EdgeKind::Modulation, through(reading.after(slope)));
+                }
+            }
         }
     }
 

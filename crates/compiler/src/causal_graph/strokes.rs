@@ -325,6 +325,21 @@ impl<'a> Strokes<'a> {
                 (1, 1, 0) => Err(Conflict::Element(element)),
                 _ => Ok(None),
             },
+            Kind::MatrixTransformer(ref m) => {
+                let (rows, columns) = (m.rows as u32, m.columns as u32);
+                match () {
+                    () if here > rows || away > columns => Err(Conflict::Element(element)),
+                    () if open == 0 => Ok(None),
+                    () if here == rows => Ok(Some(false)),
+                    () if away == columns => Ok(Some(true)),
+                    () => Ok(None),
+                }
+            }
+            Kind::MatrixGyrator(_) => match (here % 2, open) {
+                (1, 0) => Err(Conflict::Element(element)),
+                (odd, 1) => Ok(Some(odd == 1)),
+                _ => Ok(None),
+            },
             _ => Ok(None),
         }
     }

@@ -155,7 +155,9 @@ fn bent_law(graph: &BondGraph, before: &Table<BondId, Stroke>, after: &Table<Bon
     let mut x = graph.exprs.clone();
     graph.outer_ports().into_iter().filter(|&port| before[graph.bond_of(port)] != after[graph.bond_of(port)]).find_map(
         |port| {
-            let Kind::Resistor(laws) = &graph.elements[port.element].kind else { return None };
+            let (Kind::Resistor(laws) | Kind::SkewGyrator(laws)) = &graph.elements[port.element].kind else {
+                return None;
+            };
             let bond = &graph.bonds[graph.bond_of(port)];
             let sets_flow = gives_flow(graph, after, port)?;
             let wanted = if sets_flow { bond.flow } else { bond.effort };

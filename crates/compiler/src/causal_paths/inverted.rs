@@ -186,7 +186,7 @@ impl Tries<'_> {
             cyclic_components(&signals.algebraic_successors()).into_iter().flatten().collect();
         let on_path = |place: &PortRef| {
             let bond = self.graph.bond_of(*place);
-            matches!(self.graph.elements[place.element].kind, Kind::Resistor(_))
+            matches!(self.graph.elements[place.element].kind, Kind::Resistor(_) | Kind::SkewGyrator(_))
                 && members.contains(&NodeId::effort(bond).index())
         };
         self.graph.outer_ports().into_iter().filter(on_path).collect()
@@ -221,7 +221,7 @@ type TurnedBond = (BondId, PortRef);
 
 impl Turner<'_> {
     pub fn is_resistor(&self, place: PortRef) -> bool {
-        matches!(self.graph.elements[place.element].kind, Kind::Resistor(_))
+        matches!(self.graph.elements[place.element].kind, Kind::Resistor(_) | Kind::SkewGyrator(_))
     }
 
     pub fn is_integral(&self, place: PortRef) -> bool {

@@ -85,6 +85,8 @@ codes! {
     B009 "several ports or bonds could be meant";
     B010 "a causality that an element cannot have";
     B011 "a port of a field without a bond";
+    B012 "bonds side by side that differ in number";
+    B013 "a port whose signals come twice, not at all or the wrong way";
     B020 "parts that nothing connects";
     B021 "a junction that joins nothing";
     L001 "an element without a law";

@@ -149,7 +149,7 @@ impl<'a> Assembled<'a> {
 
     /// Constraints: what they carry is an unknown.
     pub fn open_constraints(&mut self, causal: &CausalGraph) -> Vec<AlgebraicConstraint> {
-        self.open(causal, |kind| !matches!(kind, Kind::Resistor(_)))
+        self.open(causal, |kind| !matches!(kind, Kind::Resistor(_) | Kind::SkewGyrator(_)))
     }
 
     fn open(&mut self, causal: &CausalGraph, test: impl Fn(&Kind) -> bool) -> Vec<AlgebraicConstraint> {
@@ -162,7 +162,7 @@ impl<'a> Assembled<'a> {
             {
                 self.d.of.remove(&state.input);
                 self.d.free.insert(state.input);
-                let law = matches!(kind, Kind::Resistor(_));
+                let law = matches!(kind, Kind::Resistor(_) | Kind::SkewGyrator(_));
                 let cause = if law { AlgebraicRole::Law(element) } else { AlgebraicRole::Multiplier(element) };
                 constraints.push(AlgebraicConstraint { unknown: Some((state.input, cause)), residual });
             }

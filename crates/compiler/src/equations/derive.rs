@@ -537,12 +537,8 @@ fn span_of_symbols(graph: &BondGraph, symbols: &[Symbol]) -> Span {
 /// The elements whose moduli read what a pivot reads.
 fn readers(d: &Definitions, pivot: crate::algebra::Expr) -> Vec<ElementId> {
     let symbols = d.x.symbols_of(pivot);
-    let modulus = |k: &Kind| match k {
-        Kind::Transformer { modulus } | Kind::Gyrator { modulus } => Some(*modulus),
-        _ => None,
-    };
     let reads = |m| d.x.symbols_of(m).iter().any(|s| symbols.contains(s));
-    d.graph.elements.iter().filter(|(_, e)| modulus(&e.kind).is_some_and(reads)).map(|(id, _)| id).collect()
+    d.graph.elements.iter().filter(|(_, e)| e.kind.moduli().into_iter().any(reads)).map(|(id, _)| id).collect()
 }
 
 fn unit_of(graph: &BondGraph, symbol: Symbol) -> Option<Unit> {

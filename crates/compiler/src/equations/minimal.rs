@@ -200,7 +200,7 @@ impl<'a> Assembled<'a> {
         let graph = &causal.graph;
         let bond = &graph.bonds[graph.bond_of(state.port)];
         let residual = match &graph.elements[state.port.element].kind {
-            Kind::Resistor(laws) => match laws[state.port.port as usize] {
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => match laws[state.port.port as usize] {
                 ResistorLaw::Resistive(e) => (bond.effort, e, PortCausality::Resistive),
                 ResistorLaw::Conductive(f) => (bond.flow, f, PortCausality::Conductive),
                 ResistorLaw::Implicit(residual) => {

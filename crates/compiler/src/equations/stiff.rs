@@ -96,7 +96,9 @@ fn fastest_rate(open: &CausalGraph) -> f64 {
 fn resistance(open: &CausalGraph, x: &mut crate::algebra::Exprs, given: Symbol) -> Option<f64> {
     use crate::bond_graph::ResistorLaw::{Conductive, Implicit, Resistive};
     let state = open.ports.ports.iter().find(|p| p.input == given)?;
-    let Kind::Resistor(laws) = &open.graph.elements[state.port.element].kind else { return None };
+    let (Kind::Resistor(laws) | Kind::SkewGyrator(laws)) = &open.graph.elements[state.port.element].kind else {
+        return None;
+    };
     let bond = &open.graph.bonds[open.graph.bond_of(state.port)];
     let (law, by, inverse) = match laws[state.port.port as usize] {
         Resistive(e) => (e, bond.flow, given != bond.effort),

@@ -86,7 +86,7 @@ fn uses(graph: &BondGraph) -> BTreeMap<Symbol, Use> {
                     }
                 }
             }
-            Kind::Resistor(laws) => {
+            Kind::Resistor(laws) | Kind::SkewGyrator(laws) => {
                 for law in laws {
                     match *law {
                         ResistorLaw::Resistive(e) | ResistorLaw::Conductive(e) | ResistorLaw::Implicit(e) => {

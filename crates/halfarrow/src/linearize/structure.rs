@@ -152,7 +152,7 @@ fn sources_of(graph: &BondGraph, inputs: &[String]) -> Option<Vec<ElementId>> {
         match &element.kind {
             Kind::EffortSource { value } | Kind::FlowSource { value } if reads(*value) => sources.push(id),
             Kind::ZeroCompliance { flow } if reads(*flow) => return None,
-            Kind::Transformer { modulus } | Kind::Gyrator { modulus } if reads(*modulus) => return None,
+            kind if kind.moduli().into_iter().any(reads) => return None,
             _ => {}
         }
     }

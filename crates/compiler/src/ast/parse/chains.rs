@@ -1,6 +1,5 @@
 //! Nodes and bonds.
 
-use super::expressions::reserved;
 use super::*;
 
 impl Parser<'_> {
@@ -59,10 +58,11 @@ impl Parser<'_> {
         match self.kind() {
             TokenKind::Ident | TokenKind::Number if self.ahead(1).kind == TokenKind::Colon => self.element(None),
             TokenKind::Ident if self.ahead(1).kind == TokenKind::LParen => self.nameless(),
-            TokenKind::Ident if self.width_follows() => {
+            TokenKind::Ident | TokenKind::Number if self.width_follows() => {
                 let kind = self.bump();
                 self.element(Some(kind))
             }
+            TokenKind::LBracket => self.joined(),
             TokenKind::Ident if !RESERVED.contains(&self.text_of(self.token())) => Node::Named(self.path()),
             TokenKind::Number => self.number_node(),
             _ => {
@@ -74,21 +74,42 @@ impl Parser<'_> {
 
     /// Whether `I[3]:` comes.
     fn width_follows(&self) -> bool {
-        let mut i = 2;
-        if self.ahead(1).kind != TokenKind::LBracket {
+        if self.ahead(1).kind != TokenKind::LBracket || !self.adjacent(1) {
             return false;
         }
-        while self.ahead(i).newlines == 0 && matches!(self.ahead(i).kind, TokenKind::Number | TokenKind::Ident) {
+        let (mut i, mut open) = (1, 0usize);
+        loop {
+            match self.ahead(i).kind {
+                TokenKind::LBracket | TokenKind::LParen => open += 1,
+                TokenKind::RBracket | TokenKind::RParen => open -= 1,
+                TokenKind::End | TokenKind::Arrow | TokenKind::Assign => return false,
+                _ => {}
+            }
             i += 1;
+            if open == 0 {
+                return self.ahead(i).kind == TokenKind::Colon;
+            }
         }
-        self.ahead(i).kind == TokenKind::RBracket && self.ahead(i + 1).kind == TokenKind::Colon
+    }
+
+    /// `[v, w]`: nodes side by side.
+    fn joined(&mut self) -> Node {
+        let start = self.span();
+        let nodes = self.bracketed(TokenKind::RBracket, |p| {
+            let mut node = p.nested(Self::node).unwrap_or_else(|| Node::Missing(p.gap()));
+            let doc = p.doc();
+            let left_over = document(&mut node, doc);
+            p.idle_doc(left_over);
+            Some(node)
+        });
+        Node::Joined(nodes, self.since(start))
     }
 
     /// `Kind:name[ports](args)`; the kind has been read if it is given.
     fn element(&mut self, wide: Option<Token>) -> Node {
         let kind = wide.unwrap_or_else(|| self.bump());
         let start = self.span_of(kind);
-        let width = if wide.is_some() { self.width() } else { None };
+        let widths = if wide.is_some() { self.widths() } else { Vec::new() };
         if kind.kind == TokenKind::Number && !matches!(self.text_of(kind), "0" | "1") {
             self.no_such_junction(kind);
         }
@@ -101,7 +122,7 @@ impl Parser<'_> {
         match name {
             Some(name) => {
                 let kind = self.name_of(kind);
-                Node::Declared(Box::new(Element { kind, width, name, indices, ports, args, doc: None, port, span }))
+                Node::Declared(Box::new(Element { kind, widths, name, indices, ports, args, doc: None, port, span }))
             }
             None => Node::Missing(span),
         }
@@ -130,12 +151,14 @@ impl Parser<'_> {
         self.remark(fault);
     }
 
-    fn width(&mut self) -> Option<Expr> {
+    fn widths(&mut self) -> Vec<Expr> {
         let start = self.span();
-        let mut widths = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
-        self.remark(reserved(self.since(start), "a multibond", "write one element for each direction"));
-        widths.truncate(1);
-        widths.pop()
+        let widths = self.bracketed(TokenKind::RBracket, |p| Some(p.expr()));
+        if widths.is_empty() {
+            let fault = Diagnostic::error(codes::S001, "a width is expected", self.since(start), "nothing stands here");
+            self.report(fault.hint("write how many bonds there are: `1[3]:v`"));
+        }
+        widths
     }
 
     /// What stands in brackets behind the name of an element: indices, then ports. Names alone are ports here.

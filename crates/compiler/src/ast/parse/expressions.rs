@@ -435,9 +435,3 @@ impl Parser<'_> {
 fn digits_missing(span: Span, hint: &str) -> Diagnostic {
     Diagnostic::error(codes::S007, "a decimal point has digits on both sides", span, "").hint(hint)
 }
-
-/// The error for syntax that is kept for a later version.
-pub(super) fn reserved(span: Span, what: &str, hint: &str) -> Diagnostic {
-    Diagnostic::error(codes::S008, format!("{what} cannot be used yet"), span, "reserved for a later version")
-        .hint(hint)
-}

@@ -50,7 +50,8 @@ impl Parser<'_> {
     /// Whether the text only declares what others import, or an error has been reported already.
     fn is_library(&self, statements: &[Statement]) -> bool {
         use StatementKind::*;
-        let declares = |s: &Statement| matches!(s.kind, Component(_) | Import(_) | Const(_) | Let(_) | Function(_));
+        let declares =
+            |s: &Statement| matches!(s.kind, Component(_) | Import(_) | Const(_) | Let(_) | Function(_) | PortKind(_));
         !self.faults.is_empty() || (!statements.is_empty() && statements.iter().all(declares))
     }
 
@@ -116,6 +117,7 @@ impl Parser<'_> {
         let token = self.token();
         let word = match token.kind {
             TokenKind::Ident | TokenKind::Number => self.text_of(token),
+            TokenKind::LBracket => return Some(StatementKind::Chain(self.chain())),
             TokenKind::Text | TokenKind::OpenText => {
                 let doc = self.doc();
                 self.idle_doc(doc);
@@ -133,6 +135,10 @@ impl Parser<'_> {
             }
         };
         let node = matches!(self.ahead(1).kind, TokenKind::Arrow | TokenKind::Colon | TokenKind::Dot);
+        if word == "port" && self.ahead(1).kind == TokenKind::Ident && self.ahead(2).kind == TokenKind::LBrace {
+            self.bump();
+            return Some(StatementKind::PortKind(Box::new(self.port_kind()?)));
+        }
         if !node && self.choice_follows() {
             return Some(StatementKind::Choice(Box::new(self.choice())));
         }
@@ -232,6 +238,14 @@ impl Parser<'_> {
     /// `name : unit = value : unit "doc"`, with the unit in one of the two places.
     fn declaration(&mut self, value: Value) -> Option<Declaration> {
         let start = self.span();
+        let owner = match self.owner_follows() {
+            true => {
+                let owner = self.name("a port");
+                self.bump(); // the dot
+                owner
+            }
+            false => None,
+        };
         let PathPart { name, indices } = self.indexed("a name")?;
         let unit = self.unit();
         let value = match value {
@@ -244,7 +258,15 @@ impl Parser<'_> {
         };
         let unit = self.second_unit(unit);
         let doc = self.doc();
-        Some(Declaration { name, indices, unit, value, doc, span: self.since(start) })
+        Some(Declaration { owner, name, indices, unit, value, doc, span: self.since(start) })
+    }
+
+    /// Whether `port.` comes, before the name of one of its signals.
+    fn owner_follows(&self) -> bool {
+        self.kind() == TokenKind::Ident
+            && self.ahead(1).kind == TokenKind::Dot
+            && self.adjacent(1)
+            && self.ahead(2).kind == TokenKind::Ident
     }
 
     /// `path : unit = value : unit "doc"`, with the unit in one of the two places.
@@ -321,6 +343,56 @@ impl Parser<'_> {
         let span = self.path().span;
         let text = self.text[span.start as usize..span.end as usize].to_string();
         Some(Import { path: Doc { text, span }, library: true })
+    }
+
+    /// `port frame { bond twist[6]; in R[3, 3] }`; `port` has been read.
+    fn port_kind(&mut self) -> Option<PortKind> {
+        let name = self.name("the name of a kind of port")?;
+        let mut kind = PortKind { name, bonds: Vec::new(), signals: Vec::new(), doc: None };
+        if !self.expect(TokenKind::LBrace, "`{`") {
+            return None;
+        }
+        let open = self.span_before();
+        while !matches!(self.kind(), TokenKind::End | TokenKind::RBrace) {
+            let before = self.pos;
+            self.tokens[self.pos].newlines = 0;
+            self.quiet = false;
+            let list = match self.text_of(self.token()) {
+                "bond" => Some(&mut kind.bonds),
+                "in" => Some(&mut kind.signals),
+                _ => None,
+            };
+            match list {
+                Some(list) => {
+                    self.bump();
+                    loop {
+                        list.extend(self.declaration(Value::Optional));
+                        if !self.eat(TokenKind::Comma) {
+                            break;
+                        }
+                    }
+                }
+                None => {
+                    self.expected("`bond` or `in`");
+                    self.skip();
+                }
+            }
+            if !self.eat(TokenKind::Semicolon) {
+                self.end_statement();
+            }
+            if self.pos == before {
+                self.bump();
+            }
+        }
+        if self.kind() == TokenKind::RBrace {
+            self.bump();
+        } else {
+            let fault = Diagnostic::error(codes::S002, "`}` is missing", open, "opened here")
+                .also(self.gap(), "the text ends here");
+            self.report(fault);
+        }
+        kind.doc = self.doc();
+        Some(kind)
     }
 
     fn component(&mut self) -> Option<Component> {
