@@ -135,7 +135,8 @@ impl<'a> Builder<'a, '_> {
         }
         let terms = flows.into_iter().zip(coefficients);
         let terms: Vec<(Symbol, Expr)> = terms.filter(|(_, a)| !self.exprs.is_zero(*a)).collect();
-        if terms.is_empty() {
+        // What holds whatever moves, as the closure of a plane loop across its plane does, carries nothing.
+        if terms.is_empty() && !(self.exprs.is_zero(expr) && sides.restitution.is_none()) {
             let d = Diagnostic::error(
                 codes::L006,
                 "a constraint on nothing that moves",

@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::builder::Builder;
+use super::flatten::Word;
 use super::scope::Here;
 use super::value::Reading;
 use super::{BondGraph, Guess, Kind, Meaning, StorageLaw};
 use crate::algebra::{Expr, Node, Symbol};
 use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
+use crate::ids::Id;
 use crate::span::Span;
 
 impl<'a> Builder<'a, '_> {
@@ -37,7 +39,10 @@ impl<'a> Builder<'a, '_> {
         let flat = self.flat;
         let cx = Reading::of(here, flat.names.scopes[here.scope].prefix.trim_end_matches('.'));
         let own = self.path(&cx, &guess.what)?;
-        let symbol = self.searched(own.expr, guess.what.span)?;
+        let symbol = match self.common_flow(own.expr) {
+            Some(symbol) => symbol,
+            None => self.searched(own.expr, guess.what.span)?,
+        };
         let value = self.number(&cx, &guess.value)?;
         let value = self.with_unit(value, guess.unit.as_ref(), guess.value.span);
         self.equal(&value.quantity, &own.quantity, guess.span, "the guess and what it is for");
@@ -45,6 +50,15 @@ impl<'a> Builder<'a, '_> {
             return None;
         }
         Some((symbol, Guess { what: own.expr, value: value.expr, span: guess.span }))
+    }
+
+    /// The symbol, if it is the common flow of a 1-junction, which may have no storage that could be guessed.
+    fn common_flow(&self, e: Expr) -> Option<Symbol> {
+        let Node::Symbol(symbol) = *self.exprs.node(e) else { return None };
+        let Some(Meaning::Flow(bond)) = self.meaning(symbol) else { return None };
+        let wire = &self.wiring.wires[bond.index()];
+        let common = |part: usize| self.part(part).word == Word::One && self.representative(part) == Some(bond.index());
+        [wire.from.0, wire.to.0].into_iter().any(common).then_some(symbol)
     }
 
     /// The symbol, if the start is searched for what it stands for.
@@ -57,7 +71,7 @@ impl<'a> Builder<'a, '_> {
         if matches!(meaning, Some(Meaning::Signal(_) | Meaning::Stored(_))) {
             return symbol;
         }
-        let title = "a guess is for a state, the `q` of a C or the `p` of an I";
+        let title = "a guess is for a state, the `q` of a C, the `p` of an I or the `f` of a 1-junction";
         let what = match meaning {
             Some(Meaning::Parameter(_)) => "a parameter has its value already",
             Some(Meaning::Input(_)) => "an input is given from outside",

@@ -238,6 +238,13 @@ pub struct Element {
     pub cell: Option<CellId>,
 }
 
+impl Element {
+    /// The name of a port of it, as it stands in results: `spring`, `gap.el`, `twist[4]`.
+    pub fn part_name(&self, port: usize) -> String {
+        multibonds::part_name(&self.name, &self.ports[port].name)
+    }
+}
+
 /// A port and its bond.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Port {
@@ -701,10 +708,7 @@ impl BondGraph {
     /// What a port is called: its element, in fields and two-ports with the port: `body`, `gap.el`, `gear.in`.
     pub fn port_name(&self, port: PortRef) -> String {
         let element = &self.elements[port.element];
-        match element.ports[port.port as usize].name.as_str() {
-            "" => element.name.clone(),
-            own => format!("{}.{own}", element.name),
-        }
+        element.part_name(port.port as usize)
     }
     /// The symbols (co-energy `z`, rate `X'`) of a storage port: (flow, effort) of an `I`, (effort, flow) of a `C`.
     ///

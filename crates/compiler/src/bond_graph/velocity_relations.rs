@@ -323,6 +323,39 @@ fn classified(x: &mut Exprs, graph: &BondGraph, terms: Vec<(Symbol, Expr)>) -> V
     if terms.iter().any(|t| x.depends_on_any(t.1, &|s| !is_coordinate(x, graph, s))) {
         return VelocityRelation { terms, integral: Integral::Undecided };
     }
+    if let Some(found) = closed(x, graph, &terms) {
+        return found;
+    }
+    // Elimination leaves factors on both sides of the line.
+    let short: Option<Vec<(Symbol, Expr)>> = terms.iter().map(|&(s, e)| Some((s, in_lowest_terms(x, e)?))).collect();
+    let found = short.filter(|short| *short != terms).and_then(|short| {
+        let mut below: Vec<Expr> = short.iter().map(|t| x.over_and_under(t.1).1).filter(|&e| e != ONE).collect();
+        below.sort();
+        below.dedup();
+        let below = x.mul(&below);
+        let whole: Vec<(Symbol, Expr)> = short
+            .iter()
+            .map(|&(s, e)| {
+                let product = x.mul(&[below, e]);
+                (s, in_lowest_terms(x, product).unwrap_or(product))
+            })
+            .collect();
+        closed(x, graph, &whole).or_else(|| closed(x, graph, &short))
+    });
+    found.unwrap_or(VelocityRelation { terms, integral: Integral::Open })
+}
+
+fn in_lowest_terms(x: &mut Exprs, e: Expr) -> Option<Expr> {
+    let lowest = x.lowest_terms(e)?;
+    Some(lowest.below.into_iter().fold(lowest.above, |above, (factor, power)| {
+        let power = x.int(power.into());
+        let below = x.pow(factor, power);
+        x.div(above, below)
+    }))
+}
+
+/// A relation as it stands, or multiplied by what makes a differential of it with a closed form, if there is one.
+fn closed(x: &mut Exprs, graph: &BondGraph, terms: &[(Symbol, Expr)]) -> Option<VelocityRelation> {
     let factors: Vec<Expr> = std::iter::once(ONE)
         .chain(
             terms.iter().map(|t| t.1).filter(|&e| !is_fixed(x, e)).collect::<Vec<_>>().into_iter().map(|e| x.recip(e)),
@@ -339,10 +372,10 @@ fn classified(x: &mut Exprs, graph: &BondGraph, terms: Vec<(Symbol, Expr)>) -> V
         if is_exact(x, graph, &scaled)
             && let Some(potential) = x.potential(&scaled)
         {
-            return VelocityRelation { terms: scaled, integral: Integral::Closed(potential) };
+            return Some(VelocityRelation { terms: scaled, integral: Integral::Closed(potential) });
         }
     }
-    VelocityRelation { terms, integral: Integral::Open }
+    None
 }
 
 /// Whether a symbol is a position, a parameter, time, or what events alone change.

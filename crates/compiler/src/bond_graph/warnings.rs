@@ -1,8 +1,8 @@
 //! What is legal but odd about a graph.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::{BondGraph, Element, Kind, Meaning, Storage, StorageLaw};
+use super::{Bond, BondGraph, Element, Kind, Meaning, Storage, StorageLaw};
 use crate::algebra::{Expr, Symbol};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -16,9 +16,19 @@ pub fn warnings(graph: &BondGraph) -> Vec<Diagnostic> {
     found
 }
 
-/// Junctions with one bond: a 0 lets nothing flow, a 1 lets nothing push.
+/// Junctions with one bond: a 0 lets nothing flow, a 1 lets nothing push. One whose common variable something reads, as the
+/// rate of an angle, is there for its name.
 fn lonely_junctions(graph: &BondGraph) -> Vec<Diagnostic> {
-    let lonely = graph.elements.values().filter(|e| matches!(e.kind, Kind::Zero | Kind::One) && e.ports.len() == 1);
+    let alone = |e: &&Element| matches!(e.kind, Kind::Zero | Kind::One) && e.ports.len() == 1;
+    let read: BTreeSet<Symbol> = match graph.elements.values().any(|e| alone(&e)) {
+        true => graph.expressions().into_iter().flat_map(|e| graph.exprs.symbols_of(e)).collect(),
+        false => BTreeSet::new(),
+    };
+    let named = |e: &Element| {
+        let bond = &graph.bonds[e.ports[0].bond];
+        read.contains(if matches!(e.kind, Kind::One) { &bond.flow } else { &bond.effort })
+    };
+    let lonely = graph.elements.values().filter(|e| alone(e) && !named(e));
     let warning = |e: &Element| {
         let (what, hint) = match e.kind {
             Kind::Zero => ("flow", "the flow of its bond is 0; remove the junction, or join more to it"),
@@ -53,6 +63,15 @@ fn isolated_parts(graph: &BondGraph) -> Vec<Diagnostic> {
     }
     graph.outputs.iter().for_each(|output| reads.beside_each_other(output.value));
     let mut sets = reads.sets;
+    // A constraint that holds whatever moves is joined to nothing.
+    let idle =
+        |bond: &Bond| graph.elements[bond.from.element].ports.len() + graph.elements[bond.to.element].ports.len() == 2;
+    for constraint in &graph.constraints {
+        let bond = graph.elements[constraint.element].ports.first().map(|p| &graph.bonds[p.bond]);
+        if bond.is_some_and(idle) {
+            sets.join(0, constraint.element.index());
+        }
+    }
     let mut seen: BTreeMap<usize, &Element> = BTreeMap::new();
     for (id, element) in graph.elements.iter() {
         seen.entry(sets.find(id.index())).or_insert(element);
@@ -181,7 +200,7 @@ fn asymmetric(
             let cross = pool.derivative(a, variable(j));
             let back = pool.derivative(b, variable(i));
             let difference = pool.sub(cross, back);
-            if !pool.is_zero(difference) {
+            if !pool.is_zero(difference) && !pool.is_zero_given(difference) {
                 return Some((j, i));
             }
         }

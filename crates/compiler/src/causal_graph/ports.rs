@@ -133,6 +133,8 @@ pub(super) struct Net {
 /// Parts with more elements than this are solved by the roles of their ports alone, if they can be: elimination fills the
 /// rows of a chain in.
 const LARGE: usize = 600;
+/// As many elements a wide two-port counts for.
+const WIDE: usize = 60;
 
 /// Solves the junction structure of one connected part. Definitions are as short as the elements write them where that
 /// can be.
@@ -144,7 +146,8 @@ pub fn solve_part(
 ) -> Solved {
     let before = x.assumed();
     let net = Net::new(x, graph, members, preferences);
-    if members.len() > LARGE
+    let wide = |e: &&ElementId| matches!(graph.elements[**e].kind, Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_));
+    if members.len() + WIDE * members.iter().filter(wide).count() > LARGE
         && let Some(solved) = net.solved_by_roles(x, preferences)
     {
         return solved;

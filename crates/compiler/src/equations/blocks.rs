@@ -62,7 +62,15 @@ pub struct LinearRow {
 /// Puts the definitions of `symbols` into evaluation order. Loops are preferably torn at the variables in `first`.
 pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
     let mut ordered = Ordered::default();
+    let mut numbers: BTreeMap<Symbol, Expr> = BTreeMap::new();
     for component in components(d, symbols) {
+        put_in(d, &component, &numbers);
+        if let [only] = component[..]
+            && let Definition::Explicit(value) = d.of[&only]
+            && d.x.is_number(value).is_some()
+        {
+            numbers.insert(only, value);
+        }
         match component[..] {
             [only] if is_direct(d, only) => {
                 ordered.steps.push(EquationStep::Assign { symbol: only, value: d.of[&only].expr() });
@@ -71,6 +79,20 @@ pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) 
         }
     }
     Ok(ordered)
+}
+
+/// Puts in variables that are plain numbers, as what a source of zero imposes is: what is multiplied by it is not there.
+fn put_in(d: &mut Definitions, symbols: &[Symbol], numbers: &BTreeMap<Symbol, Expr>) {
+    if numbers.is_empty() {
+        return;
+    }
+    for symbol in symbols {
+        let definition = d.of[symbol];
+        if d.x.depends_on_any(definition.expr(), &|s| numbers.contains_key(&s)) {
+            let value = d.x.substitute(definition.expr(), numbers);
+            d.of.insert(*symbol, definition.with(value));
+        }
+    }
 }
 
 fn is_direct(d: &Definitions, symbol: Symbol) -> bool {

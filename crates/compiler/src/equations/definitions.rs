@@ -17,6 +17,14 @@ pub enum Definition {
 }
 
 impl Definition {
+    /// The same with another expression.
+    pub fn with(self, e: Expr) -> Definition {
+        match self {
+            Definition::Explicit(_) => Definition::Explicit(e),
+            Definition::Implicit(_) => Definition::Implicit(e),
+        }
+    }
+
     /// The expression.
     pub fn expr(self) -> Expr {
         match self {

@@ -10,7 +10,7 @@ use super::InitialCondition;
 use super::definitions::{Definition, Definitions};
 use super::independent_rows::{IndependentRows, Row, equilibrate};
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
-use crate::bond_graph::Kind;
+use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
 use crate::causal_graph::{CausalGraph, Role};
 
@@ -30,7 +30,9 @@ pub(super) fn conditions(
     sums: &[Sum],
     given: &[InitialCondition],
 ) -> Vec<InitialCondition> {
-    let empty = storages(d, causal, sums);
+    let mut empty = guessed_flows(d);
+    let stored = storages(d, causal, sums).into_iter().filter(|s| !empty.contains(s)).collect::<Vec<_>>();
+    empty.extend(stored);
     let guessed: BTreeMap<Expr, Expr> = d.graph.guesses.iter().map(|g| (g.what, g.value)).collect();
     let value = |x: &mut Exprs, s: Symbol| guessed.get(&x.sym(s)).copied().unwrap_or(ZERO);
     let wanted: Vec<(Symbol, Expr)> = empty.into_iter().map(|s| (s, value(&mut d.x, s))).collect();
@@ -47,6 +49,13 @@ pub(super) fn conditions(
         });
     }
     weak
+}
+
+/// Common flows of junctions that are guessed, but for those guessed to be 0: so they are in any case.
+fn guessed_flows(d: &Definitions) -> Vec<Symbol> {
+    let is_flow = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Flow(_))) && d.of.contains_key(s);
+    let guesses = d.graph.guesses.iter().filter(|g| g.value != ZERO);
+    guesses.flat_map(|g| d.x.symbols_of(g.what)).filter(|s| is_flow(s) && !d.missing.contains_key(s)).collect()
 }
 
 /// What the storages hold, in the order of the model; then speeds (or efforts) that are kept without one.

@@ -138,8 +138,8 @@ fn variables(graph: &BondGraph) -> Vec<(String, ObservedKind, Symbol)> {
             Kind::Zero => all.push((format!("{name}.e"), Effort, bond(0).effort)),
             Kind::One => all.push((format!("{name}.f"), Flow, bond(0).flow)),
             kind => {
-                for (index, port) in element.ports.iter().enumerate() {
-                    let place = if port.name.is_empty() { name.clone() } else { format!("{name}.{}", port.name) };
+                for index in 0..element.ports.len() {
+                    let place = element.part_name(index);
                     all.push((format!("{place}.e"), Effort, bond(index).effort));
                     all.push((format!("{place}.f"), Flow, bond(index).flow));
                     match kind {
@@ -164,7 +164,9 @@ pub fn guesses(d: &mut Definitions) -> Vec<Guess> {
     let mut all = Vec::new();
     for guess in &graph.guesses {
         let symbols = d.x.symbols_of(guess.what);
-        if symbols.iter().any(|s| d.missing.contains_key(s)) {
+        // Common flows take part where freedom is left, see `freedom`.
+        let flow = |s: &Symbol| matches!(graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Flow(_)));
+        if symbols.iter().any(|s| d.missing.contains_key(s) || flow(s)) {
             continue;
         }
         let name = symbols.iter().next().map_or(String::new(), |s| d.x.name(*s).to_string());

@@ -54,7 +54,8 @@ impl Model {
         observed.iter().enumerate().for_each(|(i, o)| _ = index_of.entry(&o.name).or_insert(i));
         let mut chosen = Vec::with_capacity(names.len());
         for &name in names {
-            let index = *index_of.get(name).ok_or_else(|| RecordError::Unknown(name.to_string()))?;
+            let index = index_of.get(name).or_else(|| index_of.get(with_letters(name).as_str()));
+            let index = *index.ok_or_else(|| RecordError::Unknown(name.to_string()))?;
             if let Err(why) = &observed[index].value {
                 return Err(RecordError::Unavailable(name.to_string(), why.clone()));
             }
@@ -105,4 +106,12 @@ impl Model {
             self.frame.reserve_batches(batches);
         }
     }
+}
+
+/// A name with its strands by their letters: `body.v[2].f` is `body.v.y.f` where a multibond is no wider than three.
+fn with_letters(name: &str) -> String {
+    ["x", "y", "z"]
+        .iter()
+        .enumerate()
+        .fold(name.to_string(), |name, (at, letter)| name.replace(&format!("[{}]", at + 1), &format!(".{letter}")))
 }
