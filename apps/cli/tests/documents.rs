@@ -72,7 +72,7 @@ fn models_in_the_readme_run() {
 
 #[test]
 fn models_in_the_language_document_run() {
-    snippets_run("docs/language.md", 14);
+    snippets_run("docs/language.md", 17);
 }
 
 #[test]

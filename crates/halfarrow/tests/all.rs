@@ -42,6 +42,8 @@ mod library_std;
 mod linearize;
 #[path = "mechanisms.rs"]
 mod mechanisms;
+#[path = "multibonds.rs"]
+mod multibonds;
 #[path = "names.rs"]
 mod names;
 #[path = "repeated.rs"]

@@ -5,7 +5,7 @@
 
 use super::lexer::{TokenKind, lex};
 use super::parse::{KEYWORDS, RESERVED, parse_with_units, significant};
-use crate::diagnostic::{Diagnostic, codes};
+use crate::diagnostic::Diagnostic;
 use crate::span::{FileId, Span};
 
 const INDENT: usize = 4;
@@ -13,7 +13,7 @@ const INDENT: usize = 4;
 /// Lines wider than this take no part in the alignment of what stands at their ends.
 const WIDEST: usize = 60;
 
-/// The text in canonical layout; its errors if it cannot be read. Reserved syntax can be laid out, although not used.
+/// The text in canonical layout; its errors if it cannot be read.
 ///
 /// ```
 /// use halfarrow_compiler::ast::format;
@@ -22,7 +22,7 @@ const WIDEST: usize = 60;
 /// ```
 pub fn format(text: &str) -> Result<String, Vec<Diagnostic>> {
     let (parsed, units) = parse_with_units(text, FileId::default());
-    if parsed.diagnostics.iter().any(|d| d.is_error() && d.code != codes::S008) {
+    if parsed.diagnostics.iter().any(Diagnostic::is_error) {
         return Err(parsed.diagnostics);
     }
     let lines = Layout::new(text, &units).lines();

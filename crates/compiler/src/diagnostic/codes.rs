@@ -29,7 +29,6 @@ codes! {
     S005 "the model does not begin with `model Name`";
     S006 "nested too deeply";
     S007 "a number that cannot be read";
-    S008 "reserved for a later version";
     S009 "a reserved word stands where a name is needed";
     S010 "a node without a name or without a kind";
     S011 "quoted text that documents nothing";

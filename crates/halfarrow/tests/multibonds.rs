@@ -1,0 +1,336 @@
+//! Multibonds, ports with signals, and `std.multibody` against closed forms.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
+use std::f64::consts::{FRAC_PI_3, PI};
+
+use halfarrow::{Compare, Form, Model, Record, Run, Simulated};
+
+fn model(text: &str) -> Model {
+    Model::from_text("test.bond", text, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn run(text: &str, run: &Run) -> Simulated {
+    let run = Run { record: Record::All, ..run.clone() };
+    model(text).simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn column<'a>(done: &'a Simulated, name: &str) -> &'a [f64] {
+    let found = done.trace.columns.iter().find(|c| c.name == name);
+    &found.unwrap_or_else(|| panic!("nothing called {name}")).values
+}
+
+fn times(done: &Simulated) -> &[f64] {
+    &done.trace.times
+}
+
+fn last(done: &Simulated, name: &str) -> f64 {
+    *column(done, name).last().expect("there are samples")
+}
+
+#[track_caller]
+fn close(found: f64, expected: f64, off: f64) {
+    assert!((found - expected).abs() <= off, "{found} instead of {expected}: off by {:.1e}", (found - expected).abs());
+}
+
+/// Names and number of the states of the minimal form.
+fn states(text: &str) -> Vec<String> {
+    let report = model(text).equations(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    report.states.into_iter().map(|s| s.name).collect()
+}
+
+/// Jacobi's elliptic functions sn, cn, dn of `u` and parameter `m`, by the arithmetic-geometric mean.
+fn jacobi(u: f64, m: f64) -> [f64; 3] {
+    let (mut a, mut b, mut c) = (1.0f64, (1.0 - m).sqrt(), m.sqrt());
+    let mut steps = vec![(a, c)];
+    while c.abs() > 1e-17 {
+        (a, b, c) = ((a + b) / 2.0, (a * b).sqrt(), (a - b) / 2.0);
+        steps.push((a, c));
+    }
+    let last = steps.len() - 1;
+    let mut phi = 2f64.powi(last as i32) * a * u;
+    for &(a, c) in steps[1..].iter().rev() {
+        phi = (phi + (c / a * phi.sin()).asin()) / 2.0;
+    }
+    let sn = phi.sin();
+    [sn, phi.cos(), (1.0 - m * sn * sn).sqrt()]
+}
+
+/// A body that nothing holds turns over about its middle axis: Euler's equations in Jacobi's functions.
+#[test]
+fn a_free_body_turns_over() {
+    let text = "model Tumble
+1[3]:w -> I[3]:body([1, 2, 3], f0 = [1, 0, 0.5])
+w -> GY[3]:ejs(skew(body.p))
+";
+    let [i1, i2, i3] = [1.0, 2.0, 3.0f64];
+    // Twice the energy, and the square of the angular momentum: below 2 E I2 the body turns about its first axis.
+    let (e, l) = (i1 + i3 * 0.25, i1 * i1 + i3 * i3 * 0.25);
+    assert!(l < e * i2);
+    let rate = ((i2 - i1) * (e * i3 - l) / (i1 * i2 * i3)).sqrt();
+    let parameter = (i3 - i2) * (l - e * i1) / ((i2 - i1) * (e * i3 - l));
+    let [x, y, z] = [(e * i3 - l, i1, i3), (l - e * i1, i2, i2), (l - e * i1, i3, i3)]
+        .map(|(above, own, far)| (above / (own * (far - i1))).sqrt());
+    let done = run(text, &Run { to: 20.0, rtol: 1e-12, every: Some(0.5), ..Run::default() });
+    for (k, t) in times(&done).iter().enumerate() {
+        let [sn, cn, dn] = jacobi(rate * t, parameter);
+        close(column(&done, "body.x.f")[k], x * dn, 1e-9);
+        close(column(&done, "body.y.f")[k], y * sn, 1e-9);
+        close(column(&done, "body.z.f")[k], z * cn, 1e-9);
+    }
+}
+
+/// A top on its point, at the two rates at which it goes round without nodding: C w3 W - A W^2 cos(th) = m g l.
+#[test]
+fn a_top_precesses_steadily() {
+    let (a, c, mgl, theta, spin) = (0.02, 0.005, 0.981, FRAC_PI_3, 60.0);
+    let root = f64::sqrt((c * spin) * (c * spin) - 4.0 * a * mgl * f64::cos(theta));
+    for around in [(c * spin - root) / (2.0 * a * theta.cos()), (c * spin + root) / (2.0 * a * theta.cos())] {
+        for joint in [
+            format!("Spherical:point(e0 = [cos(theta/2), sin(theta/2), 0, 0], w0 = [0, {around}*sin(theta), 60])"),
+            // About x, y and z in turn: the axis of the top leans about x.
+            format!("SphericalCardan:point(q1 = theta, w1 = 0, w2 = {around}*sin(theta), w3 = 60)"),
+        ] {
+            let text = format!(
+                "model Top
+import std.multibody
+param theta = {theta}
+World:world -> {joint} -> FixedTranslation:stem(d = [0, 0, 0.1])
+stem -> Body:top(m = 1, J = diag([0.01, 0.01, 0.005]))
+output up = top.a.R[3,3]
+output x = top.a.r[1]
+output y = top.a.r[2]
+"
+            );
+            let to = 1.0;
+            let done = run(&text, &Run { to, rtol: 1e-12, every: Some(0.01), ..Run::default() });
+            for (k, t) in times(&done).iter().enumerate() {
+                let angle = around * t;
+                close(column(&done, "up")[k], theta.cos(), 1e-9);
+                close(column(&done, "x")[k], 0.1 * theta.sin() * angle.sin(), 1e-9);
+                close(column(&done, "y")[k], -0.1 * theta.sin() * angle.cos(), 1e-9);
+            }
+        }
+    }
+}
+
+/// Two shafts at an angle with a cardan joint between them: tan(b) = tan(a)/cos(bend).
+#[test]
+fn a_universal_joint_turns_unevenly() {
+    let text = "model Cardan
+import std.multibody
+param bend = 0.5235987755982988
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:input(n = [1, 0, 0], w0 = 2, fixed = 1) -> 1[frame]:yoke -> Body:first(m = 1, J = diag([0.1, 1, 1]))
+yoke -> Universal:cross(n1 = [0, 1, 0], n2 = [0, 0, 1], q2 = bend) -> 1[frame]:shaft
+shaft -> Body:second(m = 1, J = diag([0.2, 1, 1]))
+// The second shaft turns in a bearing whose axis leans by the bend.
+ground -> FixedRotation:lean(n = [0, 0, 1], angle = bend) -> Revolute:output(n = [1, 0, 0]) -> bearing.b
+CutOrientation:bearing
+shaft -> bearing.a
+";
+    assert_eq!(states(text).len(), 2, "{:?}", states(text));
+    let done = run(text, &Run { to: 10.0, rtol: 1e-11, every: Some(0.05), ..Run::default() });
+    assert!(last(&done, "input.angle") > 15.0);
+    let (sin, cos) = (PI / 6.0).sin_cos();
+    for k in 0..times(&done).len() {
+        // The first axis of the cross is y: at an angle of 0 it lies in the plane of the shafts.
+        let a = column(&done, "input.angle")[k];
+        let ratio = column(&done, "output.speed")[k] / column(&done, "input.speed")[k];
+        close(ratio, cos / (1.0 - sin * sin * a.sin() * a.sin()), 1e-9);
+    }
+}
+
+/// The planar model by transformers and the frames of space tell the same double pendulum.
+#[test]
+fn a_double_pendulum_of_frames_is_that_of_transformers() {
+    let plane =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/double_pendulum/model.bond"));
+    let exact = Run { to: 3.0, rtol: 1e-12, every: Some(0.1), ..Run::default() };
+    let plane = run(&plane.expect("the model is there"), &exact);
+    // Points: all inertia is in the masses.
+    let text = "model Frames
+import std.multibody
+component Point(param m; in a : frame) {
+    a.v -> 1[3]:v -> I[3]:mass(m)
+    a.w -> 1[3]:w
+    v -> GY[3]:turning(m*transpose(skew(w.f)))
+    Se[3]:weight(m*(transpose(a.R)*a.g)) -> v
+}
+World:world -> Revolute:one(n = [0, 1, 0], q0 = -0.9) -> FixedTranslation:rod1(d = [0, 0, -0.6]) -> 1[frame]:elbow
+elbow -> Point:m1(m = 1.2)
+elbow -> Revolute:two(n = [0, 1, 0], q0 = 1.3) -> FixedTranslation:rod2(d = [0, 0, -0.9]) -> Point:m2(m = 0.8)
+output phi1 = -one.q
+output phi2 = -one.q - two.q
+";
+    let space = run(text, &exact);
+    for name in ["phi1", "phi2"] {
+        for (k, value) in column(&space, name).iter().enumerate() {
+            close(*value, column(&plane, name)[k], 1e-9);
+        }
+    }
+}
+
+const FOUR_BAR: &str = "model FourBar
+import std.multibody
+World:world -> 1[frame]:ground -> Revolute:a1(n = [0, 1, 0], q0 = 0.3, w0 = 8, fixed = 1) -> 1[frame]:crank
+crank -> FixedTranslation:c1(d = [0.2, 0, 0]) -> Revolute:a2(n = [0, 1, 0]) -> 1[frame]:coupler
+crank -> Body:crank_body(m = 1, J = diag([0.001, 0.01, 0.01]), c = [0.1, 0, 0])
+coupler -> Body:coupler_body(m = 1, J = diag([0.001, 0.03, 0.03]), c = [0.25, 0, 0])
+coupler -> FixedTranslation:c2(d = [0.5, 0, 0])
+ground -> FixedTranslation:g(d = [0.5, 0, 0]) -> Revolute:a3(n = [0, 1, 0], q0 = 1.2) -> 1[frame]:rocker
+rocker -> Body:rocker_body(m = 1, J = diag([0.001, 0.02, 0.02]), c = [0.2, 0, 0])
+rocker -> FixedTranslation:c3(d = [0.4, 0, 0])
+CutRevolute:close(n = [0, 1, 0])
+c2 -> close.a
+c3 -> close.b
+output gap = norm(close.a.r - close.b.r)
+";
+
+/// A hinge in space closes a plane loop: three of its five conditions hold anyway, one degree of freedom is left, and the loop
+/// stays closed while the crank turns round.
+#[test]
+fn a_four_bar_in_space_has_one_degree_of_freedom() {
+    assert_eq!(states(FOUR_BAR), ["a1.rate.f", "a1.q"]);
+    let done = run(FOUR_BAR, &Run { to: 5.0, rtol: 1e-10, every: Some(0.01), ..Run::default() });
+    assert!(last(&done, "a1.q").abs() > 12.0, "the crank turns round: {}", last(&done, "a1.q"));
+    assert!(column(&done, "gap").iter().all(|gap| *gap < 1e-12));
+}
+
+/// Energy along the motion of a chain of bodies in space whose joints turn about axes in all directions.
+#[test]
+fn chains_in_space_keep_their_energy() {
+    let mut text = String::from("model Chain\nimport std.multibody\nWorld:world -> 1[frame]:end0\n");
+    for i in 1..=5 {
+        let axis = ["[1, 0, 0]", "[0, 0.6, 0.8]", "[0, 1, 0]"][i % 3];
+        text += &format!("end{} -> Revolute:j{i}(n = {axis}, q0 = 0.{i}, w0 = {i} - 2) -> 1[frame]:hub{i}\n", i - 1);
+        text += &format!(
+            "hub{i} -> Body:b{i}(m = 1, J = [[0.02, 0.001, 0], [0.001, 0.03, 0], [0, 0, 0.01]], c = [0, 0.05, -0.25])\n"
+        );
+        text += &format!("hub{i} -> FixedTranslation:t{i}(d = [0, 0, -0.5]) -> 1[frame]:end{i}\n");
+    }
+    let parts: Vec<String> = (1..=5)
+        .map(|i| {
+            format!(
+                "0.5*dot(b{i}.mass.p, b{i}.mass.f) + 0.5*dot(b{i}.inertia.p, b{i}.inertia.f) + 9.81*(b{i}.a.r[3] + dot([b{i}.a.R[3,1], b{i}.a.R[3,2], b{i}.a.R[3,3]], [0, 0.05, -0.25]))"
+            )
+        })
+        .collect();
+    text += &format!("output E = {}\n", parts.join(" + "));
+    assert_eq!(states(&text).len(), 10);
+    let done = run(&text, &Run { to: 2.0, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    let energy = column(&done, "E");
+    assert!(energy[0].abs() > 1.0);
+    for e in energy {
+        close(*e, energy[0], 1e-9);
+    }
+}
+
+/// All forms agree on a pendulum of two bodies in space, reactions included.
+#[test]
+fn all_forms_agree_in_space() {
+    let text = "model Two
+import std.multibody
+World:world -> Revolute:j1(n = [0, 1, 0], q0 = 0.5, w0 = 1) -> 1[frame]:h1 -> Body:b1(m = 1, J = diag([0.02, 0.03, 0.01]), c = [0, 0, -0.2])
+h1 -> FixedTranslation:t1(d = [0, 0, -0.4]) -> Revolute:j2(n = [1, 0, 0], q0 = 0.2) -> Body:b2(m = 2, J = diag([0.02, 0.03, 0.01]), c = [0, 0, -0.3])
+";
+    let compare = Compare { to: Some(0.5), ..Compare::default() };
+    let report = model(text).compare(&compare, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert_eq!(report.rows.len(), 7);
+    for row in &report.rows {
+        let limit = if row.form == Form::Stiff { 1e-5 } else { 1e-8 };
+        assert!(row.max_error.is_some_and(|e| e < limit), "{:?}: {:?} {:?}", row.form, row.max_error, row.reason);
+    }
+}
+
+/// A free body on a parabola turns as one that is held at its centre; by its quaternion and by joints beside each other.
+#[test]
+fn a_free_body_flies() {
+    let text = "model Flight
+import std.multibody
+World:world -> Free:air(x0 = [1, 2, 3], v0 = [4, 0, 5], w0 = [1, 0, 0.6]) -> Body:stone(m = 2, J = diag([1, 2, 3]))
+World:hall(g = [0, 0, 0]) -> Spherical:hold(w0 = [1, 0, 0.6]) -> Body:held(m = 2, J = diag([1, 2, 3]))
+output r = stone.a.r
+";
+    let done = run(text, &Run { to: 2.0, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    for (k, t) in times(&done).iter().enumerate() {
+        close(column(&done, "r[1]")[k], 1.0 + 4.0 * t, 1e-9);
+        close(column(&done, "r[2]")[k], 2.0, 1e-9);
+        close(column(&done, "r[3]")[k], 3.0 + 5.0 * t - 4.905 * t * t, 1e-9);
+        for s in ["x", "y", "z"] {
+            close(
+                column(&done, &format!("stone.inertia.{s}.f"))[k],
+                column(&done, &format!("held.inertia.{s}.f"))[k],
+                1e-9,
+            );
+        }
+    }
+}
+
+/// A spring between two points of two bodies: the distance of two masses swings about its length.
+#[test]
+fn two_masses_swing_on_a_spring() {
+    let text = "model Dumbbell
+import std.multibody
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Prismatic:left(n = [0.6, 0, 0.8], q0 = 0) -> 1[frame]:a -> Body:one(m = 1, J = diag([1, 1, 1]))
+ground -> Prismatic:right(n = [0.6, 0, 0.8], q0 = 1.5) -> 1[frame]:b -> Body:two(m = 3, J = diag([1, 1, 1]))
+SpringDamper:spring(k = 12, l0 = 1)
+a -> spring.a
+b -> spring.b
+";
+    let done = run(text, &Run { to: 3.0, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    for (k, t) in times(&done).iter().enumerate() {
+        close(column(&done, "spring.length")[k], 1.0 + 0.5 * (4.0 * t).cos(), 1e-9);
+    }
+}
+
+/// What a matrix transformer says, row by row, with all its strands.
+#[test]
+fn a_matrix_transformer_hands_on_power() {
+    let text = "model Rows
+Se[3]:push([1, 2, 3]) -> 1[3]:v -> TF[2, 3]:map([[1, 0, 2], [0, -1, 1]]) -> 1[2]:u
+v -> R[3]:friction([1, 2, 3])
+u -> R[2]:load([[2, 1], [1, 2]])
+output lost = dot(map.in.e, map.in.f) - dot(map.out.e, map.out.f)
+output off = map.out[1].f - v[1].f - 2*v.z.f
+";
+    let done = run(text, &Run { to: 0.1, ..Run::default() });
+    close(last(&done, "lost"), 0.0, 1e-14);
+    close(last(&done, "off"), 0.0, 1e-14);
+    // (diag(1, 2, 3) + MᵀLM) f = e, solved by hand elimination in exact fractions: residuals are zero.
+    let m = [[1.0, 0.0, 2.0], [0.0, -1.0, 1.0]];
+    let l = [[2.0, 1.0], [1.0, 2.0]];
+    let f: Vec<f64> = ["x", "y", "z"].iter().map(|s| last(&done, &format!("v.{s}.f"))).collect();
+    let u: Vec<f64> = m.iter().map(|row| row.iter().zip(&f).map(|(a, b)| a * b).sum()).collect();
+    let e: Vec<f64> = l.iter().map(|row| row.iter().zip(&u).map(|(a, b)| a * b).sum()).collect();
+    for i in 0..3 {
+        let back = m[0][i] * e[0] + m[1][i] * e[1];
+        close([1.0, 2.0, 3.0][i] * f[i] + back, [1.0, 2.0, 3.0][i], 1e-13);
+    }
+}
+
+/// A matrix gyrator between two sides: efforts at `out` from flows at `in`.
+#[test]
+fn a_matrix_gyrator_turns_flows_into_efforts() {
+    let text = "model Motor
+Sf[2]:turn([1, 2]) -> GY[3, 2]:k([[1, 2], [3, 4], [5, 6]]) -> R[3]:coil([1, 2, 4])
+";
+    let done = run(text, &Run { to: 0.1, ..Run::default() });
+    for (s, e) in [("x", 5.0), ("y", 11.0), ("z", 17.0)] {
+        close(last(&done, &format!("coil.{s}.e")), e, 1e-13);
+    }
+    // e_in = Mᵀ f_out
+    close(last(&done, "turn.x.e"), 5.0 + 3.0 * 5.5 + 5.0 * 4.25, 1e-13);
+}
+
+/// One axis by the joint's own port: a motor, and a port left open.
+#[test]
+fn a_joint_is_driven_at_its_axis() {
+    let text = "model Driven
+import std.multibody
+World:world(g = [0, 0, 0]) -> Revolute:j(n = [0, 0, 1]) -> Body:arm(m = 2, J = diag([1, 1, 1.5]), c = [0.5, 0, 0])
+Se:motor(3 N.m) -> j.axis
+";
+    let done = run(text, &Run { to: 2.0, rtol: 1e-12, ..Run::default() });
+    close(last(&done, "j.angle"), 0.5 * 3.0 / 2.0 * 4.0, 1e-9);
+}
