@@ -133,10 +133,10 @@ shaft -> bearing.a
     assert!(last(&done, "input.angle") > 15.0);
     let (sin, cos) = (PI / 6.0).sin_cos();
     for k in 0..times(&done).len() {
-        // The first axis of the cross is y: at an angle of 0 it lies in the plane of the shafts.
+        // The first axis of the cross is y: at an angle of 0 it lies in the plane of the shafts, and tan(b) = tan(a)/cos(bend).
         let a = column(&done, "input.angle")[k];
         let ratio = column(&done, "output.speed")[k] / column(&done, "input.speed")[k];
-        close(ratio, cos / (1.0 - sin * sin * a.sin() * a.sin()), 1e-9);
+        close(ratio, cos / (1.0 - sin * sin * a.cos() * a.cos()), 1e-9);
     }
 }
 
@@ -172,7 +172,7 @@ output phi2 = -one.q - two.q
 
 const FOUR_BAR: &str = "model FourBar
 import std.multibody
-World:world -> 1[frame]:ground -> Revolute:a1(n = [0, 1, 0], q0 = 0.3, w0 = 8, fixed = 1) -> 1[frame]:crank
+World:world -> 1[frame]:ground -> Revolute:a1(n = [0, 1, 0], q0 = 0.3, w0 = 25, fixed = 1) -> 1[frame]:crank
 crank -> FixedTranslation:c1(d = [0.2, 0, 0]) -> Revolute:a2(n = [0, 1, 0]) -> 1[frame]:coupler
 crank -> Body:crank_body(m = 1, J = diag([0.001, 0.01, 0.01]), c = [0.1, 0, 0])
 coupler -> Body:coupler_body(m = 1, J = diag([0.001, 0.03, 0.03]), c = [0.25, 0, 0])

@@ -190,7 +190,8 @@ impl<'a> Builder<'a, '_> {
                 }
             }
             Ok((Node::Part(part), used)) => {
-                used + 2 == path.parts.len() && matches!(self.part(part).width, Width::Matrix { .. })
+                let whole = used + 2 == path.parts.len() && path.parts[used].indices.is_empty();
+                whole && matches!(self.part(part).width, Width::Matrix { .. })
             }
             _ => false,
         }

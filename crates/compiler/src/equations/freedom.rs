@@ -30,7 +30,8 @@ pub(super) fn conditions(
     sums: &[Sum],
     given: &[InitialCondition],
 ) -> Vec<InitialCondition> {
-    let mut empty = guessed_flows(d);
+    let mut empty = guessed_signals(d);
+    empty.extend(guessed_flows(d));
     let stored = storages(d, causal, sums).into_iter().filter(|s| !empty.contains(s)).collect::<Vec<_>>();
     empty.extend(stored);
     let guessed: BTreeMap<Expr, Expr> = d.graph.guesses.iter().map(|g| (g.what, g.value)).collect();
@@ -49,6 +50,12 @@ pub(super) fn conditions(
         });
     }
     weak
+}
+
+/// Integrated signals that are guessed: what nothing determines stays where it is guessed, before storages are empty.
+fn guessed_signals(d: &Definitions) -> Vec<Symbol> {
+    let is_signal = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Signal(_))) && !d.missing.contains_key(s);
+    d.graph.guesses.iter().flat_map(|g| d.x.symbols_of(g.what)).filter(is_signal).collect()
 }
 
 /// Common flows of junctions that are guessed, but for those guessed to be 0: so they are in any case.
