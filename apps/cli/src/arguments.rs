@@ -652,6 +652,9 @@ pub struct Draw {
     /// Of the cells of a `for` that are made alike draw the first alone
     #[arg(long)]
     pub first_cells: bool,
+    /// Draw the bonds of a multibond one by one
+    #[arg(long)]
+    pub expand: bool,
     /// An earlier drawing, as .svg: elements that are in it stay where they are there, as seen from each other
     #[arg(long, value_name = "FILE")]
     pub keep: Option<PathBuf>,

@@ -117,6 +117,8 @@ fn line(causal: &CausalGraph, id: halfarrow_compiler::bond_graph::BondId) -> Lin
             Stroke::Undetermined => None,
         },
         name: bond.name.clone(),
+        width: 1,
+        mixed: false,
     }
 }
 

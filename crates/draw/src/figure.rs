@@ -84,6 +84,10 @@ pub struct Line {
     pub stroke: Option<usize>,
     /// Its name, may be empty.
     pub name: String,
+    /// How many bonds side by side it stands for.
+    pub width: usize,
+    /// Whether these have their strokes at different ends.
+    pub mixed: bool,
 }
 
 /// A causal path, as bonds in order.
@@ -106,6 +110,16 @@ impl Figure {
             nodes: self.glyphs.iter().map(Glyph::node).collect(),
             bonds: self.bonds.iter().map(|b| b.ends).collect(),
             alike: alike(self),
+        }
+    }
+}
+
+impl Line {
+    /// Its number, or those of all bonds that it stands for, with how many there are.
+    pub fn label(&self) -> String {
+        match self.width {
+            1 => self.number.to_string(),
+            width => format!("{} [{width}]", self.number),
         }
     }
 }

@@ -12,6 +12,7 @@ mod geometry;
 mod kept;
 mod label;
 pub mod layout;
+mod multibonds;
 mod overlay;
 mod paper;
 mod route;
@@ -25,6 +26,7 @@ use causal::figure;
 pub use causal::path_count;
 use cells::first_cells;
 pub use kept::positions;
+use multibonds::joined;
 pub use svg::render;
 
 use halfarrow_compiler::causal_graph::CausalGraph;
@@ -39,6 +41,8 @@ pub struct DrawOptions {
     pub laws: bool,
     /// Whether of the cells of a repetition that are made alike the first alone is drawn.
     pub first_cells: bool,
+    /// Whether multibonds are drawn bond by bond.
+    pub expand: bool,
     /// Where elements stand already, in px by their names: they stay there, as seen from each other. From
     /// [`positions`] of an earlier drawing, or from an editor.
     pub keep: BTreeMap<String, [f64; 2]>,
@@ -54,9 +58,15 @@ pub enum DrawnPaths {
 }
 
 impl Default for DrawOptions {
-    /// 12 causal paths, laws, all cells, nothing kept.
+    /// 12 causal paths, laws, all cells, thick bonds for multibonds, nothing kept.
     fn default() -> Self {
-        DrawOptions { paths: DrawnPaths::First(12), laws: true, first_cells: false, keep: BTreeMap::new() }
+        DrawOptions {
+            paths: DrawnPaths::First(12),
+            laws: true,
+            first_cells: false,
+            expand: false,
+            keep: BTreeMap::new(),
+        }
     }
 }
 
@@ -68,6 +78,11 @@ impl Default for DrawOptions {
 /// give equal texts.
 pub fn draw(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> String {
     let all = figure(causal, paths, options);
-    let drawn = if options.first_cells { first_cells(all, &causal.graph) } else { all };
+    let wide = causal.graph.elements.values().any(|e| e.strand.is_some());
+    let drawn = match options.first_cells {
+        true => first_cells(all, &causal.graph),
+        false if wide && !options.expand => joined(all, &causal.graph),
+        false => all,
+    };
     render(&drawn, &options.keep)
 }

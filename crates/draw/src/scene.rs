@@ -186,7 +186,7 @@ fn numbers(figure: &Figure, routes: &[Route], lanes: &Lanes, paper: &mut Paper) 
     for (i, (bond, route)) in figure.bonds.iter().zip(routes).enumerate() {
         let ports = bond.ports.iter().enumerate().filter(|p| !p.1.is_empty());
         let ports = ports.map(|(end, port)| (if end == 0 { [0.16, 0.3] } else { [0.84, 0.7] }, port.clone()));
-        for (ways, text) in ports.chain([([0.5, 0.36], bond.number.to_string())]) {
+        for (ways, text) in ports.chain([([0.5, 0.36], bond.label())]) {
             let size = number_size(&text);
             let (centre, how) = paper.settle(&beside_bond(route, ways, lanes.bands(i, route), size), size);
             crowded += usize::from(how > 0);

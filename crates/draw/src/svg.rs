@@ -111,6 +111,10 @@ fn legend(figure: &Figure) -> Vec<Row> {
         let text = "junction whose flow (1) or effort (0) is independent: no bond sets it, it acts as a source there";
         rows.extend(Row::lines(Mark::Kept, text));
     }
+    if figure.bonds.iter().any(|b| b.mixed) {
+        let text = "bonds side by side with their strokes at different ends (--expand draws them one by one)";
+        rows.extend(Row::lines(Mark::None, text));
+    }
     if figure.bonds.iter().any(|b| b.stroke.is_none()) {
         rows.extend(Row::lines(Mark::Undetermined, "bond whose effort and flow are not determined"));
     }
@@ -198,9 +202,17 @@ impl Svg {
             let name = if bond.name.is_empty() { String::new() } else { format!(" {}", bond.name) };
             let tip = escape(&format!("bond {}{name}: {} → {}", bond.number, called(from), called(to)));
             _ = write!(self.out, "<g class=\"bond\" data-bond=\"{}\"><title>{tip}</title>", bond.number);
+            if bond.width > 1 {
+                _ = write!(self.out, "<g class=\"wide\" data-width=\"{}\" stroke-width=\"2.8\">", bond.width);
+            }
             self.shaft(route, bond.stroke.is_some());
-            if let Some(end) = bond.stroke {
-                self.stroke(route, end);
+            match bond.stroke {
+                _ if bond.mixed => [0, 1].into_iter().for_each(|end| self.stroke(route, end)),
+                Some(end) => self.stroke(route, end),
+                None => {}
+            }
+            if bond.width > 1 {
+                self.out.push_str("</g>");
             }
             self.out.push_str("</g>\n");
         }

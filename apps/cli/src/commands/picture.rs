@@ -33,7 +33,13 @@ fn options(arguments: &arguments::Draw) -> Result<DrawOptions, Problem> {
         (_, numbers) => DrawnPaths::Numbers(numbers.to_vec()),
     };
     let keep = arguments.keep.as_deref().map(kept).transpose()?.unwrap_or_default();
-    Ok(DrawOptions { paths, laws: !arguments.no_laws, first_cells: arguments.first_cells, keep })
+    Ok(DrawOptions {
+        paths,
+        laws: !arguments.no_laws,
+        first_cells: arguments.first_cells,
+        expand: arguments.expand,
+        keep,
+    })
 }
 
 /// Where elements stand in an earlier drawing.

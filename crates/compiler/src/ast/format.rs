@@ -267,6 +267,7 @@ impl<'t> Layout<'t> {
             (LBrace, RBrace) => false,
             // What happens where two sides meet stands apart from them: `x >= h (restitution = 0.8)`.
             (Ident, LParen) if self.colon == self::Colon::After && self.begins_arguments(i) => true,
+            (Number, LBracket) => false,
             (_, LParen | LBracket) => !matches!(l, Ident | RBracket) || is_word(left.text),
             _ => !closes_up(r),
         }

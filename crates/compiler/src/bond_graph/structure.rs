@@ -2,6 +2,7 @@
 
 use super::assemble::cell_of;
 use super::builder::Builder;
+use super::multibonds::Width;
 use super::wire::Wire;
 use super::{Bond, BondId, Element, ElementId, Kind, Port, PortRef};
 use crate::algebra::Symbol;
@@ -36,7 +37,11 @@ impl Builder<'_, '_> {
         });
         let cell = cell_of(self.flat.names.turn_around(p.here));
         let (name, label) = (p.name.clone(), self.label(part));
-        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell }
+        let strand = match p.width {
+            Width::Strand(at, of) => Some((at as u32, of as u32)),
+            _ => None,
+        };
+        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell, strand }
     }
 
     fn bond(&self, wire: usize, w: &Wire) -> Bond {
@@ -55,7 +60,7 @@ impl Builder<'_, '_> {
 impl Structure {
     /// A new element without bonds.
     pub fn add(&mut self, name: String, kind: Kind, span: Span, label: String) -> ElementId {
-        self.elements.push(Element { name, kind, ports: Vec::new(), span, label, cell: None })
+        self.elements.push(Element { name, kind, ports: Vec::new(), span, label, cell: None, strand: None })
     }
 
     /// A new bond between two elements, at new ports of these names.

@@ -184,6 +184,7 @@ fn detect(graph: &mut BondGraph, symbol: Symbol) -> Option<PortRef> {
         span,
         label: String::new(),
         cell: None,
+        strand: None,
     };
     let (inner, outer) = match effort {
         true => (Kind::Zero, Kind::EffortDetector),

@@ -58,11 +58,11 @@ fn guessed_signals(d: &Definitions) -> Vec<Symbol> {
     d.graph.guesses.iter().flat_map(|g| d.x.symbols_of(g.what)).filter(is_signal).collect()
 }
 
-/// Common flows of junctions that are guessed, but for those guessed to be 0: so they are in any case.
+/// Common flows of junctions that are guessed; those guessed to be 0, as what is not given is, after the others.
 fn guessed_flows(d: &Definitions) -> Vec<Symbol> {
-    let is_flow = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Flow(_))) && d.of.contains_key(s);
-    let guesses = d.graph.guesses.iter().filter(|g| g.value != ZERO);
-    guesses.flat_map(|g| d.x.symbols_of(g.what)).filter(|s| is_flow(s) && !d.missing.contains_key(s)).collect()
+    let is_flow = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Flow(_))) && !d.missing.contains_key(s);
+    let (zero, given): (Vec<_>, Vec<_>) = d.graph.guesses.iter().partition(|g| g.value == ZERO);
+    given.into_iter().chain(zero).flat_map(|g| d.x.symbols_of(g.what)).filter(is_flow).collect()
 }
 
 /// What the storages hold, in the order of the model; then speeds (or efforts) that are kept without one.

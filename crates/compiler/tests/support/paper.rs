@@ -167,7 +167,15 @@ impl Builder<'_> {
             let kind = self.kind(data, id, &ports);
             let name = data["name"].as_str().expect("a name").to_owned();
             let label = data["parameter"].as_str().unwrap_or_default().to_owned();
-            self.graph.elements.push(Element { name, kind, ports, span: Span::default(), label, cell: None });
+            self.graph.elements.push(Element {
+                name,
+                kind,
+                ports,
+                span: Span::default(),
+                label,
+                cell: None,
+                strand: None,
+            });
         }
     }
 

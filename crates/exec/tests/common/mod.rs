@@ -99,6 +99,7 @@ impl Sketch {
             span: Span::default(),
             label,
             cell: None,
+            strand: None,
         })
     }
     /// A state, recorded by default; its rate is given by [`rate`](Sketch::rate).
