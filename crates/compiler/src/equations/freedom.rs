@@ -10,7 +10,7 @@ use super::InitialCondition;
 use super::definitions::{Definition, Definitions};
 use super::independent_rows::{IndependentRows, Row, equilibrate};
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
-use crate::bond_graph::{Kind, Meaning};
+use crate::bond_graph::{Guess, Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
 use crate::causal_graph::{CausalGraph, Role};
 
@@ -61,7 +61,7 @@ fn guessed_signals(d: &Definitions) -> Vec<Symbol> {
 /// Common flows of junctions that are guessed; those guessed to be 0, as what is not given is, after the others.
 fn guessed_flows(d: &Definitions) -> Vec<Symbol> {
     let is_flow = |s: &Symbol| matches!(d.meaning(*s), Some(Meaning::Flow(_))) && !d.missing.contains_key(s);
-    let (zero, given): (Vec<_>, Vec<_>) = d.graph.guesses.iter().partition(|g| g.value == ZERO);
+    let (zero, given): (Vec<&Guess>, Vec<&Guess>) = d.graph.guesses.iter().partition(|g| g.value == ZERO);
     given.into_iter().chain(zero).flat_map(|g| d.x.symbols_of(g.what)).filter(is_flow).collect()
 }
 
