@@ -89,8 +89,9 @@ pub(super) struct EventWork {
     pub misses: Vec<f64>,
     /// Contacts that come to rest, since their impacts accumulate.
     pub at_rest: Vec<bool>,
-    /// Of each condition the magnitude below which its operand is on the side that is held.
-    pub floors: Vec<f64>,
+    /// Laws that have been released for the impulses of the round, and those whose next flight would be too short.
+    pub released: Vec<u32>,
+    pub short: Vec<u32>,
     /// The clauses of contacts that take part in impulses.
     pub contacts: Vec<usize>,
 }
@@ -102,7 +103,8 @@ impl EventWork {
             fired: vec![false; clauses.len()],
             at_rest: vec![false; clauses.len()],
             contacts: Vec::new(),
-            floors: vec![0.0; mode.program.conditions.len()],
+            released: Vec::new(),
+            short: Vec::new(),
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
             misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],
             impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),
@@ -139,7 +141,7 @@ impl Model {
                 }
             }
         }
-        Ok(())
+        self.find_meeting(t, x)
     }
 
     /// Which conditions hold at `(t, x)`, as held, and which clauses happen: conditions that have become true, periods that
@@ -160,6 +162,8 @@ impl Model {
             events.fired[clause] = holds && !condition.holds;
             condition.holds = holds;
         }
+        self.find_meeting(t, x)?;
+        let Model { run, events, .. } = self;
         for (memory, fired) in run.clauses.iter_mut().zip(&mut events.fired) {
             if let ClauseMemory::Every { period, next } = memory {
                 while t >= *next * *period {
@@ -167,6 +171,18 @@ impl Model {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Contacts take an impact where their sides meet, whatever the sign of a gap that is zero.
+    fn find_meeting(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        let (meeting, short) = self.meeting(t, x)?;
+        for margin in bounds.margins.iter().filter(|m| m.meets) {
+            self.events.fired[margin.clause] = meeting.contains(&margin.clause);
+        }
+        self.events.short = short;
         Ok(())
     }
 

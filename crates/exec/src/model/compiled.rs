@@ -6,7 +6,7 @@ use super::exchanges::Ratios;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
-use super::modes::Bounds;
+use super::margins::Bounds;
 use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;

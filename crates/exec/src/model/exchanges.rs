@@ -199,6 +199,7 @@ impl Model {
             run.first = Some(left);
         }
         run.mode = mode;
+        run.floors = vec![0.0; code.program.conditions.len()];
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         (self.frame, self.recorded, self.code) = (frame, recorded, code);

@@ -7,6 +7,8 @@ use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Jumps, Program, Target, Value};
 use halfarrow_sim::Failure;
 
+/// Contacts that are let act, for each that there is, at most.
+const PASSES: usize = 8;
 /// Passes of Newton.
 const ITERATIONS: usize = 50;
 /// A relative step that has to shrink, or is what rounding leaves.
@@ -155,8 +157,10 @@ impl Model {
         done
     }
 
-    /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact, by
-    /// exchanging the one with the least number that is broken (Murty's principal pivoting).
+    /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact.
+    /// That is the least kinetic energy of what the impulses change, found by letting act the contact that gives way most and
+    /// letting go those that would pull on the way there. A contact that others hold already adds nothing.
+    /// Source: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, chapter 23.
     fn share_out(
         &mut self,
         t: f64,
@@ -164,48 +168,91 @@ impl Model {
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
     ) -> Result<(), Failure> {
-        if self.events.contacts.is_empty() {
-            self.take_asked(balance, &mut work.asked);
-            return self.solve_balance(t, x, balance, work).map(|_| ());
-        }
         let contacts = self.events.contacts.clone();
-        let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
         contacts.iter().for_each(|&contact| self.events.fired[contact] = false);
-        let mut tried: Vec<Vec<bool>> = Vec::new();
-        loop {
-            self.take_asked(balance, &mut work.asked);
-            self.solve_balance(t, x, balance, work)?;
-            let Some(broken) = contacts.iter().copied().find(|&c| self.is_broken(c, balance, work)) else {
-                return Ok(());
-            };
-            let active: Vec<bool> = contacts.iter().map(|&c| self.events.fired[c]).collect();
-            if tried.contains(&active) {
-                return Err(self.unmet_resets(t));
+        let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
+        // What has been shared out last, and of each contact.
+        let (mut shared, mut held) = (vec![0.0; contacts.len()], vec![false; contacts.len()]);
+        self.solve_shares(t, x, balance, work)?;
+        for _ in 0..PASSES * (contacts.len() + 1) {
+            let gives = |&k: &usize| !self.events.fired[contacts[k]] && !held[k];
+            let open = (0..contacts.len()).filter(gives).map(|k| (k, self.gives_way(contacts[k], balance)));
+            let worst = open.filter(|(_, by)| *by > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a });
+            let Some((added, _)) = worst else { return Ok(()) };
+            self.events.fired[contacts[added]] = true;
+            loop {
+                x.copy_from_slice(&start);
+                self.run.conserved.clone_from(&conserved);
+                match self.solve_shares(t, x, balance, work) {
+                    Err(Failure::Reset { .. }) if !held[added] && self.events.fired[contacts[added]] => {
+                        // The others hold it to rounding.
+                        (held[added], self.events.fired[contacts[added]]) = (true, false);
+                        continue;
+                    }
+                    solved => solved?,
+                }
+                let wanted: Vec<f64> = contacts.iter().map(|&c| self.impulse_of(c, work)).collect();
+                let noise = self.noise_of_impulses(balance, work);
+                let pulls = |k: &usize| self.events.fired[contacts[*k]] && wanted[*k] < -noise;
+                let way = |k: usize| shared[k] / (shared[k] - wanted[k]);
+                let least = (0..contacts.len()).filter(pulls).map(|k| (k, way(k)));
+                let Some((first, part)) = least.reduce(|a, b| if b.1 < a.1 { b } else { a }) else {
+                    shared = wanted;
+                    break;
+                };
+                for k in 0..contacts.len() {
+                    shared[k] += part * (wanted[k] - shared[k]);
+                    if self.events.fired[contacts[k]] && (k == first || shared[k] <= 0.0) {
+                        (shared[k], self.events.fired[contacts[k]]) = (0.0, false);
+                    }
+                }
             }
-            tried.push(active);
-            self.events.fired[broken] = !self.events.fired[broken];
-            x.copy_from_slice(&start);
-            self.run.conserved.clone_from(&conserved);
+        }
+        Err(self.unmet_resets(t))
+    }
+
+    fn solve_shares(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        balance: &ImpulseBalance,
+        work: &mut ImpulseWork,
+    ) -> Result<(), Failure> {
+        self.take_asked(balance, &mut work.asked);
+        self.solve_balance(t, x, balance, work).map(|_| ())
+    }
+
+    /// What a contact asks for, and its impulse.
+    fn of_contact(&self, contact: usize) -> Option<(Value, usize)> {
+        let action = self.code.program.clauses[contact].actions.first()?;
+        match action.target {
+            Target::Moved { what, impulse } => Some((what, impulse as usize)),
+            _ => None,
         }
     }
 
-    /// Whether a contact pulls, or gives way, after what has been solved last.
-    fn is_broken(&self, contact: usize, balance: &ImpulseBalance, work: &ImpulseWork) -> bool {
+    /// By how much a contact gives way after what has been solved last, beyond rounding.
+    fn gives_way(&self, contact: usize, balance: &ImpulseBalance) -> f64 {
+        let Some((what, _)) = self.of_contact(contact) else { return 0.0 };
         let first = balance.all.outputs.len() - balance.moved.len();
-        let clause = &self.code.program.clauses[contact];
-        let Some((Target::Moved { what, impulse }, k)) = clause.actions.first().map(|a| (a.target, 0)) else {
-            return false;
-        };
-        let target = self.events.values[self.code.clauses.place(contact, k)];
-        if self.events.fired[contact] {
-            let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
-            let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse as usize);
-            let kept = work.sizes[..balance.jumps.balances.len()].iter().fold(0.0f64, |most, size| most.max(*size));
-            return own.is_some_and(|(_, p)| *p < -MET * most - ROUNDING * kept);
-        }
         let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
         let flow = self.frame.r[balance.all.outputs[output] as usize];
-        flow - target < -ROUNDING * self.greatest_rate(contact)
+        let target = self.events.values[self.code.clauses.place(contact, 0)];
+        (target - flow - ROUNDING * self.greatest_rate(contact)).max(0.0)
+    }
+
+    /// The impulse of a contact in what has been solved last.
+    fn impulse_of(&self, contact: usize, work: &ImpulseWork) -> f64 {
+        let Some((_, impulse)) = self.of_contact(contact).filter(|_| self.events.fired[contact]) else { return 0.0 };
+        let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse);
+        own.map_or(0.0, |(_, p)| *p)
+    }
+
+    /// An impulse that is rounding.
+    fn noise_of_impulses(&self, balance: &ImpulseBalance, work: &ImpulseWork) -> f64 {
+        let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
+        let kept = work.sizes[..balance.jumps.balances.len()].iter().fold(0.0f64, |most, size| most.max(*size));
+        MET * most + ROUNDING * kept
     }
 
     /// Newton on the unknowns and the impulses; whether any unknown has changed.

@@ -54,6 +54,8 @@ pub(super) struct Remembered {
     pub clauses: Vec<ClauseMemory>,
     /// How great margins of set-valued laws have been.
     pub extents: Extents,
+    /// Of each condition the magnitude below which its operand is on the side that is held.
+    pub floors: Vec<f64>,
     /// The piece of each input that holds.
     pub pieces: Vec<Option<PointRange>>,
 }
