@@ -2,6 +2,7 @@
 
 use super::clause_memory::ClauseMemory;
 use super::impulses::ImpulseBalance;
+use super::modes::Extents;
 use super::positions::Motion;
 use super::system::What;
 use super::{DelayOrSample, Model};
@@ -284,6 +285,17 @@ impl Events for Model {
         let idle = self.code.motion.iter().chain(&self.recorded.motion).flat_map(|motion| &motion.idle);
         let longest = idle.map(|block| self.frame.solvers[block.0 as usize].newton.longest_way());
         longest.fold(f64::INFINITY, f64::min)
+    }
+
+    fn note_magnitudes(&mut self, t: f64, x: &[f64], magnitudes: &[f64]) -> Result<(), Failure> {
+        if self.code.bounds.is_none() {
+            return Ok(());
+        }
+        let code = self.code.clone();
+        for (&symbol, &magnitude) in code.program.tracked.iter().zip(magnitudes) {
+            Extents::note(&mut self.run.extents.states, symbol, magnitude);
+        }
+        self.watch_bounds(t, x)
     }
 
     fn looks_between(&self) -> bool {

@@ -17,6 +17,8 @@ const NOISE: f64 = 1e-9;
 const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// What is a difference of what storages keep and below this part of it is rounding.
 const ROUNDING: f64 = 1e-11;
+/// What storages keep that is nothing beside what they have kept, in parts of [`MET`] of it.
+const NOTHING: f64 = 1e-4;
 /// How well the resets are met, as part of what is asked for.
 const MET: f64 = 1e-9;
 
@@ -45,6 +47,9 @@ pub(super) struct ImpulseWork {
     sizes: Vec<f64>,
     /// The greatest term of what is reset, on the way.
     greatest: Vec<f64>,
+    /// How great what storages keep has been, and the unknowns, where a run knows.
+    kept: Vec<f64>,
+    been: Vec<f64>,
 }
 
 /// A reset of the round: the place of what it changes among the outputs, the value that it asks for, its impulse.
@@ -92,6 +97,8 @@ impl ImpulseBalance {
             equations: Elimination::new(rows + asked, unknowns + asked),
             sizes: Vec::with_capacity(rows + asked),
             greatest: Vec::with_capacity(asked),
+            kept: vec![0.0; self.jumps.stored.len()],
+            been: vec![0.0; unknowns],
         }
     }
 }
@@ -271,6 +278,14 @@ impl Model {
         if m == 0 {
             return Ok(false);
         }
+        let (extents, tracked) = (&self.run.extents, &self.code.program.tracked);
+        for (kept, symbol) in work.kept.iter_mut().zip(&balance.jumps.storages) {
+            *kept = extents.stored.get(symbol).copied().unwrap_or(0.0);
+        }
+        for (been, &unknown) in work.been.iter_mut().zip(&balance.jumps.unknowns) {
+            let symbol = tracked.get(unknown as usize);
+            *been = symbol.and_then(|s| extents.states.get(s)).copied().unwrap_or(0.0);
+        }
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
@@ -286,9 +301,10 @@ impl Model {
             let step = &work.equations.step;
             let mut length = 0.0f64;
             changed = true;
-            for (&u, s) in balance.jumps.unknowns.iter().zip(step) {
+            for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&work.been) {
                 let value = self.unknown_mut(x, u);
-                length = length.max(s.abs() / value.abs().max(s.abs()).max(f64::MIN_POSITIVE));
+                let size = value.abs().max(s.abs()).max(f64::MIN_POSITIVE);
+                length = length.max(if s.abs() <= f64::EPSILON * been { 0.0 } else { s.abs() / size });
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
@@ -330,7 +346,7 @@ impl Model {
     /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
     fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
         let jumps = &balance.jumps;
-        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest } = work;
+        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest, kept, .. } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
         let rows = jumps.balances.len();
         equations.clear(rows + asked.len(), m);
@@ -359,7 +375,8 @@ impl Model {
                     let jump = stored - before[k as usize];
                     sum += c * jump;
                     slope += c * change + dc * jump;
-                    size += (c * stored).abs() + (c * before[k as usize]).abs();
+                    size +=
+                        (c * stored).abs() + (c * before[k as usize]).abs() + (NOTHING * c * kept[k as usize]).abs();
                     factor += 1;
                 }
                 (residual[row], sizes[row]) = (sum, size);

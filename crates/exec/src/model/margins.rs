@@ -211,7 +211,7 @@ impl Model {
     }
 
     /// The margins at `(t, x)` with what is zero beside them.
-    fn values_of_margins(&mut self, t: f64, x: &[f64]) -> Result<Vec<Standing>, Failure> {
+    pub(super) fn values_of_margins(&mut self, t: f64, x: &[f64]) -> Result<Vec<Standing>, Failure> {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(Vec::new()) };
         let been = |model: &Model| -> Vec<f64> {
@@ -304,6 +304,11 @@ impl Model {
             sides.push((condition, s.ended));
         }
         Ok(sides)
+    }
+
+    /// Watches margins that are zero from below what is zero now.
+    pub(super) fn watch_bounds(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.sides_of_bounds(t, x).map(|_| ())
     }
 
     /// The clauses of contacts whose sides meet at `(t, x)`, and of these the laws whose next flight would be too short to be

@@ -198,6 +198,7 @@ impl Instant<'_> {
         let Some(bounds) = &self.model.code.bounds else { return Err([0, 0]) };
         let mut short = 0;
         let commanded = |law: u32| bounds.commands.iter().any(|(_, bound)| bound.law == law);
+        let apart = self.apart(bounds)?;
         let counts: Vec<u32> = self.model.code.program.set_valued.iter().map(|l| l.branches.len() as u32).collect();
         // Commands are obeyed by whatever mode.
         let mut first = bounds.branches.clone();
@@ -218,7 +219,7 @@ impl Instant<'_> {
                     if leaping.is_some() && distance > FAR {
                         break;
                     }
-                    for law in (0..mode.len()).filter(|&law| !commanded(law as u32)) {
+                    for law in (0..mode.len()).filter(|&law| !commanded(law as u32) && !apart.contains(&(law as u32))) {
                         for branch in 0..counts[law] {
                             let mut other = mode.clone();
                             other[law] = branch;
@@ -260,6 +261,13 @@ impl Instant<'_> {
             }
         }
         leaping.map(|(_, found)| *found).ok_or([tried.len(), short])
+    }
+
+    /// The contacts whose sides are apart: no force closes these.
+    fn apart(&self, bounds: &Bounds) -> Result<Vec<u32>, [usize; 2]> {
+        let standings = self.model.clone().values_of_margins(self.t, self.x).map_err(|_| [0, 0])?;
+        let margins = bounds.margins.iter().zip(standings).filter(|(m, _)| m.bound.gap.is_some());
+        Ok(margins.filter(|(_, s)| s.value > s.zero || s.rate.abs() > s.still).map(|(m, _)| m.bound.law).collect())
     }
 
     /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.

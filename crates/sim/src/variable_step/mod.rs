@@ -93,6 +93,7 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
         if !told {
             run.report_tolerances(atol.magnitudes(), &atol.absolute(1.0));
         }
+        shared.events().note_magnitudes(run.time, x, atol.magnitudes())?;
         let kept = step.take();
         let mut drive = |integrator: &mut dyn Integrator, first, stiffness| {
             let mut stepper = Controlled::new(run, shared, integrator, &mut tolerances, stiffness).from(first);
