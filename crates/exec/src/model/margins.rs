@@ -181,6 +181,10 @@ impl Model {
         let code = self.code.clone();
         let Some(bounds) = &code.bounds else { return Ok(()) };
         self.note_extents(t, x)?;
+        self.run.extents.gaps.1.clear();
+        let standings = self.values_of_margins(t, x)?;
+        let gaps = bounds.margins.iter().zip(standings).filter(|(m, _)| m.bound.gap.is_some());
+        self.run.extents.gaps = (t, gaps.map(|(m, s)| (m.bound.law, s.zero)).collect());
         // What has no value in a mode that may not hold is compared with nothing.
         let moves = self.rates_at(t, x).is_ok();
         self.place(t, x);
@@ -234,7 +238,8 @@ impl Model {
             let zero = ZERO * own[0].max(sizes[m.place]).max(if gap { 0.0 } else { group });
             let still = if gap { MEETS * own[1].max(sizes[m.place + 1]).max(group) } else { 0.0 };
             let rate = if gap { value(m.place + 1) } else { 0.0 };
-            let zero = zero.max(rounding).max(finest);
+            let known = extents.gaps.1.get(&m.bound.law).filter(|_| gap && extents.gaps.0 == t);
+            let zero = known.copied().unwrap_or(zero.max(rounding).max(finest));
             Standing { value: value(m.place), rate, zero, still, rounding, change: f64::NAN, ended: false }
         };
         Ok(bounds.margins.iter().map(standing).collect())

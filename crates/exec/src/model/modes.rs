@@ -29,6 +29,8 @@ pub(super) struct Extents {
     pub margins: BTreeMap<(u32, u32, u32), [f64; 3]>,
     /// Of efforts and flows in groups of one unit.
     pub groups: Vec<f64>,
+    /// What is zero of gaps, by law, at one time: the same in all modes.
+    pub gaps: (f64, BTreeMap<u32, f64>),
     /// Of what storages keep.
     pub stored: BTreeMap<Symbol, f64>,
     /// Of states and of their rates, by the variables that they are.

@@ -92,7 +92,8 @@ impl Run<'_> {
         let finest = 2.0 * FINEST * (end - self.time);
         for margin in MARGINS {
             let Some((time, _)) = crossing else { break };
-            let beyond = time + margin * (time - self.time);
+            // What was no crossing is left behind by a part of the step at least.
+            let beyond = time + margin * (time - self.time).max(end - time);
             if time - self.time <= finest || beyond >= end || !stepper.shorten(beyond) {
                 break;
             }

@@ -137,5 +137,6 @@ fn becomes_known(run: &Run<'_>, shared: &Shared<'_>, tolerances: &mut Tolerances
     let system = &mut *shared.system();
     let later = 1e-3 * interval;
     tolerances.guess(system, run.time + later, x, later).unwrap_or(false)
+        || tolerances.renew(system, (run.time, x), later, interval)
         || tolerances.clear_rounding(system, (run.time, x), later, interval)
 }
