@@ -139,6 +139,26 @@ fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<S
     (off > within).then(|| format!("explicit {found:?}, radau {other:?}\n{text}"))
 }
 
+/// How the campaign takes a machine of a seed: its kind, the machine, and how near the ends of two methods are.
+fn machines(seed: u64) -> [(&'static str, (String, Vec<String>), f64); 3] {
+    [("circuit", circuit(seed), 1e-5), ("row", row(seed, false), 1e-4), ("bouncing row", row(seed, true), 1e-4)]
+}
+
+/// Machines that were wrong once: several margins that vanish together, contacts that are apart, flights as short as rounding,
+/// grazed contacts, states of which nothing is known when an event moves them, starts at which all is zero.
+#[test]
+fn some() {
+    let circuits = [1, 129, 224, 744, 746, 934].map(|seed| (0, seed));
+    let rows = [0, 2, 4, 5, 9, 10, 94, 99, 323, 341, 389, 394, 400, 434, 443].map(|seed| (1, seed));
+    let bouncing = [0, 5, 17, 168, 399, 793, 929, 990].map(|seed| (2, seed));
+    for (kind, seed) in circuits.into_iter().chain(rows).chain(bouncing) {
+        let (name, machine, within) = machines(seed).into_iter().nth(kind).expect("a kind");
+        if let Some(fault) = wrong(machine, 4.0, within) {
+            panic!("{name} {seed}: {fault}");
+        }
+    }
+}
+
 /// As many as `GRAPHS` of each kind, from the seed `FROM` on; of one `KIND` if it is given.
 #[test]
 #[ignore = "a campaign"]
@@ -148,12 +168,7 @@ fn many() {
     let only = std::env::var("KIND").unwrap_or_default();
     let mut faults = 0;
     for seed in from..from + count {
-        let kinds = [
-            ("circuit", circuit(seed), 1e-5),
-            ("row", row(seed, false), 1e-4),
-            ("bouncing row", row(seed, true), 1e-4),
-        ];
-        for (kind, machine, within) in kinds.into_iter().filter(|(kind, ..)| kind.starts_with(&only)) {
+        for (kind, machine, within) in machines(seed).into_iter().filter(|(kind, ..)| kind.starts_with(&only)) {
             if let Some(fault) = wrong(machine, 4.0, within) {
                 faults += 1;
                 println!("{kind} {seed}: {fault}");
