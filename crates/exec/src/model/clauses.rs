@@ -9,7 +9,7 @@ use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Layout, Routine};
-use halfarrow_compiler::program::{Program, Target, Trigger, Value};
+use halfarrow_compiler::program::{Op, Program, Target, Trigger, Value};
 use halfarrow_sim::{Affected, Failure};
 
 /// Rounds at one instant at most.
@@ -75,6 +75,18 @@ impl Clauses {
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
         std::iter::once(&self.becomes).chain(&self.values)
     }
+}
+
+/// A condition on one number that has made something happen, holds still, and is about to hold no longer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Return {
+    clause: usize,
+    /// When it happened, in s.
+    since: f64,
+    /// The place of the number among the indicators, its value then, and the way that it goes.
+    indicator: usize,
+    value: f64,
+    way: f64,
 }
 
 /// Room for what is computed at events.
@@ -183,6 +195,56 @@ impl Model {
             self.events.fired[margin.clause] = meeting.contains(&margin.clause);
         }
         self.events.short = short;
+        Ok(())
+    }
+
+    /// Notes which conditions have made something happen at `(t, x)` and are about to hold no longer: a ball that has hit the
+    /// floor leaves it.
+    pub(super) fn note_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.run.returns.clear();
+        let code = self.code.clone();
+        let happened = |clause: &usize| match self.run.clauses[*clause] {
+            ClauseMemory::Becomes(condition) => condition.holds_since(t),
+            ClauseMemory::Every { .. } => false,
+        };
+        let indicator = |clause: usize| match code.program.values.op(code.program.clauses[clause].trigger.value()) {
+            Op::Sign(condition, _) => code.switching.iter().position(|c| *c == condition),
+            _ => None,
+        };
+        let own = code.clauses.conditional.iter().copied().filter(|c| code.program.clauses[*c].bound.is_none());
+        let watched: Vec<(usize, usize)> = own.filter(happened).filter_map(|c| Some((c, indicator(c)?))).collect();
+        if watched.is_empty() {
+            return Ok(());
+        }
+        self.rates_at(t, x)?;
+        self.place(t, x);
+        self.move_along(t);
+        self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
+        for (clause, indicator) in watched {
+            let register = code.indicators.outputs[indicator] as usize;
+            let (value, rate) = (self.frame.r[register], self.frame.d[register]);
+            if rate != 0.0 && value * rate <= 0.0 {
+                self.run.returns.push(Return { clause, since: t, indicator, value, way: rate.signum() });
+            }
+        }
+        Ok(())
+    }
+
+    /// What was about to return and is further beyond at the end of a step has been lost.
+    pub(super) fn watch_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.run.returns.is_empty() || self.run.returns.iter().any(|r| r.since == t) {
+            return Ok(());
+        }
+        let code = self.code.clone();
+        self.place(t, x);
+        self.frame.run(&code.indicators).map_err(|error| self.failure(t, error))?;
+        for r in std::mem::take(&mut self.run.returns) {
+            let value = self.frame.r[code.indicators.outputs[r.indicator] as usize];
+            if value * r.way < 0.0 && value.abs() > r.value.abs() {
+                let what = code.program.clauses[r.clause].name.clone();
+                return Err(Failure::Lost { time: t, what, since: r.since });
+            }
+        }
         Ok(())
     }
 

@@ -186,6 +186,7 @@ impl Model {
                 }
             }
         }
+        self.note_returns(t, x)?;
         self.follow_solutions(t, x)
     }
 
@@ -307,6 +308,7 @@ impl Events for Model {
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.watch_returns(t, x)?;
         if self.has_delays() {
             self.place(t, x);
             self.run_sources(t, x)?;

@@ -200,6 +200,7 @@ impl Model {
         }
         run.mode = mode;
         run.floors = vec![0.0; code.program.conditions.len()];
+        run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         (self.frame, self.recorded, self.code) = (frame, recorded, code);
