@@ -161,7 +161,7 @@ impl Model {
         work.asked.clear();
         let done = self.solve_balance(t, x, balance, &mut work);
         self.events.impulses = work;
-        done
+        done?.ok_or_else(|| self.dependent_resets(t))
     }
 
     /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact.
@@ -180,7 +180,9 @@ impl Model {
         let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
         // What has been shared out last, and of each contact.
         let (mut shared, mut held) = (vec![0.0; contacts.len()], vec![false; contacts.len()]);
-        self.solve_shares(t, x, balance, work)?;
+        if !self.solve_shares(t, x, balance, work)? {
+            return Err(self.dependent_resets(t));
+        }
         for _ in 0..PASSES * (contacts.len() + 1) {
             let gives = |&k: &usize| !self.events.fired[contacts[k]] && !held[k];
             let open = (0..contacts.len()).filter(gives).map(|k| (k, self.gives_way(contacts[k], balance)));
@@ -191,13 +193,14 @@ impl Model {
                 x.copy_from_slice(&start);
                 self.run.conserved.clone_from(&conserved);
                 match self.solve_shares(t, x, balance, work) {
-                    Err(Failure::Reset { .. }) if !held[added] && self.events.fired[contacts[added]] => {
+                    Ok(false) if !held[added] && self.events.fired[contacts[added]] => {
                         // The others hold it to rounding.
                         (held[added], self.events.fired[contacts[added]]) = (true, false);
                         continue;
                     }
+                    Ok(false) => return Err(self.dependent_resets(t)),
                     solved => solved?,
-                }
+                };
                 let wanted: Vec<f64> = contacts.iter().map(|&c| self.impulse_of(c, work)).collect();
                 let noise = self.noise_of_impulses(balance, work);
                 let pulls = |k: &usize| self.events.fired[contacts[*k]] && wanted[*k] < -noise;
@@ -218,15 +221,16 @@ impl Model {
         Err(self.unmet_resets(t))
     }
 
+    /// Impulses for all that acts; `false` if some of it depends on the rest.
     fn solve_shares(
         &mut self,
         t: f64,
         x: &mut [f64],
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
-    ) -> Result<(), Failure> {
+    ) -> Result<bool, Failure> {
         self.take_asked(balance, &mut work.asked);
-        self.solve_balance(t, x, balance, work).map(|_| ())
+        self.solve_balance(t, x, balance, work).map(|solved| solved.is_some())
     }
 
     /// What a contact asks for, and its impulse.
@@ -262,21 +266,21 @@ impl Model {
         MET * most + ROUNDING * kept
     }
 
-    /// Newton on the unknowns and the impulses; whether any unknown has changed.
+    /// Newton on the unknowns and the impulses; whether any unknown has changed. `None` if resets depend on each other.
     fn solve_balance(
         &mut self,
         t: f64,
         x: &mut [f64],
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
-    ) -> Result<bool, Failure> {
+    ) -> Result<Option<bool>, Failure> {
         let (n, m) = (balance.unknowns(), balance.unknowns() + work.asked.len());
         work.impulses.clear();
         work.impulses.resize(work.asked.len(), 0.0);
         work.greatest.clear();
         work.greatest.resize(work.asked.len(), 0.0);
         if m == 0 {
-            return Ok(false);
+            return Ok(Some(false));
         }
         let (extents, tracked) = (&self.run.extents, &self.code.program.tracked);
         for (kept, symbol) in work.kept.iter_mut().zip(&balance.jumps.storages) {
@@ -295,7 +299,7 @@ impl Model {
             }
             match work.equations.solve() {
                 None => break,
-                Some(rank) if rank < m => return Err(self.dependent_resets(t)),
+                Some(rank) if rank < m => return Ok(None),
                 Some(_) => {}
             }
             let step = &work.equations.step;
@@ -317,7 +321,7 @@ impl Model {
         self.balanced(t, x, balance, work)?;
         let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
         match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
-            true => Ok(changed),
+            true => Ok(Some(changed)),
             false => Err(self.unmet_resets(t)),
         }
     }
@@ -346,7 +350,7 @@ impl Model {
     /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
     fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
         let jumps = &balance.jumps;
-        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest, kept, .. } = work;
+        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest, kept, been } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
         let rows = jumps.balances.len();
         equations.clear(rows + asked.len(), m);
@@ -414,7 +418,7 @@ impl Model {
                 };
                 for (k, a) in asked.iter().enumerate() {
                     let slope = self.frame.d[balance.all.outputs[a.output] as usize];
-                    greatest[k] = greatest[k].max((slope * value).abs());
+                    greatest[k] = greatest[k].max((slope * value).abs()).max((NOTHING * slope * been[column]).abs());
                 }
             }
         }
