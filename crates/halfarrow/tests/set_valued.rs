@@ -382,6 +382,21 @@ fn a_body_at_rest_is_hit() {
     }
 }
 
+/// A contact that closes for a part of a step of fixed length only: the way back begins there, as if time had gone on.
+#[test]
+fn a_contact_within_a_fixed_step() {
+    let text = "1:v -> I:m(1)\nv -> C:spring(k = 1, q0 = 1)\nstate x' = v.f from 1\n\
+                constraint wall: x >= -0.9999 (restitution = 1)\n";
+    for step in [0.05, 0.043, 0.037] {
+        let options = Run { method: Method::Fixed(FixedMethod::Rk4), step: Some(step), ..to(5.0, &["x", "m.f"]) };
+        let ends = last(&run(text, &options));
+        // The way down and up again beyond the wall is left out.
+        let phase = 5.0 + 2.0 * (PI - (-0.9999f64).acos());
+        assert!((ends[0] - phase.cos()).abs() < 1e-5, "{step}: {ends:?} for {}", phase.cos());
+        assert!((ends[1] + phase.sin()).abs() < 1e-5, "{step}: {ends:?} for {}", -phase.sin());
+    }
+}
+
 /// What cannot be is refused, with the element and the remedy.
 #[test]
 fn refusals() {

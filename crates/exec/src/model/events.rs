@@ -336,6 +336,8 @@ impl Events for Model {
             let floor = self.run.floors[condition.0 as usize];
             if self.run.signs_taken == Some(t) || floor > 0.0 && beyond[0].abs() <= floor {
                 frame.conditions.confirm(condition, &mut beyond);
+                // What rounding makes of a zero bends nothing.
+                beyond[0] = floor.max(beyond[0].abs()).copysign(beyond[0]);
             }
             let count = self.code.program.conditions[condition].kind.switches();
             g[next..next + count].copy_from_slice(&beyond[..count]);

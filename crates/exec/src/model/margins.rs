@@ -16,6 +16,8 @@ const ZERO: f64 = 1e-12;
 const MEETS: f64 = 1e-10;
 /// How a margin changes, or the rate of a gap, if it stays as it is, as part of the greatest such change.
 const STEADY: f64 = 1e-9;
+/// How soon, as part of the time that has passed, a change has to show in what it changes.
+const SOON: f64 = 1e-6;
 /// What rounding leaves of a sum, as part of its terms.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// A height of flight that rounding decides on, in what it leaves of a gap, and a time of flight in what it leaves of time.
@@ -273,9 +275,9 @@ impl Model {
             s.change = changes[place];
             let most = self.run.extents.margins.entry(m.key).or_default();
             most[level] = most[level].max(s.change.abs());
-            // What would not show in as much time as has passed is none.
+            // What would not show soon in what it changes is none yet.
             let below = if level == 2 { s.still } else { s.zero };
-            let slow = if t == 0.0 { 0.0 } else { below / t.abs() };
+            let slow = if t == 0.0 { 0.0 } else { below / (SOON * t.abs()) };
             s.ended = s.change < -(STEADY * most[level]).max(ZERO * sizes[place]).max(slow);
         }
         Ok(all)

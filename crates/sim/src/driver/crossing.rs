@@ -43,7 +43,8 @@ impl Run<'_> {
     }
 
     /// The same where there is no dense output, by steps from the same start that end sooner. After an event the inside of the
-    /// step is looked at as well: what has been changed there may come back at once.
+    /// step is looked at as well, since what has been changed there may come back at once, and where indicators bend so much
+    /// that they may have been zero twice.
     fn accept_by_shorter_steps<S: Stepper>(
         &mut self,
         stepper: &mut S,
@@ -56,7 +57,9 @@ impl Run<'_> {
         // The step to the end has just been made.
         stepper.accept(end, inside);
         let switched = signs.crossed(&mut *stepper.events(), end, inside)?.is_some();
-        if !(handled || switched) {
+        let hidden = signs.may_hide_in_step(end - *time);
+        if !(handled || switched || hidden) {
+            signs.step_ended(end - *time);
             point.copy_from_slice(inside);
             return Ok((end, false));
         }
@@ -73,6 +76,7 @@ impl Run<'_> {
         let crossing = first_crossing(signs, *time, end, &mut crossed)?;
         let (end, indicator) = crossing.map_or((end, None), |(time, indicator)| (time, Some(indicator)));
         crossed(signs, end)?;
+        signs.step_ended(end - *time);
         point.copy_from_slice(inside);
         if let Some(indicator) = indicator.filter(|_| self.chatter.is_one(end)) {
             let what = stepper.events().indicator_name(indicator);
