@@ -139,16 +139,22 @@ fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<S
     if apart(&found, &other) <= within {
         return None;
     }
-    // Where impacts of several bodies follow each other closely their order decides: what differs by tolerances alone says
-    // nothing of methods.
-    let fine = match end(&text, &names, to, Method::Explicit, FINE) {
-        Ok(fine) => fine,
-        Err(why) => return Some(format!("fine: {why}\n{text}")),
-    };
-    let told = format!("explicit {found:?}, at {FINE:e} {fine:?}, radau {other:?}\n{text}");
-    if apart(&found, &fine) > within {
-        println!("sensitive: {told}");
-        return None;
+    // Where impacts of several bodies follow each other closely their order decides: what a start that differs by next to
+    // nothing changes as much says nothing of methods.
+    let told = format!("explicit {found:?}, radau {other:?}\n{text}");
+    let beside = ["+ 1e-8", "- 1e-8"].map(|by| text.replace("from 0.5\n", &format!("from 0.5 {by}\n")));
+    let starts = beside.iter().map(|text| (text, RTOL)).chain([(&text, FINE)]);
+    for (text, rtol) in starts {
+        for (method, reference) in [(Method::Explicit, &found), (Method::Radau, &other)] {
+            match end(text, &names, to, method, rtol) {
+                Ok(beside) if apart(reference, &beside) > within => {
+                    println!("sensitive: {told}");
+                    return None;
+                }
+                Ok(_) => {}
+                Err(why) => return Some(format!("beside it: {why}\n{text}")),
+            }
+        }
     }
     Some(told)
 }
@@ -162,9 +168,9 @@ fn machines(seed: u64) -> [(&'static str, (String, Vec<String>), f64); 3] {
 /// grazed contacts, states of which nothing is known when an event moves them, starts at which all is zero.
 #[test]
 fn some() {
-    let circuits = [1, 129, 224, 744, 746, 934].map(|seed| (0, seed));
-    let rows = [0, 2, 4, 5, 9, 10, 94, 99, 323, 341, 389, 394, 400, 434, 443].map(|seed| (1, seed));
-    let bouncing = [0, 5, 17, 168, 399, 793, 929, 990].map(|seed| (2, seed));
+    let circuits = [1, 129, 224, 744, 746, 934, 1172].map(|seed| (0, seed));
+    let rows = [0, 2, 4, 5, 9, 10, 94, 99, 323, 341, 389, 394, 400, 434, 443, 1953].map(|seed| (1, seed));
+    let bouncing = [0, 5, 17, 52, 168, 399, 793, 929, 990].map(|seed| (2, seed));
     for (kind, seed) in circuits.into_iter().chain(rows).chain(bouncing) {
         let (name, machine, within) = machines(seed).into_iter().nth(kind).expect("a kind");
         if let Some(fault) = wrong(machine, 4.0, within) {

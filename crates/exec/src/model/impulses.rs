@@ -202,11 +202,19 @@ impl Model {
                     solved => solved?,
                 };
                 let wanted: Vec<f64> = contacts.iter().map(|&c| self.impulse_of(c, work)).collect();
+                if self.events.fired[contacts[added]] && shared[added] == 0.0 && wanted[added] <= 0.0 {
+                    // What it gives way by is rounding.
+                    (held[added], self.events.fired[contacts[added]]) = (true, false);
+                    continue;
+                }
                 let noise = self.noise_of_impulses(balance, work);
                 let pulls = |k: &usize| self.events.fired[contacts[*k]] && wanted[*k] < -noise;
                 let way = |k: usize| shared[k] / (shared[k] - wanted[k]);
                 let least = (0..contacts.len()).filter(pulls).map(|k| (k, way(k)));
                 let Some((first, part)) = least.reduce(|a, b| if b.1 < a.1 { b } else { a }) else {
+                    if self.events.fired[contacts[added]] {
+                        held.fill(false);
+                    }
                     shared = wanted;
                     break;
                 };
@@ -308,7 +316,7 @@ impl Model {
             for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&work.been) {
                 let value = self.unknown_mut(x, u);
                 let size = value.abs().max(s.abs()).max(f64::MIN_POSITIVE);
-                length = length.max(if s.abs() <= f64::EPSILON * been { 0.0 } else { s.abs() / size });
+                length = length.max(if s.abs() <= MET * NOTHING * been { 0.0 } else { s.abs() / size });
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);

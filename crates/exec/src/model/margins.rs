@@ -16,6 +16,8 @@ const ZERO: f64 = 1e-12;
 const MEETS: f64 = 1e-10;
 /// How a margin changes, or the rate of a gap, if it stays as it is, as part of the greatest such change.
 const STEADY: f64 = 1e-9;
+/// From where on below zero a margin is watched, in what is zero: it grows while a run goes on.
+const BELOW: f64 = 2.0;
 /// How soon, as part of the time that has passed, a change has to show in what it changes.
 const SOON: f64 = 1e-6;
 /// What rounding leaves of a sum, as part of its terms.
@@ -305,7 +307,7 @@ impl Model {
             // What rises from a gap that is zero is watched from where it is: a floor further below would feed the next
             // impact.
             let rises = m.bound.gap.is_some() && s.rate > s.still;
-            let floor = if rises { (-s.value).max(0.0) + s.rounding } else { s.zero };
+            let floor = if rises { (-s.value).max(0.0) + s.rounding } else { BELOW * s.zero };
             let touches = !s.ended && s.value <= s.zero;
             self.run.floors[condition.0 as usize] = if touches { floor } else { 0.0 };
             sides.push((condition, s.ended));
