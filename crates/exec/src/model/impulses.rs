@@ -298,6 +298,10 @@ impl Model {
             let symbol = tracked.get(unknown as usize);
             *been = symbol.and_then(|s| extents.states.get(s)).copied().unwrap_or(0.0);
         }
+        for k in 0..n {
+            let value = self.unknown_mut(x, balance.jumps.unknowns[k]).abs();
+            work.been[k] = work.been[k].max(value);
+        }
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
@@ -313,10 +317,11 @@ impl Model {
             let step = &work.equations.step;
             let mut length = 0.0f64;
             changed = true;
-            for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&work.been) {
+            for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&mut work.been) {
+                *been = been.max(s.abs());
                 let value = self.unknown_mut(x, u);
                 let size = value.abs().max(s.abs()).max(f64::MIN_POSITIVE);
-                length = length.max(if s.abs() <= MET * NOTHING * been { 0.0 } else { s.abs() / size });
+                length = length.max(if s.abs() <= MET * NOTHING * *been { 0.0 } else { s.abs() / size });
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
