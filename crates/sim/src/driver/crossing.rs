@@ -7,6 +7,9 @@ use crate::events::{Events, FINEST, Signs, first_crossing};
 /// Parts of a step by which it is made to go beyond a zero crossing.
 const MARGINS: [f64; 2] = [1e-3, 1e-6];
 
+/// Steps in a row that were made again for a crossing that was none then, from which on that is left behind.
+const MOST_VANISHED: usize = 3;
+
 impl Run<'_> {
     /// Writes the point that the step has led to: its end, or a zero crossing before it. Gives when that is, and whether an
     /// event indicator has changed its sign there.
@@ -94,16 +97,21 @@ impl Run<'_> {
     ) -> Result<(f64, Option<(f64, usize)>), Failure> {
         let mut crossing = self.crossing(stepper, end)?;
         let finest = 2.0 * FINEST * (end - self.time);
+        let found = crossing.is_some();
         for margin in MARGINS {
             let Some((time, _)) = crossing else { break };
-            // What was no crossing is left behind by a part of the step at least.
-            let beyond = time + margin * (time - self.time).max(end - time);
+            // What was no crossing time after time is left behind by a part of the step at least, where steps are searched: a
+            // contact that is grazed.
+            let grazed = self.signs.is_thorough() && self.vanished >= MOST_VANISHED;
+            let least = if grazed { end - time } else { 0.0 };
+            let beyond = time + margin * (time - self.time).max(least);
             if time - self.time <= finest || beyond >= end || !stepper.shorten(beyond) {
                 break;
             }
             end = beyond;
             crossing = self.crossing(stepper, end)?;
         }
+        self.vanished = if found && crossing.is_none() { self.vanished + 1 } else { 0 };
         Ok((end, crossing))
     }
 

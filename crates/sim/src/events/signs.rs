@@ -101,6 +101,11 @@ impl Signs {
         Some(middle as f64 + turn)
     }
 
+    /// Whether steps are searched for two crossings of one indicator.
+    pub(crate) fn is_thorough(&self) -> bool {
+        self.thorough
+    }
+
     /// Whether there is nothing to watch.
     pub(crate) fn is_empty(&self) -> bool {
         self.held.is_empty()
