@@ -298,9 +298,11 @@ impl Model {
             let symbol = tracked.get(unknown as usize);
             *been = symbol.and_then(|s| extents.states.get(s)).copied().unwrap_or(0.0);
         }
+        // Without set-valued laws there are no bodies that others hold at rest, and exported C takes the same passes.
+        let held = self.code.bounds.is_some();
         for k in 0..n {
             let value = self.unknown_mut(x, balance.jumps.unknowns[k]).abs();
-            work.been[k] = work.been[k].max(value);
+            work.been[k] = if held { work.been[k].max(value) } else { 0.0 };
         }
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
@@ -318,7 +320,7 @@ impl Model {
             let mut length = 0.0f64;
             changed = true;
             for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&mut work.been) {
-                *been = been.max(s.abs());
+                *been = if held { been.max(s.abs()) } else { 0.0 };
                 let value = self.unknown_mut(x, u);
                 let size = value.abs().max(s.abs()).max(f64::MIN_POSITIVE);
                 length = length.max(if s.abs() <= MET * NOTHING * *been { 0.0 } else { s.abs() / size });
