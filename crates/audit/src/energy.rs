@@ -264,9 +264,12 @@ fn greatest(x: &[f64]) -> f64 {
 /// Part of what it holds at most by which a stored quantity has to change at once to have jumped.
 const JUMPED: f64 = 1e-9;
 
+/// What is gained at samples, in J.
+type Gains = Vec<(usize, f64)>;
+
 /// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample, without what it
 /// has gained by impulses, and that, each with its sample; `None` if its law is no function of its own stored quantity and parameters, or reads what is not known.
-fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, Vec<(usize, f64)>)> {
+fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, Gains)> {
     let element = &graph.elements[port.element];
     let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
     let (StorageLaw::Integral(law) | StorageLaw::Known { law, .. }) = *storage.laws.first()? else { return None };

@@ -126,7 +126,7 @@ fn end(text: &str, names: &[String], to: f64, method: Method, rtol: f64) -> Resu
 }
 
 /// What is wrong about a machine.
-fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<String> {
+fn wrong((text, names): Machine, to: f64, within: f64) -> Option<String> {
     let found = match end(&text, &names, to, Method::Explicit, RTOL) {
         Ok(found) => found,
         Err(why) => return Some(format!("{why}\n{text}")),
@@ -159,8 +159,11 @@ fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<S
     Some(told)
 }
 
+/// A model, and what of it is compared.
+type Machine = (String, Vec<String>);
+
 /// How the campaign takes a machine of a seed: its kind, the machine, and how near the ends of two methods are.
-fn machines(seed: u64) -> [(&'static str, (String, Vec<String>), f64); 3] {
+fn machines(seed: u64) -> [(&'static str, Machine, f64); 3] {
     [("circuit", circuit(seed), 1e-5), ("row", row(seed, false), 1e-4), ("bouncing row", row(seed, true), 1e-4)]
 }
 
