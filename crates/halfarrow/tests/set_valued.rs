@@ -222,6 +222,25 @@ constraint bc: xc - xb >= 0 (restitution = 1)
     }
 }
 
+/// Newton's cradle, its balls a little apart: one after the other hands its speed on, and the last one leaves with all of it.
+#[test]
+fn a_cradle() {
+    let mut text = String::new();
+    for k in 0..5 {
+        text += &format!("1:v{k} -> I:m{k}(2, f0 = {})\nstate x{k}' = v{k}.f from {k}\n", u8::from(k == 0));
+    }
+    for k in 0..4 {
+        text += &format!("constraint c{k}: x{} - x{k} >= 0.9 (restitution = 1)\n", k + 1);
+    }
+    for method in [Method::Explicit, Method::Radau, Method::Fixed(FixedMethod::Heun)] {
+        let step = matches!(method, Method::Fixed(_)).then_some(0.07);
+        let ends = last(&run(&text, &Run { method, step, ..to(3.0, &["x0", "x3", "x4", "m0.f", "m3.f", "m4.f"]) }));
+        for (found, expected) in ends.iter().zip([0.1, 3.1, 6.6, 0.0, 0.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12, "{method:?}: {ends:?}");
+        }
+    }
+}
+
 /// A rod on a pin meets a stop: the pin takes nothing where the stop stands at two thirds of its length.
 #[test]
 fn centre_of_percussion() {
