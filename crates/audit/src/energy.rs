@@ -143,6 +143,9 @@ pub(crate) struct Balance {
     pub moved: f64,
     /// What storages have gained by impulses, in J, by their names.
     pub by_impulses: Vec<(String, f64)>,
+    /// Where impulses can only take energy and have given some: when most of it at once, to which storage above all, and all
+    /// of it.
+    given: Option<(f64, String, f64)>,
 }
 
 /// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
@@ -152,6 +155,8 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     let n = values.times.len();
     let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
     let (mut any, mut held, mut by_impulses) = (false, 0.0f64, Vec::new());
+    let mut gains: Vec<Vec<(String, f64)>> = vec![Vec::new(); n];
+    let mut told = true;
     for port in graph.outer_ports() {
         let element = &graph.elements[port.element];
         if pseudo.contains(&parts.of(graph.bond_of(port))) {
@@ -165,12 +170,15 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
         held = held.max(energy_held(graph, values, port));
         let own = match stored_by_law(graph, values, port) {
             Some((energy, gained)) => {
-                if gained != 0.0 {
-                    by_impulses.push((graph.port_name(port), gained));
+                if !gained.is_empty() {
+                    let name = graph.port_name(port);
+                    by_impulses.push((name.clone(), gained.iter().map(|(_, gain)| gain).sum()));
+                    gained.into_iter().for_each(|(k, gain)| gains[k].push((name.clone(), gain)));
                 }
                 energy
             }
             None => {
+                told &= !matches!(element.kind, Kind::Inertance(_) | Kind::Compliance(_));
                 let through = values.quadrature.integrate(&power);
                 uncertainty.iter_mut().zip(&through.uncertainty).for_each(|(sum, own)| *sum += own);
                 through.values
@@ -182,7 +190,32 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
         }
     }
     let moved = moved.into_iter().fold(held, f64::max);
-    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses })
+    let given = if told && takes_only(graph) { given(values.times, &gains) } else { None };
+    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses, given })
+}
+
+/// Whether all impulses come from set-valued laws at rest, which take energy or leave it as it is: no event resets anything,
+/// nothing imposes a motion.
+fn takes_only(graph: &BondGraph) -> bool {
+    let resets = graph.clauses.iter().any(|c| c.bound.is_none() && c.actions.iter().any(|a| a.impulse.is_some()));
+    let own = |id: ElementId| graph.set_valued.iter().any(|law| law.element == id);
+    let imposed = graph.elements.iter().any(|(id, e)| matches!(e.kind, Kind::FlowSource { .. }) && !own(id));
+    let still = |s: Symbol| {
+        let meaning = graph.variables.get(&s).map(|v| v.meaning);
+        matches!(meaning, Some(Meaning::Signal(_) | Meaning::Stored(_) | Meaning::Parameter(_)))
+    };
+    let gaps = graph.set_valued.iter().filter_map(|law| law.constraint.as_ref()).chain(graph.constraints.iter());
+    let moving = gaps.flat_map(|c| graph.exprs.symbols_of(c.expr)).any(|s| !still(s));
+    !graph.set_valued.is_empty() && !resets && !imposed && !moving
+}
+
+/// What impulses have given at samples where they gave more than they took.
+fn given(times: &[f64], gains: &[Vec<(String, f64)>]) -> Option<(f64, String, f64)> {
+    let at = |k: usize| gains[k].iter().map(|(_, gain)| gain).sum::<f64>();
+    let most = (0..times.len()).filter(|&k| at(k) > 0.0).reduce(|most, k| if at(k) > at(most) { k } else { most })?;
+    let (name, _) = gains[most].iter().reduce(|a, b| if b.1 > a.1 { b } else { a })?;
+    let all = (0..times.len()).map(|k| at(k).max(0.0)).sum();
+    Some((times[most], name.clone(), all))
 }
 
 impl Balance {
@@ -193,6 +226,11 @@ impl Balance {
             let terms = vec![Term::of(Quantity::Energy, 1.0)];
             let raw = Raw { miss: self.missing[k], resolution: self.uncertainty[k], time, place, terms };
             worst.keep(raw, settled);
+        }
+        if let Some((time, name, all)) = &self.given {
+            let place = format!("{name}: what impulses give that can only take");
+            let terms = vec![Term::of(Quantity::Energy, 1.0)];
+            worst.keep(Raw { miss: *all, resolution: 0.0, time: *time, place, terms }, settled);
         }
     }
 }
@@ -226,9 +264,12 @@ fn greatest(x: &[f64]) -> f64 {
 /// Part of what it holds at most by which a stored quantity has to change at once to have jumped.
 const JUMPED: f64 = 1e-9;
 
+/// What is gained at samples, in J.
+type Gains = Vec<(usize, f64)>;
+
 /// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample, without what it
-/// has gained by impulses, and that; `None` if its law is no function of its own stored quantity and parameters, or reads what is not known.
-fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, f64)> {
+/// has gained by impulses, and that, each with its sample; `None` if its law is no function of its own stored quantity and parameters, or reads what is not known.
+fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, Gains)> {
     let element = &graph.elements[port.element];
     let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
     let (StorageLaw::Integral(law) | StorageLaw::Known { law, .. }) = *storage.laws.first()? else { return None };
@@ -245,11 +286,11 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(V
     let mut z = |x: f64| law.values_in(&mut room, &mut |s| if s == own { x } else { parameter(s) })[0];
     // What an impulse gives or takes is no power of any sample.
     let jumps = jumps(values.times, x, JUMPED * greatest(x));
-    let (mut energy, mut gained) = (vec![0.0; x.len()], 0.0);
+    let (mut energy, mut gained) = (vec![0.0; x.len()], Vec::new());
     for k in 1..x.len() {
         let change = gauss(x[k - 1], x[k], &mut z);
         let by_impulse = jumps[k] != jumps[k - 1];
-        gained += if by_impulse { change } else { 0.0 };
+        gained.extend(by_impulse.then_some((k, change)));
         energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { change };
     }
     Some((energy, gained))

@@ -70,6 +70,32 @@ fn a_ball_bounces_when_it_should_until_its_impacts_accumulate() {
     }
 }
 
+/// No method falls through the floor without a word, however short the last flights are beside what it is to be exact to.
+#[test]
+fn no_flight_is_lost_without_a_word() {
+    for e in [0.05f64, 0.3, 0.8, 0.95] {
+        let text = BALL.replace("e = 0.8", &format!("e = {e}"));
+        for rtol in [1e-4f64, 1e-6, 1e-8, 1e-10] {
+            for method in [Method::Explicit, Method::Bdf, Method::Radau, Method::Fixed(FixedMethod::Heun)] {
+                let step = matches!(method, Method::Fixed(_)).then_some(0.1 * rtol.sqrt());
+                if step.is_some_and(|step| step < 1e-3) {
+                    continue;
+                }
+                let record = Record::Names(vec!["h".to_string()]);
+                let run = Run { method, rtol, step, record, ..exact(60.0) };
+                let stopped = match model(&text).simulate(&run, &mut |_| true) {
+                    Err(Error::Run(stopped)) => stopped,
+                    other => panic!("{e} {rtol} {method:?}: {:?}", other.map(|done| done.report)),
+                };
+                let told = matches!(stopped.failure, Failure::Accumulation { .. } | Failure::Lost { .. });
+                assert!(told, "{e} {rtol} {method:?}: {}", stopped.failure);
+                let lowest = column(&stopped.trace, "h").iter().copied().fold(0.0, f64::min);
+                assert!(lowest > -0.01, "{e} {rtol} {method:?}: it is at {lowest}");
+            }
+        }
+    }
+}
+
 #[test]
 fn steps_of_fixed_length_are_cut_short_at_impacts() {
     let first = (2.0f64 / 9.81).sqrt();

@@ -381,6 +381,30 @@ fn what_is_sound_passes_and_what_is_made_wrong_is_caught() {
     assert!(sound > 60 && columns_caught > 300 && laws_caught > 100, "{sound} {columns_caught} {laws_caught}");
 }
 
+/// A body meets a wall in free flight. All that it has after that may be taken times a number: every law holds then, and the
+/// energy says whether a wall at rest can have done it.
+#[test]
+fn an_impact_that_gives_energy_is_caught() {
+    let source = "model Wall\n1:v -> I:m(2, f0 = -1)\nstate x' = v.f from 0.5\n\
+                  constraint wall: x >= 0 (restitution = 0.5)\n";
+    let done =
+        text(source).simulate(&Run { to: 1.0, every: None, record: Record::All, ..Run::default() }, &mut |_| true);
+    let trace = done.unwrap_or_else(|e| panic!("{}", e.render(false))).trace;
+    let graph = elaborated(source, &[]);
+    let wanted = halfarrow_audit::wanted(&graph);
+    let after = (1..trace.times.len()).find(|&k| trace.times[k] == trace.times[k - 1] && k > 1).expect("an impact");
+    let times = |by: f64| -> Columns {
+        let own = trace.columns.iter().filter(|c| wanted.contains(&c.name));
+        let scaled = |(k, v): (usize, &f64)| if k < after { *v } else { by * v };
+        own.map(|c| (c.name.clone(), c.values.iter().enumerate().map(scaled).collect())).collect()
+    };
+    let energy = |by: f64| audited(&graph, &trace.times, &times(by)).energy.map_or(0.0, |energy| energy.value);
+    // From half the speed to the whole of it, and beyond.
+    for (by, gives) in [(0.5, false), (1.0, false), (2.0, false), (2.1, true), (4.0, true)] {
+        assert_eq!(energy(by) > 1e-3, gives, "{by}: {}", energy(by));
+    }
+}
+
 fn run_or_none(model: &Model, run: &Run) -> Option<Failure> {
     match model.simulate(run, &mut |_| true) {
         Err(Error::Run(stopped)) => Some(stopped.failure),

@@ -222,6 +222,25 @@ constraint bc: xc - xb >= 0 (restitution = 1)
     }
 }
 
+/// Newton's cradle, its balls a little apart: one after the other hands its speed on, and the last one leaves with all of it.
+#[test]
+fn a_cradle() {
+    let mut text = String::new();
+    for k in 0..5 {
+        text += &format!("1:v{k} -> I:m{k}(2, f0 = {})\nstate x{k}' = v{k}.f from {k}\n", u8::from(k == 0));
+    }
+    for k in 0..4 {
+        text += &format!("constraint c{k}: x{} - x{k} >= 0.9 (restitution = 1)\n", k + 1);
+    }
+    for method in [Method::Explicit, Method::Radau, Method::Fixed(FixedMethod::Heun)] {
+        let step = matches!(method, Method::Fixed(_)).then_some(0.07);
+        let ends = last(&run(&text, &Run { method, step, ..to(3.0, &["x0", "x3", "x4", "m0.f", "m3.f", "m4.f"]) }));
+        for (found, expected) in ends.iter().zip([0.1, 3.1, 6.6, 0.0, 0.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12, "{method:?}: {ends:?}");
+        }
+    }
+}
+
 /// A rod on a pin meets a stop: the pin takes nothing where the stop stands at two thirds of its length.
 #[test]
 fn centre_of_percussion() {
@@ -269,6 +288,131 @@ fn fixed_steps() {
         for (found, expected) in last(&run(text, &fixed)).iter().zip(&reference) {
             assert!((found - expected).abs() < within, "{method:?}: {found} for {expected}");
         }
+    }
+}
+
+/// A diode behind forty cells that a wave has not reached yet keeps its branch, whatever rounding makes of it there; then the
+/// wave is that of the line without it, as long as it conducts.
+#[test]
+fn a_diode_far_from_the_wave() {
+    let line = |end: &str| {
+        let mut text = String::from("Se:src(10*sin(3*t)) -> 1:l0\n");
+        for k in 0..40 {
+            text += &format!("l{k} -> I:i{k}(0.05)\nl{k} -> 0:n{k}\nn{k} -> C:c{k}(0.05)\n");
+            text += &if k < 39 { format!("n{k} -> 1:l{}\n", k + 1) } else { format!("n{k} -> 1:end\nend -> R:r(1)\n") };
+        }
+        text + end
+    };
+    for method in [Method::Explicit, Method::Radau] {
+        let names = ["c39.e", "r.f"];
+        let options = Run { every: None, method, rtol: 1e-9, ..to(2.4, &names) };
+        let with = run(&line("end -> R:d(0 <= f, 0 <= -e)\n"), &options);
+        let without = run(&line(""), &options);
+        assert!(with.report.switches <= 100 && with.report.steps < 4 * without.report.steps, "{:?}", with.report);
+        let (with, without) = (last(&with), last(&without));
+        assert!(with[1] > 0.1, "the wave has come: {with:?}");
+        for (with, without) in with.iter().zip(&without) {
+            close(*with, *without, 1e-6);
+        }
+    }
+}
+
+/// A block slides against a wall and stops there: it touches and stays, sticks, and comes away where it is pulled hard enough.
+#[test]
+fn a_block_that_sticks_at_a_wall() {
+    // It stops at 2 m after 2 s, where the wall stands to rounding; the pull needs 2 N.
+    for wall in ["2", "2 - 1e-15", "2 + 1e-15", "1.9"] {
+        let text = format!(
+            "1:v -> I:m(2, f0 = 2)\nv -> R:pad(friction = 2)\nSe:pull(if t < 3 then 0 else -(t - 3)) -> v\n\
+             state x' = v.f from 0\nconstraint wall: x <= {wall} (restitution = 0)\n"
+        );
+        for method in [Method::Explicit, Method::Radau] {
+            let ends = last(&run(&text, &Run { method, ..to(4.5, &["x", "m.f", "wall.e"]) }));
+            close(ends[0], if wall == "1.9" { 1.9 } else { 2.0 }, 1e-9);
+            assert!(ends[1].abs() < 1e-12 && ends[2].abs() < 1e-9, "{ends:?}");
+            // From 5 s on a force of t - 5 pulls beyond friction.
+            let ends = last(&run(&text, &Run { method, ..to(7.0, &["m.f", "wall.e"]) }));
+            close(ends[0], -2.0 * 2.0 / 2.0 / 2.0, 1e-9);
+            assert_eq!(ends[1], 0.0);
+        }
+    }
+}
+
+/// Two balls, one above the other, come to rest together: then the floor carries both and the lower one the upper one.
+#[test]
+fn a_stack_comes_to_rest() {
+    for e in ["0.3", "0.5", "0.8"] {
+        let text = format!(
+            "Se:w1(-10) -> 1:v1 -> I:m1(1)\nSe:w2(-20) -> 1:v2 -> I:m2(2)\nstate x1' = v1.f from 0.5\n\
+             state x2' = v2.f from 1\nconstraint floor: x1 >= 0 (restitution = {e})\n\
+             constraint between: x2 - x1 >= 0.25 (restitution = {e})\n"
+        );
+        for method in [Method::Explicit, Method::Radau] {
+            let names = ["x1", "x2", "m1.f", "m2.f", "floor.e", "between.e"];
+            let result = run(&text, &Run { method, rtol: 1e-10, ..to(12.0, &names) });
+            assert!(result.report.steps < 20_000, "{}", result.report.steps);
+            let ends = last(&result);
+            assert!(ends[0].abs() < 1e-11 && (ends[1] - 0.25).abs() < 1e-11, "{e}: {ends:?}");
+            assert!(ends[2].abs() < 1e-11 && ends[3].abs() < 1e-11, "{e}: {ends:?}");
+            close(ends[4], 30.0, 1e-11);
+            close(ends[5], 20.0, 1e-11);
+        }
+    }
+}
+
+/// A row that fits exactly between two walls is hit: more contacts close than there are speeds, and no one moves.
+#[test]
+fn more_contacts_than_speeds() {
+    let text = "1:a -> I:ma(1, f0 = 3)\n1:b -> I:mb(2)\n1:c -> I:mc(1)\nstate xa' = a.f from 0\nstate xb' = b.f from 1\n\
+                state xc' = c.f from 2\nconstraint ab: xb - xa >= 1\nconstraint bc: xc - xb >= 1\n\
+                constraint left: xa >= 0\nconstraint right: xc <= 2\n";
+    let ends = last(&run(text, &to(1.0, &["ma.f", "mb.f", "mc.f", "ab.impulse", "bc.impulse", "right.impulse"])));
+    assert!(ends[..3].iter().all(|f| f.abs() < 1e-14), "{ends:?}");
+    for impulse in &ends[3..] {
+        close(*impulse, 3.0, 1e-12);
+    }
+}
+
+/// A contact that is touched at one instant and left again, to rounding: the motion goes on as if nothing stood there.
+#[test]
+fn a_contact_that_is_grazed() {
+    let text = "1:v -> I:m(3, f0 = -1)\nSe:p(3*sin(t)) -> v\nstate x' = v.f from 0\nconstraint left: x >= -1\n";
+    for method in [Method::Explicit, Method::Radau] {
+        let result = run(text, &Run { method, rtol: 1e-9, ..to(3.0, &["m.f", "x"]) });
+        assert!(result.report.steps < 2000, "{}", result.report.steps);
+        let ends = last(&result);
+        assert!((ends[0] + 3f64.cos()).abs() < 1e-6 && (ends[1] + 3f64.sin()).abs() < 1e-6, "{ends:?}");
+    }
+}
+
+/// A body at rest of which nothing is known is hit.
+#[test]
+fn a_body_at_rest_is_hit() {
+    let text = "1:a -> I:ma(3, f0 = -1)\n1:b -> I:mb(2)\nb -> C:spring(k = 8)\nstate xa' = a.f from 0.5\n\
+                state xb' = b.f from 0\n1:u -> I:mu(1, f0 = -1)\nu -> R:pad(friction = 0.5)\n\
+                constraint gap: xa - xb >= 0 (restitution = 0.5)\n";
+    for method in [Method::Explicit, Method::Radau] {
+        let ends = last(&run(text, &Run { method, ..to(1.0, &["ma.f", "mb.f", "xb"]) }));
+        // By momentum and Newton's law, then half a second of its own oscillation.
+        let (va, vb) = (-1.0 + 2.0 / 5.0 * 1.5, -3.0 / 5.0 * 1.5);
+        close(ends[0], va, 1e-9);
+        close(ends[1], vb * 1f64.cos(), 1e-8);
+        close(ends[2], vb / 2.0 * 1f64.sin(), 1e-8);
+    }
+}
+
+/// A contact that closes for a part of a step of fixed length only: the way back begins there, as if time had gone on.
+#[test]
+fn a_contact_within_a_fixed_step() {
+    let text = "1:v -> I:m(1)\nv -> C:spring(k = 1, q0 = 1)\nstate x' = v.f from 1\n\
+                constraint wall: x >= -0.9999 (restitution = 1)\n";
+    for step in [0.05, 0.043, 0.037] {
+        let options = Run { method: Method::Fixed(FixedMethod::Rk4), step: Some(step), ..to(5.0, &["x", "m.f"]) };
+        let ends = last(&run(text, &options));
+        // The way down and up again beyond the wall is left out.
+        let phase = 5.0 + 2.0 * (PI - (-0.9999f64).acos());
+        assert!((ends[0] - phase.cos()).abs() < 1e-5, "{step}: {ends:?} for {}", phase.cos());
+        assert!((ends[1] + phase.sin()).abs() < 1e-5, "{step}: {ends:?} for {}", -phase.sin());
     }
 }
 

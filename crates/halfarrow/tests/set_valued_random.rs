@@ -70,11 +70,11 @@ fn circuit(seed: u64) -> (String, Vec<String>) {
 }
 
 /// Bodies in a row between two walls, with friction, springs and forces.
-fn row(seed: u64) -> (String, Vec<String>) {
+fn row(seed: u64, bouncing: bool) -> (String, Vec<String>) {
     let mut random = Random(seed);
     let r = &mut random;
     let n = 2 + r.below(3);
-    let back = "0";
+    let back = if bouncing { r.one(&["0.3", "0.5", "0.7", "0.9"]) } else { "0" };
     let mut text = String::from("model Row\n");
     for k in 0..n {
         text += &format!("1:v{k} -> I:m{k}({}, f0 = {})\n", r.one(&["1", "2", "3"]), r.one(&["0", "1", "-1", "2"]));
@@ -99,41 +99,100 @@ fn row(seed: u64) -> (String, Vec<String>) {
     (text, (0..n).map(|k| format!("x{k}")).collect())
 }
 
+/// Tolerances: the second one where an audit asks for it.
+const RTOL: f64 = 1e-9;
+const FINE: f64 = 1e-12;
+/// Steps that no machine needs.
+const MOST_STEPS: usize = 50_000;
+
 /// What a machine comes to by a method, or why not.
-fn end(text: &str, names: &[String], to: f64, method: Method) -> Result<Vec<f64>, String> {
+fn end(text: &str, names: &[String], to: f64, method: Method, rtol: f64) -> Result<Vec<f64>, String> {
     let model = Model::from_text("random.bond", text, &[]).map_err(|e| e.render(false))?;
-    let run = Run { to, rtol: 1e-9, method, record: Record::Names(names.to_vec()), ..Run::default() };
-    let result = model.simulate(&run, &mut |_| true).map_err(|e| e.render(false))?;
+    let run = Run { to, rtol, method, record: Record::Names(names.to_vec()), ..Run::default() };
+    let mut steps = 0;
+    let mut goes_on = |_: halfarrow::Progress<'_>| {
+        steps += 1;
+        steps < MOST_STEPS
+    };
+    let result = model.simulate(&run, &mut goes_on).map_err(|e| e.render(false))?;
     if !result.report.audit.warnings.is_empty() {
+        // What steps leave open: it is not so with shorter ones.
+        if rtol > FINE {
+            return end(text, names, to, method, FINE);
+        }
         return Err(result.report.audit.warnings.join("; "));
     }
     Ok(result.trace.columns.iter().map(|c| *c.values.last().expect("a value")).collect())
 }
 
 /// What is wrong about a machine.
-fn wrong((text, names): (String, Vec<String>), to: f64, within: f64) -> Option<String> {
-    let found = match end(&text, &names, to, Method::Explicit) {
+fn wrong((text, names): Machine, to: f64, within: f64) -> Option<String> {
+    let found = match end(&text, &names, to, Method::Explicit, RTOL) {
         Ok(found) => found,
         Err(why) => return Some(format!("{why}\n{text}")),
     };
-    let other = match end(&text, &names, to, Method::Radau) {
+    let other = match end(&text, &names, to, Method::Radau, RTOL) {
         Ok(other) => other,
         Err(why) => return Some(format!("radau: {why}\n{text}")),
     };
-    let off = found.iter().zip(&other).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-    (off > within).then(|| format!("explicit {found:?}, radau {other:?}\n{text}"))
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+    if apart(&found, &other) <= within {
+        return None;
+    }
+    // Where impacts of several bodies follow each other closely their order decides: what a start that differs by next to
+    // nothing changes as much says nothing of methods.
+    let told = format!("explicit {found:?}, radau {other:?}\n{text}");
+    let beside = ["+ 1e-8", "- 1e-8"].map(|by| text.replace("from 0.5\n", &format!("from 0.5 {by}\n")));
+    let starts = beside.iter().map(|text| (text, RTOL)).chain([(&text, FINE)]);
+    for (text, rtol) in starts {
+        for (method, reference) in [(Method::Explicit, &found), (Method::Radau, &other)] {
+            match end(text, &names, to, method, rtol) {
+                Ok(beside) if apart(reference, &beside) > within => {
+                    println!("sensitive: {told}");
+                    return None;
+                }
+                Ok(_) => {}
+                Err(why) => return Some(format!("beside it: {why}\n{text}")),
+            }
+        }
+    }
+    Some(told)
 }
 
-/// As many as `GRAPHS`, from the seed `FROM` on.
+/// A model, and what of it is compared.
+type Machine = (String, Vec<String>);
+
+/// How the campaign takes a machine of a seed: its kind, the machine, and how near the ends of two methods are.
+fn machines(seed: u64) -> [(&'static str, Machine, f64); 3] {
+    [("circuit", circuit(seed), 1e-5), ("row", row(seed, false), 1e-4), ("bouncing row", row(seed, true), 1e-4)]
+}
+
+/// Machines that were wrong once: several margins that vanish together, contacts that are apart, flights as short as rounding,
+/// grazed contacts, states of which nothing is known when an event moves them, starts at which all is zero.
+#[test]
+fn some() {
+    let circuits = [1, 129, 224, 744, 746, 934, 1172].map(|seed| (0, seed));
+    let rows = [0, 2, 4, 5, 9, 10, 94, 99, 323, 341, 389, 394, 400, 434, 443, 1953].map(|seed| (1, seed));
+    let bouncing = [0, 5, 17, 52, 168, 399, 793, 929, 990].map(|seed| (2, seed));
+    for (kind, seed) in circuits.into_iter().chain(rows).chain(bouncing) {
+        let (name, machine, within) = machines(seed).into_iter().nth(kind).expect("a kind");
+        if let Some(fault) = wrong(machine, 4.0, within) {
+            panic!("{name} {seed}: {fault}");
+        }
+    }
+}
+
+/// As many as `GRAPHS` of each kind, from the seed `FROM` on; of one `KIND` if it is given.
 #[test]
 #[ignore = "a campaign"]
 fn many() {
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
     let (from, count) = (number("FROM").unwrap_or(0), number("GRAPHS").unwrap_or(1000));
+    let only = std::env::var("KIND").unwrap_or_default();
     let mut faults = 0;
     for seed in from..from + count {
-        for (kind, fault) in [("circuit", wrong(circuit(seed), 4.0, 1e-5)), ("row", wrong(row(seed), 4.0, 1e-4))] {
-            if let Some(fault) = fault {
+        for (kind, machine, within) in machines(seed).into_iter().filter(|(kind, ..)| kind.starts_with(&only)) {
+            if let Some(fault) = wrong(machine, 4.0, within) {
                 faults += 1;
                 println!("{kind} {seed}: {fault}");
             }

@@ -111,6 +111,15 @@ pub enum Failure {
         /// The instant, in s.
         end: f64,
     },
+    /// What an event sends back is beyond its border at the end of the next step, and was never seen to return.
+    Lost {
+        /// The end of the step, in s.
+        time: f64,
+        /// The event, as it begins in the model.
+        what: String,
+        /// When it happened last, in s.
+        since: f64,
+    },
     /// Two events at one instant give something different values.
     Conflict {
         /// When, in s.
@@ -240,6 +249,7 @@ impl Failure {
             | Failure::Chattering { time, .. }
             | Failure::Livelock { time, .. }
             | Failure::Accumulation { time, .. }
+            | Failure::Lost { time, .. }
             | Failure::Conflict { time, .. }
             | Failure::Reset { time, .. }
             | Failure::NoMode { time, .. }
@@ -336,6 +346,12 @@ impl fmt::Display for Failure {
                 "at t = {time} s `{what}` happens ever faster, {interval:.1e} s after the last time: its events accumulate at \
                  t = {end} s, and what is beyond that the model does not say; end the run before it, or let a law take over \
                  where it gets fast, such as a spring and a damper"
+            ),
+            Failure::Lost { time, what, since } => write!(
+                f,
+                "at t = {time} s `{what}` holds further on after it has happened at t = {since} s, and the way back that it began \
+                 with was shorter than a step can tell: shorten the step or tighten --rtol, end the run before it, or let a law \
+                 take over where events get fast, such as a contact (`constraint gap: x >= 0`)"
             ),
             Failure::Conflict { time, what, by } => write!(
                 f,

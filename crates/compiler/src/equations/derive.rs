@@ -9,7 +9,7 @@ use super::breaks::{name_of, open_loops};
 use super::definitions::Definitions;
 use super::exchanges::{Exchanges, exchanges, may_exchange};
 use super::freedom::{self, Sum};
-use super::jumps::{margins, readable};
+use super::jumps::readable;
 use super::minimal::{Assembled, assemble};
 use super::momenta::{Momentum, known};
 use super::position_relations::position_relations;
@@ -241,7 +241,6 @@ fn order_equations(
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, jumps.as_ref())?;
-    let margins = margins(&d);
     let observed = observed::observed(&mut d, &states, &positions);
     // The other forms start as the minimal one does.
     let own_start = matches!(form, Form::Minimal | Form::Kane);
@@ -299,7 +298,6 @@ fn order_equations(
         momenta,
         exchanges,
         jumps,
-        margins,
         free_rates,
         certificate: None,
         dof,

@@ -6,7 +6,7 @@ use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, rows_of};
 use super::{Form, Unavailable, observed};
 use crate::algebra::{Expr, ONE, Symbol};
-use crate::bond_graph::{Action, BondGraph, Bound, BoundKind, Meaning, SetValuedLaw};
+use crate::bond_graph::{Action, BondGraph, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
 use crate::span::Span;
@@ -183,21 +183,6 @@ pub(super) fn readable(d: &mut Definitions, jumps: Option<&Jumps>) -> Result<(),
         }
     }
     Ok(())
-}
-
-/// The margins of all branches of set-valued laws, where they have a value.
-pub(super) fn margins(d: &Definitions) -> Vec<Vec<(usize, usize, Expr)>> {
-    let of = |law: &SetValuedLaw| {
-        let bounds = law.branches.iter().enumerate();
-        let bounds =
-            bounds.flat_map(|(branch, b)| b.bounds.iter().enumerate().map(move |(n, bound)| (branch, n, bound)));
-        let margin = |(branch, number, bound): (usize, usize, &Bound)| match bound.kind {
-            BoundKind::Margin(margin) => observed::value_of(d, margin).ok().map(|_| (branch, number, margin)),
-            BoundKind::Command(_) => None,
-        };
-        bounds.filter_map(margin).collect()
-    };
-    d.graph.set_valued.iter().map(of).collect()
 }
 
 fn unreadable(name: &str, span: Span, reason: &Unavailable) -> Diagnostics {

@@ -117,8 +117,6 @@ pub struct Equations {
     pub exchanges: Exchanges,
     /// How storages change at events; none where no event changes them, and in forms that go by the minimal one there.
     pub jumps: Option<Jumps>,
-    /// Of each set-valued law the margins of all its branches that have a value: branch, number of the bound, margin.
-    pub margins: Vec<Vec<(usize, usize, Expr)>>,
     /// Rates that nothing defines.
     pub free_rates: BTreeSet<Symbol>,
     /// How few break variables open all loops, where the form has any.

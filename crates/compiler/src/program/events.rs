@@ -33,8 +33,21 @@ pub struct Bound {
     pub next: u32,
     /// What is never negative while the branch holds; none where a condition ends it.
     pub margin: Option<Value>,
+    /// What the margin is measured in.
+    pub measure: Measure,
     /// Where the margin is a gap: its rate, and the flow of the element with which it stays as it is.
     pub gap: Option<(Value, Value)>,
+}
+
+/// What a margin is measured in: with which variables of the graph it is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Measure {
+    /// As the effort of its element.
+    Effort,
+    /// As its flow.
+    Flow,
+    /// As neither: a gap.
+    Gap,
 }
 
 /// A set-valued law.
@@ -48,9 +61,6 @@ pub struct SetValued {
     pub present: u32,
     /// The branch that it has while impulses are shared out, where it would take part in them otherwise.
     pub released: Option<u32>,
-    /// The margins of all branches, by branch and number of the bound, where they have a value: how great they have been tells
-    /// what is zero.
-    pub margins: Vec<(u32, u32, Value)>,
 }
 
 /// When an event happens.
@@ -166,7 +176,15 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
                 BoundKind::Command(_) => None,
             };
             let gap = bound.impact.as_ref().map(|i| (lower.value(i.rate), lower.value(i.still)));
-            Bound { law: law as u32, next: bound.next as u32, margin, gap }
+            let flow = |s| matches!(meaning(graph, s), Some(Meaning::Flow(_)));
+            let effort = |s| matches!(meaning(graph, s), Some(Meaning::Effort(_)));
+            let reads = |wanted: &dyn Fn(Symbol) -> bool| graph.exprs.depends_on_any(bound.kind.expr(), wanted);
+            let measure = match bound.impact {
+                Some(_) => Measure::Gap,
+                None if reads(&flow) && !reads(&effort) => Measure::Flow,
+                None => Measure::Effort,
+            };
+            Bound { law: law as u32, next: bound.next as u32, margin, measure, gap }
         });
         clauses.push(Clause { name: clause.name.clone(), trigger, actions, bound, span: clause.span });
     }
@@ -191,22 +209,15 @@ fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {
 }
 
 /// The set-valued laws of a graph.
-pub(super) fn set_valued(lower: &mut Lowering, equations: &Equations) -> Vec<SetValued> {
+pub(super) fn set_valued(equations: &Equations) -> Vec<SetValued> {
     let graph = &equations.graph;
-    let mut margins = equations.margins.iter();
-    let mut law = |law: &bond_graph::SetValuedLaw| SetValued {
+    let law = |law: &bond_graph::SetValuedLaw| SetValued {
         name: graph.elements[law.element].name.clone(),
         branches: law.branches.iter().map(|b| b.name).collect(),
         present: law.present as u32,
         released: law.branch().released.map(|branch| branch as u32),
-        margins: margins
-            .next()
-            .into_iter()
-            .flatten()
-            .map(|&(branch, bound, e)| (branch as u32, bound as u32, lower.value(e)))
-            .collect(),
     };
-    graph.set_valued.iter().map(&mut law).collect()
+    graph.set_valued.iter().map(law).collect()
 }
 
 /// The balances as values; which unknowns they have is told by [`with_unknowns`].

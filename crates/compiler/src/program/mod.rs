@@ -37,7 +37,7 @@ mod triggers;
 mod values;
 mod verify;
 
-pub use events::{Action, Bound, Clause, Impulse, Jumps, SetValued, Target, Trigger};
+pub use events::{Action, Bound, Clause, Impulse, Jumps, Measure, SetValued, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};

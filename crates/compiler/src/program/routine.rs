@@ -244,7 +244,6 @@ impl Program {
         wanted.extend(self.guesses.iter().flat_map(|g| [g.residual, g.asked]));
         wanted.extend(self.held.iter().flat_map(|h| [h.source, h.time]));
         wanted.extend(self.clauses.iter().flat_map(|c| c.values()));
-        wanted.extend(self.set_valued.iter().flat_map(|law| law.margins.iter().map(|m| m.2)));
         wanted.extend(self.jumps.iter().flat_map(|j| j.values()));
         wanted.extend(self.momenta.values());
         wanted.extend(self.positions.iter().filter_map(|p| p.rate));

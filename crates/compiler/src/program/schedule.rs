@@ -269,7 +269,7 @@ impl Schedule<'_> {
         let inputs = self.inputs();
         let held = self.held();
         let clauses = events::clauses(&mut self.lower, equations);
-        let set_valued = events::set_valued(&mut self.lower, equations);
+        let set_valued = events::set_valued(equations);
         let jumps = events::jumps(&mut self.lower, equations);
         let observed = self.observed(equations);
         let conditions = self.start_conditions(equations);

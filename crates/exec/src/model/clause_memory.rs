@@ -56,6 +56,11 @@ impl Condition {
         Condition { holds, start: t, last: f64::NEG_INFINITY, interval: f64::INFINITY, faster: 0 }
     }
 
+    /// Whether it has happened at `t`, and holds after it.
+    pub fn holds_since(&self, t: f64) -> bool {
+        self.holds && self.last == t
+    }
+
     /// Takes notice that the clause happens at `t`. Gives what has passed since the last time and where its events accumulate,
     /// if they do.
     pub fn happens(&mut self, t: f64) -> Option<(f64, f64)> {

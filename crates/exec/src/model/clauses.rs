@@ -9,7 +9,7 @@ use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Layout, Routine};
-use halfarrow_compiler::program::{Program, Target, Trigger, Value};
+use halfarrow_compiler::program::{Op, Program, Target, Trigger, Value};
 use halfarrow_sim::{Affected, Failure};
 
 /// Rounds at one instant at most.
@@ -77,6 +77,18 @@ impl Clauses {
     }
 }
 
+/// A condition on one number that has made something happen, holds still, and is about to hold no longer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Return {
+    clause: usize,
+    /// When it happened, in s.
+    since: f64,
+    /// The place of the number among the indicators, its value then, and the way that it goes.
+    indicator: usize,
+    value: f64,
+    way: f64,
+}
+
 /// Room for what is computed at events.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EventWork {
@@ -89,8 +101,9 @@ pub(super) struct EventWork {
     pub misses: Vec<f64>,
     /// Contacts that come to rest, since their impacts accumulate.
     pub at_rest: Vec<bool>,
-    /// Of each condition the magnitude below which its operand is on the side that is held.
-    pub floors: Vec<f64>,
+    /// Laws that have been released for the impulses of the round, and those whose next flight would be too short.
+    pub released: Vec<u32>,
+    pub short: Vec<u32>,
     /// The clauses of contacts that take part in impulses.
     pub contacts: Vec<usize>,
 }
@@ -102,7 +115,8 @@ impl EventWork {
             fired: vec![false; clauses.len()],
             at_rest: vec![false; clauses.len()],
             contacts: Vec::new(),
-            floors: vec![0.0; mode.program.conditions.len()],
+            released: Vec::new(),
+            short: Vec::new(),
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
             misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],
             impulses: mode.impulses.as_ref().map_or_else(ImpulseWork::default, ImpulseBalance::work),
@@ -139,7 +153,7 @@ impl Model {
                 }
             }
         }
-        Ok(())
+        self.find_meeting(t, x)
     }
 
     /// Which conditions hold at `(t, x)`, as held, and which clauses happen: conditions that have become true, periods that
@@ -160,11 +174,75 @@ impl Model {
             events.fired[clause] = holds && !condition.holds;
             condition.holds = holds;
         }
+        self.find_meeting(t, x)?;
+        let Model { run, events, .. } = self;
         for (memory, fired) in run.clauses.iter_mut().zip(&mut events.fired) {
             if let ClauseMemory::Every { period, next } = memory {
                 while t >= *next * *period {
                     (*fired, *next) = (true, *next + 1.0);
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Contacts take an impact where their sides meet, whatever the sign of a gap that is zero.
+    fn find_meeting(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let code = self.code.clone();
+        let Some(bounds) = &code.bounds else { return Ok(()) };
+        let (meeting, short) = self.meeting(t, x)?;
+        for margin in bounds.margins.iter().filter(|m| m.meets) {
+            self.events.fired[margin.clause] = meeting.contains(&margin.clause);
+        }
+        self.events.short = short;
+        Ok(())
+    }
+
+    /// Notes which conditions have made something happen at `(t, x)` and are about to hold no longer: a ball that has hit the
+    /// floor leaves it.
+    pub(super) fn note_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.run.returns.clear();
+        let code = self.code.clone();
+        let happened = |clause: &usize| match self.run.clauses[*clause] {
+            ClauseMemory::Becomes(condition) => condition.holds_since(t),
+            ClauseMemory::Every { .. } => false,
+        };
+        let indicator = |clause: usize| match code.program.values.op(code.program.clauses[clause].trigger.value()) {
+            Op::Sign(condition, _) => code.switching.iter().position(|c| *c == condition),
+            _ => None,
+        };
+        let own = code.clauses.conditional.iter().copied().filter(|c| code.program.clauses[*c].bound.is_none());
+        let watched: Vec<(usize, usize)> = own.filter(happened).filter_map(|c| Some((c, indicator(c)?))).collect();
+        if watched.is_empty() {
+            return Ok(());
+        }
+        self.rates_at(t, x)?;
+        self.place(t, x);
+        self.move_along(t);
+        self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
+        for (clause, indicator) in watched {
+            let register = code.indicators.outputs[indicator] as usize;
+            let (value, rate) = (self.frame.r[register], self.frame.d[register]);
+            if rate != 0.0 && value * rate <= 0.0 {
+                self.run.returns.push(Return { clause, since: t, indicator, value, way: rate.signum() });
+            }
+        }
+        Ok(())
+    }
+
+    /// What was about to return and is further beyond at the end of a step has been lost.
+    pub(super) fn watch_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.run.returns.is_empty() || self.run.returns.iter().any(|r| r.since == t) {
+            return Ok(());
+        }
+        let code = self.code.clone();
+        self.place(t, x);
+        self.frame.run(&code.indicators).map_err(|error| self.failure(t, error))?;
+        for r in std::mem::take(&mut self.run.returns) {
+            let value = self.frame.r[code.indicators.outputs[r.indicator] as usize];
+            if value * r.way < 0.0 && value.abs() > r.value.abs() {
+                let what = code.program.clauses[r.clause].name.clone();
+                return Err(Failure::Lost { time: t, what, since: r.since });
             }
         }
         Ok(())

@@ -6,7 +6,7 @@ use super::exchanges::Ratios;
 use super::impulses::ImpulseBalance;
 use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
-use super::modes::Bounds;
+use super::margins::Bounds;
 use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
@@ -195,8 +195,10 @@ impl Mode {
     fn new(program: Program, entries: Option<Vec<JacobianEntry>>) -> Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let kept = program.position_relations.iter().flat_map(|r| r.values());
-        let layout =
-            Layout::new(&program, &derivatives.chain(program.relations.values()).chain(kept).collect::<Vec<_>>());
+        // Where branches end, all variables of the graph are taken over into the next mode.
+        let carried = program.variables.values().copied().filter(|_| !program.set_valued.is_empty());
+        let more: Vec<Value> = derivatives.chain(program.relations.values()).chain(kept).chain(carried).collect();
+        let layout = Layout::new(&program, &more);
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
         let rates = layout.guarded_routine(&program, &rates);
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();

@@ -2,11 +2,15 @@
 
 use super::clause_memory::ClauseMemory;
 use super::impulses::ImpulseBalance;
+use super::modes::Extents;
 use super::positions::Motion;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
 use halfarrow_sim::{Affected, Events, Failure};
+
+/// Modes that one instant leads through at most.
+const MOST_MODES: usize = 200;
 
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
@@ -154,9 +158,10 @@ impl Model {
         if !self.run.begun {
             self.begin_delays_and_samples(t, x)?;
             self.run.begun = true;
+            self.note_compared(t, x)?;
             self.take_signs(t, x)?;
-            self.begin_clauses(t, x)?;
             self.begin_contacts(t, x)?;
+            self.begin_clauses(t, x)?;
         } else {
             let conserve = |model: &mut Model, x: &mut [f64]| match leaps {
                 true => model.balance_leaps(t, x),
@@ -171,12 +176,7 @@ impl Model {
             }
             self.find_fired(t, x, told)?;
         }
-        self.run_clauses(t, x)?;
-        while self.settle_mode(t, x)? {
-            self.switched = true;
-            self.find_fired(t, x, &[])?;
-            self.run_clauses(t, x)?;
-        }
+        self.settle_all(t, x)?;
         if self.has_delays() {
             self.run_sources(t, x)?;
             for i in 0..self.run.delays_and_samples.len() {
@@ -186,7 +186,24 @@ impl Model {
                 }
             }
         }
+        self.note_returns(t, x)?;
         self.follow_solutions(t, x)
+    }
+
+    /// Lets happen what has been found to happen, and goes on in the mode that holds after it.
+    fn settle_all(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        self.note_compared(t, x)?;
+        self.run_clauses(t, x)?;
+        for _ in 0..MOST_MODES {
+            if !self.settle_mode(t, x)? {
+                return Ok(());
+            }
+            self.switched = true;
+            self.find_fired(t, x, &[])?;
+            self.run_clauses(t, x)?;
+        }
+        let what = self.laws_ended(t, x)?.join(", ");
+        Err(Failure::Livelock { time: t, what })
     }
 
     /// Goes on in another mode: where the present one has ended, or with other independent variables.
@@ -194,8 +211,12 @@ impl Model {
         if std::mem::take(&mut self.switched) {
             return Ok(true);
         }
-        if !failed && self.has_mode_ended(t, x)? && self.settle_mode(t, x)? {
-            return Ok(true);
+        if !failed && self.is_margin_below(t, x)? {
+            self.find_fired(t, x, &[])?;
+            self.settle_all(t, x)?;
+            if std::mem::take(&mut self.switched) {
+                return Ok(true);
+            }
         }
         self.exchange(t, x, failed)
     }
@@ -267,6 +288,17 @@ impl Events for Model {
         longest.fold(f64::INFINITY, f64::min)
     }
 
+    fn note_magnitudes(&mut self, t: f64, x: &[f64], magnitudes: &[f64]) -> Result<(), Failure> {
+        if self.code.bounds.is_none() {
+            return Ok(());
+        }
+        let code = self.code.clone();
+        for (&symbol, &magnitude) in code.program.tracked.iter().zip(magnitudes) {
+            Extents::note(&mut self.run.extents.states, symbol, magnitude);
+        }
+        self.watch_bounds(t, x)
+    }
+
     fn looks_between(&self) -> bool {
         self.code.bounds.is_some()
     }
@@ -276,6 +308,7 @@ impl Events for Model {
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        self.watch_returns(t, x)?;
         if self.has_delays() {
             self.place(t, x);
             self.run_sources(t, x)?;
@@ -300,9 +333,11 @@ impl Events for Model {
         let mut next = 0;
         for (&condition, &register) in self.code.switching.iter().zip(&self.code.indicators.outputs) {
             let mut beyond = frame.conditions.beyond(condition, frame.r[register as usize], &frame.tables);
-            let floor = self.events.floors[condition.0 as usize];
+            let floor = self.run.floors[condition.0 as usize];
             if self.run.signs_taken == Some(t) || floor > 0.0 && beyond[0].abs() <= floor {
                 frame.conditions.confirm(condition, &mut beyond);
+                // What rounding makes of a zero bends nothing.
+                beyond[0] = floor.max(beyond[0].abs()).copysign(beyond[0]);
             }
             let count = self.code.program.conditions[condition].kind.switches();
             g[next..next + count].copy_from_slice(&beyond[..count]);

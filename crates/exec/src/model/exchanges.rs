@@ -199,6 +199,8 @@ impl Model {
             run.first = Some(left);
         }
         run.mode = mode;
+        run.floors = vec![0.0; code.program.conditions.len()];
+        run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         (self.frame, self.recorded, self.code) = (frame, recorded, code);

@@ -7,6 +7,8 @@ use crate::bytecode::{Layout, Routine};
 use halfarrow_compiler::program::{Jumps, Program, Target, Value};
 use halfarrow_sim::Failure;
 
+/// Contacts that are let act, for each that there is, at most.
+const PASSES: usize = 8;
 /// Passes of Newton.
 const ITERATIONS: usize = 50;
 /// A relative step that has to shrink, or is what rounding leaves.
@@ -15,6 +17,8 @@ const NOISE: f64 = 1e-9;
 const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// What is a difference of what storages keep and below this part of it is rounding.
 const ROUNDING: f64 = 1e-11;
+/// What storages keep that is nothing beside what they have kept, in parts of [`MET`] of it.
+const NOTHING: f64 = 1e-4;
 /// How well the resets are met, as part of what is asked for.
 const MET: f64 = 1e-9;
 
@@ -43,6 +47,9 @@ pub(super) struct ImpulseWork {
     sizes: Vec<f64>,
     /// The greatest term of what is reset, on the way.
     greatest: Vec<f64>,
+    /// How great what storages keep has been, and the unknowns, where a run knows.
+    kept: Vec<f64>,
+    been: Vec<f64>,
 }
 
 /// A reset of the round: the place of what it changes among the outputs, the value that it asks for, its impulse.
@@ -90,6 +97,8 @@ impl ImpulseBalance {
             equations: Elimination::new(rows + asked, unknowns + asked),
             sizes: Vec::with_capacity(rows + asked),
             greatest: Vec::with_capacity(asked),
+            kept: vec![0.0; self.jumps.stored.len()],
+            been: vec![0.0; unknowns],
         }
     }
 }
@@ -152,11 +161,13 @@ impl Model {
         work.asked.clear();
         let done = self.solve_balance(t, x, balance, &mut work);
         self.events.impulses = work;
-        done
+        done?.ok_or_else(|| self.dependent_resets(t))
     }
 
-    /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact, by
-    /// exchanging the one with the least number that is broken (Murty's principal pivoting).
+    /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact.
+    /// That is the least kinetic energy of what the impulses change, found by letting act the contact that gives way most and
+    /// letting go those that would pull on the way there. A contact that others hold already adds nothing.
+    /// Source: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, chapter 23.
     fn share_out(
         &mut self,
         t: f64,
@@ -164,65 +175,134 @@ impl Model {
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
     ) -> Result<(), Failure> {
-        if self.events.contacts.is_empty() {
-            self.take_asked(balance, &mut work.asked);
-            return self.solve_balance(t, x, balance, work).map(|_| ());
-        }
         let contacts = self.events.contacts.clone();
-        let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
         contacts.iter().for_each(|&contact| self.events.fired[contact] = false);
-        let mut tried: Vec<Vec<bool>> = Vec::new();
-        loop {
-            self.take_asked(balance, &mut work.asked);
-            self.solve_balance(t, x, balance, work)?;
-            let Some(broken) = contacts.iter().copied().find(|&c| self.is_broken(c, balance, work)) else {
-                return Ok(());
-            };
-            let active: Vec<bool> = contacts.iter().map(|&c| self.events.fired[c]).collect();
-            if tried.contains(&active) {
-                return Err(self.unmet_resets(t));
+        let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
+        // What has been shared out last, and of each contact.
+        let (mut shared, mut held) = (vec![0.0; contacts.len()], vec![false; contacts.len()]);
+        if !self.solve_shares(t, x, balance, work)? {
+            return Err(self.dependent_resets(t));
+        }
+        for _ in 0..PASSES * (contacts.len() + 1) {
+            let gives = |&k: &usize| !self.events.fired[contacts[k]] && !held[k];
+            let open = (0..contacts.len()).filter(gives).map(|k| (k, self.gives_way(contacts[k], balance)));
+            let worst = open.filter(|(_, by)| *by > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a });
+            let Some((added, _)) = worst else { return Ok(()) };
+            self.events.fired[contacts[added]] = true;
+            loop {
+                x.copy_from_slice(&start);
+                self.run.conserved.clone_from(&conserved);
+                match self.solve_shares(t, x, balance, work) {
+                    Ok(false) if !held[added] && self.events.fired[contacts[added]] => {
+                        // The others hold it to rounding.
+                        (held[added], self.events.fired[contacts[added]]) = (true, false);
+                        continue;
+                    }
+                    Ok(false) => return Err(self.dependent_resets(t)),
+                    solved => solved?,
+                };
+                let wanted: Vec<f64> = contacts.iter().map(|&c| self.impulse_of(c, work)).collect();
+                if self.events.fired[contacts[added]] && shared[added] == 0.0 && wanted[added] <= 0.0 {
+                    // What it gives way by is rounding.
+                    (held[added], self.events.fired[contacts[added]]) = (true, false);
+                    continue;
+                }
+                let noise = self.noise_of_impulses(balance, work);
+                let pulls = |k: &usize| self.events.fired[contacts[*k]] && wanted[*k] < -noise;
+                let way = |k: usize| shared[k] / (shared[k] - wanted[k]);
+                let least = (0..contacts.len()).filter(pulls).map(|k| (k, way(k)));
+                let Some((first, part)) = least.reduce(|a, b| if b.1 < a.1 { b } else { a }) else {
+                    if self.events.fired[contacts[added]] {
+                        held.fill(false);
+                    }
+                    shared = wanted;
+                    break;
+                };
+                for k in 0..contacts.len() {
+                    shared[k] += part * (wanted[k] - shared[k]);
+                    if self.events.fired[contacts[k]] && (k == first || shared[k] <= 0.0) {
+                        (shared[k], self.events.fired[contacts[k]]) = (0.0, false);
+                    }
+                }
             }
-            tried.push(active);
-            self.events.fired[broken] = !self.events.fired[broken];
-            x.copy_from_slice(&start);
-            self.run.conserved.clone_from(&conserved);
         }
+        Err(self.unmet_resets(t))
     }
 
-    /// Whether a contact pulls, or gives way, after what has been solved last.
-    fn is_broken(&self, contact: usize, balance: &ImpulseBalance, work: &ImpulseWork) -> bool {
-        let first = balance.all.outputs.len() - balance.moved.len();
-        let clause = &self.code.program.clauses[contact];
-        let Some((Target::Moved { what, impulse }, k)) = clause.actions.first().map(|a| (a.target, 0)) else {
-            return false;
-        };
-        let target = self.events.values[self.code.clauses.place(contact, k)];
-        if self.events.fired[contact] {
-            let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
-            let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse as usize);
-            let kept = work.sizes[..balance.jumps.balances.len()].iter().fold(0.0f64, |most, size| most.max(*size));
-            return own.is_some_and(|(_, p)| *p < -MET * most - ROUNDING * kept);
-        }
-        let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
-        let flow = self.frame.r[balance.all.outputs[output] as usize];
-        flow - target < -ROUNDING * self.greatest_rate(contact)
-    }
-
-    /// Newton on the unknowns and the impulses; whether any unknown has changed.
-    fn solve_balance(
+    /// Impulses for all that acts; `false` if some of it depends on the rest.
+    fn solve_shares(
         &mut self,
         t: f64,
         x: &mut [f64],
         balance: &ImpulseBalance,
         work: &mut ImpulseWork,
     ) -> Result<bool, Failure> {
+        self.take_asked(balance, &mut work.asked);
+        self.solve_balance(t, x, balance, work).map(|solved| solved.is_some())
+    }
+
+    /// What a contact asks for, and its impulse.
+    fn of_contact(&self, contact: usize) -> Option<(Value, usize)> {
+        let action = self.code.program.clauses[contact].actions.first()?;
+        match action.target {
+            Target::Moved { what, impulse } => Some((what, impulse as usize)),
+            _ => None,
+        }
+    }
+
+    /// By how much a contact gives way after what has been solved last, beyond rounding.
+    fn gives_way(&self, contact: usize, balance: &ImpulseBalance) -> f64 {
+        let Some((what, _)) = self.of_contact(contact) else { return 0.0 };
+        let first = balance.all.outputs.len() - balance.moved.len();
+        let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
+        let flow = self.frame.r[balance.all.outputs[output] as usize];
+        let target = self.events.values[self.code.clauses.place(contact, 0)];
+        (target - flow - ROUNDING * self.greatest_rate(contact)).max(0.0)
+    }
+
+    /// The impulse of a contact in what has been solved last.
+    fn impulse_of(&self, contact: usize, work: &ImpulseWork) -> f64 {
+        let Some((_, impulse)) = self.of_contact(contact).filter(|_| self.events.fired[contact]) else { return 0.0 };
+        let own = work.asked.iter().zip(&work.impulses).find(|(a, _)| a.impulse == impulse);
+        own.map_or(0.0, |(_, p)| *p)
+    }
+
+    /// An impulse that is rounding.
+    fn noise_of_impulses(&self, balance: &ImpulseBalance, work: &ImpulseWork) -> f64 {
+        let most = work.impulses.iter().fold(0.0f64, |most, p| most.max(p.abs()));
+        let kept = work.sizes[..balance.jumps.balances.len()].iter().fold(0.0f64, |most, size| most.max(*size));
+        MET * most + ROUNDING * kept
+    }
+
+    /// Newton on the unknowns and the impulses; whether any unknown has changed. `None` if resets depend on each other.
+    fn solve_balance(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        balance: &ImpulseBalance,
+        work: &mut ImpulseWork,
+    ) -> Result<Option<bool>, Failure> {
         let (n, m) = (balance.unknowns(), balance.unknowns() + work.asked.len());
         work.impulses.clear();
         work.impulses.resize(work.asked.len(), 0.0);
         work.greatest.clear();
         work.greatest.resize(work.asked.len(), 0.0);
         if m == 0 {
-            return Ok(false);
+            return Ok(Some(false));
+        }
+        let (extents, tracked) = (&self.run.extents, &self.code.program.tracked);
+        for (kept, symbol) in work.kept.iter_mut().zip(&balance.jumps.storages) {
+            *kept = extents.stored.get(symbol).copied().unwrap_or(0.0);
+        }
+        for (been, &unknown) in work.been.iter_mut().zip(&balance.jumps.unknowns) {
+            let symbol = tracked.get(unknown as usize);
+            *been = symbol.and_then(|s| extents.states.get(s)).copied().unwrap_or(0.0);
+        }
+        // Without set-valued laws there are no bodies that others hold at rest, and exported C takes the same passes.
+        let held = self.code.bounds.is_some();
+        for k in 0..n {
+            let value = self.unknown_mut(x, balance.jumps.unknowns[k]).abs();
+            work.been[k] = if held { work.been[k].max(value) } else { 0.0 };
         }
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
@@ -233,15 +313,17 @@ impl Model {
             }
             match work.equations.solve() {
                 None => break,
-                Some(rank) if rank < m => return Err(self.dependent_resets(t)),
+                Some(rank) if rank < m => return Ok(None),
                 Some(_) => {}
             }
             let step = &work.equations.step;
             let mut length = 0.0f64;
             changed = true;
-            for (&u, s) in balance.jumps.unknowns.iter().zip(step) {
+            for ((&u, s), been) in balance.jumps.unknowns.iter().zip(step).zip(&mut work.been) {
+                *been = if held { been.max(s.abs()) } else { 0.0 };
                 let value = self.unknown_mut(x, u);
-                length = length.max(s.abs() / value.abs().max(s.abs()).max(f64::MIN_POSITIVE));
+                let size = value.abs().max(s.abs()).max(f64::MIN_POSITIVE);
+                length = length.max(if s.abs() <= MET * NOTHING * *been { 0.0 } else { s.abs() / size });
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
@@ -254,7 +336,7 @@ impl Model {
         self.balanced(t, x, balance, work)?;
         let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
         match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
-            true => Ok(changed),
+            true => Ok(Some(changed)),
             false => Err(self.unmet_resets(t)),
         }
     }
@@ -283,7 +365,7 @@ impl Model {
     /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
     fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
         let jumps = &balance.jumps;
-        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest } = work;
+        let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest, kept, been } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());
         let rows = jumps.balances.len();
         equations.clear(rows + asked.len(), m);
@@ -312,7 +394,8 @@ impl Model {
                     let jump = stored - before[k as usize];
                     sum += c * jump;
                     slope += c * change + dc * jump;
-                    size += (c * stored).abs() + (c * before[k as usize]).abs();
+                    size +=
+                        (c * stored).abs() + (c * before[k as usize]).abs() + (NOTHING * c * kept[k as usize]).abs();
                     factor += 1;
                 }
                 (residual[row], sizes[row]) = (sum, size);
@@ -350,7 +433,7 @@ impl Model {
                 };
                 for (k, a) in asked.iter().enumerate() {
                     let slope = self.frame.d[balance.all.outputs[a.output] as usize];
-                    greatest[k] = greatest[k].max((slope * value).abs());
+                    greatest[k] = greatest[k].max((slope * value).abs()).max((NOTHING * slope * been[column]).abs());
                 }
             }
         }

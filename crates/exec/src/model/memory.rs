@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::clause_memory::ClauseMemory;
+use super::clauses::Return;
 use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
@@ -54,6 +55,10 @@ pub(super) struct Remembered {
     pub clauses: Vec<ClauseMemory>,
     /// How great margins of set-valued laws have been.
     pub extents: Extents,
+    /// Of each condition the magnitude below which its operand is on the side that is held.
+    pub floors: Vec<f64>,
+    /// Conditions that have made something happen and are about to hold no longer.
+    pub returns: Vec<Return>,
     /// The piece of each input that holds.
     pub pieces: Vec<Option<PointRange>>,
 }

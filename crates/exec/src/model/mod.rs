@@ -19,6 +19,7 @@ mod jacobian;
 mod jumps;
 mod linear;
 mod machine;
+mod margins;
 mod memory;
 mod minimum_norm;
 mod modes;
@@ -133,6 +134,8 @@ impl Model {
             delays_and_samples: Vec::new(),
             clauses: Vec::new(),
             extents: Extents::default(),
+            returns: Vec::new(),
+            floors: vec![0.0; code.program.conditions.len()],
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -294,6 +297,8 @@ impl Model {
         self.run.delays_and_samples = self.empty_delays_and_samples();
         self.run.clauses = self.clauses_at_rest();
         self.run.extents = Extents::default();
+        self.run.returns.clear();
+        self.run.floors.fill(0.0);
     }
 
     fn follow(&mut self) {

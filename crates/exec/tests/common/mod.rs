@@ -202,7 +202,6 @@ impl Sketch {
             unkept_relations: Vec::new(),
             momenta: Vec::new(),
             jumps: None,
-            margins: Vec::new(),
             exchanges: Default::default(),
             steps: self.steps,
             observed: self.observed,

@@ -7,6 +7,9 @@ use crate::events::{Events, FINEST, Signs, first_crossing};
 /// Parts of a step by which it is made to go beyond a zero crossing.
 const MARGINS: [f64; 2] = [1e-3, 1e-6];
 
+/// Steps in a row that were made again for a crossing that was none then, from which on that is left behind.
+const MOST_VANISHED: usize = 3;
+
 impl Run<'_> {
     /// Writes the point that the step has led to: its end, or a zero crossing before it. Gives when that is, and whether an
     /// event indicator has changed its sign there.
@@ -43,7 +46,8 @@ impl Run<'_> {
     }
 
     /// The same where there is no dense output, by steps from the same start that end sooner. After an event the inside of the
-    /// step is looked at as well: what has been changed there may come back at once.
+    /// step is looked at as well, since what has been changed there may come back at once, and where indicators bend so much
+    /// that they may have been zero twice.
     fn accept_by_shorter_steps<S: Stepper>(
         &mut self,
         stepper: &mut S,
@@ -56,7 +60,9 @@ impl Run<'_> {
         // The step to the end has just been made.
         stepper.accept(end, inside);
         let switched = signs.crossed(&mut *stepper.events(), end, inside)?.is_some();
-        if !(handled || switched) {
+        let hidden = signs.may_hide_in_step(end - *time);
+        if !(handled || switched || hidden) {
+            signs.step_ended(end - *time);
             point.copy_from_slice(inside);
             return Ok((end, false));
         }
@@ -73,6 +79,7 @@ impl Run<'_> {
         let crossing = first_crossing(signs, *time, end, &mut crossed)?;
         let (end, indicator) = crossing.map_or((end, None), |(time, indicator)| (time, Some(indicator)));
         crossed(signs, end)?;
+        signs.step_ended(end - *time);
         point.copy_from_slice(inside);
         if let Some(indicator) = indicator.filter(|_| self.chatter.is_one(end)) {
             let what = stepper.events().indicator_name(indicator);
@@ -90,15 +97,21 @@ impl Run<'_> {
     ) -> Result<(f64, Option<(f64, usize)>), Failure> {
         let mut crossing = self.crossing(stepper, end)?;
         let finest = 2.0 * FINEST * (end - self.time);
+        let found = crossing.is_some();
         for margin in MARGINS {
             let Some((time, _)) = crossing else { break };
-            let beyond = time + margin * (time - self.time);
+            // What was no crossing time after time is left behind by a part of the step at least, where steps are searched: a
+            // contact that is grazed.
+            let grazed = self.signs.is_thorough() && self.vanished >= MOST_VANISHED;
+            let least = if grazed { end - time } else { 0.0 };
+            let beyond = time + margin * (time - self.time).max(least);
             if time - self.time <= finest || beyond >= end || !stepper.shorten(beyond) {
                 break;
             }
             end = beyond;
             crossing = self.crossing(stepper, end)?;
         }
+        self.vanished = if found && crossing.is_none() { self.vanished + 1 } else { 0 };
         Ok((end, crossing))
     }
 

@@ -58,6 +58,8 @@ pub(crate) struct Run<'a> {
     inside: Vec<f64>,
     /// Whether an event has been handled where the run stands.
     handled: bool,
+    /// Steps in a row that were made again for a crossing that was none then.
+    vanished: usize,
 }
 
 impl<'a> Run<'a> {
@@ -78,6 +80,7 @@ impl<'a> Run<'a> {
             values: vec![0.0; events.observed()],
             inside: Vec::new(),
             handled: false,
+            vanished: 0,
         }
     }
 
@@ -109,6 +112,7 @@ impl<'a> Run<'a> {
             values,
             inside,
             handled,
+            vanished: 0,
         }
     }
 

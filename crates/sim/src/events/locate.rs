@@ -1,7 +1,7 @@
 //! The first zero crossing inside a step.
 
 use super::Signs;
-use super::signs::PLACES;
+use super::signs::INSIDE;
 use crate::Failure;
 
 /// Parts of a step at whose ends the signs are looked at: a pulse as short as one part is not missed.
@@ -77,7 +77,7 @@ fn hidden(
     const MIDDLE: usize = BEGIN + 1;
     const FIRST: usize = MIDDLE + 1;
     let mut before = begin;
-    let mut ends = [0.0; PLACES];
+    let mut ends = [0.0; INSIDE];
     signs.keep_as(part - 1, BEGIN);
     signs.keep_as(part, FIRST);
     let mut open = FIRST;
@@ -92,7 +92,7 @@ fn hidden(
             }
             signs.keep(MIDDLE);
         }
-        if inside && open + 1 < PLACES && signs.may_hide(BEGIN, MIDDLE, open) {
+        if inside && open + 1 < INSIDE && signs.may_hide(BEGIN, MIDDLE, open) {
             open += 1;
             signs.keep_as(MIDDLE, open);
             ends[open] = middle;

@@ -80,6 +80,16 @@ pub trait Events {
         Ok(false)
     }
 
+    /// The states will be of these magnitudes, as a method of variable step takes them from `(t, point)` on: what is far below
+    /// them is no sign of anything.
+    ///
+    /// # Errors
+    /// As [`event_indicators`](Events::event_indicators).
+    fn note_magnitudes(&mut self, t: f64, point: &[f64], magnitudes: &[f64]) -> Result<(), Failure> {
+        let _ = (t, point, magnitudes);
+        Ok(())
+    }
+
     /// Whether steps are searched for two crossings of one indicator between the points that are looked at anyway, as where
     /// a law holds for a short while only.
     fn looks_between(&self) -> bool {

@@ -4,7 +4,12 @@ use super::Events;
 use crate::{Affected, Failure};
 
 /// Points of a step of which values are kept.
-pub(super) const PLACES: usize = 18;
+pub(super) const PLACES: usize = 20;
+/// Of these, where the present step begins, and where the one before it began.
+const START: usize = PLACES - 1;
+const BEFORE: usize = PLACES - 2;
+/// Points for searches inside a step.
+pub(super) const INSIDE: usize = PLACES - 2;
 /// What an indicator bends by less, as part of its greatest magnitude, is rounding.
 const NOISE: f64 = 1e-12;
 
@@ -19,13 +24,15 @@ pub(crate) struct Signs {
     most: Vec<f64>,
     /// Whether steps are searched for two crossings of one indicator.
     pub(super) thorough: bool,
+    /// How long the step before was, in s, if no event lies between.
+    last: Option<f64>,
 }
 
 impl Signs {
     pub(crate) fn new(indicators: usize) -> Signs {
         let values = vec![0.0; indicators];
         let (seen, most) = (vec![0.0; indicators * PLACES], values.clone());
-        Signs { held: vec![false; indicators], seen, most, values, thorough: false }
+        Signs { held: vec![false; indicators], seen, most, values, thorough: false, last: None }
     }
 
     /// One held sign, for tests.
@@ -62,6 +69,27 @@ impl Signs {
         })
     }
 
+    /// A step of this length has ended, whose values are the present ones.
+    pub(crate) fn step_ended(&mut self, length: f64) {
+        self.keep_as(START, BEFORE);
+        self.keep(START);
+        self.last = Some(length);
+    }
+
+    /// Whether an indicator may have been zero twice in a step of this length, whose end has the present values: on the way
+    /// from the begin of the step before, it bends by more than half of its least magnitude. Known only where steps are
+    /// searched, and not of the first step after an event, which is looked at anyway.
+    pub(crate) fn may_hide_in_step(&self, length: f64) -> bool {
+        let Some(last) = self.last.filter(|_| self.thorough) else { return false };
+        let n = self.values.len();
+        let part = last / (last + length);
+        (0..n).any(|i| {
+            let (a, b, c) = (self.seen[BEFORE * n + i], self.seen[START * n + i], self.values[i]);
+            let bend = (b - a - part * (c - a)).abs();
+            bend > 0.5 * b.abs().min(c.abs()) && bend > NOISE * self.most[i]
+        })
+    }
+
     /// Where, in parts, the values of an indicator turn round on their way to 0, judged by the parabola through those kept of
     /// the ends of the last parts.
     pub(super) fn turn(&self, indicator: usize, part: usize) -> Option<f64> {
@@ -71,6 +99,11 @@ impl Signs {
         let (slope, bend) = (0.5 * (c - a), a - 2.0 * b + c);
         let turn = (bend * b > 0.0).then(|| -slope / bend).filter(|turn| turn.abs() <= 1.0)?;
         Some(middle as f64 + turn)
+    }
+
+    /// Whether steps are searched for two crossings of one indicator.
+    pub(crate) fn is_thorough(&self) -> bool {
+        self.thorough
     }
 
     /// Whether there is nothing to watch.
@@ -85,6 +118,8 @@ impl Signs {
         }
         self.thorough = events.looks_between();
         events.event_indicators(t, point, &mut self.values)?;
+        self.keep(START);
+        self.last = None;
         self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
         Ok(())
     }

@@ -93,6 +93,7 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
         if !told {
             run.report_tolerances(atol.magnitudes(), &atol.absolute(1.0));
         }
+        shared.events().note_magnitudes(run.time, x, atol.magnitudes())?;
         let kept = step.take();
         let mut drive = |integrator: &mut dyn Integrator, first, stiffness| {
             let mut stepper = Controlled::new(run, shared, integrator, &mut tolerances, stiffness).from(first);
@@ -124,10 +125,17 @@ pub(crate) fn run<'s>(run: &mut Run<'_>, shared: &'s Shared<'s>, x: &mut [f64]) 
             Ok((_, Some(HandOver::Stiff))) => stiff = true,
             Err(Failure::StepTooSmall { .. }) if becomes_known(run, shared, &mut tolerances, x) => {}
             Err(Failure::StepTooSmall { .. }) if method == Method::Auto && !stiff => stiff = true,
+            Err(Failure::StepTooSmall { .. }) if are_renewed(run, shared, &mut tolerances, x) => {}
             Err(failure) => return Err(failure),
         }
         run.counts.stiff |= stiff && method == Method::Auto;
     }
+}
+
+/// What an event has moved far beyond its magnitude fails every test. `true` if magnitudes are others now.
+fn are_renewed(run: &Run<'_>, shared: &Shared<'_>, tolerances: &mut Tolerances, x: &[f64]) -> bool {
+    let interval = run.next_stop(&mut *shared.events()).time - run.time;
+    tolerances.renew(&mut *shared.system(), (run.time, x), 1e-3 * interval, interval)
 }
 
 /// A state of unknown magnitude that leaves 0 fails every test. `true` if its magnitude can be guessed a little later.

@@ -20,6 +20,9 @@ const CLEAR: f64 = 10.0;
 /// Part of the way to the next jump at which rounding is looked for where a state has no magnitude yet: sources may grow.
 const AHEAD: f64 = 0.1;
 
+/// A magnitude that rates leave behind at once was noise: this part of what they make of the state.
+const LEFT: f64 = 1e-6;
+
 /// Magnitude of a state of which nothing is known. Small enough not to hide anything, large enough to divide by.
 const UNKNOWN: f64 = 1e-100;
 
@@ -138,6 +141,27 @@ impl Tolerances {
         if let Some((_, least)) = surroundings(system, (t, x), interval, &self.magnitudes) {
             raise(&mut self.magnitudes, &least);
         }
+    }
+
+    /// Takes magnitudes anew where the system stands at `(t, x)`, as it is `later` s on, `interval` s before the next jump: what
+    /// an event has moved is far beyond them, and what the rates leave behind at once was noise. `true` if any has grown by far.
+    pub(super) fn renew(&mut self, system: &mut dyn System, (t, x): (f64, &[f64]), later: f64, interval: f64) -> bool {
+        if self.given.is_some() {
+            return false;
+        }
+        let before = self.magnitudes.clone();
+        self.watch(x);
+        self.magnitudes.iter_mut().zip(&self.greatest).for_each(|(m, greatest)| *m = m.max(*greatest));
+        let mut rates = vec![0.0; x.len()];
+        if system.rates(t + later, x, &mut rates).is_ok() {
+            let noise = self.magnitudes.iter_mut().zip(&rates).filter(|(m, rate)| **m < LEFT * later * rate.abs());
+            noise.for_each(|(m, _)| *m = 0.0);
+        }
+        if guess_magnitudes(system, (t + later, x), interval, &mut self.magnitudes).is_ok() {
+            self.grow(system, t, x, interval);
+        }
+        self.magnitudes.iter_mut().zip(&before).for_each(|(m, before)| *m = m.max(*before));
+        self.magnitudes.iter().zip(&before).any(|(m, before)| *m > GROWTH * before)
     }
 
     /// Whether nothing is known of a state: nothing has moved it, and nothing would.
