@@ -19,6 +19,7 @@ fn sweep(method: Method) -> Sweep {
         reduce: reduce.to_vec(),
         restart: false,
         units: false,
+        part: None,
     }
 }
 
