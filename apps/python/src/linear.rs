@@ -64,13 +64,6 @@ impl Linearized {
         Ok(pythonize(py, &self.report)?)
     }
 
-    /// The transfer matrix at `s`, a row for each output; nothing at a pole.
-    fn transfer(&self, s: Complex64) -> Option<Vec<Vec<Complex64>>> {
-        let complex = |[re, im]: [f64; 2]| Complex64::new(re, im);
-        let rows = self.report.transfer([s.re, s.im])?;
-        Some(rows.into_iter().map(|row| row.into_iter().map(complex).collect()).collect())
-    }
-
     /// The responses of all outputs to all inputs over the frequencies that the model knows.
     fn responses<'py>(&self, py: Python<'py>) -> Vec<Response<'py>> {
         let response = |r: halfarrow::Response| {

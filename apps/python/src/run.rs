@@ -79,6 +79,11 @@ impl Ended {
         Ok(pythonize(py, &self.report)?)
     }
 
+    /// Of each state its name, the magnitude that it was taken to have and the error allowed in a step, in SI units.
+    fn tolerances(&self) -> Vec<(String, f64, f64)> {
+        self.report.tolerances.iter().map(|kept| (kept.name.clone(), kept.scale, kept.absolute)).collect()
+    }
+
     /// What was left out or is to be known.
     #[getter]
     fn notes(&self) -> Vec<String> {
