@@ -6,7 +6,20 @@ from typing import Any, TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
-__all__: list[str]
+__all__ = [
+    "Ended",
+    "Linearized",
+    "Model",
+    "Snapshot",
+    "Stepper",
+    "Swept",
+    "__version__",
+    "format_text",
+    "library",
+    "png",
+    "write_trace",
+]
+
 __version__: str
 
 _Array: TypeAlias = npt.NDArray[np.float64]

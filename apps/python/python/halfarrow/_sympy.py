@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import sympy
@@ -36,18 +36,16 @@ _RELATIONS = {"<": sympy.Lt, "<=": sympy.Le, ">": sympy.Gt, ">=": sympy.Ge, "=="
 _T = sympy.Symbol("t")
 
 
-def equations(lines: Sequence[str], unknowns: Sequence[str]) -> list[sympy.Eq]:
-    """Lines ``left = right``. What is unknown or defined is a function of time; other names are constants."""
-    defined = [line.split(" = ", 1)[0] for line in lines]
-    varying = {*unknowns, *(left for left in defined if re.fullmatch(r"[A-Za-z_][\w.\[\],]*", left))}
-    return [_Reader(line, varying).equation() for line in lines]
+def equations(lines: Sequence[str], constants: Collection[str]) -> list[sympy.Eq]:
+    """Lines ``left = right``. What is no constant is a function of time."""
+    return [_Reader(line, constants).equation() for line in lines]
 
 
 class _Reader:
     """Reads a line from the left to the right."""
 
-    def __init__(self, line: str, varying: set[str]) -> None:
-        self.line, self.varying = line, varying
+    def __init__(self, line: str, constants: Collection[str]) -> None:
+        self.line, self.constants = line, constants
         self.tokens: list[tuple[str, str]] = []
         at = 0
         while at < len(line.rstrip()):
@@ -137,7 +135,7 @@ class _Reader:
         kind, text = self._next()
         if kind == "number":
             return sympy.Rational(text)
-        if kind == "name" and self.tokens[self.at][1] == "(" and text not in self.varying:
+        if kind == "name" and self.tokens[self.at][1] == "(":
             if text not in _FUNCTIONS:
                 raise self._refused(text)
             self._expect("(")
@@ -161,7 +159,7 @@ class _Reader:
             return _T
         if name == "pi" and not order:
             return sympy.pi
-        if name in self.varying or order:
-            value = sympy.Function(name)(_T)
-            return sympy.Derivative(value, (_T, order)) if order else value
-        return sympy.Symbol(name)
+        if name in self.constants:
+            return sympy.Integer(0) if order else sympy.Symbol(name)
+        value = sympy.Function(name)(_T)
+        return sympy.Derivative(value, (_T, order)) if order else value

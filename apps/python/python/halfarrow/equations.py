@@ -12,6 +12,8 @@ from ._tables import record
 if TYPE_CHECKING:
     import sympy
 
+    from .model import Model
+
 
 @dataclasses.dataclass(frozen=True)
 class State:
@@ -83,12 +85,14 @@ class Equations:
     """Numbers of ``differential`` and ``algebraic`` equations."""
     dof: int
     """Number of independent storages."""
+    of: Model = dataclasses.field(repr=False, compare=False)
+    """The model that they are of."""
 
     @classmethod
-    def _of(cls, told: Mapping[str, Any]) -> Equations:
+    def _of(cls, told: Mapping[str, Any], model: Model) -> Equations:
         states = [record(State, state) for state in told["states"]]
         algebraic = [record(Algebraic, unknown) for unknown in told["algebraic"]]
-        named = {"states": states, "algebraic": algebraic, "lines": told["text"], "latex_lines": told["latex"]}
+        named = {"states": states, "algebraic": algebraic, "lines": told["text"], "latex_lines": told["latex"], "of": model}
         return record(cls, {**told, **named})
 
     @property
@@ -113,7 +117,7 @@ class Equations:
 
     def sympy(self) -> list[sympy.Eq]:
         """The equations, then the definitions, as equations of SymPy, with exact numbers. Variables are functions of ``t``
-        by their names, parameters are symbols.
+        by their names; parameters and what is conserved are symbols.
 
         >>> import halfarrow as ha
         >>> cart = ha.model("model Cart\\nparam m = 2 kg\\nSe:push(3 N) -> I:cart(m)\\n")
@@ -127,7 +131,8 @@ class Equations:
             from . import _sympy
         except ImportError:
             raise needed("sympy", "sympy", "sympy") from None
-        return _sympy.equations([*self.equations, *self.definitions], self.unknowns)
+        constants = {*self.of.parameters, *(line.split(" = ", 1)[0] for line in self.conserved)}
+        return _sympy.equations([*self.equations, *self.definitions], constants)
 
     def __str__(self) -> str:
         return self.text

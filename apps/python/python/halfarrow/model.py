@@ -31,7 +31,7 @@ from ._errors import (
 from ._inputs import InputLike, all_given
 from ._progress import Bar
 from ._tables import as_html, record
-from ._words import hint
+from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
 from .linear import Linearization
@@ -320,7 +320,7 @@ class Model:
             ModelError: the form does not apply to the model.
         """
         names = [only] if isinstance(only, str) else list(only)
-        return Equations._of(self._core.equations(choice("form", form, _FORMS), names))
+        return Equations._of(self._core.equations(choice("form", form, _FORMS), names), self)
 
     def draw(self, *, paths: Iterable[int] | None = None, laws: bool = True, first_cells: bool = False) -> Picture:
         """The bond graph with causal strokes, numbered bonds and causal paths.
@@ -411,8 +411,7 @@ class Model:
             )
             bar.reach(ended.reached)
         result = Result(self, ended, to)
-        _warn(ended)
-        _raise(ended, result)
+        _conclude(ended, result)
         return result
 
     def linearize(
@@ -830,18 +829,19 @@ def _write(path: Path, content: bytes) -> None:
         raise FileError(f"{path} cannot be written: {why}") from None
 
 
-def _warn(ended: _halfarrow.Ended) -> None:
-    notes = ended.notes
-    if notes and ended.failure is None:
-        missed = ended.warnings
-        for note in notes:
-            warnings.warn((AuditWarning if note in missed else ModelWarning)(note), stacklevel=3)
-
-
-def _raise(ended: _halfarrow.Ended, result: Result) -> None:
+def _conclude(ended: _halfarrow.Ended, result: Result) -> None:
+    """Says what is to be known of a run, by an exception if it did not come to its end."""
     if isinstance(ended.raised, KeyboardInterrupt):
         raise Interrupted(f"stopped at t = {result.reached:g} s; `result` has what was computed", result) from ended.raised
     if ended.raised is not None:
         raise ended.raised
+    notes = ended.notes
     if ended.failure is not None:
-        raise RunError(ended.failure, result)
+        error = RunError(ended.failure, result)
+        for note in notes:
+            error.add_note(in_python(note))
+        raise error
+    if notes:
+        missed = ended.warnings
+        for note in notes:
+            warnings.warn((AuditWarning if note in missed else ModelWarning)(note), stacklevel=3)

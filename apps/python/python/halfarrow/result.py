@@ -102,15 +102,16 @@ class Result(Mapping[str, Array]):
         """The model that has run."""
         self.t: Array = ended.times
         """Times of the samples, in s. After an event a time stands twice, before and after it."""
-        self.units: dict[str, str] = {name: unit for name, unit, _ in ended.columns}
+        columns = ended.columns
+        self.units: dict[str, str] = {name: unit for name, unit, _ in columns}
         """The unit of each variable; empty where there is none."""
         self.reached: float = ended.reached
         """The time reached, in s."""
-        self.complete: bool = ended.failure is None and ended.reached >= to
-        """Whether the run came to its end."""
         self.failure: str | None = ended.failure
-        """Why it did not, or why its result is not to be used."""
-        self._columns = {name: values for name, _, values in ended.columns}
+        """Why it stopped before its end, or why its result is not to be used; None if neither."""
+        self.complete: bool = self.failure is None and self.reached >= to
+        """Whether the run came to its end."""
+        self._columns = {name: values for name, _, values in columns}
         self._ended: _halfarrow.Ended | None = ended
         self._told: dict[str, Any] = {}
 
