@@ -92,7 +92,7 @@ def test_parameters(cart: ha.Model) -> None:
 
 
 def test_arrays_of_parameters() -> None:
-    text = "model M\nparam n = 2\nparam k[n] = 10 N/m\nfor i in 1..n {\n1:v[i] -> I:m[i](1 kg, f0 = 1 m/s)\nv[i] -> C:s[i](k = k[i])\nif i > 1 { v[i - 1] -> 0:j[i] -> v[i]\nj[i] -> R:r[i](1 ohm) }\n}\n"
+    text = "model M\nparam n = 2\nparam k[n] = 10 N/m\nfor i in 1..n {\n1:v[i] -> I:m[i](1 kg, f0 = 1 m/s)\nv[i] -> C:s[i](k = k[i])\nif i > 1 { v[i - 1] -> 0:j[i] -> v[i]\nj[i] -> R:r[i](1 N.s/m) }\n}\n"
     model = ha.model(text)
     both = model.simulate(to=0.1, k=20)["m[1].f"].tobytes()
     assert both == model.simulate(to=0.1, parameters={"k[1]": 20, "k[2]": "20 N/m"})["m[1].f"].tobytes()
@@ -132,6 +132,8 @@ def test_equations_in_sympy(path: Path) -> None:
     """Every model: the rates that SymPy computes at the start are those that the library computes."""
     import sympy
 
+    from halfarrow import _sympy
+
     model = ha.load(path)
     equations = model.equations()
     if equations.index or equations.algebraic or equations.definitions or model.inputs:
@@ -146,8 +148,10 @@ def test_equations_in_sympy(path: Path) -> None:
     values = {sympy.Symbol(p.name): sympy.Float(p.value, 30) for p in model.parameters.values()}
     values[t] = sympy.Integer(0)
     if kept := [line.split(" = ", 1)[0] for line in equations.conserved]:
-        r = model.simulate(to=1e-9, record=kept)
-        values |= {sympy.Symbol(name): sympy.Float(r[name][0], 30) for name in kept}
+        for line in _sympy.equations(equations.conserved, {*model.parameters, *kept}):
+            parts = line.rhs.atoms(sympy.core.function.AppliedUndef)
+            r = model.simulate(to=1e-9, record=[part.func.__name__ for part in parts])
+            values[line.lhs] = line.rhs.subs({part: sympy.Float(r[part.func.__name__][0], 30) for part in parts})
     at = {sympy.Function(name)(t): sympy.Float(x, 30) for name, x in zip(lin.states, lin.x)}
     for name, rate in zip(lin.states, lin.rates):
         derivative = sympy.Derivative(sympy.Function(name)(t), t)

@@ -101,7 +101,7 @@ def test_failures_are_told_by_set() -> None:
 
 
 def test_numbers_that_shape_the_model(car: ha.Model) -> None:
-    text = "model M\nparam n = 2\nfor i in 1..n {\n1:v[i] -> I:m[i](1 kg, f0 = 1 m/s)\nif i > 1 { v[i - 1] -> 0:j[i] -> v[i]\nj[i] -> R:r[i](1 ohm) }\n}\n"
+    text = "model M\nparam n = 2\nfor i in 1..n {\n1:v[i] -> I:m[i](1 kg, f0 = 1 m/s)\nif i > 1 { v[i - 1] -> 0:j[i] -> v[i]\nj[i] -> R:r[i](1 N.s/m) }\n}\n"
     model = ha.model(text)
     here = model.sweep(to=1, step=1e-2, n=[2, 3, 4], reduce={"end": ("m[1].f", "final")})
     with ThreadPoolExecutor(2) as pool:
@@ -111,9 +111,10 @@ def test_numbers_that_shape_the_model(car: ha.Model) -> None:
 
 def test_audits_are_warnings() -> None:
     spring = ha.model("model M\nparam k = 1 N/m\n1:v -> I:m(1 kg, f0 = 1 m/s)\nv -> C:s(k = k)\n")
-    with pytest.warns(ha.AuditWarning, match="set 2"):
+    with pytest.warns(ha.AuditWarning) as caught:
         s = spring.sweep(to=5, step=0.05, k=[1e-3, 100])
-    with pytest.warns(ha.AuditWarning, match="set 2"), ThreadPoolExecutor(2) as pool:
+    assert any("set 2:" in str(w.message) for w in caught) and all(w.filename == __file__ for w in caught)
+    with pytest.warns(ha.AuditWarning), ThreadPoolExecutor(2) as pool:
         parts = spring.sweep(to=5, step=0.05, k=[1e-3, 100], executor=pool, chunk=1)
     assert s.audit["misses"] == parts.audit["misses"]
     assert s.audit["doubtful"] == parts.audit["doubtful"] and s.audit["refused"] == parts.audit["refused"]
@@ -133,8 +134,7 @@ def dask() -> Iterator[Executor]:
     from distributed import Client, LocalCluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        with client.get_executor() as executor:
-            yield executor
+        yield client.get_executor()
 
 
 EXECUTORS: dict[str, Callable[[], Any]] = {
@@ -153,8 +153,7 @@ def test_executors_give_the_same_bytes(car: ha.Model, kind: str) -> None:
         for chunk in (None, 7):
             there = ask(car, executor=executor, chunk=chunk)
             assert content(there) == content(here)
-            assert there.audit["sets"] == here.audit["sets"] and there.audit["misses"] == here.audit["misses"]
-            assert there.audit["greatest"]["energy"] == here.audit["greatest"]["energy"]
+            assert there.audit == here.audit
 
 
 class Counting(Executor):

@@ -327,6 +327,8 @@ fn compute(
                 |worker, chunk| sender.send(worker.chunk(chunk, start)).map_err(drop),
             );
         });
+        // It ends with this loop, on which those who send to it wait.
+        let receiver = receiver;
         loop {
             let go_on = match receiver.recv_timeout(ASKED) {
                 Ok(entry) => {

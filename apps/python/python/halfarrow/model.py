@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import html
 import os
@@ -627,8 +628,6 @@ class Model:
         with Bar(progress, 1.0, self.name, "") as bar:
             told = (lambda part, _: bar.reach(part)) if bar else None
             report, svg = self._core.compare(to, error, repeats, patience, budget, given, told)
-        for note in report["notes"]:
-            warnings.warn(ModelWarning(note), stacklevel=2)
         return record(Comparison, {**report, "report": report, "picture": Picture(svg)})
 
     def report(
@@ -825,7 +824,8 @@ def _write(path: Path, content: bytes) -> None:
         beside.write_bytes(content)
         os.replace(beside, path)
     except OSError as why:
-        beside.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            beside.unlink()
         raise FileError(f"{path} cannot be written: {why}") from None
 
 

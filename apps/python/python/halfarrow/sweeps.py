@@ -334,11 +334,14 @@ def _chunk(sets: int, workers: int, asked: int | None) -> int:
 def _merged(reports: Sequence[dict[str, Any]], sets: int) -> dict[str, Any]:
     """The reports of parts as one."""
     audits = [report["audit"] for report in reports]
-    greatest: dict[str, Any] = {}
-    for audit in audits:
-        for kind in ("power", "energy", "residual", "rates"):
-            miss, known = audit["greatest"][kind], greatest.get(kind)
-            greatest[kind] = miss if known is None or (miss and miss["value"] > known["value"]) else known
+    verdicts = ("holds", "doubtful", "refused")
+    found = [audit["greatest"] for audit in audits]
+    greatest = {
+        **found[0],
+        **{kind: _greatest([audit[kind] for audit in found]) for kind in ("power", "energy", "residual", "rates")},
+        **{kind: sorted({text for audit in found for text in audit[kind]}) for kind in ("notes", "unchecked")},
+        "verdict": max((audit["verdict"] for audit in found), key=verdicts.index),
+    }
     return {
         "sets": sets,
         "failures": sorted((f for report in reports for f in report["failures"]), key=lambda f: f["set"])[:100],
@@ -349,6 +352,12 @@ def _merged(reports: Sequence[dict[str, Any]], sets: int) -> dict[str, Any]:
             "greatest": greatest,
         },
     }
+
+
+def _greatest(misses: Sequence[dict[str, Any] | None]) -> dict[str, Any] | None:
+    """The miss that is farthest above what can be told; one that is not a number first."""
+    some = [miss for miss in misses if miss is not None]
+    return max(some, key=lambda m: (m["value"] != m["value"], m["value"] - m["resolution"]), default=None)
 
 
 def _warn(result: SweepResult) -> None:
