@@ -38,7 +38,7 @@ impl LinearizeOptions {
             }
         };
         let LinearizeOptions { inputs: between, outputs, symbolic, .. } = self;
-        Ok(Linearize { at, inputs: between, outputs, symbolic, series: inputs(given) })
+        Ok(Linearize { at, inputs: between, outputs, symbolic, series: inputs(given)? })
     }
 }
 

@@ -187,7 +187,7 @@ impl Model {
         x: Option<String>,
         log: [bool; 2],
     ) -> PyResult<String> {
-        let traces = traces(runs);
+        let traces = traces(runs)?;
         let named: Vec<_> = traces.iter().map(|(name, trace)| (name.as_str(), trace)).collect();
         let options = PlotOptions { vars, x, log };
         match (&named[..], options.is_plain()) {
@@ -301,7 +301,7 @@ impl Model {
         given: Inputs<'_>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Bound<'py, PyAny>, String)> {
-        let wanted = Compare { to, error, inputs: inputs(given), repeats, patience, budget };
+        let wanted = Compare { to, error, inputs: inputs(given)?, repeats, patience, budget };
         let mut watcher = Watcher::new(progress);
         let compared = py.detach(|| {
             self.model.compare(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string())))
@@ -323,7 +323,7 @@ impl Model {
         given: Inputs<'_>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, Vec<String>, Option<String>, Vec<&'static str>)> {
-        let wanted = Report { to, compare, compare_budget: budget, inputs: inputs(given), ..Report::default() };
+        let wanted = Report { to, compare, compare_budget: budget, inputs: inputs(given)?, ..Report::default() };
         let mut watcher = Watcher::new(progress);
         let made = py.detach(|| {
             self.model.report(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string())))

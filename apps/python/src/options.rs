@@ -1,7 +1,7 @@
 //! What the Python part asks for, as the library takes it.
 
 use halfarrow::{Execution, FixedMethod, Form, Input, Method, Record, Run, Start};
-use numpy::PyReadonlyArray1;
+use numpy::{PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::errors::UsageError;
@@ -19,16 +19,16 @@ pub enum Given<'py> {
 pub type Inputs<'py> = Vec<(String, Given<'py>)>;
 
 /// As the library takes them.
-pub fn inputs(given: Inputs<'_>) -> Vec<(String, Input)> {
-    let input = |given: Given<'_>| match given {
-        Given::Constant(value) => Input::Constant(value),
-        Given::Series(times, values) => {
-            Input::Series { times: times.as_array().to_vec(), values: values.as_array().to_vec() }
-        }
-        Given::Csv(kind, path) if kind == "file" => Input::File(path.into()),
-        Given::Csv(_, text) => Input::Csv(text),
+pub fn inputs(given: Inputs<'_>) -> PyResult<Vec<(String, Input)>> {
+    let input = |given: Given<'_>| {
+        Ok::<_, PyErr>(match given {
+            Given::Constant(value) => Input::Constant(value),
+            Given::Series(times, values) => Input::Series { times: times.to_vec()?, values: values.to_vec()? },
+            Given::Csv(kind, path) if kind == "file" => Input::File(path.into()),
+            Given::Csv(_, text) => Input::Csv(text),
+        })
     };
-    given.into_iter().map(|(name, given)| (name, input(given))).collect()
+    given.into_iter().map(|(name, given)| Ok((name, input(given)?))).collect()
 }
 
 /// What is recorded: `default`, `all`, `names` or `also`, and the names for the last two.
@@ -69,7 +69,7 @@ impl RunOptions {
             atol: self.atol,
             project: self.project,
             minimum_norm: self.minimum_norm,
-            inputs: inputs(given),
+            inputs: inputs(given)?,
             start: start(&self.start)?,
             record: match kind.as_str() {
                 "default" => Record::Default,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use halfarrow::{Column, Error, RunReport, Simulated, Trace};
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
 use pythonize::pythonize;
@@ -107,14 +107,13 @@ impl Ended {
 pub type Runs<'py> = Vec<(String, PyReadonlyArray1<'py, f64>, Vec<(String, String, PyReadonlyArray1<'py, f64>)>)>;
 
 /// The same as the library takes them.
-pub fn traces(runs: Runs<'_>) -> Vec<(String, Trace)> {
-    let column = |(name, unit, values): (String, String, PyReadonlyArray1<'_, f64>)| Column {
-        name,
-        unit,
-        values: values.as_array().to_vec(),
+pub fn traces(runs: Runs<'_>) -> PyResult<Vec<(String, Trace)>> {
+    let column = |(name, unit, values): (String, String, PyReadonlyArray1<'_, f64>)| {
+        Ok(Column { name, unit, values: values.to_vec()? })
     };
     let trace = |(name, times, columns): (String, PyReadonlyArray1<'_, f64>, Vec<_>)| {
-        (name, Trace { times: times.as_array().to_vec(), columns: columns.into_iter().map(column).collect() })
+        let columns = columns.into_iter().map(column).collect::<PyResult<_>>()?;
+        Ok((name, Trace { times: times.to_vec()?, columns }))
     };
     runs.into_iter().map(trace).collect()
 }
@@ -131,7 +130,7 @@ pub fn write_trace(py: Python<'_>, path: PathBuf, runs: Runs<'_>, units: bool) -
             return Err(UsageError::new_err(text));
         }
     };
-    let traces = traces(runs);
+    let traces = traces(runs)?;
     py.detach(|| traces.iter().try_for_each(|(_, trace)| write(trace, &path, units)))
         .map_err(|why| FileError::new_err(format!("{} cannot be written: {}", path.display(), why.source)))
 }

@@ -1,7 +1,7 @@
 //! Sweeps in memory.
 
 use halfarrow::{Error, Part, Reduce, Samples, Sweep, SweepReport, SweepTable, Vary};
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
 use pythonize::pythonize;
@@ -28,15 +28,17 @@ pub struct SweepOptions<'py> {
 
 impl SweepOptions<'_> {
     pub fn sweep(self, given: Inputs<'_>) -> PyResult<Sweep> {
-        let vary = |(name, values): (String, PyReadonlyArray1<'_, f64>)| Vary { name, values: values.as_array().to_vec() };
-        let samples = |(names, rows): (Vec<String>, PyReadonlyArray2<'_, f64>)| Samples {
-            names,
-            rows: rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect(),
+        let vary = |(name, values): (String, PyReadonlyArray1<'_, f64>)| {
+            Ok(Vary { name, values: values.to_vec()? })
+        };
+        let samples = |(names, rows): (Vec<String>, PyReadonlyArray2<'_, f64>)| {
+            let rows = rows.as_slice()?.chunks(names.len().max(1)).map(<[f64]>::to_vec).collect();
+            Ok::<_, PyErr>(Samples { names, rows })
         };
         Ok(Sweep {
             run: self.run.run(given)?,
-            vary: self.vary.into_iter().map(vary).collect(),
-            samples: self.samples.map(samples),
+            vary: self.vary.into_iter().map(vary).collect::<PyResult<_>>()?,
+            samples: self.samples.map(samples).transpose()?,
             reduce: self.reduce.iter().map(|text| Reduce::parse(text)).collect::<Result<_, _>>().map_err(refused)?,
             restart: false,
             units: false,

@@ -48,6 +48,8 @@ def test_every_kind_of_input(cart: ha.Model, tmp_path: Path) -> None:
     assert run(str(tmp_path / "push.csv")) == wanted
     assert run(pandas.Series(v, index=t)) == wanted
     assert run(xarray.DataArray(v, dims="time", coords={"time": t})) == wanted
+    unaligned = np.frombuffer(b"." + v.tobytes(), dtype=np.uint8)[1:].view(np.float64)
+    assert not unaligned.flags.aligned and run((t, unaligned)) == wanted
     assert run((np.arange(8.0)[::2], np.ones(4))) == run(1) == run(np.float64(1.0))
 
 

@@ -55,8 +55,7 @@ def given(name: str, value: Any, to: float, sample: float) -> Given:
 def series(name: str, times: npt.ArrayLike, values: npt.ArrayLike) -> Given:
     """Values at times in s."""
     try:
-        t = np.ascontiguousarray(times, dtype=np.float64)
-        v = np.ascontiguousarray(values, dtype=np.float64)
+        t, v = numbers(times), numbers(values)
     except (TypeError, ValueError) as why:
         raise UsageError(f"`{name}` is given what is no numbers: {why}") from None
     if t.ndim != 1 or t.shape != v.shape:
@@ -67,6 +66,11 @@ def series(name: str, times: npt.ArrayLike, values: npt.ArrayLike) -> Given:
     return t, v
 
 
+def numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """An array as the compiled part takes it. What comes out of a message of another process may lie at any address."""
+    return np.require(values, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
+
+
 def all_given(values: Mapping[str, InputLike], to: float, sample: float) -> list[tuple[str, Given]]:
     """All of them, in order."""
     return [(name, given(name, value, to, sample)) for name, value in values.items()]
@@ -74,10 +78,17 @@ def all_given(values: Mapping[str, InputLike], to: float, sample: float) -> list
 
 def on_its_own(value: Given) -> Given:
     """The same without files, for a computer that does not have them."""
-    if isinstance(value, tuple) and value[0] is not None and isinstance(value[0], str) and value[0] == "file":
+    if isinstance(value, tuple) and isinstance(value[0], str) and value[0] == "file":
         path = Path(str(value[1]))
         try:
             return ("csv", path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as why:
             raise FileError(f"{path} cannot be read: {why}") from None
+    return value
+
+
+def as_sent(value: Given) -> Given:
+    """The same as it came out of a message of another process."""
+    if isinstance(value, tuple) and isinstance(value[0], np.ndarray):
+        return numbers(value[0]), numbers(value[1])
     return value

@@ -29,7 +29,7 @@ from ._errors import (
     choice,
     unknown,
 )
-from ._inputs import InputLike, all_given
+from ._inputs import InputLike, all_given, numbers
 from ._progress import Bar
 from ._tables import as_html, record
 from ._words import hint, in_python
@@ -521,7 +521,7 @@ class Model:
             options=options,
             given=all_given(given, to, sample or every or step or to / _POINTS),
             fixed={name: float(value) for name, value in several.items() if not np.ndim(value)},
-            vary={name: np.asarray(value) for name, value in several.items() if np.ndim(value)},
+            vary={name: numbers(value) for name, value in several.items() if np.ndim(value)},
             samples=table,
             reduce=sweeps.reductions(reduce),
         )
@@ -813,7 +813,7 @@ def _samples(samples: Any) -> tuple[list[str], npt.NDArray[np.float64]] | None:
         rows = np.column_stack([values.astype(np.float64) for values in columns.values()])
     except (TypeError, ValueError) as why:
         raise UsageError(f"samples has what is no numbers: {why}") from None
-    return list(columns), np.ascontiguousarray(rows)
+    return list(columns), numbers(rows)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from . import _halfarrow
 from ._errors import AuditWarning, Interrupted, ModelWarning, RunError, UsageError, choice, needed, unknown
-from ._inputs import Given, on_its_own
+from ._inputs import Given, as_sent, numbers, on_its_own
 from ._progress import Bar
 from ._tables import as_html, as_text
 
@@ -160,7 +160,7 @@ class Plan:
         every = np.array(list(itertools.product(*self.vary.values())), dtype=np.float64).reshape(-1, len(self.vary))
         fixed = np.tile(list(self.fixed.values()), (len(rows) * len(every), 1)).reshape(len(rows) * len(every), -1)
         table = np.hstack([np.repeat(rows, len(every), axis=0), fixed, np.tile(every, (len(rows), 1))])
-        return [*names, *self.fixed, *self.vary], np.ascontiguousarray(table, dtype=np.float64)
+        return [*names, *self.fixed, *self.vary], numbers(table)
 
 
 def reductions(reduce: Mapping[str, tuple[str, str]] | Sequence[str] | None) -> dict[str, str]:
@@ -259,8 +259,9 @@ def _work(key: str, job: _Job | None, names: list[str], rows: Array, first: int,
         if model is None:
             model = _halfarrow.Model.from_text(*job.parts)
         _keep(_models, made_of, model)
-    arguments = {**job.arguments, "vary": [], "samples": (names, rows), "part": (first, of)}
-    swept = model.sweep(arguments, job.given, None)
+    arguments = {**job.arguments, "vary": [], "samples": (names, numbers(rows)), "part": (first, of)}
+    given = [(name, as_sent(value)) for name, value in job.given]
+    swept = model.sweep(arguments, given, None)
     if swept.raised is not None:
         raise swept.raised
     return _Done(first, swept.columns, swept.report())
