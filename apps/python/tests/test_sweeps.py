@@ -83,6 +83,7 @@ def test_what_cannot_be(car: ha.Model) -> None:
         ("different lengths", {"samples": {"ks": [1, 2], "b": [1]}}),
         ("no parameter `kx`", {"samples": {"kx": [1, 2]}}),
         ("varied twice", {"samples": {"ks": [1, 2]}, "ks": [1]}),
+        ("`ks` is given no values", {"ks": []}),
         ("chunk is 0", {"ks": [1, 2], "executor": ThreadPoolExecutor(1), "chunk": 0}),
     ]:
         with pytest.raises(ha.UsageError, match=words):

@@ -19,11 +19,21 @@ _CALLED = {
 
 
 def in_python(text: str) -> str:
-    """The text with options of the command line as arguments of functions.
+    """The text with options of the command line as arguments of functions; lines of the model in it stay as they are.
 
     >>> in_python("give it with --step, as in `--step 1e-3`")
     'give it with step, as in `step=1e-3`'
+    >>> print(in_python("4 | param a = b--c\\n  = hint: leave out --form"))
+    4 | param a = b--c
+      = hint: leave out form
     """
+    if "--" not in text:
+        return text
+    lines = text.split("\n")
+    return "\n".join(line if re.match(r"\s*\d+ \|", line) else _line(line) for line in lines)
+
+
+def _line(text: str) -> str:
     text = re.sub(r"`--allow ([^`]*)`, in a program `Disk::allow`", r'`allow=["\1"]`', text)
     text = re.sub(r",? as by `--set`", ", as by `with_parameters`", text)
     for option, called in _CALLED.items():

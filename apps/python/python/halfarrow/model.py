@@ -525,6 +525,9 @@ class Model:
             samples=table,
             reduce=sweeps.reductions(reduce),
         )
+        for name, values_of in plan.vary.items():
+            if not len(values_of):
+                raise UsageError(f"`{name}` is given no values")
         if table is None and not plan.vary:
             raise UsageError("nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`")
         return sweeps.run(self, plan, executor, chunk, progress)
