@@ -6,6 +6,7 @@ Most have: ``concurrent.futures``, joblib's loky (``get_reusable_executor()``), 
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from typing import Any, TypeVar
@@ -27,12 +28,12 @@ class RayExecutor(Executor):
 
     def __init__(self, **options: Any) -> None:
         try:
-            import ray
+            ray: Any = importlib.import_module("ray")
         except ImportError:
             raise needed("ray", "ray", "RayExecutor") from None
         if not ray.is_initialized():
             raise UsageError("Ray is not connected to a cluster: call `ray.init()` first")
-        remote = ray.remote(_call)
+        remote: Any = ray.remote(_call)
         self._task = remote.options(**options) if options else remote
         self._max_workers = int(ray.cluster_resources().get("CPU", 1))
 
