@@ -8,6 +8,7 @@ mod options;
 mod run;
 mod stepper;
 mod sweep;
+mod threads;
 mod watcher;
 
 use pyo3::prelude::*;
@@ -30,6 +31,7 @@ mod _halfarrow {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::threads::loaded();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

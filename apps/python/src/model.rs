@@ -19,6 +19,7 @@ use crate::options::{Inputs, RunOptions, fixed, form, inputs, none};
 use crate::run::{Ended, Runs, traces};
 use crate::stepper::Stepper;
 use crate::sweep::{SweepOptions, Swept};
+use crate::threads::{alone, apart};
 use crate::watcher::Watcher;
 
 /// Values of parameters as text.
@@ -75,9 +76,9 @@ fn overrides(set: Overrides) -> Vec<Override> {
     set.into_iter().map(|(name, value)| Override { name, value }).collect()
 }
 
-/// Does something without the interpreter.
-fn apart<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
-    py.detach(work).map_err(|error| raised(py, error))
+/// Does something without the interpreter, which may fail.
+fn tried<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
+    apart(py, work).map_err(|error| raised(py, error))
 }
 
 #[pymethods]
@@ -92,13 +93,13 @@ impl Model {
         set: Overrides,
     ) -> PyResult<Model> {
         let source = Source::text(name, text).with_files(files);
-        apart(py, || halfarrow::Model::new(source, &overrides(set)).map(Model::of))
+        tried(py, || halfarrow::Model::new(source, &overrides(set)).map(Model::of))
     }
 
     /// A model from a file; what it imports lies in its folder, in those of `allow`, or below.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf, allow: Vec<PathBuf>, set: Overrides) -> PyResult<Model> {
-        apart(py, || {
+        tried(py, || {
             let source = Source::open_allowing(&path, &allow)?;
             halfarrow::Model::new(source, &overrides(set)).map(Model::of)
         })
@@ -106,7 +107,7 @@ impl Model {
 
     /// The same model with other values of parameters.
     fn with_parameters(&self, py: Python<'_>, set: Overrides) -> PyResult<Model> {
-        apart(py, || self.model.with(&overrides(set)).map(Model::of))
+        tried(py, || self.model.with(&overrides(set)).map(Model::of))
     }
 
     /// What the same model can be made of elsewhere.
@@ -128,7 +129,7 @@ impl Model {
 
     /// What was noticed through all stages.
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = apart(py, || self.model.check())?;
+        let found = tried(py, || self.model.check())?;
         diagnostics(py, &found)
     }
 
@@ -139,32 +140,32 @@ impl Model {
 
     /// Parameters, inputs, states, variables.
     fn interface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let compiled = apart(py, || self.compiled(Form::Minimal))?;
+        let compiled = tried(py, || self.compiled(Form::Minimal))?;
         Ok(pythonize(py, &compiled.interface())?)
     }
 
     /// The value of a text such as `20 kN/m` for a parameter, in SI units.
     fn quantity(&self, py: Python<'_>, name: &str, text: &str) -> PyResult<f64> {
-        apart(py, || self.compiled(Form::Minimal))?.quantity(name, text).map_err(refused)
+        tried(py, || self.compiled(Form::Minimal))?.quantity(name, text).map_err(refused)
     }
 
     /// A stage as text.
     fn show(&self, py: Python<'_>, stage: &str) -> PyResult<String> {
         let found = Stage::ALL.into_iter().find(|known| known.name() == stage);
         let stage = found.ok_or_else(|| none("stage", stage))?;
-        apart(py, || stage.show_model(&self.model))
+        tried(py, || stage.show_model(&self.model))
     }
 
     /// Zero-order causal paths and what becomes of them.
     fn loops<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let report = apart(py, || self.model.loops())?;
+        let report = tried(py, || self.model.loops())?;
         Ok(pythonize(py, &report)?)
     }
 
     /// The equations of a form, of some variables or all.
     fn equations<'py>(&self, py: Python<'py>, form_name: &str, only: Vec<String>) -> PyResult<Bound<'py, PyAny>> {
         let form = form(form_name)?;
-        let report = apart(py, || self.model.equations_for(form, &only))?;
+        let report = tried(py, || self.model.equations_for(form, &only))?;
         Ok(pythonize(py, &report)?)
     }
 
@@ -176,17 +177,11 @@ impl Model {
             first_cells,
             ..DrawOptions::default()
         };
-        apart(py, || self.model.draw(&options)).map(|picture| picture.svg)
+        tried(py, || self.model.draw(&options)).map(|picture| picture.svg)
     }
 
     /// A plot of runs as SVG.
-    fn plot(
-        &self,
-        runs: Runs<'_>,
-        vars: Vec<String>,
-        x: Option<String>,
-        log: [bool; 2],
-    ) -> PyResult<String> {
+    fn plot(&self, runs: Runs<'_>, vars: Vec<String>, x: Option<String>, log: [bool; 2]) -> PyResult<String> {
         let traces = traces(runs)?;
         let named: Vec<_> = traces.iter().map(|(name, trace)| (name.as_str(), trace)).collect();
         let options = PlotOptions { vars, x, log };
@@ -208,7 +203,7 @@ impl Model {
         let run = options.run(given)?;
         let mut watcher = Watcher::new(progress);
         let mut begun = Instant::now();
-        let outcome = py.detach(|| {
+        let outcome = apart(py, || {
             let mut go_on = |told: halfarrow::Progress<'_>| watcher.go_on(|| (told.time,));
             if run.minimum_norm {
                 return self.model_with(&values)?.simulate(&run, &mut go_on);
@@ -221,38 +216,33 @@ impl Model {
         Ended::of(py, outcome, seconds, watcher)
     }
 
-    /// A sweep in memory.
+    /// A sweep in memory, on all cores or on one thread.
     fn sweep(
         &self,
         py: Python<'_>,
         options: SweepOptions<'_>,
         given: Inputs<'_>,
         progress: Option<Py<PyAny>>,
+        on_one_thread: bool,
     ) -> PyResult<Swept> {
         let sweep = options.sweep(given)?;
         let mut watcher = Watcher::new(progress);
-        let outcome = py.detach(|| {
+        let work = || {
             let mut told = 0;
             let mut go_on = |done: usize, sets: usize| match std::mem::replace(&mut told, done) == done {
                 true => watcher.go_on(|| (done, sets)),
                 false => watcher.ask(|| (done, sets)),
             };
             self.compiled(Form::Minimal)?.sweep(&sweep, &mut go_on)
-        });
+        };
+        let outcome = if on_one_thread { alone(py, work) } else { apart(py, work) };
         Swept::of(py, outcome, watcher)
     }
 
     /// A run by steps.
-    fn stepper(
-        &self,
-        py: Python<'_>,
-        method: &str,
-        step: f64,
-        start: &str,
-        values: Values,
-    ) -> PyResult<Stepper> {
+    fn stepper(&self, py: Python<'_>, method: &str, step: f64, start: &str, values: Values) -> PyResult<Stepper> {
         let (method, start) = (fixed(method)?, crate::options::start(start)?);
-        apart(py, || self.compiled_with(Form::Minimal, &values)?.stepper(method, step, start)).map(Stepper::of)
+        tried(py, || self.compiled_with(Form::Minimal, &values)?.stepper(method, step, start)).map(Stepper::of)
     }
 
     /// Matrices near a point.
@@ -264,7 +254,7 @@ impl Model {
         values: Values,
     ) -> PyResult<Linearized> {
         let wanted = options.wanted(given)?;
-        apart(py, || self.model_with(&values)?.linearize(&wanted)).map(Linearized::of)
+        tried(py, || self.model_with(&values)?.linearize(&wanted)).map(Linearized::of)
     }
 
     /// Code for elsewhere: files with their contents, and what there is to know of them.
@@ -281,9 +271,12 @@ impl Model {
     ) -> PyResult<(Vec<(String, Bound<'py, PyBytes>)>, Bound<'py, PyAny>)> {
         let targets = [Target::C, Target::Fmu2, Target::Fmu3, Target::Latex];
         let target = targets.into_iter().find(|known| known.name() == target).ok_or_else(|| none("target", target))?;
-        let real = [Real::Double, Real::Float].into_iter().find(|known| known.name() == real).ok_or_else(|| none("real", real))?;
+        let real = [Real::Double, Real::Float]
+            .into_iter()
+            .find(|known| known.name() == real)
+            .ok_or_else(|| none("real", real))?;
         let export = Export { target, form: form(form_name)?, method: fixed(method)?, step, real, binary };
-        let exported = apart(py, || self.model.export(&export))?;
+        let exported = tried(py, || self.model.export(&export))?;
         let files = exported.files.iter().map(|file| (file.path.clone(), PyBytes::new(py, &file.bytes))).collect();
         Ok((files, pythonize(py, &exported.report)?))
     }
@@ -303,9 +296,8 @@ impl Model {
     ) -> PyResult<(Bound<'py, PyAny>, String)> {
         let wanted = Compare { to, error, inputs: inputs(given)?, repeats, patience, budget };
         let mut watcher = Watcher::new(progress);
-        let compared = py.detach(|| {
-            self.model.compare(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string())))
-        });
+        let compared =
+            apart(py, || self.model.compare(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string()))));
         if let Some(error) = watcher.raised() {
             return Err(error);
         }
@@ -325,9 +317,8 @@ impl Model {
     ) -> PyResult<(String, Vec<String>, Option<String>, Vec<&'static str>)> {
         let wanted = Report { to, compare, compare_budget: budget, inputs: inputs(given)?, ..Report::default() };
         let mut watcher = Watcher::new(progress);
-        let made = py.detach(|| {
-            self.model.report(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string())))
-        });
+        let made =
+            apart(py, || self.model.report(&wanted, &mut |part, what| watcher.go_on(|| (part, what.to_string()))));
         if let Some(error) = watcher.raised() {
             return Err(error);
         }
@@ -339,14 +330,14 @@ impl Model {
 /// A picture as PNG.
 #[pyfunction]
 pub fn png<'py>(py: Python<'py>, svg: String) -> PyResult<Bound<'py, PyBytes>> {
-    let bytes = py.detach(|| Picture { svg }.to_png()).map_err(refused)?;
+    let bytes = apart(py, || Picture { svg }.to_png()).map_err(refused)?;
     Ok(PyBytes::new(py, &bytes))
 }
 
 /// The canonical layout of a text.
 #[pyfunction]
 pub fn format_text(py: Python<'_>, name: &str, text: &str) -> PyResult<String> {
-    apart(py, || halfarrow::format_text(name, text))
+    tried(py, || halfarrow::format_text(name, text))
 }
 
 /// The components that come with the program.

@@ -9,6 +9,7 @@ use pyo3::types::PyAny;
 use pythonize::pythonize;
 
 use crate::errors::{FileError, UsageError, raised};
+use crate::threads::apart;
 use crate::watcher::Watcher;
 
 /// A run that came to its end, or stopped with what it had computed. Times and columns are the memory of the run itself.
@@ -36,12 +37,7 @@ pub struct Ended {
 }
 
 impl Ended {
-    pub fn of(
-        py: Python<'_>,
-        outcome: Result<Simulated, Error>,
-        seconds: f64,
-        watcher: Watcher,
-    ) -> PyResult<Ended> {
+    pub fn of(py: Python<'_>, outcome: Result<Simulated, Error>, seconds: f64, watcher: Watcher) -> PyResult<Ended> {
         let stopped_by = watcher.raised();
         let (trace, report, failure) = match outcome {
             Ok(done) => (done.trace, done.report, None),
@@ -126,11 +122,12 @@ pub fn write_trace(py: Python<'_>, path: PathBuf, runs: Runs<'_>, units: bool) -
         "csv" => |trace, path, units| halfarrow::write_csv(trace, path, units),
         "parquet" => |trace, path, _| halfarrow::write_parquet(trace, path),
         _ => {
-            let text = format!("the name {} does not say what to write: let it end in .csv or .parquet", path.display());
+            let text =
+                format!("the name {} does not say what to write: let it end in .csv or .parquet", path.display());
             return Err(UsageError::new_err(text));
         }
     };
     let traces = traces(runs)?;
-    py.detach(|| traces.iter().try_for_each(|(_, trace)| write(trace, &path, units)))
+    apart(py, || traces.iter().try_for_each(|(_, trace)| write(trace, &path, units)))
         .map_err(|why| FileError::new_err(format!("{} cannot be written: {}", path.display(), why.source)))
 }

@@ -4,6 +4,7 @@ use halfarrow::Error;
 use pyo3::prelude::*;
 
 use crate::errors::{raised, refused};
+use crate::threads::apart;
 use crate::watcher::Watcher;
 
 /// Steps between two looks at the clock.
@@ -45,7 +46,7 @@ impl Stepper {
     fn advance(&mut self, py: Python<'_>, steps: u64) -> PyResult<()> {
         let mut watcher = Watcher::new(None);
         let run = &mut self.run;
-        let done = py.detach(|| {
+        let done = apart(py, || {
             let mut left = steps;
             while left > 0 {
                 let now = left.min(STRIDE);

@@ -28,9 +28,7 @@ pub struct SweepOptions<'py> {
 
 impl SweepOptions<'_> {
     pub fn sweep(self, given: Inputs<'_>) -> PyResult<Sweep> {
-        let vary = |(name, values): (String, PyReadonlyArray1<'_, f64>)| {
-            Ok(Vary { name, values: values.to_vec()? })
-        };
+        let vary = |(name, values): (String, PyReadonlyArray1<'_, f64>)| Ok(Vary { name, values: values.to_vec()? });
         let samples = |(names, rows): (Vec<String>, PyReadonlyArray2<'_, f64>)| {
             let rows = rows.as_slice()?.chunks(names.len().max(1)).map(<[f64]>::to_vec).collect();
             Ok::<_, PyErr>(Samples { names, rows })

@@ -141,7 +141,8 @@ def dask() -> Iterator[Executor]:
 EXECUTORS: dict[str, Callable[[], Any]] = {
     "threads": lambda: ThreadPoolExecutor(2),
     "processes": lambda: ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")),
-    "forks": lambda: ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("forkserver")),
+    "forks": lambda: ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")),
+    "forkserver": lambda: ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("forkserver")),
     "loky": loky,
     "dask": dask,
 }
@@ -155,6 +156,28 @@ def test_executors_give_the_same_bytes(car: ha.Model, kind: str) -> None:
             there = ask(car, executor=executor, chunk=chunk)
             assert content(there) == content(here)
             assert there.audit == here.audit
+
+
+def _in_a_fork(car: ha.Model, sink: Any) -> None:
+    sink.put((content(ask(car)), car.simulate(to=1, execution="machine")["body.f"].tobytes()))
+
+
+def test_forks_run_too(car: ha.Model) -> None:
+    """Threads for all cores, which the parent has made, are not there any more."""
+    here = content(ask(car)), car.simulate(to=1, execution="machine")["body.f"].tobytes()
+    context = multiprocessing.get_context("fork")
+    sink = context.Queue()
+    process = context.Process(target=_in_a_fork, args=(car, sink))
+    process.start()
+    assert sink.get(timeout=60) == here
+    process.join()
+
+
+def test_threads_share_a_model(car: ha.Model) -> None:
+    model = pickle.loads(pickle.dumps(car))
+    with ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(lambda ks: model.simulate(to=1, ks=ks)["body.f"].tobytes(), [1e4, 2e4] * 8))
+    assert runs == [car.simulate(to=1, ks=ks)["body.f"].tobytes() for ks in [1e4, 2e4] * 8]
 
 
 class Counting(Executor):

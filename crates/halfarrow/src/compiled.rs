@@ -133,7 +133,8 @@ impl Compiled {
         known_parameter(self.minimal(), name)?;
         let parameter = self.minimal().program().parameters.iter().find(|p| p.name == name);
         let unit = parameter.and_then(|p| p.unit.as_ref());
-        quantity(text, unit).map_err(|why| Problem::BadOption { reason: format!("`{name}` is given as `{text}`: {why}") })
+        quantity(text, unit)
+            .map_err(|why| Problem::BadOption { reason: format!("`{name}` is given as `{text}`: {why}") })
     }
 
     /// Sets a parameter, in SI units. If it breaks what the equations rest on they are derived anew.

@@ -80,10 +80,7 @@ impl Compiled {
                 })
                 .collect(),
             inputs: (program.inputs.iter())
-                .map(|i| InterfaceInput {
-                    name: i.name.clone(),
-                    unit: text(i.unit.as_ref().or(i.deduced.as_ref())),
-                })
+                .map(|i| InterfaceInput { name: i.name.clone(), unit: text(i.unit.as_ref().or(i.deduced.as_ref())) })
                 .collect(),
             states: program.states.iter().map(|s| s.name.clone()).collect(),
             variables: (program.observed.iter().filter(|o| o.value.is_ok()))

@@ -237,17 +237,13 @@ impl Model {
 }
 
 impl Compiled {
-    /// Runs a sweep on all cores with the equations that are there, and keeps its rows in memory. What was set holds where
-    /// the sweep does not vary it. `progress` is told how many sets are done, and says whether to go on; it is asked some
+    /// Runs a sweep on all cores with the equations that are there, and keeps its rows in memory; called on a thread of a pool
+    /// of rayon, on that thread. What was set holds where the sweep does not vary it. `progress` is told how many sets are done, and says whether to go on; it is asked some
     /// times a second. What is done when it stops the sweep is kept.
     ///
     /// # Errors
     /// As [`Model::sweep_columns`]; the form is not the minimal one.
-    pub fn sweep(
-        &self,
-        sweep: &Sweep,
-        progress: &mut dyn FnMut(usize, usize) -> bool,
-    ) -> Result<SweepTable, Error> {
+    pub fn sweep(&self, sweep: &Sweep, progress: &mut dyn FnMut(usize, usize) -> bool) -> Result<SweepTable, Error> {
         if self.form() != Form::Minimal || sweep.run.form != Form::Minimal {
             let reason = "a compiled model sweeps in the form minimal".into();
             return Err(Problem::BadOption { reason }.into());
@@ -304,8 +300,8 @@ fn compute(
     if open.is_empty() || !progress(done, work.plan.sets()) {
         return Ok(open.is_empty());
     }
-    if cfg!(target_family = "wasm") {
-        // There are no threads.
+    if cfg!(target_family = "wasm") || rayon::current_thread_index().is_some() {
+        // There are no threads, or this is one of some that have work of their own.
         let mut worker = Worker::new(work);
         for chunk in open {
             let entry = worker.chunk(chunk, start);

@@ -186,5 +186,11 @@ fn a_sweep_in_memory_that_is_stopped_keeps_what_is_done() {
     assert!(!table.complete && (100..5000).contains(&done), "{done} sets");
     assert_eq!((table.report.sets, table.report.audit.sets), (5000, 0));
     let k = |set: f64| 1.0 + (set - 1.0) / 4999.0 * 8.0;
-    assert!(table.columns[0].values.iter().zip(&table.columns[1].values).all(|(&set, &found)| (k(set) - found).abs() < 1e-12));
+    assert!(
+        table.columns[0]
+            .values
+            .iter()
+            .zip(&table.columns[1].values)
+            .all(|(&set, &found)| (k(set) - found).abs() < 1e-12)
+    );
 }

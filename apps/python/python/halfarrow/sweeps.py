@@ -206,7 +206,7 @@ def _here(model: Model, plan: Plan, progress: Any) -> tuple[Columns, dict[str, A
     sets *= int(np.prod([len(values) for values in plan.vary.values()], dtype=np.int64))
     with Bar(progress, sets, model.name, "set") as bar:
         told = (lambda done, _: bar.reach(done)) if bar else None
-        swept = model._core.sweep(plan.arguments(), plan.given, told)
+        swept = model._core.sweep(plan.arguments(), plan.given, told, False)
     return swept.columns, swept.report(), swept.complete, swept.raised
 
 
@@ -261,7 +261,8 @@ def _work(key: str, job: _Job | None, names: list[str], rows: Array, first: int,
         _keep(_models, made_of, model)
     arguments = {**job.arguments, "vary": [], "samples": (names, numbers(rows)), "part": (first, of)}
     given = [(name, as_sent(value)) for name, value in job.given]
-    swept = model.sweep(arguments, given, None)
+    # The executor has the other cores.
+    swept = model.sweep(arguments, given, None, True)
     if swept.raised is not None:
         raise swept.raised
     return _Done(first, swept.columns, swept.report())

@@ -71,7 +71,6 @@ fn audit_set(work: &SweepContext<'_>, run: &Run, set: usize) -> Option<AuditRepo
     Some(report)
 }
 
-
 impl AuditReport {
     /// Keeps the greater misses, and all that is said.
     fn merge(&mut self, other: AuditReport) {

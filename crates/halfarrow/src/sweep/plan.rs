@@ -162,7 +162,9 @@ impl Plan {
         };
         let sets = plan.vary.iter().try_fold(plan.rows.len(), |n, values| n.checked_mul(values.len()));
         match sets {
-            Some(sets) if plan.part.is_some_and(|part| part.first.checked_add(sets).is_none_or(|end| end > part.of)) => {
+            Some(sets)
+                if plan.part.is_some_and(|part| part.first.checked_add(sets).is_none_or(|end| end > part.of)) =>
+            {
                 Err(bad("a part of a sweep does not lie within it"))
             }
             Some(sets) if sets as u64 <= MOST_SETS => Ok(plan),
