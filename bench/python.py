@@ -41,7 +41,10 @@ def run_beyond(car: ha.Model, **values: float) -> tuple[float, float]:
 def main() -> None:
     car = ha.load(CAR)
     car.simulate(to=1e-3)
-    for words, values in [("a run of one step", {}), ("the same with a parameter and an input", {"ks": 20e3, "road": 0.1})]:
+    for words, values in [
+        ("a run of one step", {}),
+        ("the same with a parameter and an input", {"ks": 20e3, "road": 0.1}),
+    ]:
         beyond, engine = run_beyond(car, **values)
         print(f"{words}: {beyond:.1f} beyond the engine's {engine:.1f}")
     with car.stepper(step=1e-3) as run:
@@ -53,7 +56,9 @@ def main() -> None:
         print(f"reading a variable: {median(lambda: run['body.f']):.2f}")
     t = np.linspace(0, 1, 100_001)
     road = (t, np.sin(t))
-    print(f"an input of 100,001 rows: {median(lambda: car.simulate(to=1e-3, step=1e-3, method='rk4', road=road), 20):.0f}")
+    print(
+        f"an input of 100,001 rows: {median(lambda: car.simulate(to=1e-3, step=1e-3, method='rk4', road=road), 20):.0f}"
+    )
     r = car.simulate(to=10, every=1e-4)
     print(f"{len(r)} columns of {len(r.t)} samples to xarray: {median(r.to_xarray, 100):.0f}")
 

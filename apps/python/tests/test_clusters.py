@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import halfarrow as ha
-from halfarrow.executors import RayExecutor
-
 from conftest import MODELS
+from halfarrow.executors import RayExecutor
 
 
 def test_ray(car: ha.Model, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,7 +56,22 @@ def test_mpi(tmp_path: Path) -> None:
     if mpiexec is None:
         pytest.skip("no mpiexec")
     (tmp_path / "sweep.py").write_text(SCRIPT)
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
-    command = [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", "sweep.py", str(MODELS / "quarter_car" / "model.bond")]
-    done = subprocess.run(command, cwd=tmp_path, env={**os.environ, **allowed}, capture_output=True, text=True, timeout=120)
+    allowed = {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    }
+    command = [
+        mpiexec,
+        "-n",
+        "3",
+        sys.executable,
+        "-m",
+        "mpi4py.futures",
+        "sweep.py",
+        str(MODELS / "quarter_car" / "model.bond"),
+    ]
+    done = subprocess.run(
+        command, cwd=tmp_path, env={**os.environ, **allowed}, capture_output=True, text=True, timeout=120
+    )
     assert "the same" in done.stdout, done.stderr

@@ -5,11 +5,9 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import halfarrow as ha
-
 from conftest import CART, MODELS
 
 
@@ -162,8 +160,10 @@ def test_equations_in_sympy(path: Path) -> None:
         if others:
             pytest.skip(f"reads {sorted(others)}")
         difference = (found[0].lhs - found[0].rhs).subs(derivative, sympy.Float(rate, 30)).subs(at).subs(values)
-        scale = max(abs(complex(term.subs(derivative, sympy.Float(rate, 30)).subs(at).subs(values))) for term in
-                    sympy.Add.make_args(sympy.expand(found[0].lhs)) + sympy.Add.make_args(found[0].rhs))
+        scale = max(
+            abs(complex(term.subs(derivative, sympy.Float(rate, 30)).subs(at).subs(values)))
+            for term in sympy.Add.make_args(sympy.expand(found[0].lhs)) + sympy.Add.make_args(found[0].rhs)
+        )
         assert abs(complex(difference)) <= 1e-9 * max(scale, 1e-300), found[0]
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import halfarrow as ha
-
 from conftest import MODELS
 
 REFERENCES = sorted(MODELS.glob("*/reference.json"))

@@ -15,7 +15,6 @@ import pytest
 import xarray
 
 import halfarrow as ha
-
 from conftest import MODELS
 
 

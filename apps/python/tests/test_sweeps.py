@@ -18,9 +18,8 @@ import pandas
 import pytest
 
 import halfarrow as ha
-from halfarrow import sweeps
-
 from conftest import MODELS
+from halfarrow import sweeps
 
 ROAD = ([0.0, 0.2, 0.2, 0.4], [0.0, 0.0, 0.3, 0.0])
 REDUCE = {"peak": ("body.f", "max"), "low": ("travel", "min"), "end": ("spring.q", "final")}

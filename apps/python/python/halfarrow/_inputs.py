@@ -19,14 +19,13 @@ InputLike: TypeAlias = Union[
 pandas or a one-dimensional array of xarray over times; the path of a CSV file."""
 
 
-
 class Series(Protocol):
     """A series of pandas or an array of xarray over times."""
 
     def to_numpy(self) -> npt.NDArray[Any]: ...
 
 
-Given: TypeAlias = Union[float, tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]], tuple[str, str]]
+Given: TypeAlias = float | tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | tuple[str, str]
 
 
 def given(name: str, value: Any, to: float, sample: float) -> Given:

@@ -35,8 +35,28 @@ class Comparison:
         """Forms whose results do not satisfy the model, as the audit found."""
         return [row["form"] for row in self.rows if row["audit"] and row["audit"]["verdict"] == "refused"]
 
-    _header = ("form", "differential", "algebraic", "index", "operations", "solver", "steps", "time for 1 s in s", "ratio")
-    _fields = ("form", "differential", "algebraic", "index", "flops", "solver", "steps", "seconds_per_second", "times_minimal")
+    _header = (
+        "form",
+        "differential",
+        "algebraic",
+        "index",
+        "operations",
+        "solver",
+        "steps",
+        "time for 1 s in s",
+        "ratio",
+    )
+    _fields = (
+        "form",
+        "differential",
+        "algebraic",
+        "index",
+        "flops",
+        "solver",
+        "steps",
+        "seconds_per_second",
+        "times_minimal",
+    )
 
     def _table(self) -> list[list[Any]]:
         return [[row[name] for name in self._fields] for row in self.rows if row["differential"] is not None]

@@ -92,7 +92,13 @@ class Equations:
     def _of(cls, told: Mapping[str, Any], model: Model) -> Equations:
         states = [record(State, state) for state in told["states"]]
         algebraic = [record(Algebraic, unknown) for unknown in told["algebraic"]]
-        named = {"states": states, "algebraic": algebraic, "lines": told["text"], "latex_lines": told["latex"], "of": model}
+        named = {
+            "states": states,
+            "algebraic": algebraic,
+            "lines": told["text"],
+            "latex_lines": told["latex"],
+            "of": model,
+        }
         return record(cls, {**told, **named})
 
     @property

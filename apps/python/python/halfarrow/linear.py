@@ -155,7 +155,9 @@ class Linearization:
             if input in (None, response.input) and output in (None, response.output):
                 hertz = response.frequencies / (2 * np.pi)
                 with np.errstate(divide="ignore"):
-                    above.semilogx(hertz, 20 * np.log10(np.abs(response.values)), label=f"{response.output} / {response.input}")
+                    above.semilogx(
+                        hertz, 20 * np.log10(np.abs(response.values)), label=f"{response.output} / {response.input}"
+                    )
                 below.semilogx(hertz, np.degrees(np.unwrap(np.angle(response.values))))
         above.set_ylabel("magnitude in dB")
         below.set_ylabel("phase in degrees")
@@ -183,7 +185,10 @@ class Linearization:
 
     def __repr__(self) -> str:
         where = f"at t = {self.t:g} s" if self.at == "time" else f"at the {self.at}"
-        parts = [f"{self.model} {where}: {len(self.states)} states, {self.stability}", as_text(self._header, self._rows())]
+        parts = [
+            f"{self.model} {where}: {len(self.states)} states, {self.stability}",
+            as_text(self._header, self._rows()),
+        ]
         return "\n".join([*parts, *self.notes])
 
     def _repr_html_(self) -> str:

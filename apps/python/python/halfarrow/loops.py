@@ -95,7 +95,9 @@ class Loops:
         return [(p.class_, " - ".join(p.elements), p.gain, p.gain_value, p.breaks, p.resolution) for p in self.paths]
 
     def _storage_rows(self) -> list[tuple[Any, ...]]:
-        return [(s.name, s.causality, "independent" if s.independent else "dependent", s.follows) for s in self.storages]
+        return [
+            (s.name, s.causality, "independent" if s.independent else "dependent", s.follows) for s in self.storages
+        ]
 
     def __str__(self) -> str:
         parts = [f"{self.model}: {len(self)} zero-order causal paths, {self.dof} independent storages"]

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -45,9 +45,7 @@ if TYPE_CHECKING:
     import pandas
 
 Form: TypeAlias = Literal["minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff"]
-FixedMethod: TypeAlias = Literal[
-    "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock"
-]
+FixedMethod: TypeAlias = Literal["euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock"]
 Method: TypeAlias = Literal[
     "auto", "explicit", "bdf", "radau",
     "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock",
@@ -55,7 +53,7 @@ Method: TypeAlias = Literal[
 Target: TypeAlias = Literal["c", "fmu2", "fmu3", "latex"]
 Stage: TypeAlias = Literal["ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program"]
 
-Value: TypeAlias = Union[float, str]
+Value: TypeAlias = float | str
 """A value of a parameter: a number in SI units, or text with a unit such as ``"20 kN/m"``."""
 
 _FORMS = ("minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff")
@@ -407,9 +405,7 @@ class Model:
             damping=damping, execution=execution,
         )  # fmt: skip
         with Bar(progress, to, self.name, "s") as bar:
-            ended = self._core.simulate(
-                options, all_given(given, to, sample), set_values, bar.reach if bar else None
-            )
+            ended = self._core.simulate(options, all_given(given, to, sample), set_values, bar.reach if bar else None)
             bar.reach(ended.reached)
         result = Result(self, ended, to)
         _conclude(ended, result)
@@ -451,9 +447,7 @@ class Model:
             "outputs": None if outputs is None else list(outputs),
             "symbolic": symbolic,
         }
-        return Linearization(
-            self._core.linearize(options, all_given(given, to, sample or to / _POINTS), set_values)
-        )
+        return Linearization(self._core.linearize(options, all_given(given, to, sample or to / _POINTS), set_values))
 
     def sweep(
         self,
@@ -529,7 +523,9 @@ class Model:
             if not len(values_of):
                 raise UsageError(f"`{name}` is given no values")
         if table is None and not plan.vary:
-            raise UsageError("nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`")
+            raise UsageError(
+                "nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`"
+            )
         return sweeps.run(self, plan, executor, chunk, progress)
 
     def stepper(
@@ -835,7 +831,9 @@ def _write(path: Path, content: bytes) -> None:
 def _conclude(ended: _halfarrow.Ended, result: Result) -> None:
     """Says what is to be known of a run, by an exception if it did not come to its end."""
     if isinstance(ended.raised, KeyboardInterrupt):
-        raise Interrupted(f"stopped at t = {result.reached:g} s; `result` has what was computed", result) from ended.raised
+        raise Interrupted(
+            f"stopped at t = {result.reached:g} s; `result` has what was computed", result
+        ) from ended.raised
     if ended.raised is not None:
         raise ended.raised
     notes = ended.notes

@@ -152,7 +152,13 @@ class Plan:
     def arguments(self) -> dict[str, Any]:
         """As the compiled part takes it. What is fixed varies over one value."""
         vary = [*((name, np.array([value])) for name, value in self.fixed.items()), *self.vary.items()]
-        return {"run": self.options, "vary": vary, "samples": self.samples, "reduce": list(self.reduce.values()), "part": None}
+        return {
+            "run": self.options,
+            "vary": vary,
+            "samples": self.samples,
+            "reduce": list(self.reduce.values()),
+            "part": None,
+        }
 
     def sets(self) -> tuple[list[str], Array]:
         """All sets: names, and a row for each, those of ``vary`` with the last one fastest."""
@@ -174,7 +180,7 @@ def reductions(reduce: Mapping[str, tuple[str, str]] | Sequence[str] | None) -> 
     kept = {}
     for name, wanted in reduce.items():
         if not (isinstance(wanted, (tuple, list)) and len(wanted) == 2):
-            raise UsageError(f"`{name}` is {wanted!r}: give a variable and what is kept of it, as in (\"body.f\", \"max\")")
+            raise UsageError(f'`{name}` is {wanted!r}: give a variable and what is kept of it, as in ("body.f", "max")')
         kept[name] = f"{choice('reduction', wanted[1], REDUCTIONS)}({wanted[0]})"
     return kept
 
