@@ -1,6 +1,7 @@
 //! A model that is ready to run, kept for many runs.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use halfarrow_compiler::bond_graph::Override;
 use halfarrow_compiler::causal_graph::shared_reactions;
@@ -11,6 +12,7 @@ use halfarrow_exec as exec;
 
 use crate::error::{Error, Problem};
 use crate::model::Model;
+use crate::quantity::quantity;
 use crate::run::{Progress, Run, Simulated};
 use crate::sweep::known_parameter;
 
@@ -31,7 +33,7 @@ use crate::sweep::known_parameter;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    model: Model,
+    model: Arc<Model>,
     form: Form,
     ready: Ready,
     /// Whether reactions that are not unique are shared.
@@ -67,7 +69,7 @@ impl Model {
                 Ready::Form { system, explicit: equations.residuals.is_empty() }
             }
         };
-        Ok(Compiled { model: self.clone(), form, ready, shares: false, set: BTreeMap::new() })
+        Ok(Compiled { model: Arc::new(self.clone()), form, ready, shares: false, set: BTreeMap::new() })
     }
 }
 
@@ -121,6 +123,18 @@ impl Compiled {
     /// The value of a parameter or constant, in SI units; `None` if there is none of that name.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         self.minimal().parameter(name)
+    }
+
+    /// The value that a text such as `20 kN/m` or `3` gives a parameter, in SI units.
+    ///
+    /// # Errors
+    /// There is no such parameter, or the text is no number in a unit of what it measures.
+    pub fn quantity(&self, name: &str, text: &str) -> Result<f64, Problem> {
+        known_parameter(self.minimal(), name)?;
+        let parameter = self.minimal().program().parameters.iter().find(|p| p.name == name);
+        let unit = parameter.and_then(|p| p.unit.as_ref());
+        quantity(text, unit)
+            .map_err(|why| Problem::BadOption { reason: format!("`{name}` is given as `{text}`: {why}") })
     }
 
     /// Sets a parameter, in SI units. If it breaks what the equations rest on they are derived anew.
@@ -178,6 +192,17 @@ impl Compiled {
         match &self.ready {
             Ready::Explicit(system) => system,
             Ready::Form { system, .. } => system.reference(),
+        }
+    }
+
+    /// The model with what was set.
+    ///
+    /// # Errors
+    /// The model has errors with these values.
+    pub fn model_as_set(&self) -> Result<Arc<Model>, Error> {
+        match self.set.is_empty() {
+            true => Ok(Arc::clone(&self.model)),
+            false => self.model.with(&self.overrides(&self.set)).map(Arc::new),
         }
     }
 

@@ -46,7 +46,8 @@ impl Input {
 
     /// Times in s and values in SI units. `declared`: the unit of the input.
     fn points(&self, name: &str, declared: Option<&Unit>) -> Result<(Vec<f64>, Vec<f64>), Problem> {
-        let si = |value: &f64| declared.map_or(*value, |unit| unit.to_si_f64(*value));
+        let own = declared.filter(|unit| !unit.is_si());
+        let si = |value: &f64| own.map_or(*value, |unit| unit.to_si_f64(*value));
         match self {
             Input::File(path) => column(ReadTable::open(path)?, path, name, declared),
             Input::Csv(text) => {

@@ -37,6 +37,7 @@ mod execution;
 mod export;
 mod families;
 mod input;
+mod interface;
 #[cfg(feature = "fmu")]
 mod library;
 mod linear_algebra;
@@ -83,6 +84,7 @@ pub use halfarrow_sim::real_time::{OnMiss, Statistics};
 pub use halfarrow_sim::{Failure, Method};
 pub use halfarrow_trace::{Column, PlotOptions, Trace, WriteError, csv_text, write_csv, write_parquet, write_whole};
 pub use input::Input;
+pub use interface::{Interface, InterfaceInput, InterfaceParameter, InterfaceVariable};
 pub use linearize::{
     Linearize, LinearizeReport, Mode, Point, ReachReport, Response, Stability, StateAt, SymbolicReport, Terminal,
     TransferFunction,
@@ -98,7 +100,9 @@ pub use run::{Progress, Record, Run, RunReport, Simulated, Start, StateTolerance
 pub use source::{Disk, Source};
 pub use stage::Stage;
 pub use stepper::{Snapshot, Stepper};
-pub use sweep::{Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, Vary};
+pub use sweep::{
+    Part, Reduce, Reduction, Samples, SetFailure, SetMiss, Sweep, SweepAudit, SweepReport, SweepTable, Vary,
+};
 pub use table_file::read_trace;
 pub use verdict::Verdict;
 pub use watch::StageTime;

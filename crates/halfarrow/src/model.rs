@@ -1,5 +1,6 @@
 //! A model that can be asked.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -93,6 +94,11 @@ impl Model {
     pub fn source(&self) -> Source {
         let Origin { source, files, .. } = &*self.origin;
         Source::text(source.name(), source.content()).with_files(files.texts())
+    }
+
+    /// The files that it read, by path, libraries that come with the program apart.
+    pub fn files(&self) -> BTreeMap<String, String> {
+        self.origin.files.texts()
     }
 
     /// The values of parameters that were replaced.

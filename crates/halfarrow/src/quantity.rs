@@ -24,6 +24,30 @@ pub fn duration(text: &str) -> Option<f64> {
     number_in(text, "s")
 }
 
+/// A number in SI units from text such as `20 kN/m` or `3`; what it measures is told by `unit`.
+pub(crate) fn quantity(text: &str, unit: Option<&Unit>) -> Result<f64, String> {
+    let (number, own) = number_and_unit(text).ok_or("write a number, or a number and a unit, as in `20 kN/m`")?;
+    match (own, unit) {
+        (None, _) => Ok(number),
+        (Some(own), Some(unit)) if own.dimension != unit.dimension => {
+            Err(format!("it measures something else than {unit}, which is the unit of the parameter"))
+        }
+        (Some(own), _) => Ok(own.to_si_f64(number)),
+    }
+}
+
+/// A number, and the unit behind it if there is one.
+pub(crate) fn number_and_unit(text: &str) -> Option<(f64, Option<Unit>)> {
+    let text = text.trim();
+    if let Ok(value) = text.parse() {
+        return Some((value, None));
+    }
+    // The longest beginning that is a number, so that `2e3` is not taken for 2 of a unit `e3`.
+    let ends = text.char_indices().map(|(i, _)| i).rev().find(|&i| text[..i].trim().parse::<f64>().is_ok())?;
+    let unit = Unit::parse(text[ends..].trim()).ok()?;
+    Some((text[..ends].trim().parse().ok()?, Some(unit)))
+}
+
 /// A number with a unit of that dimension, or in `si` if none is written.
 fn number_in(text: &str, si: &str) -> Option<f64> {
     let text = text.trim();

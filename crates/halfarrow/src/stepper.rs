@@ -126,7 +126,7 @@ impl Stepper {
         };
         finite(name, value)?;
         let unit = known[index].unit.as_ref().or(known[index].deduced.as_ref());
-        let value = unit.map_or(value, |unit| unit.to_si_f64(value));
+        let value = unit.filter(|unit| !unit.is_si()).map_or(value, |unit| unit.to_si_f64(value));
         self.inputs[index] = Some(value);
         self.system.set_input(index, value);
         Ok(())

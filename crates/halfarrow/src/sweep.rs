@@ -13,9 +13,11 @@ pub use reduce::{Reduce, Reduction};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
 
 use halfarrow_compiler::diagnostic::nearest;
+use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
@@ -24,6 +26,7 @@ use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::compiled::Compiled;
 use crate::error::{Error, Problem};
 use crate::input::connect;
 use crate::model::Model;
@@ -35,6 +38,9 @@ use structures::{Structures, set_all};
 
 /// Sets of a chunk: what is computed in one go, written at once, and lost when the program is killed.
 const CHUNK: usize = 4 * LANES;
+
+/// How often a sweep asks whether to go on, at least.
+const ASKED: Duration = Duration::from_millis(50);
 
 /// Many runs, and what is kept of each.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +57,29 @@ pub struct Sweep {
     pub restart: bool,
     /// Whether CSV has a second line with the units of the columns.
     pub units: bool,
+    /// What these sets are of a larger sweep, if it is computed in parts; `None`: they are all.
+    pub part: Option<Part>,
+}
+
+/// Where the sets of a sweep stand in a larger one. They have the numbers that they have there, and those are audited that
+/// are audited there: the parts together give what the whole sweep gives, to the last bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// How many sets stand before them.
+    pub first: usize,
+    /// How many sets there are in all.
+    pub of: usize,
+}
+
+/// A sweep whose rows are kept in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepTable {
+    /// The number of each set, its parameters, what is kept of its run, and whether it failed.
+    pub columns: Vec<Column>,
+    /// What there is to know.
+    pub report: SweepReport,
+    /// Whether all sets are there; else those that were done when it was stopped, and nothing was audited.
+    pub complete: bool,
 }
 
 /// What came of a sweep.
@@ -130,8 +159,20 @@ impl Model {
         sweep: &Sweep,
         progress: &mut dyn FnMut(usize, usize) -> bool,
     ) -> Result<(Vec<Column>, SweepReport), Error> {
-        let prepared = self.prepare(sweep)?;
-        let Prepared { plan, columns, .. } = &prepared;
+        let table = self.sweep_prepared(sweep, &self.prepare(sweep)?, progress);
+        match table.complete {
+            true => Ok((table.columns, table.report)),
+            false => Err(Error::Interrupted { done: table.columns[0].values.len(), sets: table.report.sets }),
+        }
+    }
+
+    fn sweep_prepared(
+        &self,
+        sweep: &Sweep,
+        prepared: &Prepared,
+        progress: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> SweepTable {
+        let Prepared { plan, columns, .. } = prepared;
         let mut entries: BTreeMap<usize, JournalChunk> = BTreeMap::new();
         let work = prepared.work();
         let add = &mut |entry: JournalChunk| {
@@ -140,10 +181,8 @@ impl Model {
         };
         let kept = compute(&work, sweep.run.start, (plan.chunks().collect(), 0), add, progress);
         // Memory takes whatever comes.
-        if !kept.unwrap_or(false) {
-            return Err(Error::Interrupted { done: entries.values().map(|e| e.rows).sum(), sets: plan.sets() });
-        }
-        let audit = audit::sample_of(&work, &sweep.run);
+        let complete = kept.unwrap_or(false);
+        let audit = if complete { audit::sample_of(&work, &sweep.run) } else { SweepAudit::default() };
         let mut failures = Failures::default();
         entries.values().for_each(|entry| failures.note(entry));
         let width = columns.len();
@@ -153,12 +192,16 @@ impl Model {
             unit: unit.clone(),
             values: values(c).collect(),
         };
-        Ok((columns.iter().enumerate().map(column).collect(), self.sweep_report(&prepared, 0, failures, audit)))
+        let columns = columns.iter().enumerate().map(column).collect();
+        SweepTable { columns, report: self.sweep_report(prepared, 0, failures, audit), complete }
     }
 
     /// All that a sweep needs before its first run.
     fn prepare(&self, sweep: &Sweep) -> Result<Prepared, Error> {
-        let mut system = self.system(&self.equations_in(sweep.run.form)?)?;
+        self.prepare_with(self.system(&self.equations_in(sweep.run.form)?)?, sweep)
+    }
+
+    fn prepare_with(&self, mut system: exec::Model, sweep: &Sweep) -> Result<Prepared, Error> {
         connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
         let plan = Plan::new(sweep, &system)?;
         let reducers = reducers(sweep, &mut system)?;
@@ -190,6 +233,25 @@ impl Model {
         let graph = format!("{:?}", self.graph);
         let run = Run { execution: Execution::Auto, ..sweep.run.clone() };
         format!("{} {:016x} {run:?} {plan:?} {columns:?}", self.name(), fingerprint(graph.as_bytes()))
+    }
+}
+
+impl Compiled {
+    /// Runs a sweep on all cores with the equations that are there, and keeps its rows in memory; called on a thread of a pool
+    /// of rayon, on that thread. What was set holds where the sweep does not vary it. `progress` is told how many sets are done, and says whether to go on; it is asked some
+    /// times a second. What is done when it stops the sweep is kept.
+    ///
+    /// # Errors
+    /// As [`Model::sweep_columns`]; the form is not the minimal one.
+    pub fn sweep(&self, sweep: &Sweep, progress: &mut dyn FnMut(usize, usize) -> bool) -> Result<SweepTable, Error> {
+        if self.form() != Form::Minimal || sweep.run.form != Form::Minimal {
+            let reason = "a compiled model sweeps in the form minimal".into();
+            return Err(Problem::BadOption { reason }.into());
+        }
+        // Other equations, where sets need them, follow from the model with what was set.
+        let model = self.model_as_set()?;
+        let prepared = model.prepare_with(self.minimal().clone(), sweep)?;
+        Ok(model.sweep_prepared(sweep, &prepared, progress))
     }
 }
 
@@ -238,16 +300,14 @@ fn compute(
     if open.is_empty() || !progress(done, work.plan.sets()) {
         return Ok(open.is_empty());
     }
-    let mut take = |entry: JournalChunk| -> io::Result<bool> {
-        done += entry.rows;
-        keep(entry)?;
-        Ok(progress(done, work.plan.sets()))
-    };
-    if cfg!(target_family = "wasm") {
-        // There are no threads.
+    if cfg!(target_family = "wasm") || rayon::current_thread_index().is_some() {
+        // There are no threads, or this is one of some that have work of their own.
         let mut worker = Worker::new(work);
         for chunk in open {
-            if !take(worker.chunk(chunk, start))? {
+            let entry = worker.chunk(chunk, start);
+            done += entry.rows;
+            keep(entry)?;
+            if !progress(done, work.plan.sets()) {
                 return Ok(false);
             }
         }
@@ -263,12 +323,22 @@ fn compute(
                 |worker, chunk| sender.send(worker.chunk(chunk, start)).map_err(drop),
             );
         });
-        for entry in receiver {
-            if !take(entry)? {
+        // It ends with this loop, on which those who send to it wait.
+        let receiver = receiver;
+        loop {
+            let go_on = match receiver.recv_timeout(ASKED) {
+                Ok(entry) => {
+                    done += entry.rows;
+                    keep(entry)?;
+                    progress(done, work.plan.sets())
+                }
+                Err(RecvTimeoutError::Timeout) => progress(done, work.plan.sets()),
+                Err(RecvTimeoutError::Disconnected) => return Ok(true),
+            };
+            if !go_on {
                 return Ok(false);
             }
         }
-        Ok(true)
     })
 }
 
@@ -331,7 +401,7 @@ impl<'a> Worker<'a> {
     }
 
     fn row(&self, set: usize, outcome: Outcome, entry: &mut JournalChunk) {
-        entry.values.push((set + 1) as f64);
+        entry.values.push(self.work.plan.number(set) as f64);
         entry.values.extend(self.work.plan.values(set));
         let failed = outcome.is_err();
         match outcome {
@@ -339,7 +409,7 @@ impl<'a> Worker<'a> {
             Err(reason) => {
                 let kept = self.work.reducers.iter().map(|r| r.reductions()).sum();
                 entry.values.extend(std::iter::repeat_n(f64::NAN, kept));
-                entry.failures.push(SetFailure { set: set + 1, reason });
+                entry.failures.push(SetFailure { set: self.work.plan.number(set), reason });
             }
         }
         entry.values.push(f64::from(failed));

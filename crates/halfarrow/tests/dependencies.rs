@@ -15,6 +15,7 @@ const SHARED: [&str; 4] = ["diagnostic", "ids", "span", "unit"];
 fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
     BTreeMap::from([
         ("apps/cli", &["halfarrow"][..]),
+        ("apps/python", &["halfarrow"]),
         ("crates/audit", &["halfarrow-compiler"]),
         ("crates/compiler", &["halfarrow-sparse"]),
         ("crates/draw", &["halfarrow-compiler"]),

@@ -34,6 +34,7 @@ fn sweep(model: &Model, vary: &[&str], kept: &str, method: Method) -> (SweepRepo
         reduce: vec![Reduce::parse(&format!("final({kept})")).unwrap()],
         restart: true,
         units: false,
+        part: None,
     };
     let report = model.sweep(&sweep, &out, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let text = std::fs::read_to_string(&out).unwrap();

@@ -203,6 +203,7 @@ fn sweeps_audit_a_sample_of_their_sets() {
         reduce: vec![Reduce::parse("final(m.f)").unwrap()],
         restart: true,
         units: false,
+        part: None,
     };
     let sweep = |vary: &str| {
         text(OSCILLATOR)

@@ -375,6 +375,7 @@ fn sweeps_of_pendulums_on_a_moving_base_turn_over() {
             reduce: vec![Reduce::parse("final(y)").expect("a reduction")],
             restart: false,
             units: false,
+            part: None,
         };
         let out = folder.path().join("rows.csv");
         let report =

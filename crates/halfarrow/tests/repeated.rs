@@ -47,6 +47,7 @@ fn a_sweep_over_what_shapes_a_model_compiles_each_value() {
         reduce: ["final(last)", "final(mean)", "final(pairs)"].map(|r| Reduce::parse(r).unwrap()).to_vec(),
         restart: false,
         units: false,
+        part: None,
     };
     let report = model(&[]).sweep(&sweep, &out, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
     assert_eq!((report.sets, report.failed), (8, 2));

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use halfarrow::{FixedMethod, Method, Model, Override, Record, Reduce, Run, Samples, Sweep, SweepReport, Vary};
+use halfarrow::{
+    Column, FixedMethod, Form, Method, Model, Override, Part, Record, Reduce, Run, Samples, Sweep, SweepReport, Vary,
+};
 
 const MODEL: &str = "model Oscillator\nparam k = 4 N/m, load = 1 kg, b = 0.1 N.s/m\nconst g = 9.81 m/s2\n1:a -> I:mass(load)\na -> C:spring(k = k, q0 = 10 cm)\na -> R:damper(b)\noutput x = spring.q : mm\n";
 
@@ -19,6 +21,7 @@ fn sweep(method: Method) -> Sweep {
         reduce: reduce.to_vec(),
         restart: false,
         units: false,
+        part: None,
     }
 }
 
@@ -121,4 +124,73 @@ fn columns_in_memory_are_those_of_the_file() {
     for (i, row) in rows.iter().enumerate() {
         assert!(columns.iter().zip(row).all(|(column, value)| column.values[i].to_bits() == value.to_bits()));
     }
+}
+
+fn bits(columns: &[Column]) -> Vec<(String, String, Vec<u64>)> {
+    let of = |c: &Column| (c.name.clone(), c.unit.clone(), c.values.iter().map(|v| v.to_bits()).collect());
+    columns.iter().map(of).collect()
+}
+
+#[test]
+fn parts_of_a_sweep_are_the_whole_one() {
+    let model = model();
+    let compiled = model.compile(Form::Minimal).expect("equations");
+    for method in [Method::Fixed(FixedMethod::Rk4), Method::Auto] {
+        let sweep = Sweep { vary: vec![Vary::parse("k=list(-1,1,2,3,4,5,6,7,8,9)").unwrap()], ..sweep(method) };
+        let (whole, report) = model.sweep_columns(&sweep, &mut |_, _| true).expect("rows");
+        for size in [1, 3, 10] {
+            let mut columns: Vec<Column> = Vec::new();
+            let (mut audited, mut misses) = (0, Vec::new());
+            for (first, values) in sweep.vary[0].values.chunks(size).enumerate() {
+                let samples = Samples { names: vec!["k".into()], rows: values.iter().map(|&v| vec![v]).collect() };
+                let part = Part { first: first * size, of: 10 };
+                let sweep = Sweep { vary: Vec::new(), samples: Some(samples), part: Some(part), ..sweep.clone() };
+                let table = compiled.sweep(&sweep, &mut |_, _| true).expect("rows");
+                assert!(table.complete);
+                audited += table.report.audit.sets;
+                misses.extend(table.report.audit.misses);
+                match columns.is_empty() {
+                    true => columns = table.columns,
+                    false => columns.iter_mut().zip(table.columns).for_each(|(c, more)| c.values.extend(more.values)),
+                }
+            }
+            assert_eq!(bits(&columns), bits(&whole), "{method:?} in parts of {size}");
+            assert_eq!((audited, misses), (report.audit.sets, report.audit.misses.clone()));
+        }
+        let outside = Sweep { part: Some(Part { first: 1, of: 10 }), ..sweep };
+        assert!(compiled.sweep(&outside, &mut |_, _| true).is_err(), "ten sets from the second on are eleven");
+    }
+}
+
+#[test]
+fn a_compiled_model_sweeps_with_what_was_set() {
+    let sweep = Sweep { vary: vec![Vary::parse("k=list(1,4)").unwrap()], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
+    let mut compiled = model().compile(Form::Minimal).expect("equations");
+    compiled.set("load", compiled.quantity("load", "2500 g").expect("a mass")).expect("a parameter");
+    let set = [Override { name: "load".into(), value: "2.5 kg".into() }];
+    let heavy = Model::from_text("oscillator.bond", MODEL, &set).expect("a model");
+    let table = compiled.sweep(&sweep, &mut |_, _| true).expect("rows");
+    assert_eq!(bits(&table.columns), bits(&heavy.sweep_columns(&sweep, &mut |_, _| true).expect("rows").0));
+    for (text, why) in [("3 s", "measures something else than kg"), ("much", "write a number")] {
+        let refused = compiled.quantity("load", text).expect_err("no mass").to_string();
+        assert!(refused.contains(why), "{refused}");
+    }
+}
+
+#[test]
+fn a_sweep_in_memory_that_is_stopped_keeps_what_is_done() {
+    let sweep = Sweep { vary: vec![Vary::parse("k=lin(1,9,5000)").unwrap()], ..sweep(Method::Fixed(FixedMethod::Rk4)) };
+    let compiled = model().compile(Form::Minimal).expect("equations");
+    let table = compiled.sweep(&sweep, &mut |done, _| done < 100).expect("what is done");
+    let done = table.columns[0].values.len();
+    assert!(!table.complete && (100..5000).contains(&done), "{done} sets");
+    assert_eq!((table.report.sets, table.report.audit.sets), (5000, 0));
+    let k = |set: f64| 1.0 + (set - 1.0) / 4999.0 * 8.0;
+    assert!(
+        table.columns[0]
+            .values
+            .iter()
+            .zip(&table.columns[1].values)
+            .all(|(&set, &found)| (k(set) - found).abs() < 1e-12)
+    );
 }

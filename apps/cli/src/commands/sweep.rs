@@ -82,6 +82,7 @@ fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
         reduce: all_listed(&arguments.reduce).iter().map(|text| Reduce::parse(text)).collect::<Result<_, Problem>>()?,
         restart: arguments.restart,
         units: arguments.units,
+        part: None,
     })
 }
 

@@ -4,7 +4,6 @@ use halfarrow_sim::Nobody;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::plan::Plan;
 use super::{SweepContext, prepare};
 use crate::audited::{AuditReport, Audited, Deviation};
 use crate::run::Run;
@@ -42,7 +41,7 @@ pub struct SetMiss {
 /// Audits some of the sets, on all cores. Sets that fail are told by their rows.
 pub(super) fn sample_of(work: &SweepContext<'_>, run: &Run) -> SweepAudit {
     let of = |set: usize| Some((set, audit_set(work, run, set)?));
-    let found: Vec<(usize, AuditReport)> = sample(work.plan).into_par_iter().filter_map(of).collect();
+    let found: Vec<(usize, AuditReport)> = work.plan.sample(MOST).into_par_iter().filter_map(of).collect();
     let count = |wanted: Verdict| found.iter().filter(|(_, audit)| audit.verdict == wanted).count();
     let mut audit = SweepAudit {
         sets: found.len(),
@@ -53,7 +52,7 @@ pub(super) fn sample_of(work: &SweepContext<'_>, run: &Run) -> SweepAudit {
     for (set, found) in found {
         if found.verdict != Verdict::Holds {
             let (verdict, warnings) = (found.verdict, found.warnings.clone());
-            audit.misses.push(SetMiss { set: set + 1, verdict, warnings });
+            audit.misses.push(SetMiss { set: work.plan.number(set), verdict, warnings });
         }
         audit.greatest.merge(found);
     }
@@ -70,13 +69,6 @@ fn audit_set(work: &SweepContext<'_>, run: &Run, set: usize) -> Option<AuditRepo
     let mut report = audited.finish();
     report.judge(&Made::by(run));
     Some(report)
-}
-
-/// The first set, the last, and some evenly between them.
-fn sample(plan: &Plan) -> Vec<usize> {
-    let sets = plan.sets();
-    let count = sets.min(MOST);
-    (0..count).map(|i| if count > 1 { i * (sets - 1) / (count - 1) } else { 0 }).collect()
 }
 
 impl AuditReport {

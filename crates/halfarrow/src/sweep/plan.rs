@@ -6,8 +6,9 @@ use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 
-use super::{CHUNK, Sweep, known_parameter};
+use super::{CHUNK, Part, Sweep, known_parameter};
 use crate::error::Problem;
+use crate::quantity::number_and_unit;
 
 /// More sets than this are a mistake.
 const MOST_SETS: u64 = 1 << 40;
@@ -74,14 +75,8 @@ impl Vary {
 
 /// A number, perhaps with a unit.
 fn number(text: &str) -> Option<f64> {
-    let text = text.trim();
-    if let Ok(value) = text.parse() {
-        return Some(value);
-    }
-    // The longest beginning that is a number, so that `2e3` is not taken for 2 of a unit `e3`.
-    let ends = text.char_indices().map(|(i, _)| i).rev().find(|&i| text[..i].trim().parse::<f64>().is_ok())?;
-    let unit = Unit::parse(text[ends..].trim()).ok()?;
-    Some(unit.to_si_f64(text[..ends].trim().parse().ok()?))
+    let (number, unit) = number_and_unit(text)?;
+    Some(unit.map_or(number, |unit| unit.to_si_f64(number)))
 }
 
 /// Sets of parameters from a table.
@@ -135,6 +130,8 @@ pub struct Plan {
     units: Vec<Option<Unit>>,
     rows: Vec<Vec<f64>>,
     vary: Vec<Vec<f64>>,
+    /// Where the sets stand in a larger sweep.
+    part: Option<Part>,
 }
 
 impl Plan {
@@ -161,9 +158,15 @@ impl Plan {
             names,
             rows: samples.map_or(vec![Vec::new()], |s| s.rows.clone()),
             vary: sweep.vary.iter().map(|v| v.values.clone()).collect(),
+            part: sweep.part,
         };
         let sets = plan.vary.iter().try_fold(plan.rows.len(), |n, values| n.checked_mul(values.len()));
         match sets {
+            Some(sets)
+                if plan.part.is_some_and(|part| part.first.checked_add(sets).is_none_or(|end| end > part.of)) =>
+            {
+                Err(bad("a part of a sweep does not lie within it"))
+            }
             Some(sets) if sets as u64 <= MOST_SETS => Ok(plan),
             _ => Err(bad("there are more sets than can be counted")),
         }
@@ -171,6 +174,19 @@ impl Plan {
 
     pub fn sets(&self) -> usize {
         self.vary.iter().map(Vec::len).product::<usize>() * self.rows.len()
+    }
+
+    /// The number of a set as it is told, from 1: that in the whole sweep.
+    pub fn number(&self, set: usize) -> usize {
+        self.part.map_or(0, |part| part.first) + set + 1
+    }
+
+    /// Those of so many sets spread evenly over the whole sweep that are here, the first and the last included.
+    pub fn sample(&self, most: usize) -> Vec<usize> {
+        let Part { first, of } = self.part.unwrap_or(Part { first: 0, of: self.sets() });
+        let count = of.min(most);
+        let all = (0..count).map(|i| if count > 1 { i * (of - 1) / (count - 1) } else { 0 });
+        all.filter(|set| (first..first + self.sets()).contains(set)).map(|set| set - first).collect()
     }
 
     /// Numbers of the chunks that the sets are computed in.

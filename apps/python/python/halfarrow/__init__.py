@@ -1,0 +1,120 @@
+"""Bond graphs from text to equations and trajectories.
+
+A model is text: what is connected to what. ``load`` reads a file, ``model`` takes the text itself:
+
+>>> import halfarrow as ha
+>>> car = ha.model('''model QuarterCar
+... param ms = 320 kg, ks = 18 kN/m, b = 1 kN.s/m
+... input road : m/s = 0                              "vertical speed of the road"
+... Sf:ground(road) -> 0:strut -> 1:chassis -> I:body(ms)
+... strut -> 1:gap -> C:spring(k = ks)
+... gap -> R:damper(b)
+... output travel = spring.q : mm
+... ''')
+
+Ask it
+    ``car.loops``, ``car.equations()``, ``car.draw()``, ``car.parameters``, ``car.warnings``:
+
+>>> print(car.equations().text)
+ms f_body' = b (road - f_body) + ks q_spring
+q_spring' = road - f_body
+
+Run it
+    ``simulate`` takes parameters and inputs as keywords, and gives arrays with units, and an audit against the graph:
+
+>>> r = car.simulate(to=4, every=0.01, ks=20e3, road=([0, 1, 1, 2], [0, 0, 0.2, 0]))
+>>> r["travel"].shape, r.units["travel"], r.audit.verdict
+((401,), 'mm', 'holds')
+
+    ``r.to_pandas()``, ``r.to_xarray()``, ``r.plot("travel")``, ``r.save("car.parquet")``.
+
+Run it many times
+    ``sweep`` takes several values of a parameter, on all cores or through any executor:
+
+>>> s = car.sweep(to=4, step=1e-3, ks=[10e3, 20e3, 30e3], b=[600, 900], road=0.1, reduce={"peak": ("travel", "max")})
+>>> s["peak"].shape
+(6,)
+
+Look at it near a point
+    ``linearize`` gives matrices, poles, zeros, ``bode()``, ``to_control()``:
+
+>>> car.linearize(at="equilibrium").stable
+True
+
+Step it
+    ``stepper`` runs as far as it is told, beside a controller or hardware:
+
+>>> with car.stepper(step=1e-3) as run:
+...     run["road"] = 0.1
+...     run.step(100)
+...     round(run.t, 6)
+0.1
+
+Give it away
+    ``export`` writes C and FMUs, ``report`` one page with everything, ``compare`` puts all forms beside each other.
+
+Values of parameters are numbers in SI units or text with a unit (``ks="20 kN/m"``); inputs and results are in the units of
+their declarations. What is wrong is told by exceptions with place, reason and remedy: ``ModelError``, ``UsageError``,
+``UnknownNameError``, ``RunError``, which has what was computed as ``result``. What is odd is told by ``ModelWarning``, what an
+audit finds missed by ``AuditWarning``.
+"""
+
+from __future__ import annotations
+
+from ._errors import (
+    AuditWarning,
+    Diagnostic,
+    Error,
+    FileError,
+    Interrupted,
+    ModelError,
+    ModelWarning,
+    RunError,
+    UnknownNameError,
+    UsageError,
+)
+from ._halfarrow import __version__
+from .comparison import Comparison
+from .components import Component, Library, format, library
+from .equations import Equations
+from .linear import Linearization
+from .loops import Loops
+from .model import Input, Model, Parameter, Variable, load, model
+from .picture import Picture
+from .result import Audit, Result
+from .stepper import Snapshot, Stepper
+from .sweeps import SweepResult
+
+__all__ = [
+    "Audit",
+    "AuditWarning",
+    "Comparison",
+    "Component",
+    "Diagnostic",
+    "Equations",
+    "Error",
+    "FileError",
+    "Input",
+    "Interrupted",
+    "Library",
+    "Linearization",
+    "Loops",
+    "Model",
+    "ModelError",
+    "ModelWarning",
+    "Parameter",
+    "Picture",
+    "Result",
+    "RunError",
+    "Snapshot",
+    "Stepper",
+    "SweepResult",
+    "UnknownNameError",
+    "UsageError",
+    "Variable",
+    "__version__",
+    "format",
+    "library",
+    "load",
+    "model",
+]
