@@ -594,7 +594,10 @@ fn an_unknown_library_is_refused_with_those_that_there_are() {
     let told = refused("model M\nimport std.hydraulics\nSe:a(1) -> R:r(1)\n");
     assert!(told.contains("there is no library `std.hydraulics`"), "{told}");
     assert!(told.contains("machine.bond:2:8") && told.contains("did you mean `std.hydraulic`?"), "{told}");
-    assert!(told.contains("std.electrical, std.hydraulic, std.mechanical, std.signals, std.thermal"), "{told}");
+    assert!(
+        told.contains("std.electrical, std.hydraulic, std.mechanical, std.multibody, std.signals, std.thermal"),
+        "{told}"
+    );
     let told = refused("model M\nimport motors\nSe:a(1) -> R:r(1)\n");
     assert!(told.contains("in quotes: `import \"file.bond\"`"), "{told}");
 }
@@ -637,7 +640,7 @@ fn all_libraries_stand_beside_each_other_and_go_with_a_model() {
 
 #[test]
 fn every_component_is_documented_and_tested_here() {
-    let tests = include_str!("library_std.rs");
+    let tests = [include_str!("library_std.rs"), include_str!("multibonds.rs")].concat();
     let mut seen = BTreeSet::new();
     for library in Library::all() {
         assert!(!library.about.is_empty());
@@ -665,7 +668,7 @@ fn libraries_and_components_are_found_by_name() {
         let found = Library::named(name).unwrap_or_else(|e| panic!("{e}"));
         found.into_iter().map(|l| (l.name, l.components.len())).collect::<Vec<_>>()
     };
-    assert_eq!(names("").len(), 5);
+    assert_eq!(names("").len(), 6);
     assert_eq!(names("std.thermal"), names("thermal"));
     for name in ["DCMotor", "electrical.DCMotor", "std.electrical.DCMotor"] {
         assert_eq!(names(name), [("std.electrical".to_string(), 1)]);
