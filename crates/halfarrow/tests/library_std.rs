@@ -676,7 +676,7 @@ fn libraries_and_components_are_found_by_name() {
     let unknown = Library::named("electrical.DCMotro").expect_err("no such component").to_string();
     assert!(unknown.contains("did you mean `electrical.DCMotor`?"), "{unknown}");
     let unknown = Library::named("pneumatics").expect_err("no such library").to_string();
-    assert!(unknown.contains("there are electrical, mechanical, hydraulic, thermal, signals"), "{unknown}");
+    assert!(unknown.contains("there are electrical, mechanical, multibody, hydraulic, thermal, signals"), "{unknown}");
 }
 
 /// The page about all components.
