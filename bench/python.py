@@ -1,4 +1,4 @@
-"""What calling from Python costs beyond the engine's own time: `pip install ./apps/python`, `python bench/python.py`.
+"""What calling from Python costs beyond the engine's own time: `pip install './apps/python[xarray]'`, `python bench/python.py`.
 
 Medians of many calls, in µs. The engine's own time is taken in the compiled part, around the run alone.
 """

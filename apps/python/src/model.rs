@@ -29,6 +29,11 @@ type Values = Vec<(String, f64)>;
 /// Name, text, files that it read, values of parameters as text.
 type Parts = (String, String, BTreeMap<String, String>, Overrides);
 
+/// Files with their contents, and what there is to know of them.
+type Files<'py> = (Vec<(String, Bound<'py, PyBytes>)>, Bound<'py, PyAny>);
+/// Text of a page, warnings, why its run failed, forms that are not to be used.
+type PageParts = (String, Vec<String>, Option<String>, Vec<&'static str>);
+
 /// A model of the library. Its equations are derived when they are first needed, and kept.
 #[pyclass(frozen, module = "halfarrow._halfarrow")]
 pub struct Model {
@@ -268,7 +273,7 @@ impl Model {
         step: f64,
         real: &str,
         binary: bool,
-    ) -> PyResult<(Vec<(String, Bound<'py, PyBytes>)>, Bound<'py, PyAny>)> {
+    ) -> PyResult<Files<'py>> {
         let targets = [Target::C, Target::Fmu2, Target::Fmu3, Target::Latex];
         let target = targets.into_iter().find(|known| known.name() == target).ok_or_else(|| none("target", target))?;
         let real = [Real::Double, Real::Float]
@@ -314,7 +319,7 @@ impl Model {
         budget: f64,
         given: Inputs<'_>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(String, Vec<String>, Option<String>, Vec<&'static str>)> {
+    ) -> PyResult<PageParts> {
         let wanted = Report { to, compare, compare_budget: budget, inputs: inputs(given)?, ..Report::default() };
         let mut watcher = Watcher::new(progress);
         let made =

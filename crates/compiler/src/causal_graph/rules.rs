@@ -18,7 +18,7 @@ pub fn in_order(kind: &Kind, here: usize, away: usize, kept: bool) -> bool {
         Kind::Gyrator { .. } => matches!((here, away), (2, 0) | (0, 2)),
         // As many variables are given as there are equations: where one at `in` changes sides one at `out` does.
         Kind::MatrixTransformer(m) => (here, away) == (m.rows, m.columns),
-        Kind::MatrixGyrator(_) => here % 2 == 0,
+        Kind::MatrixGyrator(_) => here.is_multiple_of(2),
         _ => true,
     }
 }

@@ -18,10 +18,9 @@ pub fn given(rows: &[TwoPortRow], sets_effort: &dyn Fn(usize) -> Option<bool>) -
     let mut given: Vec<Option<Given>> = rows.iter().map(|row| own(row).then_some(Given::Own)).collect();
     let ports = rows.iter().flat_map(|r| r.terms.iter().map(|t| t.0).chain([r.port])).max().map_or(0, |p| p + 1);
     let mut taken: Vec<Option<usize>> = vec![None; ports];
-    for row in 0..rows.len() {
-        if given[row].is_none() {
-            take(rows, sets_effort, row, &mut taken, &mut vec![false; ports]);
-        }
+    let left: Vec<usize> = (0..rows.len()).filter(|&row| given[row].is_none()).collect();
+    for row in left {
+        take(rows, sets_effort, row, &mut taken, &mut vec![false; ports]);
     }
     for (port, row) in taken.iter().enumerate() {
         if let Some(row) = *row {
