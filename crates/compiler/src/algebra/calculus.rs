@@ -7,6 +7,15 @@ use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
+/// What a derivative is taken by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum By {
+    /// A symbol, wherever it stands.
+    Symbol(Symbol),
+    /// A symbol or a whole where it stands outside of wholes.
+    Atom(Expr),
+}
+
 impl Exprs {
     /// The partial derivative by a symbol, all others held. At corners it is the derivative of one side; `sign` and
     /// `floor` count as constant.
@@ -20,15 +29,37 @@ impl Exprs {
     /// assert_eq!(x.derivative(sine, q), x.call(Function::Cos, &[e]));
     /// ```
     pub fn derivative(&mut self, e: Expr, symbol: Symbol) -> Expr {
-        if let Some(&known) = self.derivatives.get(&(e, symbol)) {
+        let by = By::Symbol(symbol);
+        if let Some(&known) = self.derivatives.get(&(e, by)) {
             return known;
         }
-        let order = self.below(&[e], &|e| self.depends_on(e, symbol) && !self.derivatives.contains_key(&(e, symbol)));
+        let order = self.below(&[e], &|e| self.depends_on(e, symbol) && !self.derivatives.contains_key(&(e, by)));
         for part in order {
-            let slope = self.derivative_of_node(part, symbol);
-            self.derivatives.insert((part, symbol), slope);
+            let slope = self.derivative_of_node(part, by);
+            self.derivatives.insert((part, by), slope);
         }
-        self.slope(e, symbol)
+        self.slope(e, by)
+    }
+
+    /// What an expression is made of if wholes in it are taken as they are: symbols and wholes. `None` if it has no wholes.
+    pub fn atoms(&self, e: Expr) -> Option<Vec<Expr>> {
+        let order = self.around_wholes(&[e]);
+        order.iter().any(|&part| matches!(self.node(part), Node::Whole(_))).then(|| {
+            order.into_iter().filter(|&part| matches!(self.node(part), Node::Whole(_) | Node::Symbol(_))).collect()
+        })
+    }
+
+    /// The derivative by one of the [`atoms`](Exprs::atoms), the others held, whatever they are made of.
+    pub fn derivative_by_atom(&mut self, e: Expr, atom: Expr) -> Expr {
+        let by = By::Atom(atom);
+        self.derivatives.insert((atom, by), ONE);
+        for part in self.around_wholes(&[e]) {
+            if !self.derivatives.contains_key(&(part, by)) && !matches!(self.node(part), Node::Whole(_)) {
+                let slope = self.derivative_of_node(part, by);
+                self.derivatives.insert((part, by), slope);
+            }
+        }
+        self.slope(e, by)
     }
 
     /// The expression with expressions in place of symbols, all at once.
@@ -78,6 +109,7 @@ impl Exprs {
             Node::Select(c, a, b) => self.select(c, a, b),
             Node::Table(t, x) => self.table(t, x),
             Node::TableSlope(t, x) => self.table_slope(t, x),
+            Node::Whole(part) => self.whole(part),
         }
     }
 
@@ -114,30 +146,30 @@ impl Exprs {
         Some(new.get(&e).copied().unwrap_or(e))
     }
 
-    fn slope(&self, e: Expr, symbol: Symbol) -> Expr {
-        self.derivatives.get(&(e, symbol)).copied().unwrap_or(ZERO)
+    fn slope(&self, e: Expr, by: By) -> Expr {
+        self.derivatives.get(&(e, by)).copied().unwrap_or(ZERO)
     }
 
     /// The derivative of a node whose parts have theirs.
-    fn derivative_of_node(&mut self, e: Expr, symbol: Symbol) -> Expr {
+    fn derivative_of_node(&mut self, e: Expr, by: By) -> Expr {
         match self.node(e).clone() {
             Node::Symbol(s) => {
-                if s == symbol {
+                if By::Symbol(s) == by {
                     ONE
                 } else {
                     ZERO
                 }
             }
             Node::Add(terms) => {
-                let slopes: Vec<Expr> = terms.iter().map(|&t| self.slope(t, symbol)).collect();
+                let slopes: Vec<Expr> = terms.iter().map(|&t| self.slope(t, by)).collect();
                 self.add(&slopes)
             }
-            Node::Mul(factors) => self.derivative_of_product(&factors, symbol),
-            Node::Pow(base, n) => self.derivative_of_power(base, n, e, symbol),
+            Node::Mul(factors) => self.derivative_of_product(&factors, by),
+            Node::Pow(base, n) => self.derivative_of_power(base, n, e, by),
             Node::Call(f, x) => {
                 let mut terms = Vec::new();
                 for (i, &argument) in x.iter().enumerate() {
-                    let slope = self.slope(argument, symbol);
+                    let slope = self.slope(argument, by);
                     if slope != ZERO {
                         let partial = self.partial(f, &x, i, e);
                         terms.push(self.mul(&[partial, slope]));
@@ -146,28 +178,32 @@ impl Exprs {
                 self.add(&terms)
             }
             Node::Select(c, a, b) => {
-                let (a, b) = (self.slope(a, symbol), self.slope(b, symbol));
+                let (a, b) = (self.slope(a, by), self.slope(b, by));
                 self.select(c, a, b)
             }
             Node::Table(t, x) => {
                 let slope = self.table_slope(t, x);
-                let inner = self.slope(x, symbol);
+                let inner = self.slope(x, by);
                 self.mul(&[slope, inner])
             }
             Node::TableSlope(t, x) => {
-                let inner = self.slope(x, symbol);
+                let inner = self.slope(x, by);
                 let t = self.table_of_slopes(t);
                 let slope = self.table_slope(t, x);
                 self.mul(&[slope, inner])
+            }
+            Node::Whole(part) => {
+                let slope = self.slope(part, by);
+                self.whole(slope)
             }
             Node::Number(_) | Node::Pi | Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => ZERO,
         }
     }
 
-    fn derivative_of_product(&mut self, factors: &[Expr], symbol: Symbol) -> Expr {
+    fn derivative_of_product(&mut self, factors: &[Expr], by: By) -> Expr {
         let mut terms = Vec::new();
         for (i, &factor) in factors.iter().enumerate() {
-            let slope = self.slope(factor, symbol);
+            let slope = self.slope(factor, by);
             if slope != ZERO {
                 let mut parts = factors.to_vec();
                 parts[i] = slope;
@@ -177,8 +213,8 @@ impl Exprs {
         self.add(&terms)
     }
 
-    fn derivative_of_power(&mut self, base: Expr, n: Expr, power: Expr, symbol: Symbol) -> Expr {
-        let (base_slope, n_slope) = (self.slope(base, symbol), self.slope(n, symbol));
+    fn derivative_of_power(&mut self, base: Expr, n: Expr, power: Expr, by: By) -> Expr {
+        let (base_slope, n_slope) = (self.slope(base, by), self.slope(n, by));
         let mut terms = Vec::new();
         if base_slope != ZERO {
             let less = self.add(&[n, MINUS_ONE]);

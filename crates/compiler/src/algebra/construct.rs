@@ -7,6 +7,9 @@ use num_integer::Integer;
 use num_rational::BigRational;
 use smallvec::{SmallVec, smallvec};
 
+/// Expressions that are written no longer than this are not taken as wholes.
+const SHORT: u64 = 12;
+
 impl Exprs {
     /// The sum.
     pub fn add(&mut self, terms: &[Expr]) -> Expr {
@@ -163,6 +166,33 @@ impl Exprs {
             Some(inverse) if !content.is_one() => (content, self.scale(&inverse, e)),
             _ => (Rational::from(1), e),
         }
+    }
+
+    /// The expression as one part: what stands around it is not multiplied into it, and nothing is taken out of it, so that
+    /// what is made of many such parts stays as long as they are many. Values and zeros are what they were. Short ones stay
+    /// as they are.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{Exprs, Facts};
+    /// let mut x = Exprs::default();
+    /// let [a, b, c] = ["a", "b", "c"].map(|name| x.symbol(name, Facts::default())).map(|s| x.sym(s));
+    /// let (ab, bc) = (x.mul(&[a, b]), x.mul(&[b, c]));
+    /// let sum = x.add(&[a, ab, bc, c, b]);
+    /// let whole = x.whole(sum);
+    /// assert_ne!(whole, sum);
+    /// let difference = x.sub(whole, sum);
+    /// assert!(x.is_zero(difference));
+    /// ```
+    pub fn whole(&mut self, e: Expr) -> Expr {
+        let (number, part) = match self.primitive(e) {
+            (number, part) if !number.is_one() => (number, part),
+            _ => self.coefficient(e),
+        };
+        if matches!(self.node(part), Node::Whole(_)) || self.written_length(part) <= SHORT {
+            return e;
+        }
+        let whole = self.intern(Node::Whole(part));
+        self.scale(&number, whole)
     }
 
     fn product(&mut self, factors: &[Expr]) -> Expr {

@@ -31,7 +31,7 @@ impl Exprs {
     /// into each other grow without bound, though they are printed and computed with the digits of one.
     pub fn is_longer(&self, e: Expr, length: u64) -> bool {
         let is_long = |part: Expr| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER);
-        self.written_length(e) > length || self.below(&[e], &|_| true).into_iter().any(is_long)
+        self.written_length(e) > length || self.around_wholes(&[e]).into_iter().any(is_long)
     }
 
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1
@@ -46,7 +46,7 @@ impl Exprs {
 
     fn add_cost(&self, e: Expr, cost: &mut Cost) {
         match self.node(e) {
-            Node::Number(_) | Node::Pi | Node::Symbol(_) => {}
+            Node::Number(_) | Node::Pi | Node::Symbol(_) | Node::Whole(_) => {}
             Node::Add(terms) => cost.adds += terms.len() - 1,
             Node::Mul(factors) => {
                 let counted = factors.iter().filter(|&&f| f != MINUS_ONE);

@@ -156,7 +156,7 @@ impl Coefficients for Exprs {
 
     fn plus(&mut self, a: Expr, b: Expr) -> Expr {
         let sum = self.add(&[a, b]);
-        if self.is_number(sum).is_some() { sum } else { self.simplify(sum) }
+        if self.is_number(sum).is_some() { sum } else { self.bounded(sum) }
     }
 
     fn times(&mut self, a: Expr, b: Expr) -> Expr {

@@ -167,6 +167,7 @@ fn node_value(pool: &Exprs, node: &Node, at: &dyn Fn(Expr) -> f64) -> f64 {
         }
         Node::Table(t, x) => pool.table1d(*t).value(at(*x)),
         Node::TableSlope(t, x) => pool.table1d(*t).slope(at(*x)),
+        Node::Whole(a) => at(*a),
     }
 }
 

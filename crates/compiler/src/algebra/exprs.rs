@@ -1,6 +1,7 @@
 //! The pool of shared expressions.
 
 use super::assumptions::Assumptions;
+use super::calculus::By;
 use super::fingerprint::{Fingerprint, mix};
 use super::grown::Grown;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
@@ -41,7 +42,7 @@ pub struct Exprs {
     pub(super) texts: Texts,
     pub(super) sets: SymbolSets,
     pub(super) tables: Vec<Table1d>,
-    pub(super) derivatives: FxHashMap<(Expr, Symbol), Expr>,
+    pub(super) derivatives: FxHashMap<(Expr, By), Expr>,
     pub(super) slope_tables: FxHashMap<TableId, TableId>,
     pub(super) short_forms: ShortForms,
     pub(super) assumptions: Assumptions,
@@ -212,6 +213,9 @@ impl Exprs {
     }
 
     fn depth_of(&self, node: &Node) -> u32 {
+        if matches!(node, Node::Whole(_)) {
+            return 1;
+        }
         let mut depth = 0;
         node.for_each_child(|c| depth = depth.max(self.entry(c).depth + 1));
         depth
@@ -219,6 +223,9 @@ impl Exprs {
 
     fn size_of(&self, node: &Node) -> u32 {
         let mut size = 1u32;
+        if matches!(node, Node::Whole(_)) {
+            return size;
+        }
         node.for_each_child(|c| size = size.saturating_add(self.entry(c).size));
         size
     }
@@ -238,6 +245,7 @@ impl Exprs {
             Node::Select(..) => 8,
             Node::Table(t, _) => mix(9, u64::from(t.0)),
             Node::TableSlope(t, _) => mix(10, u64::from(t.0)),
+            Node::Whole(_) => 11,
             Node::Call(f, _) => 32 + function_tag(*f),
         };
         let mut hash = mix(0x5eed, seed);

@@ -86,6 +86,7 @@ impl Exprs {
             }
             Node::Table(t, x) => Some(random(lane, mix(0x7ab + u64::from(t.0), self.at(*x, lane)?))),
             Node::TableSlope(t, x) => Some(random(lane, mix(!u64::from(t.0), self.at(*x, lane)?))),
+            Node::Whole(a) => self.at(*a, lane),
         }
     }
 

@@ -181,6 +181,7 @@ impl Exprs {
                 let form = indices.into_iter().map(|i| (i, self.select(c, at(&a, i), at(&b, i)))).collect();
                 Some((form, self.select(c, a_rest, b_rest)))
             }
+            Node::Whole(part) => known.get(&part).cloned(),
             _ => None,
         }
     }
@@ -210,6 +211,7 @@ impl Exprs {
                 let y = self.table(inverse, y);
                 self.invert(x, y, s)
             }
+            Node::Whole(part) => self.invert(part, y, s),
             _ => None,
         }
     }

@@ -187,6 +187,8 @@ pub enum Node {
     Table(TableId, Expr),
     /// The slope of a table at a value.
     TableSlope(TableId, Expr),
+    /// Its part, which nothing around it is multiplied into or taken out of: see [`Exprs::whole`](super::Exprs::whole).
+    Whole(Expr),
 }
 
 impl Node {
@@ -206,6 +208,7 @@ impl Node {
             &Node::Select(c, a, b) => Node::Select(part(c), part(a), part(b)),
             &Node::Table(t, x) => Node::Table(t, part(x)),
             &Node::TableSlope(t, x) => Node::TableSlope(t, part(x)),
+            &Node::Whole(a) => Node::Whole(part(a)),
         }
     }
 
@@ -218,7 +221,7 @@ impl Node {
                 visit(*a);
                 visit(*b);
             }
-            Node::Not(a) | Node::Table(_, a) | Node::TableSlope(_, a) => visit(*a),
+            Node::Not(a) | Node::Table(_, a) | Node::TableSlope(_, a) | Node::Whole(a) => visit(*a),
             Node::Select(a, b, c) => {
                 visit(*a);
                 visit(*b);

@@ -45,6 +45,7 @@ impl Exprs {
             (Node::Table(f, _), Node::Table(g, _)) | (Node::TableSlope(f, _), Node::TableSlope(g, _)) => {
                 f.cmp(g).then_with(|| self.order_children(&x.node, &y.node))
             }
+            (Node::Whole(p), Node::Whole(q)) => self.entry(*p).hash.cmp(&self.entry(*q).hash).then(p.cmp(q)),
             (p, q) => self.order_children(p, q),
         })
     }
@@ -74,5 +75,6 @@ fn rank(node: &Node) -> u8 {
         Node::Or(..) => 11,
         Node::Not(_) => 12,
         Node::Select(..) => 13,
+        Node::Whole(_) => 14,
     }
 }

@@ -252,6 +252,7 @@ impl Point<'_> {
             Node::And(a, b) => Some(logical(truth(at(a)?)? && truth(at(b)?)?, constants)),
             Node::Or(a, b) => Some(logical(truth(at(a)?)? || truth(at(b)?)?, constants)),
             Node::Not(a) => Some(logical(!truth(at(a)?)?, constants)),
+            Node::Whole(a) => at(a).cloned(),
             Node::Symbol(_) | Node::Table(..) | Node::TableSlope(..) => None,
         }
     }

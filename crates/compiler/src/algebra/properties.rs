@@ -217,6 +217,7 @@ impl Exprs {
             Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => Signs::NOT_MINUS,
             Node::Select(_, a, b) => Signs(of(*a).0 | of(*b).0),
             Node::Table(..) | Node::TableSlope(..) => Signs::ANY,
+            Node::Whole(a) => of(*a),
         }
     }
 

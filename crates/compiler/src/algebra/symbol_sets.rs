@@ -202,6 +202,24 @@ impl Exprs {
         }
     }
 
+    /// The entries below the given ones, parts before wholes; what stands inside [`Node::Whole`] left out.
+    pub(super) fn around_wholes(&self, roots: &[Expr]) -> Vec<Expr> {
+        let mut seen: FxHashSet<Expr> = roots.iter().copied().collect();
+        let mut open: Vec<Expr> = roots.to_vec();
+        while let Some(e) = open.pop() {
+            if !matches!(self.node(e), Node::Whole(_)) {
+                self.node(e).for_each_child(|c| {
+                    if seen.insert(c) {
+                        open.push(c);
+                    }
+                });
+            }
+        }
+        let mut order: Vec<Expr> = seen.into_iter().collect();
+        order.sort_unstable();
+        order
+    }
+
     /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept.
     pub(crate) fn below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> Vec<Expr> {
         let mut seen: FxHashSet<Expr> = roots.iter().copied().filter(|&r| keep(r)).collect();

@@ -460,7 +460,10 @@ impl<'a> Builder<'a, '_> {
     /// Gives a name to a value, or to an entry of a vector or matrix.
     fn name_value(&mut self, decl: DeclId, value: Value, indices: &[i64], span: Span, output: bool) -> Value {
         let d = &self.flat.names.decls[decl];
-        let value = self.with_unit(value, d.unit, span);
+        let mut value = self.with_unit(value, d.unit, span);
+        if !indices.is_empty() {
+            value.expr = self.exprs.whole(value.expr);
+        }
         let unit = d.unit.and_then(|u| self.unit(u)).and_then(|u| u.unit);
         let (name, doc) = (spelled(&d.name, indices), d.doc.to_string());
         let unit_is_written = unit.is_some();

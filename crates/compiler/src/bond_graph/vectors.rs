@@ -384,7 +384,7 @@ impl<'a> Builder<'a, '_> {
             let term = self.product(a, b);
             total = self.sum(&total, &term, false, span);
         }
-        total
+        Value { expr: self.exprs.whole(total.expr), ..total }
     }
 
     fn shaped_binary(&mut self, cx: &Reading<'_>, b: &'a ast::Binary, e: &'a ast::Expr) -> Option<Shaped> {

@@ -240,7 +240,7 @@ impl Combination {
         }
         for e in sum.values_mut() {
             if x.is_number(*e).is_none() {
-                *e = x.simplify(*e);
+                *e = x.bounded(*e);
             }
         }
         sum.retain(|&s, e| stays(x, (s, *e), undetermined));

@@ -62,18 +62,21 @@ pub struct LinearRow {
 /// Puts the definitions of `symbols` into evaluation order. Loops are preferably torn at the variables in `first`.
 pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
     let mut ordered = Ordered::default();
-    let mut numbers: BTreeMap<Symbol, Expr> = BTreeMap::new();
-    for component in components(d, symbols) {
-        put_in(d, &component, &numbers);
-        if let [only] = component[..]
-            && let Definition::Explicit(value) = d.of[&only]
-            && d.x.is_number(value).is_some()
-        {
-            numbers.insert(only, value);
+    let mut zeros: BTreeMap<Symbol, Expr> = BTreeMap::new();
+    let mut waiting: Vec<Vec<Symbol>> = components(d, symbols);
+    waiting.reverse();
+    while let Some(component) = waiting.pop() {
+        if put_in(d, &component, &zeros) && component.len() > 1 {
+            waiting.extend(components(d, &component).into_iter().rev());
+            continue;
         }
         match component[..] {
             [only] if is_direct(d, only) => {
-                ordered.steps.push(EquationStep::Assign { symbol: only, value: d.of[&only].expr() });
+                let value = d.of[&only].expr();
+                if d.x.is_zero(value) {
+                    zeros.insert(only, value);
+                }
+                ordered.steps.push(EquationStep::Assign { symbol: only, value });
             }
             _ => block(d, component, first, &mut ordered)?,
         }
@@ -81,18 +84,19 @@ pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) 
     Ok(ordered)
 }
 
-/// Puts in variables that are plain numbers, as what a source of zero imposes is: what is multiplied by it is not there.
-fn put_in(d: &mut Definitions, symbols: &[Symbol], numbers: &BTreeMap<Symbol, Expr>) {
-    if numbers.is_empty() {
-        return;
-    }
-    for symbol in symbols {
+/// Puts in variables that vanish, as what a source of zero imposes does: what is multiplied by them is not there, and loops
+/// through them are none. Whether any definition reads one.
+fn put_in(d: &mut Definitions, symbols: &[Symbol], zeros: &BTreeMap<Symbol, Expr>) -> bool {
+    let mut changed = false;
+    for symbol in symbols.iter().filter(|_| !zeros.is_empty()) {
         let definition = d.of[symbol];
-        if d.x.depends_on_any(definition.expr(), &|s| numbers.contains_key(&s)) {
-            let value = d.x.substitute(definition.expr(), numbers);
+        if d.x.depends_on_any(definition.expr(), &|s| zeros.contains_key(&s)) {
+            let value = d.x.substitute(definition.expr(), zeros);
             d.of.insert(*symbol, definition.with(value));
+            changed = true;
         }
     }
+    changed
 }
 
 fn is_direct(d: &Definitions, symbol: Symbol) -> bool {

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Unavailable;
-use crate::algebra::{Expr, Exprs, Symbol};
+use rustc_hash::FxHashMap;
+
+use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{BondGraph, HeldKind, Meaning};
 use crate::ids::Map;
 
@@ -60,6 +62,8 @@ pub struct Definitions<'a> {
     /// Symbols that have no value, with the reason.
     pub missing: BTreeMap<Symbol, Unavailable>,
     rates: Map<Symbol, Symbol>,
+    /// The time derivatives of wholes.
+    rates_of_wholes: FxHashMap<Expr, Expr>,
 }
 
 impl<'a> Definitions<'a> {
@@ -79,6 +83,7 @@ impl<'a> Definitions<'a> {
             of_laws: BTreeSet::new(),
             missing: BTreeMap::new(),
             rates: Map::new(),
+            rates_of_wholes: FxHashMap::default(),
         }
     }
 
@@ -135,6 +140,9 @@ impl<'a> Definitions<'a> {
 
     /// The time derivative of an expression. Symbols whose rates it needs are defined on the way.
     pub fn rate(&mut self, e: Expr) -> Result<Expr, Unavailable> {
+        if let Some(atoms) = self.x.atoms(e) {
+            return self.rate_by_atoms(e, atoms);
+        }
         let mut terms = Vec::new();
         for symbol in self.x.symbols_of(e) {
             if self.constants.contains(&symbol) || matches!(self.meaning(symbol), Some(Meaning::Parameter(_))) {
@@ -146,6 +154,32 @@ impl<'a> Definitions<'a> {
             }
             let rate = self.rate_of(symbol)?;
             // What keeps its value does nothing to the sum, nor to where it is defined.
+            if self.x.is_number(rate).is_none_or(|rate| !rate.is_zero()) {
+                terms.push(self.x.mul(&[slope, rate]));
+            }
+        }
+        Ok(self.x.add(&terms))
+    }
+
+    /// The time derivative of an expression with wholes in it: what they are made of is differentiated once.
+    fn rate_by_atoms(&mut self, e: Expr, atoms: Vec<Expr>) -> Result<Expr, Unavailable> {
+        let mut terms = Vec::with_capacity(atoms.len());
+        for atom in atoms {
+            let slope = self.x.derivative_by_atom(e, atom);
+            if self.x.is_zero(slope) {
+                continue;
+            }
+            let rate = match *self.x.node(atom) {
+                Node::Whole(part) => match self.rates_of_wholes.get(&part) {
+                    Some(&known) => known,
+                    None => {
+                        let rate = self.rate(part)?;
+                        let rate = self.x.whole(rate);
+                        *self.rates_of_wholes.entry(part).or_insert(rate)
+                    }
+                },
+                _ => self.rate(atom)?,
+            };
             if self.x.is_number(rate).is_none_or(|rate| !rate.is_zero()) {
                 terms.push(self.x.mul(&[slope, rate]));
             }

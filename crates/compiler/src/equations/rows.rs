@@ -87,14 +87,14 @@ impl<'a> Rows<'a> {
         for next in order.into_iter().rev() {
             let Some(terms) = factors.remove(&next) else { continue };
             let factor = x.add(&terms);
-            let factor = x.simplify(factor);
+            let factor = x.bounded(factor);
             for &(s, c) in ports.definitions[&next].0.iter().filter(|t| !self.zero.contains(&t.0)) {
                 factors.entry(s).or_default().push(x.mul(&[factor, c]));
             }
         }
         let sum = |(s, terms): (Symbol, Vec<Expr>)| {
             let factor = x.add(&terms);
-            let factor = x.simplify(factor);
+            let factor = x.bounded(factor);
             stays(x, (s, factor), &ports.undetermined).then_some((s, factor))
         };
         Some(Combination(factors.into_iter().filter_map(sum).collect()))

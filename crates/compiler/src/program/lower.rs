@@ -169,6 +169,7 @@ impl<'a> Lowering<'a> {
                 let piece = self.piece(*table, x);
                 self.op(Op::TableSlope(table.0, piece, x))
             }
+            Node::Whole(part) => of(self, *part),
         }
     }
 

@@ -212,21 +212,22 @@ impl Model {
             _ => None,
         };
         let own = code.clauses.conditional.iter().copied().filter(|c| code.program.clauses[*c].bound.is_none());
-        let watched: Vec<(usize, usize)> = own.filter(happened).filter_map(|c| Some((c, indicator(c)?))).collect();
-        if watched.is_empty() {
-            return Ok(());
+        let mut returns = std::mem::take(&mut self.run.returns);
+        let watched = own.filter(happened).filter_map(|clause| Some((clause, indicator(clause)?)));
+        returns.extend(watched.map(|(clause, indicator)| Return { clause, since: t, indicator, value: 0.0, way: 0.0 }));
+        if !returns.is_empty() {
+            self.rates_at(t, x)?;
+            self.place(t, x);
+            self.move_along(t);
+            self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
+            returns.retain_mut(|r| {
+                let register = code.indicators.outputs[r.indicator] as usize;
+                let rate = self.frame.d[register];
+                (r.value, r.way) = (self.frame.r[register], rate.signum());
+                rate != 0.0 && r.value * rate <= 0.0
+            });
         }
-        self.rates_at(t, x)?;
-        self.place(t, x);
-        self.move_along(t);
-        self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
-        for (clause, indicator) in watched {
-            let register = code.indicators.outputs[indicator] as usize;
-            let (value, rate) = (self.frame.r[register], self.frame.d[register]);
-            if rate != 0.0 && value * rate <= 0.0 {
-                self.run.returns.push(Return { clause, since: t, indicator, value, way: rate.signum() });
-            }
-        }
+        self.run.returns = returns;
         Ok(())
     }
 
@@ -238,13 +239,14 @@ impl Model {
         let code = self.code.clone();
         self.place(t, x);
         self.frame.run(&code.indicators).map_err(|error| self.failure(t, error))?;
-        for r in std::mem::take(&mut self.run.returns) {
+        for r in &self.run.returns {
             let value = self.frame.r[code.indicators.outputs[r.indicator] as usize];
             if value * r.way < 0.0 && value.abs() > r.value.abs() {
                 let what = code.program.clauses[r.clause].name.clone();
                 return Err(Failure::Lost { time: t, what, since: r.since });
             }
         }
+        self.run.returns.clear();
         Ok(())
     }
 

@@ -177,6 +177,10 @@ impl Model {
     ) -> Result<(), Failure> {
         let contacts = self.events.contacts.clone();
         contacts.iter().for_each(|&contact| self.events.fired[contact] = false);
+        if contacts.is_empty() {
+            let solved = self.solve_shares(t, x, balance, work)?;
+            return if solved { Ok(()) } else { Err(self.dependent_resets(t)) };
+        }
         let (start, conserved) = (x.to_vec(), self.run.conserved.clone());
         // What has been shared out last, and of each contact.
         let (mut shared, mut held) = (vec![0.0; contacts.len()], vec![false; contacts.len()]);

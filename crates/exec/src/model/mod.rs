@@ -134,7 +134,7 @@ impl Model {
             delays_and_samples: Vec::new(),
             clauses: Vec::new(),
             extents: Extents::default(),
-            returns: Vec::new(),
+            returns: Vec::with_capacity(code.clauses.conditional.len()),
             floors: vec![0.0; code.program.conditions.len()],
             pieces: vec![None; code.program.inputs.len()],
         };

@@ -9,10 +9,14 @@ impl Exprs {
     /// How long the expression is written: symbols, numbers, operators and functions, shared parts each time.
     pub fn written_length(&self, e: Expr) -> u64 {
         let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
-        for part in self.below(&[e], &|_| true) {
+        for part in self.around_wholes(&[e]) {
             let mut length: u64 = match self.node(part) {
                 Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 1,
                 Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
+                Node::Whole(_) => {
+                    lengths.insert(part, 2);
+                    continue;
+                }
                 Node::Add(terms) => terms.len() as u64,
                 Node::Mul(factors) => factors.len() as u64 - 1,
                 // A fraction within a fraction reads badly.
@@ -31,7 +35,7 @@ impl Exprs {
     /// How long the expression is in print: a bar counts once, brackets and fractions within fractions count extra.
     pub fn printed_length(&self, e: Expr) -> u64 {
         let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
-        for part in self.below(&[e], &|_| true) {
+        for part in self.around_wholes(&[e]) {
             let length = self.length_of(part, &lengths);
             lengths.insert(part, length);
         }
@@ -41,7 +45,7 @@ impl Exprs {
     fn length_of(&self, e: Expr, known: &FxHashMap<Expr, u64>) -> u64 {
         match self.node(e) {
             Node::Number(value) if value.abs().is_one() => 1,
-            Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
+            Node::Number(_) | Node::Pi | Node::Symbol(_) | Node::Whole(_) => 2,
             Node::Add(terms) => terms.iter().fold(terms.len() as u64 - 1, |l, t| l.saturating_add(known[t])),
             Node::Mul(factors) => self.length_of_product(factors, known),
             Node::Pow(..) => self.length_of_product(&[e], known),

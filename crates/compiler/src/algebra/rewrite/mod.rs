@@ -14,6 +14,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Expressions that are longer than this are left as they are; their parts are not.
 const LONGEST: u64 = 600;
+/// Coefficients that are written longer than this are not put into others.
+const BOUND: u64 = 80;
 
 /// By what forms are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -54,6 +56,13 @@ impl Exprs {
         self.simplify_all(&[e])[0]
     }
 
+    /// The shortest form to evaluate, as a [`whole`](Exprs::whole) where that is long: coefficients that are put into others
+    /// would hold all before them.
+    pub fn bounded(&mut self, e: Expr) -> Expr {
+        let short = self.simplify(e);
+        if self.written_length(short) > BOUND { self.whole(short) } else { short }
+    }
+
     /// The expressions, each in its shortest form to evaluate; what they share is looked at once.
     pub fn simplify_all(&mut self, roots: &[Expr]) -> Vec<Expr> {
         self.shortest_forms(roots, Length::Evaluated)
@@ -80,11 +89,15 @@ impl Exprs {
 
     /// The search: from the leaves to the roots, so that the parts of what is looked at are short already.
     fn shortest_forms(&mut self, roots: &[Expr], by: Length) -> Vec<Expr> {
-        let order = self.below(roots, &|_| true);
+        let order = self.around_wholes(roots);
         self.spend(order.len() as u64);
         let sought = self.sought(roots, &order, by);
         let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
         for part in order {
+            if matches!(self.node(part), Node::Whole(_)) {
+                new.insert(part, part);
+                continue;
+            }
             let rebuilt = self.rebuild(part, &|c| new[&c]);
             let short = if sought.contains(&part) { self.shortest_form(rebuilt, by) } else { rebuilt };
             new.insert(part, short);

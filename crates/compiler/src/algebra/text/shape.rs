@@ -83,6 +83,7 @@ impl Shaper<'_> {
             Node::Select(c, a, b) => Shape::Choice(self.boxed(*c), self.boxed(*a), self.boxed(*b)),
             Node::Table(t, a) => Shape::Table(self.names.table(*t), self.boxed(*a)),
             Node::TableSlope(t, a) => Shape::Table(dotted(&self.names.table(*t), 1), self.boxed(*a)),
+            Node::Whole(part) => return self.signed(*part, alone),
         };
         (false, shape)
     }
