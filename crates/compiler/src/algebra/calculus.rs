@@ -1,11 +1,12 @@
 //! Derivatives and substitution.
 
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
+use super::fingerprint::POISON;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::table::TableId;
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a derivative is taken by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,6 +80,57 @@ impl Exprs {
             new.insert(part, rebuilt);
         }
         roots.iter().map(|r| new.get(r).copied().unwrap_or(*r)).collect()
+    }
+
+    /// The expressions without symbols that they read though their value does not depend on them: the distance of two points
+    /// of a body does not depend on where the body is. `may_go` tells which symbols are looked at.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{Exprs, Facts, Function};
+    /// let mut x = Exprs::default();
+    /// let [phi, a] = ["phi", "a"].map(|name| x.symbol(name, Facts::default()));
+    /// let [angle, a] = [phi, a].map(|s| x.sym(s));
+    /// let [sine, cosine] = [Function::Sin, Function::Cos].map(|f| x.call(f, &[angle]));
+    /// let [across, along] = [sine, cosine].map(|e| x.mul(&[a, e]));
+    /// let squares = [across, along].map(|e| x.powi(e, 2));
+    /// let sum = x.add(&squares);
+    /// assert_eq!(x.without_idle(&[sum], &|s| s == phi), [x.powi(a, 2)]);
+    /// ```
+    pub fn without_idle(&mut self, roots: &[Expr], may_go: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
+        let symbols: BTreeSet<Symbol> = roots.iter().flat_map(|&e| self.symbols_of(e)).filter(|&s| may_go(s)).collect();
+        let mut idle: Vec<Vec<Symbol>> = vec![Vec::new(); roots.len()];
+        for symbol in symbols {
+            let at = self.substitute_all(roots, &BTreeMap::from([(symbol, ZERO)]));
+            for ((&root, value), idle) in roots.iter().zip(at).zip(&mut idle) {
+                if value != root && self.has_value_of(value, root) {
+                    idle.push(symbol);
+                }
+            }
+        }
+        let mut alike: BTreeMap<Vec<Symbol>, Vec<usize>> = BTreeMap::new();
+        idle.into_iter().enumerate().for_each(|(i, symbols)| alike.entry(symbols).or_default().push(i));
+        let mut found = roots.to_vec();
+        for (symbols, members) in alike {
+            let mut own: Vec<Expr> = members.iter().map(|&i| roots[i]).collect();
+            for symbol in symbols {
+                // A quaternion of zeros turns nothing.
+                for value in [ZERO, ONE] {
+                    let at = self.substitute_all(&own, &BTreeMap::from([(symbol, value)]));
+                    if own.iter().zip(&at).all(|(&own, &at)| self.has_value_of(at, own)) {
+                        own = at;
+                        break;
+                    }
+                }
+            }
+            members.into_iter().zip(own).for_each(|(i, e)| found[i] = e);
+        }
+        found
+    }
+
+    /// Whether the values in the prime field are the same, where there are any.
+    fn has_value_of(&self, e: Expr, other: Expr) -> bool {
+        let (own, other) = (self.fingerprint(e), self.fingerprint(other));
+        own == other && !own.contains(&POISON)
     }
 
     /// The expression made anew from other parts.

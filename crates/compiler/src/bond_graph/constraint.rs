@@ -4,7 +4,7 @@
 //! is fed from the 1-junction of every flow through a transformer of modulus `-a_k`, so that the effort `λ` of the ZC adds
 //! `a_k λ` to the efforts that drive the flow: the gradient of the constraint times its multiplier.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::assemble::cell_of;
 use super::builder::{Builder, Pair, Role};
@@ -13,7 +13,7 @@ use super::flatten::Held;
 use super::structure::Structure;
 use super::value::Reading;
 use super::{BondId, Constraint, ElementId, Kind, Meaning};
-use crate::algebra::{Expr, Facts, MINUS_ONE, ONE, Symbol};
+use crate::algebra::{Expr, Exprs, Facts, MINUS_ONE, ONE, Symbol};
 use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -74,6 +74,24 @@ impl<'a> Builder<'a, '_> {
             self.met_in(*here, before);
         }
         all
+    }
+
+    /// Takes displacements out of laws and constraints that do not depend on them, as those of points of one body do not
+    /// depend on where it is: otherwise they would be divided by what vanishes wherever the constraint is met.
+    pub fn leave_out_idle(&mut self, kinds: &mut [Option<Kind>], sides: &mut [Sides]) {
+        let mut wholes: Vec<Expr> = Vec::new();
+        let mut visit = |x: &Exprs, e: Expr| wholes.extend(x.atoms(e).is_some().then_some(e));
+        kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut |e| visit(&self.exprs, *e)));
+        sides.iter().for_each(|side| visit(&self.exprs, side.expr));
+        let displacement =
+            |s: Symbol| matches!(self.role(s), Some(Role::Known(Meaning::Signal(_) | Meaning::Stored(_))));
+        let idle: BTreeSet<Symbol> =
+            wholes.iter().flat_map(|&e| self.exprs.symbols_of(e)).filter(|&s| displacement(s)).collect();
+        let short = self.exprs.without_idle(&wholes, &|s| idle.contains(&s));
+        let short: BTreeMap<Expr, Expr> = wholes.into_iter().zip(short).collect();
+        let mut put = |e: &mut Expr| *e = short.get(e).copied().unwrap_or(*e);
+        kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut put));
+        sides.iter_mut().for_each(|side| put(&mut side.expr));
     }
 
     /// The coefficient of restitution of an inequality, 0 if none is given. The outer `None`: at fault.

@@ -97,7 +97,7 @@ fn build(
     b.later = Some(Vec::new());
     b.make_values();
     let later = b.later.take();
-    let kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
+    let mut kinds: Vec<Option<Kind>> = (0..flat.parts.len()).map(|part| b.kind(part)).collect();
     b.later = later;
     let guesses = b.guesses();
     let clauses = b.clauses();
@@ -109,7 +109,8 @@ fn build(
         forced_causality: b.forced_causality(),
         forced_strokes: b.forced_strokes(),
     };
-    let sides = b.constraint_sides();
+    let mut sides = b.constraint_sides();
+    b.leave_out_idle(&mut kinds, &mut sides);
     let rates = b.rates_of_signals();
     let relations = b.relations(&sides, &rates);
     let found = b.parted(&relations);

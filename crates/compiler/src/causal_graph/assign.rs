@@ -37,6 +37,7 @@ pub fn assign_causality(graph: &BondGraph) -> Result<CausalGraph, Diagnostics> {
             members: &members,
             laws: BTreeMap::new(),
             kept: Vec::new(),
+            near: Some(point.clone()),
         };
         match part.assign_well_conditioned(&mut strokes, &mut point) {
             Ok(solved) => {
@@ -69,6 +70,8 @@ struct ConnectedPart<'a> {
     laws: BTreeMap<PortRef, PortCausality>,
     /// Junctions whose variable turned out independent without a storage.
     kept: Vec<ElementId>,
+    /// Where pivots should not be small.
+    near: Option<NumericPoint>,
 }
 
 /// Up to this many laws on causal loops all combinations of their causalities are tried; above, they are inverted one at a
@@ -496,12 +499,12 @@ impl ConnectedPart<'_> {
             }
         }
         let before = self.x.assumed();
-        let mut first = solve_part(self.x, graph, members, &preferences);
+        let mut first = solve_part(self.x, graph, members, &preferences, self.near.as_ref());
         let reading = self.sources_of_rates(&first);
         if !reading.is_empty() {
             preferences.sources_as_laws = reading;
             self.x.suppose(before.clone());
-            first = solve_part(self.x, graph, members, &preferences);
+            first = solve_part(self.x, graph, members, &preferences, self.near.as_ref());
         }
         let speeds: Vec<Virtual> = self.wanted.virtual_speeds.iter().copied().filter(|v| inside(v.junction)).collect();
         if !speeds.is_empty() {
@@ -509,7 +512,7 @@ impl ConnectedPart<'_> {
             preferences.virtual_speeds = speeds.into_iter().filter(|v| span.holds(self.x, v)).collect();
             if !preferences.virtual_speeds.is_empty() {
                 self.x.suppose(before);
-                return (solve_part(self.x, graph, members, &preferences), preferences);
+                return (solve_part(self.x, graph, members, &preferences, self.near.as_ref()), preferences);
             }
         }
         (first, preferences)
@@ -554,8 +557,15 @@ pub(super) fn outer_ports(graph: &BondGraph, members: &[ElementId]) -> Vec<PortR
 pub(super) fn sequential(graph: &BondGraph, members: &[ElementId]) -> Option<Table<BondId, Stroke>> {
     let mut x = graph.exprs.clone();
     let wanted = StoragePreferences::default();
-    let mut part =
-        ConnectedPart { x: &mut x, graph, wanted: &wanted, members, laws: BTreeMap::new(), kept: Vec::new() };
+    let mut part = ConnectedPart {
+        x: &mut x,
+        graph,
+        wanted: &wanted,
+        members,
+        laws: BTreeMap::new(),
+        kept: Vec::new(),
+        near: None,
+    };
     let mut strokes = Strokes::new(graph);
     contradiction::force_strokes(graph, &mut strokes, members).ok()?;
     part.propagate(&mut strokes).then(|| strokes.table())

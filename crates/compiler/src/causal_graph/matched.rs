@@ -11,7 +11,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
 
 use super::ports::{regular_rows, settled};
-use crate::algebra::{Elimination, Expr, Exprs, ONE, Residue, SparseRow, eliminate};
+use crate::algebra::{Elimination, Eliminator, Expr, Exprs, NumericPoint, ONE, Residue, SparseRow, eliminate};
 use crate::sparse::Matching;
 
 /// A column as a linear combination of others.
@@ -58,8 +58,14 @@ impl BlockRows {
 
 /// Each pivot column of an elimination as a combination of columns of its block, of blocks before it and of columns that are
 /// no pivots. The determinant of the whole is the product of those of the blocks, so that what they are divided by is what
-/// has to be watched: each loop of a chain has a divisor of its own. `None` also if a block has more than `most` columns.
-pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination, most: usize) -> Option<BlockRows> {
+/// has to be watched: each loop of a chain has a divisor of its own. `None` also if a block has more than `most` columns. Pivots are such as are not small at `point`, as far as there are any.
+pub(super) fn block_rows(
+    x: &mut Exprs,
+    rows: &[SparseRow],
+    done: &Elimination,
+    most: usize,
+    point: Option<&NumericPoint>,
+) -> Option<BlockRows> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done, true)?;
     let mut found =
@@ -72,7 +78,12 @@ pub(super) fn block_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination, 
         columns.sort_unstable();
         let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
         let before = (columns.len() > 1).then(|| x.assumed());
-        let own = eliminate(x, own, &[columns.clone()]);
+        let mut work = Eliminator::new(x, own, 0);
+        if let Some(point) = point {
+            work = work.near(point.clone());
+        }
+        work.eliminate(x, &columns);
+        let own = work.finish();
         if own.pivots.len() < columns.len() || !own.degenerate.is_empty() {
             return None;
         }

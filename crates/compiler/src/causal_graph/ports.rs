@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::matched::{BlockRows, block_rows, matched_rows};
 use super::{Combination, PortState, Role};
 use crate::algebra::{
-    Assumptions, Coefficients, Elimination, Eliminator, Expr, Exprs, ONE, SparseRow, Symbol, back_substitute, eliminate,
+    Assumptions, Coefficients, Elimination, Eliminator, Expr, Exprs, NumericPoint, ONE, SparseRow, Symbol,
+    back_substitute, eliminate,
 };
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
@@ -137,18 +138,19 @@ const LARGE: usize = 600;
 const WIDE: usize = 60;
 
 /// Solves the junction structure of one connected part. Definitions are as short as the elements write them where that
-/// can be.
+/// can be. Pivots of large loops are such as are not small at `point`.
 pub fn solve_part(
     x: &mut Exprs,
     graph: &BondGraph,
     members: &[ElementId],
     preferences: &CausalityPreferences,
+    point: Option<&NumericPoint>,
 ) -> Solved {
     let before = x.assumed();
     let net = Net::new(x, graph, members, preferences);
     let wide = |e: &&ElementId| matches!(graph.elements[**e].kind, Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_));
     if members.len() + WIDE * members.iter().filter(wide).count() > LARGE
-        && let Some(solved) = net.solved_by_roles(x, preferences)
+        && let Some(solved) = net.solved_by_roles(x, preferences, point)
     {
         return solved;
     }
@@ -517,7 +519,7 @@ impl Net {
     ) -> Option<BlockRows> {
         let eliminated = x.assumed();
         x.suppose(before);
-        let parted = block_rows(x, &self.rows, done, usize::MAX);
+        let parted = block_rows(x, &self.rows, done, usize::MAX, None);
         let parted = parted.filter(|p| p.divisors.len() > 1 && 2 * length(x, &p.rows) < length(x, whole));
         if parted.is_none() {
             x.suppose(eliminated);

@@ -115,7 +115,7 @@ fn rank_of(mut x: Exprs, graph: &BondGraph, order: usize, freed: &BTreeSet<PortR
             sources_as_laws: freed.clone(),
             ..CausalityPreferences::default()
         };
-        let solved = solve_part(&mut x, graph, &members, &preferences);
+        let solved = solve_part(&mut x, graph, &members, &preferences, None);
         let stays = |p: &&PortState| p.role == Role::Dependent;
         integral.extend(solved.ports.iter().filter(stays).map(|p| p.port));
     }

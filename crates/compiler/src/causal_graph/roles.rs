@@ -9,7 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Role;
 use super::matched::{block_rows, matched_rows};
 use super::ports::{CausalityPreferences, Net, NetPort, Solved, law_causality};
-use crate::algebra::{Elimination, Evaluator, Exprs, ONE, Pivot, PrimeField, Residues, SparseRow, Symbol};
+use crate::algebra::{
+    Elimination, Evaluator, Exprs, NumericPoint, ONE, Pivot, PrimeField, Residues, SparseRow, Symbol,
+};
 use crate::ids::Id;
 
 /// A pivot below this fraction of what it is a sum of is none but for rounding.
@@ -21,7 +23,12 @@ const BLOCK: usize = 400;
 impl Net {
     /// The part solved by its roles. `None` if something is redundant, undetermined, contradictory or degenerate, or if
     /// definitions would take what only expressions tell: sizes of coefficients, or large blocks.
-    pub(super) fn solved_by_roles(&self, x: &mut Exprs, preferences: &CausalityPreferences) -> Option<Solved> {
+    pub(super) fn solved_by_roles(
+        &self,
+        x: &mut Exprs,
+        preferences: &CausalityPreferences,
+        point: Option<&NumericPoint>,
+    ) -> Option<Solved> {
         let (done, outputs) = self.roles(x, preferences)?;
         let mut solved = Solved::default();
         self.report_ports(&outputs, preferences, &mut solved);
@@ -29,7 +36,7 @@ impl Net {
         let rows = match matched {
             Some(rows) => rows,
             None => {
-                let blocks = x.if_found(|x| block_rows(x, &self.rows, &done, BLOCK))?;
+                let blocks = x.if_found(|x| block_rows(x, &self.rows, &done, BLOCK, point))?;
                 solved.watched = blocks.divisors;
                 blocks.rows
             }

@@ -38,6 +38,8 @@ pub(super) fn start_values(x: &Exprs, graph: &BondGraph) -> Map<Symbol, f64> {
         values.insert(symbol, read(&values, e));
         open.remove(&symbol);
     }
+    // What no constraint reads begins where it is guessed.
+    values.extend(guessed(x, graph, &values).into_iter().filter(|(s, _)| open.contains(s)));
     match &graph.point {
         Some(point) => values.extend(point.iter().map(|(&s, &v)| (s, v))),
         None => close(x, graph, &open, &mut values),
@@ -49,6 +51,16 @@ pub(super) fn start_values(x: &Exprs, graph: &BondGraph) -> Map<Symbol, f64> {
         values.insert(symbol, read(&values, displacement));
     }
     values
+}
+
+/// What is guessed of single variables.
+fn guessed(x: &Exprs, graph: &BondGraph, values: &Map<Symbol, f64>) -> Vec<(Symbol, f64)> {
+    let read = |e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
+    let guessed = |g: &Guess| match x.node(g.what) {
+        &Node::Symbol(symbol) => Some((symbol, read(g.value))),
+        _ => None,
+    };
+    graph.guesses.iter().filter_map(guessed).collect()
 }
 
 /// Start values as they stand in the model.
@@ -91,12 +103,7 @@ fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map
     let slopes: Vec<Vec<Expr>> =
         constraints.iter().map(|&e| unknowns.iter().map(|&s| x.derivative(e, s)).collect()).collect();
     let mut best: Option<(f64, Vec<f64>)> = None;
-    let read = |values: &Map<Symbol, f64>, e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
-    let guessed = |g: &Guess| match x.node(g.what) {
-        &Node::Symbol(symbol) => Some((symbol, read(values, g.value))),
-        _ => None,
-    };
-    let guessed: Vec<(Symbol, f64)> = graph.guesses.iter().filter_map(guessed).collect();
+    let guessed = guessed(&x, graph, values);
     for beginning in BEGINNINGS {
         unknowns.iter().for_each(|&s| _ = values.insert(s, beginning));
         values.extend(guessed.iter().filter(|(s, _)| unknowns.contains(s)).copied());

@@ -106,8 +106,14 @@ fn forced_elements(graph: &BondGraph) -> BTreeSet<ElementId> {
     graph.forced_causality.iter().map(|f| f.port.element).chain(strokes).collect()
 }
 
-/// Whether something in a part is not determined, or imposed twice: then strokes need not fit everywhere.
+/// Whether something in a part is not determined, or imposed twice: then strokes need not fit everywhere. Nor need they beside
+/// wide two-ports, which have many ways to give half of their variables: they are drawn as far as a search finds them.
 fn is_open(causal: &CausalGraph, members: &[ElementId]) -> bool {
+    let wide =
+        |e: &ElementId| matches!(causal.graph.elements[*e].kind, Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_));
+    if members.iter().any(wide) {
+        return true;
+    }
     let inside = |e: ElementId| members.binary_search(&e).is_ok();
     let of_bond = |s: &Symbol| match causal.graph.variables.get(s).map(|v| v.meaning) {
         Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => inside(causal.graph.bonds[bond].from.element),

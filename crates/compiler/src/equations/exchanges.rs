@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Conserved;
 use super::derive::of_the_bond;
 use super::minimal::{Assembled, rows_of};
-use crate::algebra::{Node, Symbol};
+use crate::algebra::{Expr, Exprs, Node, Residue, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
 use crate::causal_graph::{CausalGraph, PortState, Role, magnitude_of_slope};
@@ -72,6 +72,7 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     });
     let storages = ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output);
     let dependent: BTreeSet<Symbol> = storages.chain(rates).filter(|s| !independent.contains(s)).collect();
+    let divisors = residues_of(&mut d.x, &ports.watched);
     let mut found = Exchanges::default();
     let mut read: BTreeSet<Symbol> = BTreeSet::new();
     let mut seen: BTreeSet<Symbol> = BTreeSet::new();
@@ -91,8 +92,10 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
             return Exchanges::default();
         }
         let Some(row) = rows.of(&mut d.x, symbol).cloned() else { continue };
-        let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0)).collect();
-        if ratios.iter().all(|t| d.is_constant(t.1)) || !seen.insert(d.x.untwinned(symbol)) {
+        // What moves by lever arms alone keeps to what it hangs on.
+        let divided = |x: &Exprs, e: Expr| !d.is_constant(e) && divides(x, e, &divisors);
+        let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0) && divided(&d.x, t.1)).collect();
+        if ratios.is_empty() || !seen.insert(d.x.untwinned(symbol)) {
             continue;
         }
         read.extend(ratios.iter().map(|t| t.0));
@@ -100,6 +103,37 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     }
     found.independent.extend(read.into_iter().map(|symbol| of(d, symbol)));
     found
+}
+
+/// The values of divisors, of their factors, and of these without numbers.
+fn residues_of(x: &mut Exprs, divisors: &[Expr]) -> BTreeSet<Residue> {
+    let mut found = BTreeSet::new();
+    for &divisor in divisors {
+        let factors = match x.node(divisor) {
+            Node::Mul(factors) => factors.to_vec(),
+            _ => Vec::new(),
+        };
+        for e in factors.into_iter().chain([divisor]) {
+            let base = match *x.node(e) {
+                Node::Pow(base, _) => base,
+                _ => e,
+            };
+            let own = x.primitive(base).1;
+            let (minus, minus_own) = (x.neg(base), x.neg(own));
+            found.extend([base, own, minus, minus_own].into_iter().filter_map(|e| x.residue(e)));
+        }
+    }
+    found
+}
+
+/// Whether a part of the expression is divided by one of these values.
+fn divides(x: &Exprs, e: Expr, divisors: &BTreeSet<Residue>) -> bool {
+    x.below(&[e], &|_| true).into_iter().any(|part| match *x.node(part) {
+        Node::Pow(base, n) if x.is_number(n).is_some_and(|n| n.signum() < 0) => {
+            x.residue(base).is_some_and(|residue| divisors.contains(&residue))
+        }
+        _ => false,
+    })
 }
 
 /// The roots of the slopes `X/z` of storages, at the start.
