@@ -640,7 +640,13 @@ fn all_libraries_stand_beside_each_other_and_go_with_a_model() {
 
 #[test]
 fn every_component_is_documented_and_tested_here() {
-    let tests = [include_str!("library_std.rs"), include_str!("multibonds.rs"), include_str!("planar.rs"), include_str!("vehicles.rs")].concat();
+    let tests = [
+        include_str!("library_std.rs"),
+        include_str!("multibonds.rs"),
+        include_str!("planar.rs"),
+        include_str!("vehicles.rs"),
+    ]
+    .concat();
     let mut seen = BTreeSet::new();
     for library in Library::all() {
         assert!(!library.about.is_empty());
@@ -676,7 +682,10 @@ fn libraries_and_components_are_found_by_name() {
     let unknown = Library::named("electrical.DCMotro").expect_err("no such component").to_string();
     assert!(unknown.contains("did you mean `electrical.DCMotor`?"), "{unknown}");
     let unknown = Library::named("pneumatics").expect_err("no such library").to_string();
-    assert!(unknown.contains("there are electrical, mechanical, multibody, planar, vehicle, hydraulic, thermal, signals"), "{unknown}");
+    assert!(
+        unknown.contains("there are electrical, mechanical, multibody, planar, vehicle, hydraulic, thermal, signals"),
+        "{unknown}"
+    );
 }
 
 /// The page about all components.

@@ -9,9 +9,8 @@ use crate::span::Span;
 use std::rc::Rc;
 
 /// What may stand in the section `[UNITS]`: numbers are read as they are written, so they have to be SI.
-const SI: [&str; 14] = [
-    "meter", "metre", "m", "newton", "n", "radian", "rad", "kg", "kilogram", "second", "sec", "s", "pascal", "pa",
-];
+const SI: [&str; 14] =
+    ["meter", "metre", "m", "newton", "n", "radian", "rad", "kg", "kilogram", "second", "sec", "s", "pascal", "pa"];
 
 /// A line `NAME = value`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -126,8 +125,8 @@ impl<'a> Builder<'a, '_> {
             return known;
         }
         let read = self.read_file(path, span);
-        let parsed = read.and_then(|(path, text)| match parse(&text) {
-            Ok(all) => Some(Rc::new(Properties { path, all })),
+        let parsed = read.and_then(|(found, text)| match parse(&text) {
+            Ok(all) => Some(Rc::new(Properties { path: found, all })),
             Err(why) => {
                 let title = format!("`{path}` is no file of named numbers");
                 let d = Diagnostic::error(codes::N020, title, span, why.to_string());
