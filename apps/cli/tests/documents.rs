@@ -53,6 +53,8 @@ fn snippets_run(path: &str, expected: usize) {
     fs::create_dir_all(&folder).expect("a folder");
     fs::write(folder.join("motors.bond"), "component Brake(param r; port shaft) { shaft -> 1:w -> R:drag(r) }\n")
         .unwrap();
+    fs::write(folder.join("tyre.tir"), "[UNITS]\nFORCE = 'newton'\n[VERTICAL]\nVERTICAL_STIFFNESS = 2.0e+005 $ N/m\n")
+        .unwrap();
     let snippets = blocks(&document(path), "bond");
     assert_eq!(snippets.len(), expected, "models in {path}");
     for (i, snippet) in snippets.iter().enumerate() {
@@ -72,7 +74,7 @@ fn models_in_the_readme_run() {
 
 #[test]
 fn models_in_the_language_document_run() {
-    snippets_run("docs/language.md", 17);
+    snippets_run("docs/language.md", 18);
 }
 
 #[test]

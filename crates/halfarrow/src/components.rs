@@ -8,10 +8,12 @@ use serde::Serialize;
 use crate::error::Problem;
 
 /// The files, by the names under which they are imported.
-const TEXTS: [(&str, &str); 6] = [
+const TEXTS: [(&str, &str); 8] = [
     ("std.electrical", include_str!("../../../library/std/electrical.bond")),
     ("std.mechanical", include_str!("../../../library/std/mechanical.bond")),
     ("std.multibody", include_str!("../../../library/std/multibody.bond")),
+    ("std.planar", include_str!("../../../library/std/planar.bond")),
+    ("std.vehicle", include_str!("../../../library/std/vehicle.bond")),
     ("std.hydraulic", include_str!("../../../library/std/hydraulic.bond")),
     ("std.thermal", include_str!("../../../library/std/thermal.bond")),
     ("std.signals", include_str!("../../../library/std/signals.bond")),

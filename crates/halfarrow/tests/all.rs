@@ -46,6 +46,8 @@ mod mechanisms;
 mod multibonds;
 #[path = "names.rs"]
 mod names;
+#[path = "planar.rs"]
+mod planar;
 #[path = "repeated.rs"]
 mod repeated;
 #[path = "report.rs"]
@@ -60,5 +62,7 @@ mod shares;
 mod stiff_networks;
 #[path = "sweep.rs"]
 mod sweep;
+#[path = "vehicles.rs"]
+mod vehicles;
 #[path = "velocity.rs"]
 mod velocity;

@@ -595,7 +595,7 @@ fn an_unknown_library_is_refused_with_those_that_there_are() {
     assert!(told.contains("there is no library `std.hydraulics`"), "{told}");
     assert!(told.contains("machine.bond:2:8") && told.contains("did you mean `std.hydraulic`?"), "{told}");
     assert!(
-        told.contains("std.electrical, std.hydraulic, std.mechanical, std.multibody, std.signals, std.thermal"),
+        told.contains("std.electrical, std.hydraulic, std.mechanical, std.multibody, std.planar, std.signals, std.thermal, std.vehicle"),
         "{told}"
     );
     let told = refused("model M\nimport motors\nSe:a(1) -> R:r(1)\n");
@@ -640,7 +640,13 @@ fn all_libraries_stand_beside_each_other_and_go_with_a_model() {
 
 #[test]
 fn every_component_is_documented_and_tested_here() {
-    let tests = [include_str!("library_std.rs"), include_str!("multibonds.rs")].concat();
+    let tests = [
+        include_str!("library_std.rs"),
+        include_str!("multibonds.rs"),
+        include_str!("planar.rs"),
+        include_str!("vehicles.rs"),
+    ]
+    .concat();
     let mut seen = BTreeSet::new();
     for library in Library::all() {
         assert!(!library.about.is_empty());
@@ -668,7 +674,7 @@ fn libraries_and_components_are_found_by_name() {
         let found = Library::named(name).unwrap_or_else(|e| panic!("{e}"));
         found.into_iter().map(|l| (l.name, l.components.len())).collect::<Vec<_>>()
     };
-    assert_eq!(names("").len(), 6);
+    assert_eq!(names("").len(), 8);
     assert_eq!(names("std.thermal"), names("thermal"));
     for name in ["DCMotor", "electrical.DCMotor", "std.electrical.DCMotor"] {
         assert_eq!(names(name), [("std.electrical".to_string(), 1)]);
@@ -676,7 +682,10 @@ fn libraries_and_components_are_found_by_name() {
     let unknown = Library::named("electrical.DCMotro").expect_err("no such component").to_string();
     assert!(unknown.contains("did you mean `electrical.DCMotor`?"), "{unknown}");
     let unknown = Library::named("pneumatics").expect_err("no such library").to_string();
-    assert!(unknown.contains("there are electrical, mechanical, multibody, hydraulic, thermal, signals"), "{unknown}");
+    assert!(
+        unknown.contains("there are electrical, mechanical, multibody, planar, vehicle, hydraulic, thermal, signals"),
+        "{unknown}"
+    );
 }
 
 /// The page about all components.

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
-use halfarrow::{Form, Model, Record, Run, Simulated};
+use halfarrow::{Form, Linearize, Model, Point, Record, Run, Simulated};
 
 fn model(text: &str) -> Model {
     Model::from_text("test.bond", text, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
@@ -397,4 +397,204 @@ Se:motor(3 N.m) -> j.axis
 ";
     let done = run(text, &Run { to: 2.0, rtol: 1e-12, ..Run::default() });
     close(last(&done, "j.angle"), 0.5 * 3.0 / 2.0 * 4.0, 1e-9);
+}
+
+/// A force at the end of an arm and a torque, along the axes of the body or of the world.
+#[test]
+fn forces_and_torques_from_signals() {
+    let text = "model Pushed
+import std.multibody
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:j(n = [0, 1, 0]) -> 1[frame]:hub -> Body:arm(m = 1, J = diag([1, 1.5, 1]))
+Force:push(force = [0, 0, -1])
+hub -> FixedTranslation:out(d = [0.5, 0, 0]) -> push.a
+Torque:twist(torque = [0, 0.25, 0])
+hub -> twist.a
+ground -> Revolute:k(q0 = 0.4) -> Prismatic:slide(n = [1, 0, 0]) -> 1[frame]:far -> Body:puck(m = 2, J = diag([1, 1, 1]))
+Force:steady(world = 1, force = [0.4*t, 0.3*t, 0])
+far -> steady.a
+Torque:turn(world = 1, torque = [0, 0, -far.r[1]*0.3*t + far.r[2]*0.4*t])
+far -> turn.a
+";
+    let done = run(text, &Run { to: 2.0, rtol: 1e-12, ..Run::default() });
+    close(last(&done, "j.speed"), 0.75 / 1.5 * 2.0, 1e-9);
+    // The torque of the force about the ground is taken away: the slide keeps its direction and moves along it.
+    close(last(&done, "k.angle"), 0.4, 1e-9);
+    close(last(&done, "slide.way"), (0.4 * f64::cos(0.4) + 0.3 * f64::sin(0.4)) / 2.0 * 8.0 / 6.0, 1e-9);
+}
+
+/// Each way to move of a body on a bushing has its own frequency; and no energy is lost in large motions.
+#[test]
+fn a_bushing_has_the_frequencies_of_its_stiffness() {
+    let text = "model Mount
+import std.multibody
+World:world(g = [0, 0, 0]) -> 1[frame]:ground -> Free:air -> 1[frame]:hub -> Body:engine(m = 2, J = diag([0.1, 0.2, 0.3]))
+Bushing:rubber(K = diag([200, 800, 1800, 10, 80, 270]), C = diag([2, 2, 2, 0.1, 0.1, 0.1]))
+ground -> rubber.a
+hub -> rubber.b
+";
+    let wanted = Linearize { at: Point::Start, ..Linearize::default() };
+    let report = model(text).linearize(&wanted).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let swings: Vec<[f64; 2]> = report.poles.iter().copied().filter(|p| p[1] > 1.0).collect();
+    assert_eq!(swings.len(), 6);
+    for (m, k, c) in [
+        (2.0, 200.0, 2.0),
+        (2.0, 800.0, 2.0),
+        (2.0, 1800.0, 2.0),
+        (0.1, 10.0, 0.1),
+        (0.2, 80.0, 0.1),
+        (0.3, 270.0, 0.1),
+    ] {
+        let (re, im) = (-c / (2.0 * m), f64::sqrt(k / m - c * c / (4.0 * m * m)));
+        let found = swings.iter().any(|p| (p[0] - re).abs() < 1e-9 * im && (p[1] - im).abs() < 1e-9 * im);
+        assert!(found, "{re} {im}: {swings:?}");
+    }
+    let loose = "model Loose
+import std.multibody
+World:world(g = [0, 0, 0]) -> 1[frame]:ground -> Free:air(x0 = [0.1, 0, 0.2], v0 = [0, 1, 0], w0 = [6, 5, 4]) -> 1[frame]:hub -> Body:engine(m = 2, J = diag([0.1, 0.2, 0.3]))
+Bushing:rubber(K = diag([200, 800, 1800, 10, 80, 270]))
+ground -> rubber.a
+hub -> rubber.b
+output E = 0.5*dot(engine.mass.p, engine.mass.f) + 0.5*dot(engine.inertia.p, engine.inertia.f) + 100*rubber.way[1]^2 + 400*rubber.way[2]^2 + 900*rubber.way[3]^2 + 5*rubber.angle[1]^2 + 40*rubber.angle[2]^2 + 135*rubber.angle[3]^2
+";
+    let done = run(loose, &Run { to: 1.0, rtol: 1e-12, ..Run::default() });
+    let energy = column(&done, "E");
+    energy.iter().for_each(|e| close(*e, energy[0], 1e-8));
+    assert!(column(&done, "rubber.angle[1]").iter().any(|a| a.abs() > 0.3));
+}
+
+/// A body that slides over the ground on its lowest point comes to rest after v^2/(2 mu g), on a spring of the ground.
+#[test]
+fn a_point_slides_on_a_plane() {
+    let text = "model Slide
+import std.multibody
+World:world -> Prismatic:x(n = [1, 0, 0], v0 = 2) -> Prismatic:z(q0 = -1.962e-4, fixed = 1) -> 1[frame]:hub -> Body:b(m = 2, J = diag([1, 1, 1]))
+PointContact:foot(k = 1e5, c = 200, mu = 0.3, v_0 = 0.01 mm/s)
+hub -> foot.a
+";
+    let done = run(text, &Run { to: 1.0, rtol: 1e-10, every: Some(0.01), ..Run::default() });
+    close(last(&done, "x.way"), 4.0 / (2.0 * 0.3 * 9.81), 1e-6);
+    close(last(&done, "foot.depth"), 2.0 * 9.81 / 1e5, 1e-12);
+    let flight = text.replace("q0 = -1.962e-4", "q0 = 0.1");
+    let done = run(&flight, &Run { to: 1.0, rtol: 1e-10, every: Some(0.01), ..Run::default() });
+    let t = 0.1;
+    close(column(&done, "z.way")[10], 0.1 - 4.905 * t * t, 1e-9);
+    assert!(column(&done, "foot.load").iter().all(|load| *load >= 0.0));
+}
+
+/// What a sensor tells of a point that goes round.
+#[test]
+fn a_sensor_tells_motion_in_the_axes_of_the_world() {
+    let text = "model Round
+import std.multibody
+World:world(g = [0, 0, 0]) -> Revolute:j(n = [0, 0, 1], w0 = 2) -> 1[frame]:hub -> Body:b(m = 1, J = diag([1, 1, 1]))
+FrameSensor:sense
+hub -> FixedTranslation:arm(d = [0.5, 0, 0]) -> FixedRotation:nod(n = [0, 1, 0], angle = 0.2) -> FixedRotation:lean(n = [1, 0, 0], angle = -0.3) -> sense.a
+";
+    let done = run(text, &Run { to: 0.7, rtol: 1e-12, ..Run::default() });
+    let (sin, cos) = 1.4f64.sin_cos();
+    for (name, value) in [
+        ("r[1]", 0.5 * cos),
+        ("r[2]", 0.5 * sin),
+        ("v[1]", -sin),
+        ("v[2]", cos),
+        ("acceleration[1]", -2.0 * cos),
+        ("acceleration[2]", -2.0 * sin),
+        ("acceleration[3]", 0.0),
+        ("w[1]", -2.0 * f64::sin(0.2)),
+        ("w[2]", -2.0 * f64::cos(0.2) * f64::sin(0.3)),
+        ("w[3]", 2.0 * f64::cos(0.2) * f64::cos(0.3)),
+        ("yaw", 1.4),
+        ("pitch", 0.2),
+        ("roll", -0.3),
+    ] {
+        close(last(&done, &format!("sense.{name}")), value, 1e-9);
+    }
+}
+
+/// A disc that leans rolls on a circle: Euler's equation about the direction of rolling.
+#[test]
+fn a_disc_rolls_on_a_circle() {
+    let (lean, around, radius, m) = (0.3f64, 1.5, 0.4, 2.0);
+    let (a, c) = (m * radius * radius / 4.0, m * radius * radius / 2.0);
+    let (sin, cos) = lean.sin_cos();
+    let spin = (a * around * around * sin * cos - m * 9.81 * radius * sin) / (around * cos * (c + m * radius * radius));
+    let text = format!(
+        "model Coin
+import std.multibody
+World:world -> RollingDisc:disc(radius = {radius}, lean0 = {lean}, yaw_speed = {around}, spin_speed = {spin} - {around}*sin({lean}))
+disc -> Body:coin(m = {m}, J = diag([{a}, {c}, {a}]))
+output place = coin.a.r
+"
+    );
+    assert_eq!(states(&text).len(), 3 + 5);
+    let done = run(&text, &Run { to: 6.0, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    for (k, t) in times(&done).iter().enumerate() {
+        let path = radius * spin / around;
+        close(column(&done, "place[1]")[k], path * (around * t).sin(), 1e-8);
+        close(column(&done, "place[2]")[k], path * (1.0 - (around * t).cos()), 1e-8);
+        close(column(&done, "place[3]")[k], radius * cos, 1e-9);
+    }
+}
+
+/// A cart on one wheel: a constant torque at the axle, turned by a constant rate.
+#[test]
+fn a_wheel_rolls_where_it_is_steered() {
+    let text = "model Cart
+import std.multibody
+World:world -> RollingWheel:wheel(radius = 0.3, speed0 = 2) -> Body:cart(m = 3, J = diag([1, 1, 0.2]))
+Se:motor(2) -> 1:rotor -> wheel.axle
+rotor -> I:rotor_inertia(0.03)
+Sf:turn(0.5) -> wheel.steer
+output place = cart.a.r
+";
+    let done = run(text, &Run { to: 4.0, rtol: 1e-12, ..Run::default() });
+    let (rate, u, w, t) = (2.0 / (0.03 + 3.0 * 0.09) * 0.3, 0.6, 0.5, 4.0f64);
+    let (sin, cos) = (w * t).sin_cos();
+    close(last(&done, "wheel.speed"), (u + rate * t) / 0.3, 1e-9);
+    close(last(&done, "place[1]"), (u + rate * t) * sin / w + rate * (cos - 1.0) / (w * w), 1e-8);
+    close(last(&done, "place[2]"), u / w - (u + rate * t) * cos / w + rate * sin / (w * w), 1e-8);
+}
+
+/// Seen from the turning earth the plane of a pendulum goes round: small swings on an ellipse in the axes of the world.
+#[test]
+fn a_pendulum_shows_that_the_earth_turns() {
+    let (turn, swing, l) = (0.2, 1e-4, 9.81);
+    let text = format!(
+        "model Foucault
+import std.multibody
+World:world -> Revolute:earth -> Revolute:east(n = [0, 1, 0], q0 = {swing}/{l}) -> Revolute:north(n = [1, 0, 0]) -> FixedTranslation:wire(d = [0, 0, -{l}]) -> Body:bob(m = 5, J = 1e-6*identity(3))
+Sf:day({turn}) -> earth.axis
+output place = bob.a.r
+"
+    );
+    let done = run(&text, &Run { to: 20.0, rtol: 1e-12, every: Some(0.5), ..Run::default() });
+    for (k, t) in times(&done).iter().enumerate() {
+        // sqrt(g/l) is 1/s.
+        close(column(&done, "place[1]")[k], -swing * t.cos(), 1e-6 * swing);
+        close(column(&done, "place[2]")[k], -swing * turn * t.sin(), 1e-6 * swing);
+    }
+}
+
+/// Gear and rack of `std.mechanical` stand at the axes of joints.
+#[test]
+fn gears_and_racks_join_axes() {
+    let text = "model Axes
+import std.multibody
+import std.mechanical
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:pinion -> Body:shaft(m = 1, J = diag([1, 1, 0.5]))
+ground -> Revolute:wheel -> Body:disc(m = 1, J = diag([1, 1, 4]))
+ground -> Prismatic:slide(n = [1, 0, 0]) -> Body:bar(m = 3, J = diag([1, 1, 1]))
+1:fast -> pinion.axis
+fast -> Gear:gear(ratio = -4) -> wheel.axis
+fast -> Rack:rack(r = 0.2) -> slide.axis
+Se:motor(1.74) -> fast
+";
+    assert_eq!(states(text).iter().filter(|name| name.ends_with(".f")).count(), 1);
+    let done = run(text, &Run { to: 2.0, rtol: 1e-12, ..Run::default() });
+    let speed = 1.74 / (0.5 + 4.0 / 16.0 + 3.0 * 0.04) * 2.0;
+    close(last(&done, "pinion.speed"), speed, 1e-9);
+    close(last(&done, "wheel.speed"), -speed / 4.0, 1e-9);
+    close(last(&done, "slide.speed"), 0.2 * speed, 1e-9);
 }

@@ -9,7 +9,7 @@ use super::{HeldKind, Meaning, SignalId};
 use crate::algebra::{Expr, Facts, Interpolation, Outside, Symbol, Table1d, TableError};
 use crate::ast::{self, Arg, Call, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
-use crate::span::Span;
+use crate::span::{FileId, Span};
 use crate::unit::Dimension as Dim;
 use std::rc::Rc;
 
@@ -47,7 +47,8 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn refuse_labels(&mut self, name: &str, call: &Call, known: &[&str]) -> Option<()> {
+    /// Says which named arguments a block does not take.
+    pub fn refuse_labels(&mut self, name: &str, call: &Call, known: &[&str]) -> Option<()> {
         let mut fine = Some(());
         for arg in &call.args {
             let Some(label) = &arg.label else { continue };
@@ -302,14 +303,10 @@ impl<'a> Builder<'a, '_> {
         let mut positional = call.args.iter().filter(|a| a.label.is_none());
         let (file, x) = (positional.next()?, positional.next()?);
         let argument = self.number(cx, &x.value);
-        let ExprKind::Text(path) = &file.value.kind else {
-            let d = Diagnostic::error(codes::N017, "the name of a file is needed here", file.span, "not text");
-            self.fault(d.hint("write `table(\"file.csv\", x)`"));
-            return None;
-        };
+        let (path, place) = self.file_named(cx, &file.value, "table(\"file.csv\", x)")?;
         let interpolation = self.word(call, "interpolation", &["linear", "cubic", "step"])?;
         let outside = self.word(call, "outside", &["error", "clamp", "extrapolate"])?;
-        let table = self.columns(path, file.value.span)?;
+        let table = self.columns(path, place)?;
         let columns = &table.columns;
         let column = self.column(call, columns, span)?;
         let interpolation = [Interpolation::Linear, Interpolation::Cubic, Interpolation::Step][interpolation];
@@ -329,8 +326,7 @@ impl<'a> Builder<'a, '_> {
                     }
                     TableError::NotFinite(row) => format!("row {} is not finite", row + 1),
                 };
-                let d =
-                    Diagnostic::error(codes::N020, format!("`{path}` cannot be used as a table"), file.value.span, why);
+                let d = Diagnostic::error(codes::N020, format!("`{path}` cannot be used as a table"), place, why);
                 self.fault(d.hint("give pairs of numbers, the first column increasing"));
                 None
             }
@@ -353,42 +349,67 @@ impl<'a> Builder<'a, '_> {
         found
     }
 
+    /// The name of a file, as text or as a value that is text, and where the text stands; says so if it is none.
+    pub fn file_named(&mut self, cx: &Reading<'_>, e: &'a ast::Expr, usage: &str) -> Option<(&'a str, Span)> {
+        let found = self.text_of(cx.here, e);
+        if found.is_none() {
+            let d = Diagnostic::error(codes::N017, "the name of a file is needed here", e.span, "not text");
+            self.fault(d.hint(format!("write `{usage}`")));
+        }
+        found
+    }
+
+    /// What a file is known by that is named in the text at `span`.
+    pub fn key_of_file(&self, path: &str, span: Span) -> String {
+        format!("{}\n{path}", self.file_around(span))
+    }
+
+    /// The file from whose folder a file named in the text at `span` is seen; of a new value that of the model.
+    fn file_around(&self, span: Span) -> &str {
+        let name = self.sources.name(span.file);
+        if name.starts_with(super::overrides::SET) { self.sources.name(FileId(0)) } else { name }
+    }
+
+    /// Reads a file that is named in the text at `span`. Gives the path under which it was found, and its text; says so if
+    /// it cannot be read.
+    pub fn read_file(&mut self, path: &str, span: Span) -> Option<(String, String)> {
+        match read_beside(self.files, self.file_around(span), path) {
+            Ok(read) => Some(read),
+            Err(why) => {
+                let d = Diagnostic::error(codes::N020, format!("`{path}` cannot be read"), span, why.to_string());
+                self.fault(d.hint(why.remedy().to_string()));
+                None
+            }
+        }
+    }
+
     /// The columns of a file, read once.
     fn columns(&mut self, path: &str, span: Span) -> Option<Rc<csv::Table>> {
-        let from = self.sources.name(span.file).to_string();
-        let key = format!("{from}\n{path}");
+        let key = self.key_of_file(path, span);
         if let Some(known) = self.csv.get(&key).cloned() {
             if let Some(known) = &known {
                 self.uses.tables.push((known.path.clone(), span));
             }
             return known;
         }
-        let read = read_beside(self.files, &from, path).map_err(|why| (why.to_string(), why.remedy().to_string()));
-        let parse = |(path, text): (String, String)| match csv::parse(&text) {
-            Ok(columns) => Ok((path, columns)),
-            Err(why) => Err((why.to_string(), FileError::NotFound.remedy().into())),
-        };
-        let columns = match read.and_then(parse) {
-            Ok((path, columns)) if columns.columns.len() > 1 => {
-                self.uses.tables.push((path.clone(), span));
-                Some(Rc::new(csv::Table { path, columns }))
+        let read = self.read_file(path, span);
+        let columns = read.and_then(|(found, text)| match csv::parse(&text) {
+            Ok(columns) if columns.columns.len() > 1 => {
+                self.uses.tables.push((found.clone(), span));
+                Some(Rc::new(csv::Table { path: found, columns }))
             }
             Ok(_) => {
-                let d = Diagnostic::error(
-                    codes::N020,
-                    format!("`{path}` cannot be used as a table"),
-                    span,
-                    "it has one column",
-                );
+                let title = format!("`{path}` cannot be used as a table");
+                let d = Diagnostic::error(codes::N020, title, span, "it has one column");
                 self.fault(d.hint("give pairs of numbers: argument and value"));
                 None
             }
-            Err((why, remedy)) => {
-                let d = Diagnostic::error(codes::N020, format!("`{path}` cannot be read"), span, why);
-                self.fault(d.hint(remedy));
+            Err(why) => {
+                let d = Diagnostic::error(codes::N020, format!("`{path}` cannot be read"), span, why.to_string());
+                self.fault(d.hint(FileError::NotFound.remedy()));
                 None
             }
-        };
+        });
         self.csv.insert(key, columns.clone());
         columns
     }
@@ -419,6 +440,6 @@ impl<'a> Builder<'a, '_> {
     }
 }
 
-fn labelled<'c>(call: &'c Call, label: &str) -> Option<&'c Arg> {
+pub(super) fn labelled<'c>(call: &'c Call, label: &str) -> Option<&'c Arg> {
     call.args.iter().find(|a| a.label.as_ref().is_some_and(|l| l.name.text == label))
 }

@@ -216,6 +216,10 @@ pub(super) struct Builder<'a, 'f> {
     pub pseudo: Vec<bool>,
     /// Columns of the tables that were read.
     pub csv: FxHashMap<String, Option<Rc<super::csv::Table>>>,
+    /// Property files that were read.
+    pub property_files: FxHashMap<String, Option<Rc<super::properties::Properties>>>,
+    /// Values that are text, and where the text stands.
+    pub texts: FxHashMap<DeclId, (&'a str, Span)>,
     /// Where names are read.
     pub uses: Uses,
     pub time: Symbol,
@@ -263,6 +267,8 @@ impl<'a, 'f> Builder<'a, 'f> {
             set_valued: Vec::new(),
             pseudo: Vec::new(),
             csv: FxHashMap::default(),
+            property_files: FxHashMap::default(),
+            texts: FxHashMap::default(),
             uses: Uses::default(),
             time,
         };

@@ -250,7 +250,11 @@ impl<'a> Builder<'a, '_> {
             },
             [] => return None,
         };
-        names.decl_of(&mut self.repeats, here, value, part, item).ok()
+        match value {
+            // Its indices are those of a vector or matrix.
+            Valued::One(decl) => Some(decl),
+            Valued::Family(_) => names.decl_of(&mut self.repeats, here, value, part, item).ok(),
+        }
     }
 
     /// The array that a path names as a whole, if it names one.
@@ -287,6 +291,13 @@ impl<'a> Builder<'a, '_> {
 
     fn evaluate_one(&mut self, decl: DeclId) {
         let d = &self.flat.names.decls[decl];
+        if let DeclKind::Parameter { value: Some(e), .. } | DeclKind::Let(Some(e)) = d.kind
+            && d.item.is_empty()
+            && let Some(text) = self.text_of(d.reads, e)
+        {
+            self.texts.insert(decl, text);
+            return;
+        }
         match d.kind {
             DeclKind::Parameter { value, constant } => self.parameter(decl, value, constant),
             DeclKind::Input(value) => self.input_default(decl, value),
@@ -298,6 +309,22 @@ impl<'a> Builder<'a, '_> {
             DeclKind::Joined(_) => {
                 self.joined_signal(decl);
             }
+        }
+    }
+
+    /// The text that an expression is, as the name of a file, and where it stands: what a value is that names another one
+    /// is found before it.
+    pub fn text_of(&mut self, here: Here, e: &'a ast::Expr) -> Option<(&'a str, Span)> {
+        match &e.kind {
+            ExprKind::Text(text) => Some((text, e.span)),
+            ExprKind::Path(path) => {
+                let decl = self.decl_of(here, path, (&[], &[]))?;
+                let text = self.texts.get(&decl).copied()?;
+                let used = self.flat.names.used(decl);
+                used.into_iter().for_each(|used| self.uses.add(used, path.parts[path.parts.len() - 1].name.span));
+                Some(text)
+            }
+            _ => None,
         }
     }
 

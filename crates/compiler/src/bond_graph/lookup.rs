@@ -8,7 +8,7 @@ use super::flatten::Word;
 use super::multibonds::{Width, strand_of};
 use super::scope::{DeclId, DeclKind, Node, ScopeId, Valued, no_indices};
 use super::uses::Used;
-use super::value::Reading;
+use super::value::{ONLY_FILES, Reading};
 use super::vectors::Shaped;
 use crate::algebra::{Expr, Symbol, SymbolKind};
 use crate::ast;
@@ -130,6 +130,9 @@ impl<'a> Builder<'a, '_> {
             let d = Diagnostic::error(codes::N017, title, span, "used as a value").also(f.name.span, "declared here");
             self.fault(d.hint(format!("write `{}( … )`", f.name.text)));
             return None;
+        }
+        if self.texts.contains_key(&decl) {
+            return self.misplaced(span, "text", ONLY_FILES);
         }
         self.values[decl].clone()
     }

@@ -37,6 +37,7 @@ mod names;
 mod overrides;
 mod port_kinds;
 mod print;
+mod properties;
 mod recognise;
 mod repeat;
 mod scope;

@@ -11,6 +11,9 @@ use crate::diagnostic::nearest;
 use crate::diagnostic::{Diagnostic, Sources, codes};
 use crate::span::Span;
 
+/// How the names of the sources of new values begin.
+pub(super) const SET: &str = "--set ";
+
 /// A new value of a parameter.
 ///
 /// The value is an expression in the language, perhaps with a unit: it stands in the place of the one in the model, so
@@ -38,7 +41,7 @@ pub(super) fn parse(overrides: &[Override], sources: &mut Sources, faults: &mut 
     for o in overrides {
         // The parser reads models, so the value stands in one.
         let text = format!("model set\nparam value = {}", o.value);
-        let file = sources.add(format!("--set {}", o.name), text.clone());
+        let file = sources.add(format!("{SET}{}", o.name), text.clone());
         let parsed = ast::parse(&text, file);
         let fine = !parsed.diagnostics.iter().any(Diagnostic::is_error);
         faults.extend(parsed.diagnostics);

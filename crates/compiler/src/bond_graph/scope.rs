@@ -16,7 +16,7 @@ use crate::span::Span;
 const RESERVED: [&str; 2] = ["t", "pi"];
 
 /// Functions of the language, with the numbers of arguments that they take.
-pub(super) const FUNCTIONS: [(&str, usize, usize); 26] = [
+pub(super) const FUNCTIONS: [(&str, usize, usize); 27] = [
     ("sin", 1, 1),
     ("cos", 1, 1),
     ("tan", 1, 1),
@@ -38,6 +38,7 @@ pub(super) const FUNCTIONS: [(&str, usize, usize); 26] = [
     ("floor", 1, 1),
     ("mod", 2, 2),
     ("table", 2, 2),
+    ("number", 2, 2),
     ("pid", 4, 4),
     ("tf", 3, 3),
     ("delay", 2, 2),

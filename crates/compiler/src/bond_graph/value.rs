@@ -13,6 +13,9 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 use crate::unit::{Dimension as Dim, WHOLE};
 
+/// What text is for.
+pub(super) const ONLY_FILES: &str = "text is only read by `table` and `number`, as the name of a file";
+
 /// What an expression may read, and where it stands.
 #[derive(Clone, Copy)]
 pub(super) struct Reading<'r> {
@@ -80,7 +83,7 @@ impl<'a> Builder<'a, '_> {
             ExprKind::Unary(u) => self.unary(cx, u),
             ExprKind::Binary(b) => self.binary(cx, b, e.span),
             ExprKind::If(i) => self.choice(cx, i, e.span),
-            ExprKind::Text(_) => self.misplaced(e.span, "text", "text is only read by `table`"),
+            ExprKind::Text(_) => self.misplaced(e.span, "text", ONLY_FILES),
             ExprKind::List(list) if !cx.item.is_empty() => {
                 let (first, rest) = cx.item.split_first()?;
                 let entry = list.get(usize::try_from(first - 1).ok()?)?;
@@ -210,7 +213,8 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
-    fn misplaced(&mut self, span: Span, what: &str, why: &str) -> Option<Value> {
+    /// Says that something is no number.
+    pub fn misplaced(&mut self, span: Span, what: &str, why: &str) -> Option<Value> {
         self.fault(
             Diagnostic::error(codes::N017, "a number is needed here", span, format!("this is {what}")).note(why),
         );
@@ -346,6 +350,7 @@ impl<'a> Builder<'a, '_> {
         }
         match name {
             "table" => self.table_call(cx, call, span),
+            "number" => self.number_call(cx, call),
             "pid" | "tf" | "delay" | "sample" => self.block(cx, name, call, span),
             _ => self.elementary(cx, name, call, span),
         }
@@ -486,6 +491,7 @@ fn is_one(e: &ast::Expr) -> bool {
 fn usage(name: &str) -> String {
     match name {
         "table" => "write `table(\"file.csv\", x)`".to_string(),
+        "number" => "write `number(\"file.tir\", \"NAME\")`".to_string(),
         "pid" => "write `pid(u, kp, ki, kd)`".to_string(),
         "tf" => "write `tf(u, [num], [den])`, highest power of s first".to_string(),
         "delay" | "sample" => format!("write `{name}(u, T)`"),

@@ -70,7 +70,7 @@ codes! {
     N017 "something else than a number";
     N018 "a variable that an element does not have";
     N019 "a parameter that cannot be set";
-    N020 "a table that cannot be used";
+    N020 "a table or file of numbers that cannot be used";
     N021 "indices that belong to no element";
     N022 "something that must be known when the model is compiled";
     B001 "a half arrow out of an I, C or R";

@@ -1,0 +1,414 @@
+//! `std.vehicle` against values of others and closed forms.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
+use std::collections::BTreeMap;
+
+use halfarrow::{Model, Record, Run, Simulated, Source};
+
+const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
+
+/// Tables of roads, steering, paths and an engine.
+const TABLES: [(&str, &str); 4] = [
+    ("road.csv", "x,h\n0,0\n1,0\n2,0.05\n3,0.05\n4,0\n5,0\n"),
+    ("steer.csv", "t,angle\n0,0\n1,0\n1.5,0.02\n10,0.02\n"),
+    ("path.csv", "x,y\n-100,0\n0,0\n20,0\n40,3\n60,3\n2000,3\n"),
+    ("engine.csv", "w,full,closed\n0,100,-10\n500,100,-60\n"),
+];
+
+fn model_with(text: &str, more: &[(&str, &str)]) -> Model {
+    let text = format!("model Machine\nimport std.multibody\nimport std.vehicle\n{text}");
+    let files = TABLES.iter().chain([("sedan.tir", SEDAN)].iter()).chain(more);
+    let files: BTreeMap<String, String> = files.map(|(path, text)| ((*path).into(), (*text).into())).collect();
+    let source = Source::text("machine.bond", &text).with_files(files);
+    Model::new(source, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn run(text: &str, run: &Run) -> Simulated {
+    let run = Run { record: Record::All, ..run.clone() };
+    model_with(text, &[]).simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)))
+}
+
+fn exact(to: f64) -> Run {
+    Run { to, rtol: 1e-10, every: Some(to / 100.0), ..Run::default() }
+}
+
+fn column<'a>(done: &'a Simulated, name: &str) -> &'a [f64] {
+    let found = done.trace.columns.iter().find(|c| c.name == name);
+    &found.unwrap_or_else(|| panic!("nothing called {name}")).values
+}
+
+fn last(done: &Simulated, name: &str) -> f64 {
+    *column(done, name).last().expect("there are samples")
+}
+
+#[track_caller]
+fn close(found: f64, expected: f64, off: f64) {
+    assert!((found - expected).abs() <= off, "{found} instead of {expected}: off by {:.1e}", (found - expected).abs());
+}
+
+/// What signals are, of which none changes.
+fn still(text: &str, more: &[(&str, &str)]) -> impl Fn(&str) -> f64 + use<> {
+    let model = model_with(&format!("{text}Se:push(0) -> I:mass(1)\n"), more);
+    let run = Run { to: 1e-3, record: Record::All, ..Run::default() };
+    let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)));
+    move |name| last(&done, name)
+}
+
+/// All rows of an independent implementation.
+#[test]
+fn the_magic_formula_gives_the_forces_of_another_implementation() {
+    let table = include_str!("vehicles/tyre_vectors.csv");
+    let rows = table.lines().filter(|l| !l.starts_with('#')).skip(1);
+    let rows: Vec<Vec<f64>> = rows.map(|l| l.split(',').map(|x| x.parse().expect("a number")).collect()).collect();
+    assert_eq!(rows.len(), 36);
+    let largest = rows.iter().flat_map(|row| &row[4..]).fold(0.0f64, |most, f| most.max(f.abs()));
+    for row in &rows {
+        let [fz, kappa, alpha, gamma] = row[..4] else { panic!() };
+        let of = |name: &str, kappa: f64, alpha: f64| {
+            format!(
+                "MagicFormula:{name}(file = \"sedan.tir\", Fz = {fz}, kappa = {kappa}, alpha = {alpha}, gamma = {gamma}, Vx = 20)\n"
+            )
+        };
+        let read = still(&(of("both", kappa, alpha) + &of("long", kappa, 0.0) + &of("wide", 0.0, alpha)), &[]);
+        for (name, expected) in
+            [("long.load*Fx0", row[4]), ("wide.load*Fy0", row[5]), ("both.Fx", row[6]), ("both.Fy", row[7])]
+        {
+            let found = match name.split_once('*') {
+                Some((load, pure)) => read(load) * read(&load.replace("load", pure)),
+                None => read(name),
+            };
+            close(found, expected, 1e-9 * largest);
+        }
+    }
+}
+
+/// Without load there is no force; with hardly any it goes with the load; and a wheel that rolls backward or not at all has
+/// finite ones.
+#[test]
+fn a_tyre_has_forces_at_no_load_and_no_speed() {
+    let tyre = |name: &str, fz: f64, vx: f64, kappa: f64, alpha: f64| {
+        format!(
+            "MagicFormula:{name}(file = \"sedan.tir\", Fz = {fz}, kappa = {kappa}, alpha = {alpha}, gamma = 0.02, Vx = {vx})\n"
+        )
+    };
+    let read = still(
+        &[
+            tyre("none", 0.0, 0.0, 0.1, 0.1),
+            tyre("below", -5.0, 1.0, 0.0, 0.0),
+            tyre("little", 1e-3, 1.0, 0.1, 0.1),
+            tyre("less", 1e-4, 1.0, 0.1, 0.1),
+            tyre("stands", 3000.0, 0.0, 0.0, 0.0),
+            tyre("ahead", 3000.0, 10.0, 0.0, 0.05),
+            tyre("back", 3000.0, -10.0, 0.0, 0.05),
+        ]
+        .concat(),
+        &[],
+    );
+    for force in ["Fx", "Fy", "Mx", "My", "Mz"] {
+        assert_eq!(read(&format!("none.{force}")).abs() + read(&format!("below.{force}")).abs(), 0.0);
+        close(read(&format!("little.{force}")), 10.0 * read(&format!("less.{force}")), 1e-6);
+        assert!(read(&format!("stands.{force}")).is_finite());
+    }
+    assert!(read("little.Fy").abs() > 1e-4);
+    close(read("back.Fy"), read("ahead.Fy"), 1e-9);
+    // The trail lies behind the contact, whichever way it goes.
+    let trail = |name: &str| read(&format!("{name}.trail"));
+    close(trail("back"), -trail("ahead"), 1e-12);
+}
+
+/// A tyre of version 6 with hardly more than its stiffnesses: lateral force per camber and slip, and what pressure makes of them.
+#[test]
+fn version_six_has_camber_stiffness_and_pressure() {
+    let tir = "[DIMENSION]\nUNLOADED_RADIUS = 0.3\n[OPERATING_CONDITIONS]\nNOMPRES = 220000\nINFLPRES = 220000\n[VERTICAL]\nFNOMIN = 4000\n[MODEL]\nFITTYP = 61\nLONGVL = 16.7\n\
+PCX1 = 1.6\nPDX1 = 1.1\nPKX1 = 20\nPCY1 = 1.3\nPDY1 = 1\nPKY1 = -15\nPKY2 = 1.5\nPKY4 = 2\nPKY6 = -1.2\nPKY7 = 0.3\nPPY1 = 0.5\nPPY5 = -0.4\nQCZ1 = 1.1\nQDZ1 = 0.1\nQBZ1 = 8\nQSX2 = 0.7\n";
+    let tyre = |name: &str, alpha: f64, gamma: f64, p: &str| {
+        format!(
+            "MagicFormula:{name}(file = \"six.tir\", Fz = 3000, kappa = 0, alpha = {alpha}, gamma = {gamma}, Vx = 20{p})\n"
+        )
+    };
+    let text = [
+        tyre("slips", 1e-6, 0.0, ""),
+        tyre("leans", 0.0, 1e-6, ""),
+        tyre("slips_hard", 1e-6, 0.0, ", p = 242000"),
+        tyre("leans_hard", 0.0, 1e-6, ", p = 242000"),
+        tyre("slides", 1.4, 0.0, ""),
+    ];
+    let read = still(&text.concat(), &[("six.tir", tir)]);
+    let stiffness = |dp: f64| -15.0 * 4000.0 * (1.0 + 0.5 * dp) * (2.0 * f64::atan(3000.0 / (1.5 * 4000.0))).sin();
+    let camber = |dp: f64| (-1.2 - 0.3 * 0.25) * 3000.0 * (1.0 - 0.4 * dp);
+    close(read("slips.Fy"), 1e-6 * stiffness(0.0), 1e-9);
+    close(read("leans.Fy"), 1e-6 * camber(0.0), 1e-9);
+    close(read("slips_hard.Fy"), 1e-6 * stiffness(0.1), 1e-9);
+    close(read("leans_hard.Fy"), 1e-6 * camber(0.1), 1e-9);
+    let trail = 0.3 / 4000.0 * 0.1 * 3000.0;
+    close(read("slips.Mz"), -trail * read("slips.Fy"), 1e-9);
+    close(read("leans.Mx"), -0.7 * 1e-6 * 3000.0 * 0.3, 1e-9);
+    let b = stiffness(0.0) / (1.3 * 3000.0);
+    close(read("slides.Fy"), 3000.0 * (1.3 * (b * f64::tan(1.4)).atan()).sin(), 1e-8);
+}
+
+const QUARTER: &str = "World:world(g = [-9.81*slope, 0, -9.81]) -> Prismatic:x(n = [1, 0, 0], v0 = v0) -> Prismatic:z(q0 = z0) -> 1[frame]:carrier -> Body:car(m = 300, J = diag([10, 20, 30]))
+carrier -> Wheel:wheel(m = 20, J_axle = 1, J_across = 0.6, w0 = v0/0.33) -> Tyre:tyre(file = \"sedan.tir\")
+";
+
+/// A driven wheel: Newton's and Euler's equations with the forces it tells, and the load of the weight.
+#[test]
+fn a_driven_wheel_obeys_newton() {
+    let text = format!(
+        "param slope = 0, v0 = 10, z0 = 0.33\nSe:motor(200) -> wheel.axle\n{QUARTER}output a = x.rate.f'\noutput b = wheel.rate.f'\n"
+    );
+    let done = run(&text, &exact(4.0));
+    for k in 50..=100 {
+        let [fx, r] = ["tyre.Fx", "tyre.radius"].map(|name| column(&done, name)[k]);
+        close(column(&done, "a")[k], fx / 320.0, 1e-8);
+        close(column(&done, "b")[k], 200.0 - fx * r, 1e-6);
+    }
+    close(last(&done, "tyre.Fz"), 320.0 * 9.81, 1e-3);
+    close(last(&done, "tyre.radius"), 0.344 - 320.0 * 9.81 / 280835.2941, 1e-8);
+    assert!(last(&done, "x.speed") > 17.0);
+}
+
+/// On a slope with its brake closed a wheel comes to rest and stays there; the tyre carries the weight along the slope.
+#[test]
+fn a_wheel_stands_still_on_a_slope() {
+    let text = format!(
+        "param slope = 0.05, v0 = 5, z0 = 0.3328\nHoldingBrake:brake(t_max = 1500)\n1:shaft -> wheel.axle\nshaft -> brake\n{QUARTER}"
+    );
+    let done = run(&text, &Run { to: 10.0, rtol: 1e-8, every: Some(0.1), ..Run::default() });
+    close(last(&done, "x.speed"), 0.0, 1e-4);
+    close(last(&done, "wheel.speed"), 0.0, 1e-4);
+    close(last(&done, "tyre.Fx"), 320.0 * 9.81 * 0.05, 0.1);
+    let way = column(&done, "x.way");
+    close(way[100], way[80], 2e-4);
+    assert!(way[100] > 1.0);
+}
+
+/// A wheel that is lifted has no force and flies; what it lands on pushes, never pulls.
+#[test]
+fn a_wheel_that_flies_has_no_load() {
+    let text = format!("param slope = 0, v0 = 5, z0 = 0.4\n{QUARTER}");
+    let done = run(&text, &exact(1.0));
+    for k in 0..10 {
+        let t = 0.01 * k as f64;
+        close(column(&done, "z.way")[k], 0.4 - 4.905 * t * t, 1e-9);
+        assert_eq!(column(&done, "tyre.Fz")[k], 0.0);
+    }
+    assert!(column(&done, "tyre.Fz").iter().all(|load| *load >= 0.0));
+    close(last(&done, "x.speed"), 5.0, 0.1);
+}
+
+/// Moved aside at constant speeds a tyre builds its slip up over the relaxation length.
+#[test]
+fn slip_builds_up_over_the_relaxation_length() {
+    let text = "World:world -> Prismatic:x(n = [1, 0, 0]) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z(q0 = 0.33, fixed = 1) -> Wheel:wheel(m = 20, J_axle = 1, J_across = 0.6) -> Tyre:tyre(file = \"sedan.tir\")
+Sf:ahead(10) -> x.axis
+Sf:aside(0.2) -> y.axis
+Sf:level(0) -> z.axis
+Sf:roll(10/tyre.Re) -> wheel.axle
+output length = tyre.s_y
+";
+    let done = run(text, &exact(0.2));
+    let load = 280835.2941 * 0.014;
+    let f0 = 4850.0 * 0.81;
+    let length = 2.1439 * f64::sin(2.0 * f64::atan(load / (1.9829 * f0))) * 0.344 * 0.81;
+    close(last(&done, "length"), length, 1e-12);
+    for k in 0..=100 {
+        let t = 0.002 * k as f64;
+        let tan = 0.02 * (1.0 - (-10.0 * t / length).exp());
+        close(column(&done, "tyre.v")[k], tan * length, 1e-9);
+        close(column(&done, "tyre.u")[k], 0.0, 1e-9);
+    }
+    assert!(last(&done, "tyre.Fy") < -300.0);
+}
+
+/// A wheel in axes that do not spin is the body that spins, on an arm that goes round and tilts.
+#[test]
+fn a_wheel_is_a_body_that_spins() {
+    let text = "World:world -> 1[frame]:ground
+ground -> Revolute:a1(w0 = 0.3) -> Revolute:a2(n = [1, 0, 0], q0 = 0.4, w0 = 0.2) -> FixedTranslation:a3(d = [0.1, 0.4, 0]) -> Wheel:a(m = 2, J_axle = 0.5, J_across = 0.3, w0 = 20) -> FrameSensor:tip
+ground -> Revolute:b1(w0 = 0.3) -> Revolute:b2(n = [1, 0, 0], q0 = 0.4, w0 = 0.2) -> FixedTranslation:b3(d = [0.1, 0.4, 0]) -> Revolute:b4(n = [0, 1, 0], w0 = 20) -> Body:b(m = 2, J = diag([0.3, 0.5, 0.3]))
+";
+    let done = run(text, &Run { rtol: 1e-12, ..exact(2.0) });
+    for k in 0..=100 {
+        for (a, b) in [("a1.q", "b1.q"), ("a2.q", "b2.q"), ("a.speed", "b4.speed")] {
+            close(column(&done, a)[k], column(&done, b)[k], 1e-8);
+        }
+    }
+    assert!((last(&done, "a1.q") - 0.6).abs() > 0.1);
+}
+
+/// The contact of a leaning wheel: where it lies, how it moves, and what a force there does to the hub.
+#[test]
+fn a_contact_lies_in_the_plane_of_the_wheel() {
+    let text = "World:world(g = [0, 0, 0]) -> Revolute:yaw(q0 = 0.3, w0 = 0.2) -> Prismatic:out(n = [1, 0, 0], q0 = 2, v0 = 3) -> Prismatic:up(q0 = 0.4, v0 = 0.1) -> Revolute:lean(n = [1, 0, 0], q0 = 0.5, w0 = 0.7) -> 1[frame]:hub -> Body:b(m = 2, J = diag([0.1, 0.2, 0.1]))
+Wheel:wheel(m = 1, J_axle = 0.1, J_across = 0.05, w0 = 10)
+hub -> wheel.a
+RoadContact:road(h = 0.1*t, force = [5, 7, 11], torque = [0, 0, 2])
+wheel.b -> road
+";
+    let done = run(text, &exact(0.1));
+    let at = |name: &str| column(&done, name)[0];
+    let (sin, cos) = 0.5f64.sin_cos();
+    close(at("road.gamma"), 0.5, 1e-12);
+    close(at("road.radius"), 0.4 / cos, 1e-12);
+    close(at("road.spin"), 10.0 + 0.2 * sin, 1e-12);
+    // The speed of the centre, and of the contact about it: (lean + yaw + spin) x rho, with rho = l (0, sin, -cos).
+    let (l, spin) = (0.4 / cos, 10.0);
+    close(at("road.Vx"), 3.0, 1e-12);
+    close(at("road.slide[1]"), 3.0 - l * (0.2 * sin + spin), 1e-12);
+    close(at("road.slide[2]"), 2.0 * 0.2 + 0.7 * l * cos, 1e-12);
+    close(at("road.slide[3]"), 0.1 + 0.7 * l * sin, 1e-12);
+    let radius = column(&done, "road.radius");
+    let slope = (radius[1] - radius[0]) / 1e-3;
+    close(at("road.closing"), -slope, 1e-2);
+    close(at("road.closing"), -(0.1 + 0.7 * l * sin - 0.1) / cos, 1e-12);
+}
+
+/// The Calspan tyre: stiffness of slip, what friction can hold, camber, and a wheel that stands on it.
+#[test]
+fn the_calspan_tyre_has_its_stiffness_and_its_limit() {
+    let (fz, a0, a1, a2, a3, a4) = (3829.6, 2625.0, 14.47, 12930.0, 2.29, 18175.0);
+    let tyre = |name: &str, fz: f64, alpha: f64, gamma: f64| {
+        format!("CalspanTyre:{name}(Fz = {fz}, alpha = {alpha}, gamma = {gamma})\n")
+    };
+    let text = [
+        tyre("small", fz, 1e-7, 0.0),
+        tyre("great", fz, -1.0, 0.0),
+        tyre("leans", fz, 0.0, 1e-7),
+        tyre("none", 0.0, 0.1, 0.1),
+    ];
+    let read = still(&text.concat(), &[]);
+    let slope = (a1 * fz * (fz - a2) - a0 * a2) / a2;
+    close(read("small.Fy"), 1e-7 * slope, 1e-8);
+    let limit = (-4.64e-5 * fz + 1.216 + 2.18e-11 * fz * fz) * 1.0274 * fz;
+    close(read("great.Fy"), limit, 1e-9);
+    close(read("great.Mz"), 1.71e-5 * (limit - fz) * limit, 1e-9);
+    close(read("leans.Fy"), -1e-7 * a3 * (a4 - fz) * fz / a4, 1e-8);
+    close(read("none.Fy"), 0.0, 0.0);
+    let text = "World:world -> Prismatic:x(n = [1, 0, 0], v0 = 10) -> Prismatic:y(n = [0, 1, 0], v0 = 0.5) -> Prismatic:z(q0 = 0.36) -> 1[frame]:hub -> Body:car(m = 380, J = diag([10, 20, 30]))
+CalspanWheel:tyre(radius = 0.364325, k = 460000, c = 5000)
+hub -> tyre.a
+output a = y.rate.f'
+";
+    let done = run(text, &exact(2.0));
+    close(last(&done, "z.way"), 0.364325 - 380.0 * 9.81 / 460000.0, 1e-8);
+    close(column(&done, "a")[10], column(&done, "tyre.Fy")[10] / 380.0, 1e-8);
+    close(last(&done, "x.speed"), 10.0, 1e-12);
+    close(last(&done, "y.speed"), 0.0, 1e-6);
+}
+
+/// Roads: rows of a file, waves that get shorter, and random ones whose spectrum is that of their class.
+#[test]
+fn roads_have_their_profiles() {
+    let text = "RoadProfile:bump(file = \"road.csv\", x = 1 m/s*t)
+SweptRoad:swept(length = 50, x = 1 m/s*t)
+RandomRoad:one(x = 100 m/s*t)
+RandomRoad:two(seed = 2, x = 100 m/s*t)
+RandomRoad:rough(class = 3, x = 100 m/s*t)
+Se:push(0) -> I:mass(1)
+";
+    let done = run(text, &Run { to: 60.0, every: Some(0.0025), step: None, ..Run::default() });
+    let at = |name: &str, t: f64| column(&done, name)[(t / 0.0025).round() as usize];
+    for (x, h) in [(1.0, 0.0), (2.0, 0.05), (3.0, 0.05), (4.0, 0.0), (10.0, 0.0)] {
+        close(at("bump.h", x), h, 1e-12);
+    }
+    for x in [0.0, 3.7, 21.0, 49.9, 55.0] {
+        let way = f64::min(x, 50.0);
+        close(
+            at("swept.h", x),
+            0.01 * (2.0 * std::f64::consts::PI * (0.1 * way + 1.9 * way * way / 100.0)).sin(),
+            1e-9,
+        );
+    }
+    // The integral of 16e-6 4^2 (0.1/n)^2 from 0.01 to 4, by its waves.
+    let square = |name: &str| column(&done, name).iter().map(|h| h * h).sum::<f64>() / column(&done, name).len() as f64;
+    let whole = 256e-6 * 0.01 * (1.0 / 0.01 - 1.0 / 4.0);
+    close(square("one.h") / whole, 1.0, 0.05);
+    close(square("rough.h") / square("one.h"), 4.0, 1e-9);
+    let product = column(&done, "one.h").iter().zip(column(&done, "two.h")).map(|(a, b)| a * b).sum::<f64>();
+    assert!(product.abs() / column(&done, "one.h").len() as f64 / whole < 0.9);
+}
+
+/// A driver follows a lane change, another one steers as a file says.
+#[test]
+fn drivers_steer() {
+    let text = "World:world -> RollingWheel:rear(radius = 0.3, speed0 = 50) -> 1[frame]:car -> Body:body(m = 1000, J = diag([1, 1, 1500]))
+PathFollower:driver(file = \"path.csv\", wheelbase = 2.7, x = rear.x, y = rear.y, yaw = rear.yaw, speed = 15)
+Sf:turn(15/2.7*tan(driver.steer)) -> rear.steer
+SteerTable:hands(file = \"steer.csv\")
+";
+    let done = run(text, &exact(12.0));
+    close(last(&done, "rear.y"), 3.0, 1e-3);
+    close(last(&done, "rear.yaw"), 0.0, 1e-3);
+    let x = column(&done, "rear.x");
+    let before = x.iter().position(|x| *x > 10.0).expect("it drives");
+    close(column(&done, "rear.y")[before], 0.0, 0.1);
+    close(column(&done, "hands.angle")[10], 0.008, 1e-12);
+    close(last(&done, "hands.angle"), 0.02, 1e-12);
+}
+
+/// A body that only air slows down: 1/v grows linearly.
+#[test]
+fn air_slows_down() {
+    let text = "World:world(g = [0, 0, 0]) -> Prismatic:x(n = [1, 0, 0], v0 = 30) -> 1[frame]:hub -> Body:car(m = 1000, J = diag([1, 1, 1]))
+AerodynamicDrag:air(c_w = 0.3, A = 2, wind = [-5, 0, 0])
+hub -> air.a
+";
+    let done = run(text, &exact(20.0));
+    close(1.0 / (last(&done, "x.speed") + 5.0), 1.0 / 35.0 + 1.2 * 2.0 * 0.3 / 2000.0 * 20.0, 1e-9);
+    let u = last(&done, "x.speed") + 5.0;
+    close(last(&done, "air.drag"), 0.36 * u * u, 1e-6);
+}
+
+/// A brake that stops a flywheel by its torque, and then holds it against another one by giving way a little.
+#[test]
+fn a_brake_holds_what_stands() {
+    let text = "1:shaft -> I:flywheel(2, f0 = 10)
+shaft -> HoldingBrake:brake(t_max = 40)
+Se:load(if t < 1 then 0 else 12) -> shaft
+";
+    let done = run(text, &Run { to: 3.0, rtol: 1e-9, every: Some(0.01), ..Run::default() });
+    // The damping while it gives way takes b z_0 of the momentum.
+    close(column(&done, "shaft.f")[20], 10.0 - 20.0 * 0.2 - 0.05, 3e-3);
+    close(last(&done, "shaft.f"), 0.0, 1e-9);
+    close(last(&done, "brake.z"), 12.0 / 40.0 * 1e-3, 1e-9);
+    close(last(&done, "brake.torque"), 12.0, 1e-6);
+}
+
+/// An engine at full throttle through gearbox and differential: all inertias seen from the engine.
+#[test]
+fn engine_gearbox_and_differential() {
+    let text = "Engine:engine(file = \"engine.csv\", j = 0.2, w0 = 100, throttle = if t < 2 then 1 else 0)
+Gearbox:box(gear = 2)
+engine.shaft -> box.from
+Differential:axle(ratio = 4)
+box.to -> axle.drive
+axle.left -> 1:left -> I:left_wheel(3)
+axle.right -> 1:right -> I:right_wheel(6)
+";
+    let done = run(text, &exact(2.0));
+    // Both wheels get the same torque: w_l' = T/3, w_r' = T/6, and the engine turns at 2.1 4 times their mean.
+    let ratio = 2.1 * 4.0;
+    let rate = 100.0 / (0.2 + 1.0 / (ratio / 2.0 * ratio / 2.0 * (1.0 / 3.0 + 1.0 / 6.0)));
+    close(last(&done, "engine.w"), 100.0 + rate * 2.0, 1e-8);
+    close(last(&done, "engine.w"), ratio * (last(&done, "left.f") + last(&done, "right.f")) / 2.0, 1e-9);
+    let [l, r] = ["left.f", "right.f"].map(|name| last(&done, name) - column(&done, name)[0]);
+    close(l, 2.0 * r, 1e-9);
+    close(column(&done, "engine.torque")[10], 100.0, 1e-12);
+}
+
+/// A gear change: the sides meet at the new ratio with the momentum of both.
+#[test]
+fn a_gear_change_keeps_momentum() {
+    let text = "discrete gear = 1
+when t > 1 { gear = 3 }
+Gearbox:box(gear = gear)
+1:from -> I:rotor(0.5, f0 = 36)
+from -> box.from
+box.to -> 1:to -> I:load(2)
+";
+    let done = run(text, &exact(2.0));
+    close(column(&done, "to.f")[10], 10.0, 1e-9);
+    // (1.4^2 j + J) w = 1.4 j w_from + J w_to.
+    close(last(&done, "to.f"), (1.4 * 0.5 * 36.0 + 2.0 * 10.0) / (1.96 * 0.5 + 2.0), 1e-9);
+}
