@@ -84,7 +84,7 @@ fn compare(
         let preferences = preferences(&mut x, &graph, &members, dice);
         let net = Net::new(&mut x, &graph, &members, &preferences);
         let before = x.assumed();
-        let by_roles = net.solved_by_roles(&mut x, &preferences);
+        let by_roles = net.solved_by_roles(&mut x, &preferences, None);
         seen.parts += 1;
         let Some(by_roles) = by_roles else { continue };
         seen.by_roles += 1;
@@ -207,7 +207,7 @@ fn is_solved_by_roles(text: &str) -> bool {
         parts(&graph).iter().all(|members| {
             let mut x = graph.exprs.clone();
             let preferences = CausalityPreferences::default();
-            Net::new(&mut x, &graph, members, &preferences).solved_by_roles(&mut x, &preferences).is_some()
+            Net::new(&mut x, &graph, members, &preferences).solved_by_roles(&mut x, &preferences, None).is_some()
         })
     })
 }
