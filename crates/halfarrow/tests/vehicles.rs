@@ -326,6 +326,35 @@ ground -> Revolute:b1(w0 = 0.3) -> Revolute:b2(n = [1, 0, 0], q0 = 0.4, w0 = 0.2
     assert!((last(&done, "a1.q") - 0.6).abs() > 0.1);
 }
 
+/// A tyre on a hub that spins and on one that only takes its motion from a wheel.
+#[test]
+fn a_tyre_stands_on_hubs_that_spin() {
+    let start = "-> FixedRotation:t{}(n = [0, 0, 1], angle = 0.03) ->";
+    let corner = |name: &str| {
+        format!(
+            "ground -> Prismatic:x{name}(n = [1, 0, 0], v0 = 10) -> Prismatic:z{name}(q0 = 0.33) {}",
+            start.replace("{}", name)
+        )
+    };
+    let text = [
+        "World:world -> 1[frame]:ground\n",
+        &corner("a"),
+        " Wheel:wheel(m = 320, J_axle = 1, J_across = 0.6, w0 = 30) -> Tyre:a(file = \"sedan.tir\")\n",
+        &corner("b"),
+        " Revolute:spin(n = [0, 1, 0], w0 = 30) -> 1[frame]:hub -> Body:rim(m = 320, J = diag([0.6, 1, 0.6]))\nhub -> Tyre:b(file = \"sedan.tir\")\n",
+    ];
+    let done = run(&text.concat(), &exact(2.0));
+    for (a, b, off) in [
+        ("xa.way", "xb.way", 1e-7),
+        ("wheel.speed", "spin.speed", 1e-5),
+        ("a.Fx", "b.Fx", 1e-2),
+        ("a.Fy", "b.Fy", 1e-2),
+    ] {
+        close(last(&done, b), last(&done, a), off);
+    }
+    assert!(last(&done, "spin.angle") > 50.0 && last(&done, "a.Fy") > 500.0);
+}
+
 /// The contact of a leaning wheel: where it lies, how it moves, and what a force there does to the hub.
 #[test]
 fn a_contact_lies_in_the_plane_of_the_wheel() {
@@ -401,6 +430,12 @@ Se:push(0) -> I:mass(1)
     for (x, h) in [(1.0, 0.0), (2.0, 0.05), (3.0, 0.05), (4.0, 0.0), (10.0, 0.0)] {
         close(at("bump.h", x), h, 1e-12);
     }
+    close(at("bump.slope", 0.5), 0.0, 1e-2);
+    let [across, up] = ["bump.n[1]", "bump.n[3]"].map(|name| at(name, 1.5));
+    close(across / up, -at("bump.slope", 1.5), 1e-12);
+    close(across.hypot(up), 1.0, 1e-12);
+    // Over a footprint of 10 cm the slope is that of the heights at its ends.
+    close(at("bump.slope", 1.5), (at("bump.h", 1.55) - at("bump.h", 1.45)) / 0.1, 1e-12);
     for x in [0.0, 3.7, 21.0, 49.9, 55.0] {
         let way = f64::min(x, 50.0);
         close(
