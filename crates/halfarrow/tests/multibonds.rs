@@ -598,3 +598,51 @@ Se:motor(1.74) -> fast
     close(last(&done, "wheel.speed"), -speed / 4.0, 1e-9);
     close(last(&done, "slide.speed"), 0.2 * speed, 1e-9);
 }
+
+/// Of two cardan joints whose yokes stand alike the second takes away what the first does: the outer shafts turn as one.
+#[test]
+fn two_universal_joints_turn_evenly() {
+    let text = "model Shafts
+import std.multibody
+param bend = 0.5235987755982988
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:input(n = [1, 0, 0], w0 = 2, fixed = 1) -> 1[frame]:yoke -> Body:first(m = 1, J = diag([0.1, 1, 1]))
+yoke -> Universal:cross1(n1 = [0, 1, 0], n2 = [0, 0, 1], q2 = bend) -> 1[frame]:middle
+middle -> Body:second(m = 1, J = diag([0.2, 1, 1]))
+ground -> FixedRotation:lean(n = [0, 0, 1], angle = bend) -> Revolute:bearing(n = [1, 0, 0]) -> held.b
+CutOrientation:held
+middle -> held.a
+middle -> Universal:cross2(n1 = [0, 0, 1], n2 = [0, 1, 0], q1 = -bend) -> 1[frame]:shaft
+shaft -> Body:third(m = 1, J = diag([0.3, 1, 1]))
+ground -> Revolute:output(n = [1, 0, 0]) -> last.b
+CutOrientation:last
+shaft -> last.a
+";
+    let done = run(text, &Run { to: 5.0, rtol: 1e-11, every: Some(0.05), ..Run::default() });
+    let (input, middle) = (column(&done, "input.speed"), column(&done, "bearing.speed"));
+    assert!(input.iter().zip(middle).any(|(i, m)| (i / m - 1.0).abs() > 0.1));
+    for of in ["speed", "angle"] {
+        let [input, output] = ["input", "output"].map(|shaft| column(&done, &format!("{shaft}.{of}")));
+        input.iter().zip(output).for_each(|(i, o)| close(*o, *i, 1e-9));
+    }
+}
+
+/// A vector that an instance tells goes into another one, wherever both stand; entries may be read before it is given.
+#[test]
+fn vectors_go_from_instance_to_instance() {
+    let text = "model Hand
+component Taker(in n[3], m[3]) {
+    let w = u[2]
+    let u = n + m
+    output sum = w + dot(n, m)
+}
+component Giver(in x; out n = [x, 2*x, 3*x]) {
+    let y = x
+}
+Taker:to(n = from.n, m = 2*from.n)
+Giver:from(x = 1 + t)
+Se:push(1) -> I:mass(1)
+";
+    let done = run(text, &Run { to: 1.0, ..Run::default() });
+    close(last(&done, "to.sum"), 3.0 * 4.0 + 2.0 * 56.0, 1e-12);
+}

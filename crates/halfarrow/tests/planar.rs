@@ -110,10 +110,11 @@ ground -> PlanarPrismatic:lift(n = [0, 1]) -> 1[plane]:c -> PlanarBody:load(m = 
 c -> steady.a
 ";
     let found = over(2.0, text, &["spring.length", "j.speed", "lift.way"]);
-    for k in 0..=10 {
+    let [spring, wheel, load] = found.as_slice() else { panic!() };
+    for (k, ((length, speed), way)) in spring.iter().zip(wheel).zip(load).enumerate() {
         let t = 0.2 * k as f64;
-        close(found[0][k], 1.0 + 0.5 * (4.0 * t).cos(), 1e-9);
-        close(found[1][k], (0.5 * 2.0 + 3.0) / 2.0 * t, 1e-9);
-        close(found[2][k], t * t, 1e-9);
+        close(*length, 1.0 + 0.5 * (4.0 * t).cos(), 1e-9);
+        close(*speed, (0.5 * 2.0 + 3.0) / 2.0 * t, 1e-9);
+        close(*way, t * t, 1e-9);
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow::{Model, Record, Run, Simulated, Source};
+use halfarrow::{Model, Override, Record, Run, Simulated, Source};
 
 const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
 
@@ -80,6 +80,27 @@ fn the_magic_formula_gives_the_forces_of_another_implementation() {
             close(found, expected, 1e-9 * largest);
         }
     }
+}
+
+/// What a component reads by a name that its user gives goes with the model, as tables do.
+#[test]
+fn a_model_takes_its_tyre_with_it() {
+    let text = "param tyre = \"sedan.tir\"\nMagicFormula:m(file = tyre, Fz = 3000, kappa = 0.1, alpha = 0, gamma = 0, Vx = 20)\nSe:push(m.Fx) -> I:mass(1)\n";
+    let model = model_with(
+        text,
+        &[("ice.tir", &SEDAN.replace("LMUX                     = 1 ", "LMUX                     = 0.1 "))],
+    );
+    assert_eq!(model.files().keys().collect::<Vec<_>>(), ["sedan.tir"]);
+    let again = Model::new(model.source(), &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let end = |model: &Model| {
+        let run = Run { to: 1.0, record: Record::Names(vec!["mass.f".into()]), ..Run::default() };
+        let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        *done.trace.columns[0].values.last().expect("a value")
+    };
+    assert_eq!(end(&again).to_bits(), end(&model).to_bits());
+    let set = [Override { name: "tyre".into(), value: "\"ice.tir\"".into() }];
+    let ice = model.with(&set).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert!(end(&ice) < 0.2 * end(&model), "{} {}", end(&ice), end(&model));
 }
 
 /// Without load there is no force; with hardly any it goes with the load; and a wheel that rolls backward or not at all has
@@ -221,6 +242,74 @@ output length = tyre.s_y
     assert!(last(&done, "tyre.Fy") < -300.0);
 }
 
+/// A tyre of version 6 has its relaxation lengths from the stiffness of its carcass; on the other side of a car it is its image.
+#[test]
+fn tyres_have_a_carcass_and_a_side() {
+    let six = "FITTYP = 61\nUNLOADED_RADIUS = 0.3\nFNOMIN = 4000\nVERTICAL_STIFFNESS = 2e5\nLONGITUDINAL_STIFFNESS = 3e5\nLATERAL_STIFFNESS = 1e5\nPCX1 = 1.6\nPDX1 = 1.1\nPKX1 = 20\nPCY1 = 1.3\nPDY1 = 1\nPKY1 = -15\nPKY2 = 1.5\nPVY1 = 0.05\nQBZ1 = 8\nQCZ1 = 1.1\nQDZ1 = 0.1\nQSX1 = 0.01\n";
+    let corner = |name: &str, lean: f64, speed: f64, more: &str| {
+        format!(
+            "ground -> Prismatic:y{name}(n = [0, 1, 0]) -> FixedRotation:r{name}(n = [1, 0, 0], angle = {lean}) -> Wheel:w{name}(m = 20, J_axle = 1, J_across = 0.6) -> Tyre:t{name}(file = \"six.tir\"{more})\nSf:a{name}({speed}) -> y{name}.axis\nSf:s{name}(10/t{name}.Re) -> w{name}.axle\n"
+        )
+    };
+    let text = "World:world -> Prismatic:x(n = [1, 0, 0]) -> Prismatic:z(q0 = 0.29, fixed = 1) -> 1[frame]:ground\nSf:ahead(10) -> x.axis\nSf:level(0) -> z.axis\n";
+    let text = [text, &corner("left", 0.05, 0.3, ""), &corner("right", -0.05, -0.3, ", mirrored = 1")].concat();
+    let model = model_with(&text, &[("six.tir", six)]);
+    let done = model.simulate(&Run { record: Record::All, ..exact(0.5) }, &mut |_| true);
+    let done = done.unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let load = last(&done, "tleft.Fz");
+    close(load, 2e5 * (0.3 - 0.29 / f64::cos(0.05)), 1e-8);
+    close(last(&done, "tleft.s_x"), 20.0 * load / 3e5, 1e-12);
+    let stiffness = 15.0 * 4000.0 * (2.0 * f64::atan(load / 6000.0)).sin();
+    close(last(&done, "tleft.s_y"), stiffness / 1e5, 1e-12);
+    for (variable, sign) in
+        [("Fx", 1.0), ("Fy", -1.0), ("Fz", 1.0), ("Mz", -1.0), ("alpha", -1.0), ("gamma", -1.0), ("kappa", 1.0)]
+    {
+        let [left, right] = ["left", "right"].map(|side| column(&done, &format!("t{side}.{variable}")));
+        left.iter().zip(right).for_each(|(l, r)| close(*r, sign * l, 1e-9 * load));
+    }
+    assert!(last(&done, "tleft.Fy") < -500.0);
+}
+
+/// A car on four tyres: with those of one side mirrored it runs straight, its weight stands on them as the levers say, and
+/// steered it goes round.
+#[test]
+fn a_car_runs_straight_and_goes_round() {
+    let corner = |name: &str, px: f64, py: f64, mirrored: u8, angle: &str| {
+        format!(
+            "chassis -> FixedTranslation:m{name}(d = [{px}, {py}, -0.22]) -> Prismatic:s{name} -> 1[frame]:c{name}\n1:r{name} -> s{name}.axis\nr{name} -> C:k{name}(k = 30e3, q = s{name}.way + 0.0981)\nr{name} -> R:d{name}(2500)\nc{name} -> FixedRotation:t{name}(n = [0, 0, 1], angle = {angle}) -> Wheel:w{name}(m = 25, J_axle = 1.2, J_across = 0.7, w0 = 20/0.333) -> Tyre:{name}(file = \"sedan.tir\", mirrored = {mirrored})\n"
+        )
+    };
+    let text = [
+        "param hands = \"still.csv\"\nSteerTable:steer(file = hands)\nWorld:world -> Prismatic:x(n = [1, 0, 0], v0 = 20) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z(q0 = 0.55) -> Revolute:yaw -> Revolute:pitch(n = [0, 1, 0]) -> Revolute:roll(n = [1, 0, 0]) -> 1[frame]:chassis\nchassis -> Body:body(m = 1200, J = diag([400, 1500, 1700]))\n",
+        &corner("fl", 1.2, 0.75, 0, "steer.angle"),
+        &corner("fr", 1.2, -0.75, 1, "steer.angle"),
+        &corner("rl", -1.4, 0.75, 0, "0"),
+        &corner("rr", -1.4, -0.75, 1, "0"),
+    ];
+    let model = model_with(&text.concat(), &[("still.csv", "t,angle\n0,0\n10,0\n")]);
+    let drive = |model: &Model| {
+        let run = Run { to: 4.0, every: Some(0.1), record: Record::All, ..Run::default() };
+        model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+    };
+    let straight = drive(&model);
+    close(last(&straight, "y.way"), 0.0, 1e-9);
+    close(last(&straight, "yaw.angle"), 0.0, 1e-9);
+    let load = |done: &Simulated, wheels: &[&str]| wheels.iter().map(|w| last(done, &format!("{w}.Fz"))).sum::<f64>();
+    close(load(&straight, &["fl", "fr", "rl", "rr"]), 1300.0 * 9.81, 1.0);
+    close(load(&straight, &["fl", "fr"]), (1200.0 * 1.4 / 2.6 + 50.0) * 9.81, 20.0);
+    let set = [Override { name: "hands".into(), value: "\"steer.csv\"".into() }];
+    let round = drive(&model.with(&set).unwrap_or_else(|e| panic!("{}", e.render(false))));
+    close(load(&round, &["fl", "fr", "rl", "rr"]), 1300.0 * 9.81, 20.0);
+    // What the tyres push sideways is what the curve needs.
+    let side: f64 = ["fl", "fr", "rl", "rr"].iter().map(|w| last(&round, &format!("{w}.Fy"))).sum();
+    let [u, v] = ["x.speed", "y.speed"].map(|name| last(&round, name));
+    let needed = 1300.0 * f64::hypot(u, v) * last(&round, "yaw.speed");
+    assert!((side / needed - 1.0).abs() < 0.02, "{side} {needed}");
+    // The outer side carries more, and a left turn leans to the right.
+    assert!(load(&round, &["fr", "rr"]) > 1.3 * load(&round, &["fl", "rl"]));
+    assert!(last(&round, "yaw.angle") > 0.3 && last(&round, "roll.angle") > 0.01);
+}
+
 /// A wheel in axes that do not spin is the body that spins, on an arm that goes round and tilts.
 #[test]
 fn a_wheel_is_a_body_that_spins() {
@@ -235,6 +324,35 @@ ground -> Revolute:b1(w0 = 0.3) -> Revolute:b2(n = [1, 0, 0], q0 = 0.4, w0 = 0.2
         }
     }
     assert!((last(&done, "a1.q") - 0.6).abs() > 0.1);
+}
+
+/// A tyre on a hub that spins and on one that only takes its motion from a wheel.
+#[test]
+fn a_tyre_stands_on_hubs_that_spin() {
+    let start = "-> FixedRotation:t{}(n = [0, 0, 1], angle = 0.03) ->";
+    let corner = |name: &str| {
+        format!(
+            "ground -> Prismatic:x{name}(n = [1, 0, 0], v0 = 10) -> Prismatic:z{name}(q0 = 0.33) {}",
+            start.replace("{}", name)
+        )
+    };
+    let text = [
+        "World:world -> 1[frame]:ground\n",
+        &corner("a"),
+        " Wheel:wheel(m = 320, J_axle = 1, J_across = 0.6, w0 = 30) -> Tyre:a(file = \"sedan.tir\")\n",
+        &corner("b"),
+        " Revolute:spin(n = [0, 1, 0], w0 = 30) -> 1[frame]:hub -> Body:rim(m = 320, J = diag([0.6, 1, 0.6]))\nhub -> Tyre:b(file = \"sedan.tir\")\n",
+    ];
+    let done = run(&text.concat(), &exact(2.0));
+    for (a, b, off) in [
+        ("xa.way", "xb.way", 1e-7),
+        ("wheel.speed", "spin.speed", 1e-5),
+        ("a.Fx", "b.Fx", 1e-2),
+        ("a.Fy", "b.Fy", 1e-2),
+    ] {
+        close(last(&done, b), last(&done, a), off);
+    }
+    assert!(last(&done, "spin.angle") > 50.0 && last(&done, "a.Fy") > 500.0);
 }
 
 /// The contact of a leaning wheel: where it lies, how it moves, and what a force there does to the hub.
@@ -312,6 +430,12 @@ Se:push(0) -> I:mass(1)
     for (x, h) in [(1.0, 0.0), (2.0, 0.05), (3.0, 0.05), (4.0, 0.0), (10.0, 0.0)] {
         close(at("bump.h", x), h, 1e-12);
     }
+    close(at("bump.slope", 0.5), 0.0, 1e-2);
+    let [across, up] = ["bump.n[1]", "bump.n[3]"].map(|name| at(name, 1.5));
+    close(across / up, -at("bump.slope", 1.5), 1e-12);
+    close(across.hypot(up), 1.0, 1e-12);
+    // Over a footprint of 10 cm the slope is that of the heights at its ends.
+    close(at("bump.slope", 1.5), (at("bump.h", 1.55) - at("bump.h", 1.45)) / 0.1, 1e-12);
     for x in [0.0, 3.7, 21.0, 49.9, 55.0] {
         let way = f64::min(x, 50.0);
         close(

@@ -237,7 +237,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The declaration that a path names, if it names one.
-    fn decl_of(&mut self, here: Here, path: &'a ast::Path, (formals, item): (&[&str], &[i64])) -> Option<DeclId> {
+    pub fn decl_of(&mut self, here: Here, path: &'a ast::Path, (formals, item): (&[&str], &[i64])) -> Option<DeclId> {
         let names = &self.flat.names;
         let (value, part) = match path.parts.as_slice() {
             [one] if one.indices.is_empty() && self.is_bound(here, formals, &one.name.text) => return None,

@@ -140,10 +140,10 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// Whether a name without indices is that of a vector or matrix, not of an array.
-    fn names_vector(&self, cx: &Reading<'_>, path: &'a ast::Path) -> bool {
-        let [one] = path.parts.as_slice() else { return false };
-        let value = self.flat.names.value(cx.here.scope, &one.name.text).filter(|_| one.indices.is_empty());
-        matches!(value, Some(Valued::One(decl)) if self.shapes.contains_key(&decl))
+    fn names_vector(&mut self, cx: &Reading<'_>, path: &'a ast::Path) -> bool {
+        let whole = path.parts.last().is_some_and(|last| last.indices.is_empty());
+        let decl = if whole { self.decl_of(cx.here, path, (&[], &[])) } else { None };
+        decl.is_some_and(|decl| self.shapes.contains_key(&decl))
     }
 
     /// Whether an expression has an array of another number of indices than the one it is read for.
@@ -155,7 +155,7 @@ impl<'a> Builder<'a, '_> {
                     Some(Valued::One(decl)) => self.shapes.contains_key(&decl),
                     None => false,
                 },
-                _ => false,
+                _ => self.names_vector(cx, path),
             },
             ExprKind::Call(call) => {
                 let own = VECTOR_FUNCTIONS.iter().any(|f| f.0 == call.function.text);
