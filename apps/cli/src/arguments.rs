@@ -377,6 +377,10 @@ pub struct Simulate {
     /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
     #[arg(long, allow_negative_numbers = true)]
     pub atol: Option<f64>,
+    /// Differentiate what is recorded by parameters, start values (`body.q(0)`) and constant inputs, exactly: columns
+    /// `d(body.f)/d(ks)`; may be repeated
+    #[arg(long, value_name = "NAMES")]
+    pub sensitivity: Vec<String>,
     /// Put positions that only speeds keep together back onto the relations between them after each step
     #[arg(long)]
     pub project: bool,

@@ -51,6 +51,7 @@ pub struct RunOptions {
     minimum_norm: bool,
     start: String,
     record: Recorded,
+    sensitivities: Vec<String>,
     execution: String,
 }
 
@@ -78,6 +79,7 @@ impl RunOptions {
                 "also" => Record::Also(names),
                 other => return Err(none("record", other)),
             },
+            sensitivities: self.sensitivities,
             execution: match self.execution.as_str() {
                 "auto" => Execution::Auto,
                 "bytecode" => Execution::Bytecode,

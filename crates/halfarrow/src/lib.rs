@@ -51,6 +51,7 @@ mod quantity;
 mod real_time;
 mod report;
 mod run;
+mod sensitivity;
 mod source;
 mod stage;
 mod stepper;

@@ -69,6 +69,7 @@ fn run(arguments: &Simulate) -> Run {
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),
+        sensitivities: all_listed(&arguments.sensitivity),
         execution: execution(arguments.exec),
     }
 }

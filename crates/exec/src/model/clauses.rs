@@ -369,6 +369,12 @@ impl Model {
                 }
                 self.events.values[code.clauses.first[i] + k] = value;
             }
+            if self.variation.is_some() {
+                let still = code.clauses.still[i].filter(|_| self.events.at_rest[i]);
+                let own = routine.outputs.iter().take(code.program.clauses[i].actions.len());
+                let registers: Vec<u32> = own.map(|&register| still.unwrap_or(register)).collect();
+                self.vary_values(t, x, routine, (code.clauses.first[i], &registers))?;
+            }
         }
         Ok(())
     }
@@ -406,6 +412,7 @@ impl Model {
         let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
         let work = std::mem::take(&mut self.events);
         for (_, at, action) in Model::actions(&code, &work) {
+            self.vary_change(action.target, at);
             match action.target {
                 Target::Discrete(i) => {
                     self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at])

@@ -34,6 +34,11 @@ impl Clock {
         &self.routine
     }
 
+    /// The conditions, with the registers of their operands.
+    pub fn operands(&self) -> impl Iterator<Item = (ConditionId, u32)> + '_ {
+        self.conditions.iter().zip(&self.routine.outputs).map(|(c, &register)| (c.0, register))
+    }
+
     /// Takes all of them as they are just after `t`, and finds the next time event: when the first of them changes, in s.
     pub fn handle_time_event(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
         if self.conditions.is_empty() {
