@@ -40,6 +40,7 @@ pub type Recorded = (String, Vec<String>);
 pub struct RunOptions {
     to: f64,
     every: Option<f64>,
+    at: Vec<f64>,
     form: String,
     stiffness: Option<f64>,
     damping: Option<f64>,
@@ -61,6 +62,7 @@ impl RunOptions {
         Ok(Run {
             to: self.to,
             every: self.every,
+            at: self.at,
             form: form(&self.form)?,
             stiffness: self.stiffness,
             damping: self.damping,

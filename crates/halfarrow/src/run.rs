@@ -39,6 +39,8 @@ pub struct Run {
     pub to: f64,
     /// Time between recorded points; `None`: every step. Start and end are always recorded.
     pub every: Option<f64>,
+    /// Times that are recorded in the place of these, in s, ascending; the end is always recorded. Empty: as `every` says.
+    pub at: Vec<f64>,
     /// The formulation.
     pub form: Form,
     /// Form `stiff`: square of the ratio of the springs' frequency to the fastest rate of the model; `None`: 1e6.
@@ -101,6 +103,7 @@ impl Default for Run {
         Run {
             to: 1.0,
             every: None,
+            at: Vec::new(),
             form: Form::Minimal,
             stiffness: None,
             damping: None,
@@ -785,6 +788,7 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
         from: 0.0,
         to: run.to,
         every: run.every,
+        at: run.at.clone(),
         step: run.step,
         rtol: run.rtol,
         atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),

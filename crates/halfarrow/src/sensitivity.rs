@@ -55,15 +55,21 @@ fn quantity(system: &exec::Model, name: &str) -> Result<By, Problem> {
     let by = |quantity, unit: Option<&Unit>| By { quantity, name: name.to_string(), unit: text(unit) };
     if let Some(variable) = name.strip_suffix("(0)") {
         let given = || program.start.iter().enumerate().filter(|(_, c)| !c.firm);
+        let unit = program.observed.iter().find(|o| o.name == variable).and_then(|o| o.unit.as_ref());
+        let open = |i: &usize| program.start.iter().all(|c| !c.reads.contains(&(*i as u32)));
+        let free = || (0..program.states.len()).filter(open);
+        if let Some(state) = free().find(|&i| program.states[i].name == variable) {
+            return Ok(by(Quantity::State(state), unit));
+        }
         let Some((index, _)) = given().find(|(_, c)| c.name == variable) else {
-            let known: Vec<String> = given().map(|(_, c)| format!("{}(0)", c.name)).collect();
+            let names = given().map(|(_, c)| &c.name).chain(free().map(|i| &program.states[i].name));
+            let known: Vec<String> = names.map(|name| format!("{name}(0)")).collect();
             let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
             let reason =
                 format!("a run does not begin with a value that is given for {variable}; such values are: {known}");
             return Err(Problem::BadOption { reason });
         };
-        let observed = program.observed.iter().find(|o| o.name == variable);
-        return Ok(by(Quantity::Start(index), observed.and_then(|o| o.unit.as_ref())));
+        return Ok(by(Quantity::Start(index), unit));
     }
     if let Some(index) = program.inputs.iter().position(|input| input.name == name) {
         let input = &program.inputs[index];

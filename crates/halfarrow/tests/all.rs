@@ -50,6 +50,8 @@ mod names;
 mod repeated;
 #[path = "report.rs"]
 mod report;
+#[path = "sensitivity.rs"]
+mod sensitivity;
 #[path = "set_valued.rs"]
 mod set_valued;
 #[path = "set_valued_random.rs"]

@@ -57,6 +57,7 @@ fn run(arguments: &Simulate) -> Run {
     Run {
         to: arguments.to,
         every: arguments.every,
+        at: Vec::new(),
         form: form(arguments.form),
         stiffness: arguments.stiffness,
         damping: arguments.damping,

@@ -370,10 +370,10 @@ impl Model {
                 self.events.values[code.clauses.first[i] + k] = value;
             }
             if self.variation.is_some() {
-                let still = code.clauses.still[i].filter(|_| self.events.at_rest[i]);
-                let own = routine.outputs.iter().take(code.program.clauses[i].actions.len());
-                let registers: Vec<u32> = own.map(|&register| still.unwrap_or(register)).collect();
-                self.vary_values(t, x, routine, (code.clauses.first[i], &registers))?;
+                let actions = code.program.clauses[i].actions.len();
+                let still = code.clauses.still[i].filter(|_| self.events.at_rest[i]).map(|_| actions);
+                let outputs: Vec<usize> = (0..actions).map(|k| still.unwrap_or(k)).collect();
+                self.vary_values(t, x, routine, (code.clauses.first[i], &outputs))?;
             }
         }
         Ok(())

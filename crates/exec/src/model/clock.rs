@@ -34,9 +34,9 @@ impl Clock {
         &self.routine
     }
 
-    /// The conditions, with the registers of their operands.
-    pub fn operands(&self) -> impl Iterator<Item = (ConditionId, u32)> + '_ {
-        self.conditions.iter().zip(&self.routine.outputs).map(|(c, &register)| (c.0, register))
+    /// The conditions, in the order of the outputs of the routine.
+    pub fn conditions(&self) -> impl Iterator<Item = ConditionId> + '_ {
+        self.conditions.iter().map(|c| c.0)
     }
 
     /// Takes all of them as they are just after `t`, and finds the next time event: when the first of them changes, in s.

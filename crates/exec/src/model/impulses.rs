@@ -105,10 +105,16 @@ impl ImpulseBalance {
         &self.all
     }
 
-    /// Derivatives of the residuals along a direction along which [`all`](ImpulseBalance::all) has run, where what storages
-    /// kept before moves by `before` and the new values of actions by `values`; impulses stay.
-    pub fn residuals_along(&self, work: &ImpulseWork, frame: &Frame, before: &[f64], values: &[f64]) -> Vec<f64> {
-        let at = |output: usize| frame.pair(self.all.outputs[output]);
+    /// Derivatives of the residuals along a direction along which what [`all`](ImpulseBalance::all) gives moves by `moves`, what
+    /// storages kept before by `before` and the new values of actions by `values`; impulses stay.
+    pub fn residuals_along(
+        &self,
+        work: &ImpulseWork,
+        (frame, moves): (&Frame, &[f64]),
+        before: &[f64],
+        values: &[f64],
+    ) -> Vec<f64> {
+        let at = |output: usize| (frame.r[self.all.outputs[output] as usize], moves[output]);
         let mut factor = self.jumps.stored.len();
         let mut slopes = Vec::with_capacity(self.jumps.balances.len() + work.asked.len());
         for terms in &self.jumps.balances {

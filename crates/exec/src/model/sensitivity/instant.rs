@@ -59,13 +59,8 @@ impl Model {
                 variation.states[j][i] = s[j * n + i] + if moves == 0.0 { 0.0 } else { before[i] * moves };
             }
         }
-        let (mode, held, old) = (self.run.mode, self.run.delays_and_samples.clone(), x.to_vec());
+        let (held, old) = (self.run.delays_and_samples.clone(), x.to_vec());
         self.handle_event(t, x)?;
-        if self.run.mode != mode {
-            let laws: Vec<&str> = self.code.program.set_valued.iter().map(|law| law.name.as_str()).collect();
-            let reason = "another branch of it holds from there on, over whose begin derivatives are not followed";
-            return Err(Model::without_derivative(t, laws.join(", "), reason));
-        }
         let mut after = vec![0.0; n];
         self.rates(t, x, &mut after)?;
         if !begins && instants.iter().any(|i| !matches!(i, Instant::Moves(_))) {
@@ -91,8 +86,21 @@ impl Model {
         }
     }
 
+    /// That derivatives are not taken over into another mode, where branches of these laws have ended.
+    pub(in crate::model) fn undifferentiated_mode(&self, time: f64, ended: impl Iterator<Item = u32>) -> Failure {
+        let mut laws: Vec<&str> = ended.map(|law| self.code.program.set_valued[law as usize].name.as_str()).collect();
+        laws.dedup();
+        let (what, reason) = match laws.is_empty() {
+            true => ("the motion".to_string(), "it goes on in another mode, and derivatives are not taken over"),
+            false => {
+                (laws.join(", "), "another branch holds from there on, and derivatives are not taken over into it")
+            }
+        };
+        Model::without_derivative(time, what, reason)
+    }
+
     /// That the instant of an event is no differentiable function of what is varied.
-    fn apart(&self, time: f64, crossed: &[(ConditionId, u32, bool)]) -> Failure {
+    fn apart(&self, time: f64, crossed: &[(ConditionId, usize, bool)]) -> Failure {
         let values = &self.code.program.values;
         let reads = |clause: &halfarrow_compiler::program::Clause| match clause.trigger {
             Trigger::Becomes(value) => match values.op(value) {
@@ -114,14 +122,14 @@ impl Model {
 
     /// The conditions that change where the run stands, before the event is handled: with their operand among the outputs of
     /// its routine, and whether they are of time alone.
-    fn crossed(&mut self, t: f64, x: &[f64]) -> Result<Vec<(ConditionId, u32, bool)>, Failure> {
+    fn crossed(&mut self, t: f64, x: &[f64]) -> Result<Vec<(ConditionId, usize, bool)>, Failure> {
         let code = self.code.clone();
         let mut crossed = Vec::new();
         self.place(t, x);
         self.frame.run(&code.indicators).map_err(|error| self.failure(t, error))?;
-        for (&condition, &register) in code.switching.iter().zip(&code.indicators.outputs) {
+        for (output, (&condition, &register)) in code.switching.iter().zip(&code.indicators.outputs).enumerate() {
             if self.frame.conditions.has_left(condition, self.frame.r[register as usize], &self.frame.tables) {
-                crossed.push((condition, register, false));
+                crossed.push((condition, output, false));
             }
         }
         if self.run.clock_event.is_some_and(|event| event <= t) {
@@ -131,9 +139,9 @@ impl Model {
             code.clock.handle_time_event(&mut self.frame, t, &mut next);
             let after = self.frame.conditions.held.clone();
             self.frame.conditions.hold_again(&kept);
-            for (condition, register) in code.clock.operands() {
+            for (output, condition) in code.clock.conditions().enumerate() {
                 if before[condition.index()] != after[condition.index()] {
-                    crossed.push((condition, register, true));
+                    crossed.push((condition, output, true));
                 }
             }
         }
@@ -147,7 +155,7 @@ impl Model {
         x: &[f64],
         s: &[f64],
         rates: &[f64],
-        crossed: &[(ConditionId, u32, bool)],
+        crossed: &[(ConditionId, usize, bool)],
     ) -> Result<Vec<Instant>, Failure> {
         let (code, n) = (self.code.clone(), x.len());
         let mut instants = vec![Instant::Unknown; self.varied_by().len()];
@@ -180,11 +188,11 @@ impl Model {
             self.let_time_pass(t);
             self.frame.d[code.layout.states as usize..][..n].copy_from_slice(rates);
             self.frame.run_along(routine).map_err(|error| self.failure(t, error))?;
-            let along: Vec<f64> = of().map(|c| self.frame.d[c.1 as usize]).collect();
+            let along: Vec<f64> = of().map(|c| self.frame.d[routine.outputs[c.1] as usize]).collect();
             for (j, instant) in instants.iter_mut().enumerate() {
-                self.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), routine)?;
+                let slopes = self.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), routine)?;
                 for (c, along) in of().zip(&along) {
-                    *instant = instant.and(-self.frame.d[c.1 as usize] / along);
+                    *instant = instant.and(-slopes[c.1] / along);
                 }
             }
         }
@@ -201,8 +209,7 @@ impl Model {
         let mut all = Vec::new();
         for j in 0..self.varied_by().len() {
             let (states, instant) = (self.states_of(j), self.instant_of(j));
-            self.run_varied(j, (t, x), (&states, instant), routine)?;
-            all.push(routine.outputs.iter().map(|&r| self.frame.d[r as usize]).collect());
+            all.push(self.run_varied(j, (t, x), (&states, instant), routine)?);
         }
         Ok(all)
     }
@@ -269,20 +276,19 @@ impl Model {
         Ok(())
     }
 
-    /// Differentiates the new values of a clause, which stand in these registers after its routine has run.
+    /// Differentiates the new values of a clause, which are these outputs of its routine.
     pub(in crate::model) fn vary_values(
         &mut self,
         t: f64,
         x: &[f64],
         routine: &crate::bytecode::Routine,
-        (first, registers): (usize, &[u32]),
+        (first, outputs): (usize, &[usize]),
     ) -> Result<(), Failure> {
         for j in 0..self.varied_by().len() {
             let (states, instant) = (self.states_of(j), self.instant_of(j));
-            self.run_varied(j, (t, x), (&states, instant), routine)?;
-            let Model { frame, variation, .. } = self;
-            let values = &mut variation.as_mut().expect("it is varied").values[j][first..];
-            values.iter_mut().zip(registers).for_each(|(value, &r)| *value = frame.d[r as usize]);
+            let slopes = self.run_varied(j, (t, x), (&states, instant), routine)?;
+            let values = &mut self.variation.as_mut().expect("it is varied").values[j][first..];
+            values.iter_mut().zip(outputs).for_each(|(value, &output)| *value = slopes[output]);
         }
         Ok(())
     }
@@ -317,19 +323,12 @@ impl Model {
         let mut steps = Vec::new();
         for j in 0..self.varied_by().len() {
             let (states, instant) = (self.states_of(j), self.instant_of(j));
-            self.run_varied(j, (t, x), (&states, instant), balance.all())?;
+            let moves = self.run_varied(j, (t, x), (&states, instant), balance.all())?;
             let variation = self.variation.as_ref().expect("it is varied");
-            let slopes = balance.residuals_along(&work, &self.frame, &variation.stored[j], &variation.values[j]);
+            let slopes =
+                balance.residuals_along(&work, (&self.frame, &moves), &variation.stored[j], &variation.values[j]);
             let step = minimum_norm::step(&matrix, &slopes, m).filter(|step| step.rank == m);
-            let met = step.as_ref().is_some_and(|step| {
-                matrix.chunks(m.max(1)).zip(&slopes).all(|(row, slope)| {
-                    let terms = row.iter().zip(&step.step).map(|(a, s)| a * s);
-                    let (sum, size) =
-                        terms.fold((*slope, slope.abs()), |(sum, size), term| (sum + term, size + term.abs()));
-                    sum.abs() <= MET * size
-                })
-            });
-            steps.push(step.filter(|_| met || m == 0));
+            steps.push(step.filter(|step| step.meets(&matrix, &slopes, MET)));
         }
         let impulses: Vec<usize> = work.asked_impulses(balance).collect();
         self.events.impulses = work;

@@ -23,6 +23,8 @@ pub enum Quantity {
     Parameter(usize),
     /// The value that a condition of the start asks for.
     Start(usize),
+    /// The start value of a state of which no condition says anything.
+    State(usize),
     /// An input that is constant.
     Input(usize),
 }
@@ -126,15 +128,15 @@ impl Model {
         self.variation.as_ref().map_or(&[], |variation| &variation.names)
     }
 
-    /// Runs a routine at `(t, x)` with derivatives by quantity `j`, where the states move by `states` and the instant by
-    /// `instant`.
+    /// Runs a routine at `(t, x)` along quantity `j`, where the states move by `states` and the instant by `instant`: the
+    /// derivatives of what it gives.
     fn run_varied(
         &mut self,
         j: usize,
         (t, x): (f64, &[f64]),
         (states, instant): (&[f64], f64),
         routine: &Routine,
-    ) -> Result<(), Failure> {
+    ) -> Result<Vec<f64>, Failure> {
         self.place(t, x);
         self.run_placed(j, t, (states, instant), routine)
     }
@@ -146,7 +148,7 @@ impl Model {
         t: f64,
         (states, instant): (&[f64], f64),
         routine: &Routine,
-    ) -> Result<(), Failure> {
+    ) -> Result<Vec<f64>, Failure> {
         self.still();
         if instant != 0.0 {
             self.let_time_pass(t);
@@ -166,9 +168,11 @@ impl Model {
         add(&mut frame.d, layout.states, states);
         frame.begin(None);
         let run = frame.run_along(routine);
+        let slopes = routine.outputs.iter().map(|&r| frame.d[r as usize]).collect();
+        // All others run along directions in which parameters stay.
         frame.d[..layout.time as usize].fill(0.0);
         self.rated = None;
-        run.map_err(|error| self.failure(t, error))
+        run.map(|()| slopes).map_err(|error| self.failure(t, error))
     }
 
     /// That there is no derivative.
@@ -235,6 +239,7 @@ impl Model {
         match quantity {
             Quantity::Parameter(index) => register(Some(layout.parameters + index as u32)),
             Quantity::Input(index) => register(Some(layout.inputs + index as u32)),
+            Quantity::State(index) => self.run.scales.get(index).copied().unwrap_or(0.0),
             Quantity::Start(index) => register(layout.registers.get(&self.code.program.start[index].asked).copied()),
         }
     }
@@ -260,9 +265,8 @@ impl System for Varied<'_> {
         self.model.rates(t, x, &mut dy[..n])?;
         let code = Arc::clone(&self.model.code);
         for j in 0..self.count() {
-            self.model.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), &code.rates)?;
-            for (i, &register) in code.rates.outputs.iter().enumerate() {
-                let slope = self.model.frame.d[register as usize];
+            let slopes = self.model.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), &code.rates)?;
+            for (i, slope) in slopes.into_iter().enumerate() {
                 dy[(j + 1) * n + i] = slope;
                 if !slope.is_finite() {
                     let what = format!("the rate of {} by {}", self.model.state_name(i), self.by(j));
@@ -384,9 +388,8 @@ impl Events for Varied<'_> {
         self.model.observe(t, x, &mut out[..own])?;
         let recorded = Arc::clone(&self.model.recorded);
         for j in 0..self.count() {
-            self.model.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), &recorded.routine)?;
-            for (i, &register) in recorded.routine.outputs[self.first..].iter().enumerate() {
-                let slope = self.model.frame.d[register as usize];
+            let slopes = self.model.run_varied(j, (t, x), (&s[j * n..][..n], 0.0), &recorded.routine)?;
+            for (i, &slope) in slopes[self.first..].iter().enumerate() {
                 out[own + j * each + i] = slope;
                 if !slope.is_finite() {
                     let what = format!("{} by {}", self.model.observed_name(self.first + i), self.by(j));

@@ -22,6 +22,12 @@ impl Model {
         for _ in 0..PASSES {
             let mut moved = vec![vec![0.0; z.len()]; count];
             self.vary_guessed(t, &z, &mut moved).map_err(StartError::Failure)?;
+            let by = self.variation.iter().flat_map(|variation| &variation.by);
+            for (moved, quantity) in moved.iter_mut().zip(by) {
+                if let Quantity::State(i) = *quantity {
+                    moved[i] = 1.0;
+                }
+            }
             for group in self.code.program.start_groups() {
                 self.vary_group(t, &z, &group, &mut moved)?;
             }
@@ -47,8 +53,8 @@ impl Model {
             let still = vec![0.0; self.code.program.states.len()];
             for (j, moved) in moved.iter_mut().enumerate() {
                 self.residuals(t, &routine, z, None)?;
-                self.run_placed(j, t, (&still, 0.0), &routine)?;
-                let place = -self.frame.d[routine.outputs[0] as usize] / slope;
+                let moves = self.run_placed(j, t, (&still, 0.0), &routine)?;
+                let place = -moves[0] / slope;
                 moved[guess.unknown as usize] = if place.is_finite() { place } else { 0.0 };
             }
         }
@@ -72,11 +78,10 @@ impl Model {
         let still = vec![0.0; self.code.program.states.len()];
         for (j, moved) in moved.iter_mut().enumerate() {
             self.residuals(t, &routine, z, None).map_err(StartError::Failure)?;
-            self.run_placed(j, t, (&still, 0.0), &routine).map_err(StartError::Failure)?;
+            let slopes = self.run_placed(j, t, (&still, 0.0), &routine).map_err(StartError::Failure)?;
             let quantity = self.variation.as_ref().expect("it is varied").by[j];
             let asked = |c: usize| if quantity == Quantity::Start(c) { 1.0 } else { 0.0 };
-            let slope = |i: usize| self.frame.d[routine.outputs[i] as usize] - asked(group.conditions[i]);
-            let slopes: Vec<f64> = rows.iter().map(|&i| slope(i)).collect();
+            let slopes: Vec<f64> = rows.iter().map(|&i| slopes[i] - asked(group.conditions[i])).collect();
             if unmet.iter().any(|&i| asked(group.conditions[i]) != 0.0) {
                 return Err(without(names(self, group), "the start value gives way to others that are given"));
             }
@@ -87,14 +92,9 @@ impl Model {
                 let reason = "start values leave it open how they move together: give more of them";
                 return Err(without(names(self, group), reason));
             }
-            for (row, slope) in matrix.chunks(n.max(1)).zip(&slopes) {
-                let terms = row.iter().zip(&found.step).map(|(a, s)| a * s);
-                let (sum, size) =
-                    terms.fold((*slope, slope.abs()), |(sum, size), term| (sum + term, size + term.abs()));
-                if sum.abs() > MET * size {
-                    let reason = "more start values are given than fit: what is varied would contradict the others";
-                    return Err(without(names(self, group), reason));
-                }
+            if !found.meets(&matrix, &slopes, MET) {
+                let reason = "more start values are given than fit: what is varied would contradict the others";
+                return Err(without(names(self, group), reason));
             }
             if found.rank == n {
                 group.unknowns.iter().zip(&found.step).for_each(|(&u, step)| moved[u as usize] = *step);
@@ -110,8 +110,7 @@ impl Model {
         let mut changed = false;
         for j in 0..variation.by.len() {
             let own = self.states_of(j);
-            self.run_varied(j, (t, x), (&own, self.instant_of(j)), &code.sources)?;
-            let slopes: Vec<f64> = code.sources.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
+            let slopes = self.run_varied(j, (t, x), (&own, self.instant_of(j)), &code.sources)?;
             let kinds = self.run.delays_and_samples.iter();
             let moves: Vec<bool> = kinds.map(|held| !matches!(held, DelayOrSample::Delay(_))).collect();
             let held = &mut self.variation.as_mut().expect("it is varied").held[j];
@@ -136,8 +135,7 @@ impl Model {
         let (_, jacobian) = self.at_rest(t, x)?;
         let still = vec![0.0; x.len()];
         for j in 0..self.varied_by().len() {
-            self.run_varied(j, (t, x), (&still, 0.0), &code.rates)?;
-            let slopes: Vec<f64> = code.rates.outputs.iter().map(|&r| self.frame.d[r as usize]).collect();
+            let slopes = self.run_varied(j, (t, x), (&still, 0.0), &code.rates)?;
             let found = minimum_norm::step(&jacobian, &slopes, x.len()).filter(|found| found.rank == x.len());
             let Some(found) = found else {
                 let reason =
