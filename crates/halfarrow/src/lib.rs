@@ -36,6 +36,7 @@ mod error;
 mod execution;
 mod export;
 mod families;
+mod fit;
 mod input;
 mod interface;
 #[cfg(feature = "fmu")]
@@ -73,6 +74,7 @@ pub use error::{Error, Problem};
 pub use execution::RoutineReport;
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
 pub use families::Family;
+pub use fit::{Estimate, Fit, FitParameter, FitReport};
 pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;

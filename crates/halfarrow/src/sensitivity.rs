@@ -53,7 +53,8 @@ fn quantity(system: &exec::Model, name: &str) -> Result<By, Problem> {
     let text =
         |unit: Option<&Unit>| unit.map(|unit| unit.to_si_unit().to_string()).filter(|u| u != "1").unwrap_or_default();
     let by = |quantity, unit: Option<&Unit>| By { quantity, name: name.to_string(), unit: text(unit) };
-    if let Some(variable) = name.strip_suffix("(0)") {
+    let parameter = program.parameters.iter().any(|p| p.name == name);
+    if let Some(variable) = name.strip_suffix("(0)").filter(|_| !parameter) {
         let given = || program.start.iter().enumerate().filter(|(_, c)| !c.firm);
         let unit = program.observed.iter().find(|o| o.name == variable).and_then(|o| o.unit.as_ref());
         let open = |i: &usize| program.start.iter().all(|c| !c.reads.contains(&(*i as u32)));

@@ -165,6 +165,7 @@ class Problem:
         self.model = model
         self.names = list(names)
         self.runs = list(runs)
+        self.given = model
         self.evaluations = 0
         """Runs of all experiments."""
         self.differentiated = 0
@@ -235,8 +236,9 @@ class Fit:
     ) -> None:
         self.problem = problem
         """Residuals and their derivatives."""
-        self.model = problem.model.with_parameters(dict(zip(problem.names, found.x.tolist())))
-        """The model with what was found."""
+        own = {name: value for name, value in zip(problem.names, found.x.tolist()) if not name.endswith("(0)")}
+        self.model = problem.given.with_parameters(own)
+        """The model with the parameters that were found; start values are in ``estimates`` alone."""
         self.names: list[str] = problem.names
         self.x: Array = found.x
         """The values, in SI units."""
@@ -505,10 +507,15 @@ def fit(
             spread = np.nanstd(np.concatenate([run.measured[:, k] for run, k in places]))
             for run, k in places:
                 run.sigma[:, k] = spread if spread > 0 else 1.0
+    starts = [name[: -len("(0)")] for name in params if name.endswith("(0)")]
+    given = model
+    if starts:
+        model = type(model)(model._core.with_starts(starts))
     names = [own for name in params for own in model._names.members(name)]
     ranges = np.array([_range(model, name, params.get(name, params.get(name.split("[")[0]))) for name in names])
     units = [model.parameters[name].unit or "" for name in names]
     problem = Problem(model, names, runs, options)
+    problem.given = given
     bounds = (ranges[:, 0], ranges[:, 2])
     width = np.where(np.isfinite(ranges[:, 2] - ranges[:, 0]), ranges[:, 2] - ranges[:, 0], 1.0)
     scale = np.where(ranges[:, 1] != 0, np.abs(ranges[:, 1]), width)

@@ -495,7 +495,7 @@ class Model:
 
         Args:
             data: What was measured: columns by name, with times in ``t`` in s; or several ``Experiment``, fitted at once.
-            params: What is fitted: for each parameter nothing, a first guess, ``(least, greatest)`` or
+            params: What is fitted, parameters and start values such as ``spring.q(0)``: for each nothing, a first guess, ``(least, greatest)`` or
                 ``(least, guess, greatest)``, as numbers in SI units or text with units. Where there is no guess the value of
                 the model is one.
             to: End of the runs in s; nothing: the last time of the data.
