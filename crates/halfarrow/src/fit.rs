@@ -114,8 +114,7 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
-/// A parameter as the search has it: without bounds by `value = scale · u`, between bounds by the sine of `u`. Source: James
-/// and Roos, MINUIT, Computer Physics Communications 10, 1975.
+/// A parameter as the search has it: without bounds by `value = scale · u`, between bounds by the sine of `u`. Source: [MINUIT].
 #[derive(Debug, Clone, Copy)]
 enum Range {
     Free { scale: f64 },

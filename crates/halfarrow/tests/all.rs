@@ -32,6 +32,8 @@ mod faults_start;
 mod faults_steps;
 #[path = "faults_strokes.rs"]
 mod faults_strokes;
+#[path = "fit.rs"]
+mod fit;
 #[path = "forms.rs"]
 mod forms;
 #[path = "growth.rs"]

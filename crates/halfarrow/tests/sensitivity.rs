@@ -79,12 +79,13 @@ fn height(t: f64, (g, e, h0): (f64, f64, f64)) -> [f64; 4] {
     if t < fall {
         return [h0 - 0.5 * g * t * t, 0.0, 1.0, -0.5 * t * t];
     }
-    while t > fall * (begin + 2.0 * f64::powi(e, bounces)) {
-        by_e += 2.0 * f64::from(bounces) * f64::powi(e, bounces - 1);
-        begin += 2.0 * f64::powi(e, bounces);
+    while t > fall * (begin + 2.0 * libm::pow(e, f64::from(bounces))) {
+        by_e += 2.0 * f64::from(bounces) * libm::pow(e, f64::from(bounces - 1));
+        begin += 2.0 * libm::pow(e, f64::from(bounces));
         bounces += 1;
     }
-    let (speed, speed_by_e) = (f64::powi(e, bounces), f64::from(bounces) * f64::powi(e, bounces - 1));
+    let (speed, speed_by_e) =
+        (libm::pow(e, f64::from(bounces)), f64::from(bounces) * libm::pow(e, f64::from(bounces - 1)));
     let tau = t - fall * begin;
     let falls = speed * g * fall - g * tau;
     // By the duration of the first fall.

@@ -26,7 +26,7 @@ class Sensitivities(Mapping[tuple[str, str], Array]):
     >>> drop = ha.model("model Drop\\nparam m = 2 kg\\nSe:weight(9.81 N) -> I:mass(m)\\n")
     >>> s = drop.sensitivities(["m", "mass.f(0)"], to=2, every=1)
     >>> s["mass.f", "m"].round(4), s.units["mass.f", "m"]
-    (array([-0.    , -2.4525, -4.905 ]), '(m/s)/(kg)')
+    (array([ 0.    , -2.4525, -4.905 ]), '(m/s)/(kg)')
     >>> s["mass.f", "mass.f(0)"]
     array([1., 1., 1.])
     """

@@ -1,6 +1,6 @@
 //! Events: their instant moves with what is varied, and so does what they leave (saltation). Up to the event the run moves by
 //! `s`, at its instant `τ` by `s + f⁻ dτ`; what the event makes of that is differentiated step by step as it is computed; after
-//! it the run moves by what this gives less `f⁺ dτ`. Source: Galán, Feehery, Barton, Applied Numerical Mathematics 31, 1999.
+//! it the run moves by what this gives less `f⁺ dτ`. Source: [GalanFeeheryBarton].
 
 use super::super::impulses::ImpulseBalance;
 use super::super::jumps::ConservedSums;

@@ -2,9 +2,8 @@
 //! program along directions.
 //!
 //! Beside the states `x` stand their derivatives `s = ∂x/∂θ`, with `s' = (∂f/∂x) s + ∂f/∂θ`: together one [`System`], which every
-//! method integrates as any other. Its Jacobian is given as the blocks `∂f/∂x` along its diagonal alone, as a simultaneous
-//! corrector takes it (Maly and Petzold, Applied Numerical Mathematics 20, 1996): Newton solves for the derivatives right after
-//! the states, and second derivatives are not needed. At events see [`instant`].
+//! method integrates as any other. Its Jacobian is given as the blocks `∂f/∂x` along its diagonal alone: Newton solves for the
+//! derivatives right after the states, and second derivatives are not needed. At events see [`instant`]. Source: [MalyPetzold].
 
 mod instant;
 mod start;
