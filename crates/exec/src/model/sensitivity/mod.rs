@@ -3,7 +3,7 @@
 //!
 //! Beside the states `x` stand their derivatives `s = ∂x/∂θ`, with `s' = (∂f/∂x) s + ∂f/∂θ`: together one [`System`], which every
 //! method integrates as any other. Its Jacobian is given as the blocks `∂f/∂x` along its diagonal alone: Newton solves for the
-//! derivatives right after the states, and second derivatives are not needed. At events see [`instant`]. Source: [MalyPetzold].
+//! derivatives right after the states by the same factors, and second derivatives are not needed. At events see [`instant`]. Source: [MalyPetzold].
 
 mod instant;
 mod start;
@@ -291,6 +291,11 @@ impl System for Varied<'_> {
 
     fn sparsity(&self) -> &Sparsity {
         &self.sparsity
+    }
+
+    /// One for the states, and the same for the derivatives by each quantity.
+    fn blocks(&self) -> usize {
+        self.count() + 1
     }
 
     fn jacobian(&mut self, t: f64, y: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
