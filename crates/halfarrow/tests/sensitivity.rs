@@ -149,7 +149,7 @@ fn all_models_agree_with_differences() {
         let model = Model::new(Source::open(&path).expect("a file"), &[]).expect("a model");
         let compiled = model.compile(Form::Minimal).expect("equations");
         // What is fast is at rest soon, or has met its end.
-        let short = [("electrostatic", 1e-4), ("rlc_ladder", 2e-3), ("rectifier", 0.03)];
+        let short = [("electrostatic", 1e-4), ("rlc_ladder", 2e-3), ("rectifier", 0.03), ("wave_line", 0.01)];
         let name = path.parent().and_then(|p| p.file_name()).and_then(|n| n.to_str()).unwrap_or_default();
         let to = short.iter().find(|s| s.0 == name).map_or(0.25, |s| s.1);
         let parameters = compiled.interface().parameters;
