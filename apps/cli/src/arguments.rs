@@ -86,6 +86,14 @@ Examples:
   halfarrow report car.bond --out car.html
   halfarrow report car.bond --to 10 --without-comparison --out car.html")]
     Report(Report),
+    /// Find parameters from measurements, by least squares with exact derivatives
+    #[command(after_help = "\
+The data are a CSV file with a column t and those that are compared, in the units of the variables unless its second line
+says others. A start value is fitted by the name of its variable: spring.q(0).
+Examples:
+  halfarrow fit car.bond --data test.csv --outputs travel=z_meas --params 'ks=5 kN/m:50 kN/m,b' --input road=road.csv
+  halfarrow fit car.bond --data test.csv --outputs travel=z_meas --sigma travel=1e-3 --params 'ks,b,spring.q(0)' --json")]
+    Fit(Box<Fit>),
     /// Run a model with many sets of parameters, on all cores
     #[command(after_help = "\
 Writes a row for each set: its number, its parameters, what is kept of the run, and failed = 1 where it did not come to
@@ -377,6 +385,10 @@ pub struct Simulate {
     /// Absolute error allowed in a step, in the unit of each state [default: scaled to each state]
     #[arg(long, allow_negative_numbers = true)]
     pub atol: Option<f64>,
+    /// Differentiate what is recorded by parameters, start values (`body.q(0)`) and constant inputs, exactly: columns
+    /// `d(body.f)/d(ks)`; may be repeated
+    #[arg(long, value_name = "NAMES")]
+    pub sensitivity: Vec<String>,
     /// Put positions that only speeds keep together back onto the relations between them after each step
     #[arg(long)]
     pub project: bool,
@@ -528,6 +540,49 @@ pub struct Report {
     /// Leave out the comparison of forms, which takes time
     #[arg(long)]
     pub without_comparison: bool,
+}
+
+/// `fit`.
+#[derive(Debug, Args)]
+pub struct Fit {
+    #[command(flatten)]
+    pub model: ModelArguments,
+    /// What was measured: a CSV file
+    #[arg(long, value_name = "FILE")]
+    pub data: PathBuf,
+    /// Variables with the columns that are measurements of them, as in `travel=z_meas,body.f=v_meas`; may be repeated
+    #[arg(long, value_name = "VARIABLE=COLUMN", required = true)]
+    pub outputs: Vec<String>,
+    /// Parameters to fit, with bounds where there are some, as in `ks=5e3:50e3,b`; may be repeated
+    #[arg(long, value_name = "NAMES", required = true)]
+    pub params: Vec<String>,
+    /// Standard deviations of the measurements, as in `travel=1e-3`, for all outputs [default: estimated]
+    #[arg(long, value_name = "VARIABLE=NUMBER")]
+    pub sigma: Vec<String>,
+    /// End of each run, in s [default: the last time of the data]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    pub to: Option<f64>,
+    /// The method
+    #[arg(long, default_value = "auto")]
+    pub solver: Solver,
+    /// Step of a method with fixed step, longest step of the others, in s
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    pub step: Option<f64>,
+    /// Relative error allowed in a step of a method with variable step
+    #[arg(long, default_value_t = 1e-8, allow_negative_numbers = true)]
+    pub rtol: f64,
+    /// Relative change of the sum of squares and of the parameters at which the search ends
+    #[arg(long, default_value_t = 1e-10, allow_negative_numbers = true)]
+    pub tolerance: f64,
+    /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
+    pub input: Vec<(String, String)>,
+    /// Where each run starts
+    #[arg(long, default_value = "given")]
+    pub start: Start,
+    /// What evaluates the model: bytecode, machine code, or what is sooner done. Results are the same to the last bit
+    #[arg(long, default_value = "auto")]
+    pub exec: Exec,
 }
 
 /// `sweep`.

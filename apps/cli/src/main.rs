@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Linearize(a) => commands::linearize(&a),
         Command::Simulate(a) => commands::simulate(&a),
         Command::Report(a) => commands::report(&a),
+        Command::Fit(a) => commands::fit(&a),
         Command::Sweep(a) => commands::sweep(&a),
         Command::Run(a) => commands::run(&a),
         Command::Draw(a) => commands::draw(&a),

@@ -115,6 +115,12 @@ impl Model {
         tried(py, || self.model.with(&overrides(set)).map(Model::of))
     }
 
+    /// The same model with start values of these variables as parameters.
+    fn with_starts(&self, py: Python<'_>, variables: Vec<String>) -> PyResult<Model> {
+        let variables: Vec<&str> = variables.iter().map(String::as_str).collect();
+        tried(py, || Ok(Model::of(self.model.with_starts(&variables)?)))
+    }
+
     /// What the same model can be made of elsewhere.
     fn parts(&self) -> Parts {
         let source = self.model.source();

@@ -40,6 +40,7 @@ pub type Recorded = (String, Vec<String>);
 pub struct RunOptions {
     to: f64,
     every: Option<f64>,
+    at: Vec<f64>,
     form: String,
     stiffness: Option<f64>,
     damping: Option<f64>,
@@ -51,6 +52,7 @@ pub struct RunOptions {
     minimum_norm: bool,
     start: String,
     record: Recorded,
+    sensitivities: Vec<String>,
     execution: String,
 }
 
@@ -60,6 +62,7 @@ impl RunOptions {
         Ok(Run {
             to: self.to,
             every: self.every,
+            at: self.at,
             form: form(&self.form)?,
             stiffness: self.stiffness,
             damping: self.damping,
@@ -78,6 +81,7 @@ impl RunOptions {
                 "also" => Record::Also(names),
                 other => return Err(none("record", other)),
             },
+            sensitivities: self.sensitivities,
             execution: match self.execution.as_str() {
                 "auto" => Execution::Auto,
                 "bytecode" => Execution::Bytecode,

@@ -125,6 +125,7 @@ def test_columns_are_not_copied(car: ha.Model) -> None:
     options = _options(
         to=1.0, every=0.01, method="auto", step=None, rtol=1e-6, atol=None, form="minimal", start="given",
         record=_recorded(None, ()), project=False, minimum_norm=False, stiffness=None, damping=None, execution="auto",
+        at=[], sensitivities=[],
     )  # fmt: skip
     ended = car._core.simulate(options, [], [], None)
     r = ha.Result(car, ended, 1.0)

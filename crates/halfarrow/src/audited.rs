@@ -306,8 +306,20 @@ impl Audited<'_, exec::Model> {
     /// As [`simulate`].
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     pub fn simulate(&mut self, options: &Options, x: &mut [f64], sink: &mut dyn Sink) -> Result<Summary, Stopped> {
+        let (first, recorded, count) = (self.book.names.len(), self.model.observed(), self.model.varied_by().len());
+        self.book.shown.extend(recorded..recorded + count * (recorded - first));
         let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
-        simulate(self.model, options, x, &mut sink)
+        if count == 0 {
+            return simulate(self.model, options, x, &mut sink);
+        }
+        let mut varied = exec::Varied::new(self.model, first);
+        let mut y = varied.point(x);
+        let mut done = simulate(&mut varied, options, &mut y, &mut sink);
+        x.copy_from_slice(&y[..x.len()]);
+        if let Err(Stopped { without_rates: Some((_, y)), .. }) = &mut done {
+            y.truncate(x.len());
+        }
+        done
     }
 
     /// Names the source behind rates that are not finite, if there is one.

@@ -28,6 +28,7 @@ use crate::error::{Error, Problem};
 use crate::execution::{RoutineReport, execute, executed};
 use crate::input::{Input, connect};
 use crate::model::Model;
+use crate::sensitivity::{By, column, quantities, vary, with_derivatives};
 use crate::verdict::Made;
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
@@ -38,6 +39,8 @@ pub struct Run {
     pub to: f64,
     /// Time between recorded points; `None`: every step. Start and end are always recorded.
     pub every: Option<f64>,
+    /// Times that are recorded in the place of these, in s, ascending; the end is always recorded. Empty: as `every` says.
+    pub at: Vec<f64>,
     /// The formulation.
     pub form: Form,
     /// Form `stiff`: square of the ratio of the springs' frequency to the fastest rate of the model; `None`: 1e6.
@@ -64,6 +67,10 @@ pub struct Run {
     pub start: Start,
     /// What to record.
     pub record: Record,
+    /// What the run is differentiated by: parameters, start values (`body.q(0)`: of a variable for which the model gives one,
+    /// or that starts empty) and constant inputs. The derivatives of what is recorded, exact ones, follow its columns in this
+    /// order, each by the SI unit of what it is by. In the form `minimal`.
+    pub sensitivities: Vec<String>,
     /// Bytecode or machine code. Results are the same to the last bit.
     pub execution: Execution,
 }
@@ -96,6 +103,7 @@ impl Default for Run {
         Run {
             to: 1.0,
             every: None,
+            at: Vec::new(),
             form: Form::Minimal,
             stiffness: None,
             damping: None,
@@ -108,6 +116,7 @@ impl Default for Run {
             inputs: Vec::new(),
             start: Start::Given,
             record: Record::Default,
+            sensitivities: Vec::new(),
             execution: Execution::Auto,
         }
     }
@@ -307,6 +316,8 @@ impl Model {
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
         let mut notes = choose(&mut system, &run.record)?;
         notes.extend(projected(system.program(), run)?);
+        let by = quantities(&system, run)?;
+        vary(&mut system, &by)?;
         let start = self.start(&mut system, run.start)?;
         timings.start = begun.elapsed().as_secs_f64();
         let options = options(run)?;
@@ -317,7 +328,7 @@ impl Model {
             notes.extend(advice(&system, &start, method, step));
             notes.extend(off_step(&system, step));
         }
-        self.integrate(&mut system, start, (&options, run.execution), notes, progress)
+        self.integrate(&mut system, start, (&options, run.execution, &by), notes, progress)
     }
 
     fn run_form(
@@ -328,6 +339,10 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let begun = Moment::now();
+        if !run.sensitivities.is_empty() {
+            let reason = format!("sensitivities are those of the form minimal, not {}", run.form.name());
+            return Err(Problem::BadOption { reason }.into());
+        }
         set_up(&mut system, run)?;
         let mut notes = choose(&mut system, &run.record)?;
         match explicit {
@@ -351,7 +366,7 @@ impl Model {
             cost::check(system.reference_mut(), &x, &options, recorded)?;
         }
         match explicit {
-            true => self.integrate(&mut system.into_form(), y, (&options, run.execution), notes, progress),
+            true => self.integrate(&mut system.into_form(), y, (&options, run.execution, &[]), notes, progress),
             false => self.integrate_implicit(&mut system, (y, yp), (&options, run.execution), notes, progress),
         }
     }
@@ -360,11 +375,12 @@ impl Model {
         &self,
         system: &mut exec::Model,
         mut x: Vec<f64>,
-        (options, execution): (&Options, Execution),
+        (options, execution, by): (&Options, Execution, &[By]),
         notes: Vec<String>,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
-        let mut sink = Recorder::new(system, notes, progress);
+        let mut sink = Recorder::new(system, by, notes, progress);
+        let options = &with_derivatives(system, options, by, x.len());
         let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
@@ -388,7 +404,7 @@ impl Model {
         notes: Vec<String>,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
-        let mut sink = Recorder::new(system, notes, progress);
+        let mut sink = Recorder::new(system, &[], notes, progress);
         let names: Vec<String> = (0..y.len()).map(|i| system.unknown_name(i)).collect();
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
@@ -668,6 +684,7 @@ impl<'p> Recorder<'p> {
     /// Tells what is to be known before the run.
     fn new(
         system: &impl Recording,
+        by: &[By],
         notes: Vec<String>,
         progress: &'p mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Recorder<'p> {
@@ -675,7 +692,7 @@ impl<'p> Recorder<'p> {
             // Whether to go on is asked after the first step.
             let _ = progress(Progress { time: 0.0, note: Some(note) });
         }
-        let (trace, units) = (empty_trace(system), units(system));
+        let (trace, units) = (differentiated_trace(system, by), units(system));
         Recorder { trace, units, row: Vec::new(), notes, kept: (Vec::new(), Vec::new()), progress }
     }
 
@@ -710,7 +727,13 @@ impl Sink for Recorder<'_> {
     fn sample(&mut self, t: f64, values: &[f64]) {
         let given = |(unit, &si): (&Option<Unit>, &f64)| unit.as_ref().map_or(si, |unit| unit.from_si_f64(si));
         self.row.clear();
-        self.row.extend(self.units.iter().zip(values).map(given));
+        let (own, slopes) = values.split_at(self.units.len());
+        self.row.extend(self.units.iter().zip(own).map(given));
+        // Of units that do not begin at zero the steps count.
+        let step = |(unit, &si): (&Option<Unit>, &f64)| {
+            unit.as_ref().map_or(si, |unit| unit.from_si_f64(si) - unit.from_si_f64(0.0))
+        };
+        self.row.extend(self.units.iter().cycle().zip(slopes).map(step));
         self.trace.sample(t, &self.row);
     }
     fn progress(&mut self, t: f64) -> ControlFlow<()> {
@@ -732,6 +755,13 @@ impl Sink for Recorder<'_> {
         let _ = (self.progress)(Progress { time: *time, note: Some(&note) });
         self.notes.push(note);
     }
+}
+
+/// A trace for what is recorded, and for its derivatives.
+fn differentiated_trace(system: &impl Recording, by: &[By]) -> Trace {
+    let own = empty_trace(system).columns;
+    let slopes = by.iter().flat_map(|by| own.iter().map(move |c| column(&c.name, &c.unit, by)));
+    Trace::new(own.iter().map(|c| (c.name.clone(), c.unit.clone())).chain(slopes))
 }
 
 fn empty_trace(system: &impl Recording) -> Trace {
@@ -758,6 +788,7 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
         from: 0.0,
         to: run.to,
         every: run.every,
+        at: run.at.clone(),
         step: run.step,
         rtol: run.rtol,
         atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),

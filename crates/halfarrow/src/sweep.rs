@@ -202,6 +202,10 @@ impl Model {
     }
 
     fn prepare_with(&self, mut system: exec::Model, sweep: &Sweep) -> Result<Prepared, Error> {
+        if !sweep.run.sensitivities.is_empty() {
+            let reason = "sets of a sweep are not differentiated: simulate each with its sensitivities".into();
+            return Err(Problem::BadOption { reason }.into());
+        }
         connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
         let plan = Plan::new(sweep, &system)?;
         let reducers = reducers(sweep, &mut system)?;

@@ -32,6 +32,8 @@ mod faults_start;
 mod faults_steps;
 #[path = "faults_strokes.rs"]
 mod faults_strokes;
+#[path = "fit.rs"]
+mod fit;
 #[path = "forms.rs"]
 mod forms;
 #[path = "growth.rs"]
@@ -52,6 +54,8 @@ mod planar;
 mod repeated;
 #[path = "report.rs"]
 mod report;
+#[path = "sensitivity.rs"]
+mod sensitivity;
 #[path = "set_valued.rs"]
 mod set_valued;
 #[path = "set_valued_random.rs"]

@@ -129,6 +129,15 @@ pub enum Failure {
         /// The events, as they begin in the model, each with the value that it gives.
         by: Box<[(String, f64); 2]>,
     },
+    /// A run that is differentiated comes to where there is no derivative.
+    NotDifferentiable {
+        /// When, in s.
+        time: f64,
+        /// What has none.
+        what: String,
+        /// Why.
+        reason: String,
+    },
     /// What an event asks for cannot be.
     Reset {
         /// When, in s.
@@ -252,6 +261,7 @@ impl Failure {
             | Failure::Lost { time, .. }
             | Failure::Conflict { time, .. }
             | Failure::Reset { time, .. }
+            | Failure::NotDifferentiable { time, .. }
             | Failure::NoMode { time, .. }
             | Failure::Overlap { time, .. }
             | Failure::Branch { time, .. }
@@ -281,6 +291,9 @@ impl fmt::Display for Failure {
                 "{} {what} is not a finite number: look for a division by zero, or for a value that grows without bound",
                 When(*time)
             ),
+            Failure::NotDifferentiable { time, what, reason } => {
+                write!(f, "{} {what} has no derivative: {reason}", When(*time))
+            }
             Failure::Singular { time, what } => write!(
                 f,
                 "{} the equations of {what} have no unique solution: the machine is in a singular position or a modulus vanishes there",

@@ -57,6 +57,11 @@ pub trait ImplicitSystem {
     /// Where `∂F/∂y` or `∂F/∂y'` may be nonzero, in whatever mode: one column an unknown, one row an equation.
     fn sparsity(&self) -> &Sparsity;
 
+    /// Of how many equal blocks on their diagonal `∂F/∂y` and `∂F/∂y'` are made, with nothing beside them.
+    fn blocks(&self) -> usize {
+        1
+    }
+
     /// Exact derivatives: `dy = ∂F/∂y` and `dyp = ∂F/∂y'`, each one entry for every nonzero of
     /// [`sparsity`](ImplicitSystem::sparsity), column by column, rows ascending. Entries that are 0 are written as well.
     ///

@@ -64,6 +64,8 @@ pub struct Options {
     /// Time between samples, in s; above 0. `None`: a sample after every step and on both sides of every jump. Start and
     /// end are always sampled.
     pub every: Option<f64>,
+    /// Times of the samples in the place of these, in s, ascending; the end is always sampled. Empty: as `every` says.
+    pub at: Vec<f64>,
     /// Step of a fixed-step method, in s; above 0. Only steps that end at a jump, a sample or the end are shorter.
     /// Other methods take it for the longest step, if given.
     pub step: Option<f64>,
@@ -84,6 +86,7 @@ impl Default for Options {
             from: 0.0,
             to: 1.0,
             every: None,
+            at: Vec::new(),
             step: None,
             rtol: 1e-6,
             atol: AbsoluteTolerance::Scaled,
@@ -110,6 +113,13 @@ impl Options {
         }
         if let Some(every) = self.every.filter(|&every| !(every.is_finite() && every > 0.0)) {
             return bad("every", every, "a positive time");
+        }
+        let outside = |t: &&f64| !(t.is_finite() && **t >= self.from && **t <= self.to);
+        if let Some(&time) = self.at.iter().find(outside) {
+            return bad("at", time, "a time within the run");
+        }
+        if let Some(pair) = self.at.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return bad("at", pair[1], "after the time before it");
         }
         if let Some(step) = self.step.filter(|&step| !(step.is_finite() && step > 0.0)) {
             return bad("step", step, "a positive time");

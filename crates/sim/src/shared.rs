@@ -133,6 +133,9 @@ impl System for Counted<'_> {
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }
+    fn blocks(&self) -> usize {
+        self.system.blocks()
+    }
     fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
         self.system.jacobian(t, x, values)
     }

@@ -43,7 +43,7 @@ fn fixed(
     work: &mut Work,
 ) -> Result<(), Failure> {
     loop {
-        let mut method = FixedStep::new(method, system.sparsity());
+        let mut method = FixedStep::of_blocks(method, system.sparsity(), system.blocks());
         let mut ticks = Ticks::new(&mut method, Counted::new(system), (run.options.from, step));
         let end = run.drive(&mut ticks, x);
         work.add(ticks.system().work());

@@ -35,6 +35,12 @@ impl Sparsity {
         Sparsity::from_columns((0..states).map(|_| (0..states).collect()))
     }
 
+    /// The first of so many equal blocks on the diagonal.
+    pub fn first_block(&self, blocks: usize) -> Sparsity {
+        let columns = self.states() / blocks.max(1);
+        Sparsity::from_columns((0..columns).map(|column| self.column(column).to_vec()))
+    }
+
     /// Number of columns, which is that of the rows.
     pub fn states(&self) -> usize {
         self.starts.len() - 1

@@ -44,6 +44,12 @@ pub trait System {
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 
+    /// Of how many equal blocks on its diagonal `∂f/∂x` is made, with nothing beside them: then one of them is factored for
+    /// all. The states and [`sparsity`](System::sparsity) are those of all blocks.
+    fn blocks(&self) -> usize {
+        1
+    }
+
     /// All of `∂f/∂x` at once: its nonzeros in the order of [`sparsity`](System::sparsity). False if the system has it by
     /// [`directional_derivative`](System::directional_derivative) only; then nothing is written.
     ///

@@ -57,6 +57,7 @@ fn run(arguments: &Simulate) -> Run {
     Run {
         to: arguments.to,
         every: arguments.every,
+        at: Vec::new(),
         form: form(arguments.form),
         stiffness: arguments.stiffness,
         damping: arguments.damping,
@@ -69,6 +70,7 @@ fn run(arguments: &Simulate) -> Run {
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),
+        sensitivities: all_listed(&arguments.sensitivity),
         execution: execution(arguments.exec),
     }
 }

@@ -35,6 +35,13 @@ Run it many times
 >>> s["peak"].shape
 (6,)
 
+Differentiate it, fit it
+    ``sensitivities`` are exact derivatives of a run, ``fit`` finds parameters from measurements by them:
+
+>>> d = car.sensitivities(["ks", "body.f(0)"], to=4, every=1, road=0.1)
+>>> d["travel", "ks"].shape, d.units["travel", "ks"]
+((5,), '(mm)/(N/m)')
+
 Look at it near a point
     ``linearize`` gives matrices, poles, zeros, ``bode()``, ``to_control()``:
 
@@ -77,11 +84,13 @@ from ._halfarrow import __version__
 from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
+from .fitting import Estimate, Experiment, Fit, Profile
 from .linear import Linearization
 from .loops import Loops
 from .model import Input, Model, Parameter, Variable, load, model
 from .picture import Picture
 from .result import Audit, Result
+from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
 from .sweeps import SweepResult
 
@@ -93,7 +102,10 @@ __all__ = [
     "Diagnostic",
     "Equations",
     "Error",
+    "Estimate",
+    "Experiment",
     "FileError",
+    "Fit",
     "Input",
     "Interrupted",
     "Library",
@@ -104,8 +116,10 @@ __all__ = [
     "ModelWarning",
     "Parameter",
     "Picture",
+    "Profile",
     "Result",
     "RunError",
+    "Sensitivities",
     "Snapshot",
     "Stepper",
     "SweepResult",

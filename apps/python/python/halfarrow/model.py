@@ -35,10 +35,12 @@ from ._tables import as_html, record
 from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
+from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
 from .linear import Linearization
 from .loops import Loops
 from .picture import Picture
 from .result import Result
+from .sensitivities import Sensitivities
 from .stepper import Stepper
 
 if TYPE_CHECKING:
@@ -336,6 +338,7 @@ class Model:
         to: float,
         *,
         every: float | None = None,
+        at: npt.ArrayLike | None = None,
         method: Method = "auto",
         step: float | None = None,
         rtol: float = 1e-6,
@@ -361,6 +364,7 @@ class Model:
         Args:
             to: End of the run in s; it begins at 0.
             every: Time between samples in s; nothing: every step.
+            at: Times of the samples in s, ascending, in the place of these; the end is sampled too.
             method: ``auto``, ``explicit``, ``bdf`` or ``radau`` with steps of variable length; ``euler``, ``heun``, ``rk4``,
                 ``implicit-midpoint``, ``linearly-implicit-euler`` or ``rosenbrock`` with steps of fixed length.
             step: Step of a method with fixed step in s, longest step of the others.
@@ -400,9 +404,9 @@ class Model:
         if sample is None:
             sample = every or step or to / _POINTS
         options = _options(
-            to=to, every=every, method=method, step=step, rtol=rtol, atol=atol, form=form, start=start,
+            to=to, every=every, at=_times(at), method=method, step=step, rtol=rtol, atol=atol, form=form, start=start,
             record=_recorded(record, also), project=project, minimum_norm=minimum_norm, stiffness=stiffness,
-            damping=damping, execution=execution,
+            damping=damping, execution=execution, sensitivities=[],
         )  # fmt: skip
         with Bar(progress, to, self.name, "s") as bar:
             ended = self._core.simulate(options, all_given(given, to, sample), set_values, bar.reach if bar else None)
@@ -410,6 +414,131 @@ class Model:
         result = Result(self, ended, to)
         _conclude(ended, result)
         return result
+
+    def sensitivities(
+        self,
+        by: str | Sequence[str],
+        to: float,
+        *,
+        every: float | None = None,
+        at: npt.ArrayLike | None = None,
+        method: Method = "auto",
+        step: float | None = None,
+        rtol: float = 1e-6,
+        atol: float | None = None,
+        start: Literal["given", "equilibrium"] = "given",
+        record: str | Sequence[str] | None = None,
+        also: str | Sequence[str] = (),
+        execution: Literal["auto", "bytecode", "machine"] = "auto",
+        sample: float | None = None,
+        parameters: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        progress: Any = None,
+        **values: Any,
+    ) -> Sensitivities:
+        """A trajectory and its exact derivatives: the variational equations are integrated beside the states by the same
+        method, through events, whose instants move, and through the start. The errors of derivatives are controlled as those
+        of states are.
+
+        Args:
+            by: Parameters, constant inputs, and start values such as ``body.q(0)``.
+            to, every, at, method, step, rtol, atol, start, record, also, execution, sample, parameters, inputs, progress,
+                values: As in ``simulate``; a linearly implicit method cannot be taken.
+
+        Raises:
+            UsageError: a quantity is unknown, or the model is no differentiable function of it.
+            RunError: the run stopped, or has come to where there is no derivative, which is told with time and place.
+            UnknownNameError, Interrupted: as in ``simulate``.
+
+        Warns:
+            AuditWarning, ModelWarning: as in ``simulate``.
+        """
+        set_values, given = self._split(values, parameters, inputs)
+        quantities = [by] if isinstance(by, str) else list(by)
+        options = _options(
+            to=to, every=every, at=_times(at), method=method, step=step, rtol=rtol, atol=atol, form="minimal", start=start,
+            record=_recorded(record, also), project=False, minimum_norm=False, stiffness=None, damping=None,
+            execution=execution, sensitivities=quantities,
+        )  # fmt: skip
+        sample = sample or every or step or to / _POINTS
+        with Bar(progress, to, self.name, "s") as bar:
+            ended = self._core.simulate(options, all_given(given, to, sample), set_values, bar.reach if bar else None)
+            bar.reach(ended.reached)
+        result = Result(self, ended, to)
+        _conclude(ended, result)
+        return Sensitivities(result, quantities)
+
+    def fit(
+        self,
+        data: Data | Sequence[Experiment],
+        params: Mapping[str, Bounds],
+        *,
+        to: float | None = None,
+        outputs: Mapping[str, str] | None = None,
+        sigma: Mapping[str, Any] | None = None,
+        start: int = 1,
+        begin: Literal["given", "equilibrium"] = "given",
+        loss: Loss = "linear",
+        f_scale: float = 1.0,
+        method: Method = "auto",
+        step: float | None = None,
+        rtol: float = 1e-8,
+        tolerance: float = 1e-10,
+        most: int | None = None,
+        seed: int = 0,
+        parameters: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        **values: Any,
+    ) -> Fit:
+        """Fits parameters to measurements by least squares with exact derivatives: ``scipy.optimize.least_squares``, a
+        trust-region method with bounds. Standard errors, correlations and what the data do not tell come with it.
+
+        Args:
+            data: What was measured: columns by name, with times in ``t`` in s; or several ``Experiment``, fitted at once.
+            params: What is fitted, parameters and start values such as ``spring.q(0)``: for each nothing, a first guess, ``(least, greatest)`` or
+                ``(least, guess, greatest)``, as numbers in SI units or text with units. Where there is no guess the value of
+                the model is one.
+            to: End of the runs in s; nothing: the last time of the data.
+            outputs: Columns by the variables that they are measurements of, in the units of these variables.
+            sigma: Standard deviations of the measurements by variable: a number, or the name of a column. Nothing: one
+                variance is estimated, of which each output has a part by the spread of what was measured.
+            start: From how many points it is searched: from the guesses, then from a Latin hypercube in the bounds; where
+                there are none, between a tenth and ten times the guess.
+            begin: Where runs begin, ``given`` or ``equilibrium``.
+            loss, f_scale: What outliers count, as in SciPy: ``linear``, ``soft_l1``, ``huber``, ``cauchy``, ``arctan``.
+            method, step, rtol: As in ``simulate``.
+            tolerance: Relative changes at which the search ends.
+            most: Evaluations at most from each point.
+            seed: Of the points from which it is searched.
+            parameters, inputs, values: As in ``simulate``; an input that is given the name of a column is that column.
+
+        Raises:
+            UsageError: the data do not fit together, or the model is no differentiable function of a parameter.
+            UnknownNameError: there is no parameter, variable or column of a name.
+            RunError: the model does not run from any of the points.
+
+        >>> import halfarrow as ha
+        >>> import numpy as np
+        >>> drop = ha.model("model Drop\\nparam m = 1 kg, b = 1 N.s/m\\nSe:weight(9.81 N) -> 1:v -> I:mass(m)\\nv -> R:drag(b)\\n")
+        >>> t = np.linspace(0, 4, 41)
+        >>> f = drop.fit({"t": t, "v": 9.81 / 3 * (1 - np.exp(-3 / 2 * t))}, {"m": (0.1, 10), "b": None}, outputs={"mass.f": "v"})
+        >>> round(f["m"], 6), round(f["b"], 6), f.rank
+        (2.0, 3.0, 2)
+        """
+        set_values, given = self._split(values, parameters, inputs)
+        experiments = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [Experiment(data)]
+        for experiment in experiments:
+            if not isinstance(experiment, Experiment):
+                raise UsageError("several sets of data are given as a list of `halfarrow.Experiment`")
+        shared = [
+            dataclasses.replace(e, inputs={**given, **e.inputs}, parameters={**dict(set_values), **e.parameters})
+            for e in experiments
+        ]
+        options: dict[str, Any] = {"method": choice("method", method, _METHODS), "step": step, "rtol": rtol}
+        options["start"] = _start(begin)
+        return fit(
+            self, shared, params, outputs or {}, sigma or {}, to, start, loss, f_scale, tolerance, most, seed, options
+        )
 
     def linearize(
         self,
@@ -507,7 +636,8 @@ class Model:
         several, given = self._several(values, parameters, inputs)
         table = _samples(samples)
         options = _options(
-            to=to, every=every, method=method or ("auto" if step is None else "rk4"), step=step, rtol=rtol, atol=None,
+            to=to, every=every, at=[], sensitivities=[], method=method or ("auto" if step is None else "rk4"), step=step,
+            rtol=rtol, atol=None,
             form="minimal", start=start, record=_recorded(record, also), project=False, minimum_norm=False, stiffness=None,
             damping=None, execution=execution,
         )  # fmt: skip
@@ -785,6 +915,11 @@ def _options(**options: Any) -> dict[str, Any]:
     choice("execution", options["execution"], ("auto", "bytecode", "machine"))
     _start(options["start"])
     return options
+
+
+def _times(at: npt.ArrayLike | None) -> list[float]:
+    """Times of samples as the compiled part takes them."""
+    return [] if at is None else np.atleast_1d(np.asarray(at, dtype=np.float64)).tolist()
 
 
 def _start(start: str) -> str:

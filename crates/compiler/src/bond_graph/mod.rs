@@ -42,6 +42,7 @@ mod recognise;
 mod repeat;
 mod scope;
 mod set_valued;
+mod start_parameters;
 mod structure;
 mod symbols;
 mod turns;

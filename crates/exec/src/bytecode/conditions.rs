@@ -98,6 +98,11 @@ impl Conditions {
         value
     }
 
+    /// Whether an operand has left the side that is held.
+    pub fn has_left(&self, condition: ConditionId, operand: f64, tables: &[Table1d]) -> bool {
+        follow(self.kinds[condition.0 as usize], operand, tables) != self.held[condition.0 as usize]
+    }
+
     /// Holds this value from now on.
     pub fn take(&mut self, condition: ConditionId, value: f64) {
         self.held[condition.0 as usize] = value;

@@ -56,6 +56,8 @@ pub(crate) struct Frame {
     pub(super) terms: Vec<f64>,
     /// Set values of parameters.
     pub set: Vec<Option<f64>>,
+    /// The parameter whose derivative by itself is 1, where routines run along parameters.
+    pub varied: Option<u32>,
     pub tables: Vec<Table1d>,
     pub(super) time: u32,
     /// The code of the Newton block that is being solved, where it is not to be interpreted.
@@ -112,6 +114,7 @@ impl Frame {
             conditions: Conditions::new(program.conditions.values()),
             solvers: program.blocks.values().map(solver).collect(),
             set: vec![None; program.parameters.len()],
+            varied: None,
             tables: program.tables.clone(),
             time: layout.time,
             inner: None,
@@ -149,6 +152,11 @@ impl Frame {
         }
     }
 
+    /// A value and its derivative.
+    pub fn pair(&self, register: u32) -> (f64, f64) {
+        (self.r[register as usize], self.d[register as usize])
+    }
+
     /// Runs a routine.
     pub fn run(&mut self, routine: &Routine) -> Result<(), SolveError> {
         self.all::<false>(routine)
@@ -176,8 +184,13 @@ impl Frame {
                     }
                 }
                 Instruction::Parameter { out, index, default } => {
-                    let value = self.set[*index as usize].unwrap_or(self.r[*default as usize]);
-                    self.put::<ALONG>(*out, value, 0.0);
+                    let set = self.set[*index as usize];
+                    let rate = match set {
+                        _ if self.varied == Some(*index) => 1.0,
+                        Some(_) => 0.0,
+                        None => self.d[*default as usize],
+                    };
+                    self.put::<ALONG>(*out, set.unwrap_or(self.r[*default as usize]), rate);
                 }
             }
         }

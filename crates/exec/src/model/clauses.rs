@@ -371,6 +371,12 @@ impl Model {
                 }
                 self.events.values[code.clauses.first[i] + k] = value;
             }
+            if self.variation.is_some() {
+                let actions = code.program.clauses[i].actions.len();
+                let still = code.clauses.still[i].filter(|_| self.events.at_rest[i]).map(|_| actions);
+                let outputs: Vec<usize> = (0..actions).map(|k| still.unwrap_or(k)).collect();
+                self.vary_values(t, x, routine, (code.clauses.first[i], &outputs))?;
+            }
         }
         Ok(())
     }
@@ -408,6 +414,7 @@ impl Model {
         let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
         let work = std::mem::take(&mut self.events);
         for (_, at, action) in Model::actions(&code, &work) {
+            self.vary_change(action.target, at);
             match action.target {
                 Target::Discrete(i) => {
                     self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at])

@@ -34,6 +34,11 @@ impl Clock {
         &self.routine
     }
 
+    /// The conditions, in the order of the outputs of the routine.
+    pub fn conditions(&self) -> impl Iterator<Item = ConditionId> + '_ {
+        self.conditions.iter().map(|c| c.0)
+    }
+
     /// Takes all of them as they are just after `t`, and finds the next time event: when the first of them changes, in s.
     pub fn handle_time_event(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
         if self.conditions.is_empty() {

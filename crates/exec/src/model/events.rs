@@ -106,6 +106,7 @@ impl Model {
                     sample.value = value;
                     sample.pass(t);
                 }
+                self.vary_sample(t, x, i)?;
             }
         }
         Ok(())
@@ -157,6 +158,7 @@ impl Model {
         self.code.clock.handle_time_event(&mut self.frame, t, &mut self.run.clock_event);
         if !self.run.begun {
             self.begin_delays_and_samples(t, x)?;
+            self.vary_begin(t, x)?;
             self.run.begun = true;
             self.note_compared(t, x)?;
             self.take_signs(t, x)?;

@@ -175,6 +175,9 @@ impl Model {
 
     /// Changes the mode: code and registers, with parameters and inputs as they are set.
     pub(super) fn enter(&mut self, mode: ModeId) -> Result<(), Failure> {
+        if self.variation.is_some() && mode != self.run.mode {
+            return Err(self.undifferentiated_mode(self.run.crossed, std::iter::empty()));
+        }
         let code = self.compiled.mode(mode);
         let names: Vec<&str> =
             self.recorded.chosen.iter().map(|&i| self.code.program.observed[i].name.as_str()).collect();

@@ -3,7 +3,7 @@
 
 use super::impulse_elimination::Elimination;
 use super::{DelayOrSample, Model};
-use crate::bytecode::{Layout, Routine};
+use crate::bytecode::{Frame, Layout, Routine};
 use halfarrow_compiler::program::{Jumps, Program, Target, Value};
 use halfarrow_sim::Failure;
 
@@ -58,6 +58,8 @@ struct Asked {
     output: usize,
     value: f64,
     impulse: usize,
+    /// The place of the value among those of all actions.
+    at: usize,
 }
 
 impl ImpulseBalance {
@@ -84,8 +86,56 @@ impl ImpulseBalance {
         self.jumps.leaps
     }
 
-    fn unknowns(&self) -> usize {
+    pub fn unknowns(&self) -> usize {
         self.jumps.unknowns.len()
+    }
+
+    /// Which unknowns there are: states and, after them, conserved constants.
+    pub fn unknown_numbers(&self) -> &[u32] {
+        &self.jumps.unknowns
+    }
+
+    /// Computes what storages keep.
+    pub fn stored(&self) -> &Routine {
+        &self.stored
+    }
+
+    /// Computes all that balances are made of.
+    pub fn all(&self) -> &Routine {
+        &self.all
+    }
+
+    /// Derivatives of the residuals along a direction along which what [`all`](ImpulseBalance::all) gives moves by `moves`, what
+    /// storages kept before by `before` and the new values of actions by `values`; impulses stay.
+    pub fn residuals_along(
+        &self,
+        work: &ImpulseWork,
+        (frame, moves): (&Frame, &[f64]),
+        before: &[f64],
+        values: &[f64],
+    ) -> Vec<f64> {
+        let at = |output: usize| (frame.r[self.all.outputs[output] as usize], moves[output]);
+        let mut factor = self.jumps.stored.len();
+        let mut slopes = Vec::with_capacity(self.jumps.balances.len() + work.asked.len());
+        for terms in &self.jumps.balances {
+            let mut slope = 0.0;
+            for &(k, _) in terms {
+                let ((c, dc), (stored, change)) = (at(factor), at(k as usize));
+                slope += c * (change - before[k as usize]) + dc * (stored - work.stored[k as usize]);
+                factor += 1;
+            }
+            slopes.push(slope);
+        }
+        for (i, impulse) in self.jumps.impulses.iter().enumerate() {
+            let place = work.asked.iter().position(|a| a.impulse == i);
+            for &(row, _) in &impulse.along {
+                let (_, dc) = at(factor);
+                factor += 1;
+                slopes[row as usize] -= place.map_or(0.0, |place| dc * work.impulses[place]);
+            }
+        }
+        slopes.extend(work.asked.iter().map(|a| at(a.output).1 - values[a.at]));
+        slopes
     }
 
     pub fn work(&self) -> ImpulseWork {
@@ -109,6 +159,21 @@ impl ImpulseWork {
         &self.stored
     }
 
+    /// The equations as they were computed last.
+    pub fn equations(&self) -> &Elimination {
+        &self.equations
+    }
+
+    /// How many resets are asked for.
+    pub fn resets(&self) -> usize {
+        self.asked.len()
+    }
+
+    /// The held signals that tell the impulses of what is asked for.
+    pub fn asked_impulses<'w>(&'w self, balance: &'w ImpulseBalance) -> impl Iterator<Item = usize> + 'w {
+        self.asked.iter().map(|a| balance.jumps.impulses[a.impulse].held as usize)
+    }
+
     /// Notes it.
     pub fn keep_stored(&mut self, stored: &[f64]) {
         self.stored.copy_from_slice(stored);
@@ -125,7 +190,7 @@ impl Model {
         let Model { events, frame, .. } = self;
         let outputs = balance.stored.outputs.iter();
         events.impulses.stored.iter_mut().zip(outputs).for_each(|(stored, &r)| *stored = frame.r[r as usize]);
-        Ok(())
+        self.vary_stored(t, x, balance)
     }
 
     /// Gives states and conserved constants the values after the round, and tells the impulses; those of one instant add up,
@@ -150,7 +215,7 @@ impl Model {
                 *value += p;
             }
         }
-        Ok(())
+        self.vary_balance(t, x, balance, (true, first))
     }
 
     /// Gives states and conserved constants the values after ratios have leapt; whether any has changed.
@@ -161,7 +226,9 @@ impl Model {
         work.asked.clear();
         let done = self.solve_balance(t, x, balance, &mut work);
         self.events.impulses = work;
-        done?.ok_or_else(|| self.dependent_resets(t))
+        let moved = done?.ok_or_else(|| self.dependent_resets(t))?;
+        self.vary_balance(t, x, balance, (false, false))?;
+        Ok(moved)
     }
 
     /// Shares out the impulses of resets and of contacts: `0 <= P`, `0 <= v+ - target`, one of them zero, for each contact.
@@ -353,7 +420,7 @@ impl Model {
             let Target::Moved { what, impulse } = action.target else { continue };
             let output = first + balance.moved.binary_search(&what).expect("it is among what resets change");
             if asked.iter().all(|a| a.output != output) {
-                asked.push(Asked { output, value: self.events.values[at], impulse: impulse as usize });
+                asked.push(Asked { output, value: self.events.values[at], impulse: impulse as usize, at });
             }
         }
     }
@@ -367,7 +434,13 @@ impl Model {
     }
 
     /// Residuals of balances and resets, with their derivatives by the unknowns and by the impulses, and with what they add up.
-    fn balanced(&mut self, t: f64, x: &[f64], balance: &ImpulseBalance, work: &mut ImpulseWork) -> Result<(), Failure> {
+    pub(super) fn balanced(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        balance: &ImpulseBalance,
+        work: &mut ImpulseWork,
+    ) -> Result<(), Failure> {
         let jumps = &balance.jumps;
         let ImpulseWork { stored: before, asked, impulses, equations, sizes, greatest, kept, been } = work;
         let (n, m) = (balance.unknowns(), balance.unknowns() + asked.len());

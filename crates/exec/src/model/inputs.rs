@@ -41,6 +41,11 @@ impl InputSignal {
         self.default = value;
     }
 
+    /// Whether it has one value at all times.
+    pub fn is_constant(&self) -> bool {
+        self.times.len() <= 1
+    }
+
     /// Whether something is connected.
     pub fn moves(&self) -> bool {
         !self.times.is_empty()
@@ -87,6 +92,11 @@ impl InputSignal {
     pub fn next_corner(&self, t: f64) -> Option<f64> {
         let after = self.times.partition_point(|&p| p <= t);
         (after..self.times.len()).find(|&k| self.is_corner(k)).map(|k| self.times[k])
+    }
+
+    /// Whether it bends or jumps at `t`.
+    pub fn is_corner_at(&self, t: f64) -> bool {
+        (0..self.times.len()).any(|k| self.times[k] == t && self.is_corner(k))
     }
 
     /// Whether it jumps at `t`: two points stand there.

@@ -29,6 +29,11 @@ impl ConservedSums {
     pub fn routine(&self) -> &Routine {
         &self.sums
     }
+
+    /// The states that jump.
+    pub fn states(&self) -> &[usize] {
+        &self.states
+    }
 }
 
 impl Model {
@@ -38,14 +43,18 @@ impl Model {
         let Some(kept) = &code.kept else { return Ok(Vec::new()) };
         self.place(t, x);
         self.frame.run(&kept.sums).map_err(|error| self.failure(t, error))?;
-        Ok(kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect())
+        let sums = kept.sums.outputs.iter().map(|&r| self.frame.r[r as usize]).collect();
+        self.vary_sums(t, x, kept)?;
+        Ok(sums)
     }
 
     /// Gives the states that jump the values at which the sums in the present mode are what they were; whether any moved.
     pub(super) fn conserve_sums(&mut self, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {
         let code = self.code.clone();
         let Some(kept) = &code.kept else { return Ok(false) };
-        self.solve_sums(kept, t, x, before)
+        let moved = self.solve_sums(kept, t, x, before)?;
+        self.vary_conserved(t, x, kept)?;
+        Ok(moved)
     }
 
     fn solve_sums(&mut self, kept: &ConservedSums, t: f64, x: &mut [f64], before: &[f64]) -> Result<bool, Failure> {

@@ -17,6 +17,19 @@ pub(super) struct MinimumNormStep {
     pub weights: Vec<f64>,
 }
 
+impl MinimumNormStep {
+    /// Whether it removes the residuals, each in its weight, but for this part of the greatest.
+    pub fn meets(&self, jacobian: &[f64], residual: &[f64], part: f64) -> bool {
+        let weighed = |i: usize, value: f64| (value * self.weights[i]).abs();
+        let most = residual.iter().enumerate().fold(0.0f64, |most, (i, r)| most.max(weighed(i, *r)));
+        let left = |i: usize| {
+            let row = &jacobian[i * self.step.len()..][..self.step.len()];
+            residual[i] + row.iter().zip(&self.step).map(|(a, s)| a * s).sum::<f64>()
+        };
+        (0..residual.len()).all(|i| weighed(i, left(i)) <= part * most)
+    }
+}
+
 /// Computes it; `jacobian` row by row. `None` if something is not finite or the singular values do not come out.
 pub(super) fn step(jacobian: &[f64], residual: &[f64], columns: usize) -> Option<MinimumNormStep> {
     let rows = residual.len();

@@ -27,6 +27,7 @@ mod operations;
 mod positions;
 mod projection;
 mod recorded;
+mod sensitivity;
 mod setup;
 mod shares;
 mod start;
@@ -41,6 +42,7 @@ pub use linear::Linearised;
 pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
 pub use operations::Operations;
+pub use sensitivity::{Quantity, Varied};
 pub use setup::Setup;
 pub use wide::WideModel;
 
@@ -78,6 +80,8 @@ pub struct Model {
     projection: Option<Projection>,
     /// How reactions that are not unique are shared where they are recorded, if anybody asks for it.
     shares: Option<Box<Shares>>,
+    /// How all that the run carries moves with some quantities, if anybody asks for it.
+    variation: Option<Box<sensitivity::Variation>>,
     /// Whether another form of the model tells what happens at events.
     led: bool,
     /// Whether somebody asks for the scales: explicit methods of fixed step do not.
@@ -147,6 +151,7 @@ impl Model {
             events: EventWork::of(&code),
             projection: None,
             shares: None,
+            variation: None,
             led: false,
             scaled: true,
             dx: vec![0.0; n],
@@ -311,6 +316,7 @@ impl Model {
         if self.run.mode != ModeId::default() {
             self.enter(ModeId::default())?;
         }
+        self.variation = None;
         self.frame.set.clone_from(&self.setup.parameters);
         self.frame.parameters_changed();
         self.forget_solutions();

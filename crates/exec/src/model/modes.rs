@@ -78,6 +78,9 @@ impl Model {
         if ended.is_empty() {
             return Ok(false);
         }
+        if self.variation.is_some() {
+            return Err(self.undifferentiated_mode(t, ended.iter().map(|e| e.0)));
+        }
         self.take_stored(t, x)?;
         let stored = self.stored_now();
         let values = self.values_of_all(t, x)?;

@@ -71,6 +71,7 @@ impl Model {
         if self.scaled {
             self.run.scales = self.magnitudes(t, &x);
         }
+        self.vary_start(t, &x)?;
         Ok(x)
     }
 
@@ -306,7 +307,7 @@ impl Model {
     }
 
     /// Indices of the group's conditions that do not hold.
-    fn unmet(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
+    pub(super) fn unmet(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
         let n = group.unknowns.len();
         let asked = |i: usize| {
             let register = self.code.layout.registers.get(&self.code.program.start[group.conditions[i]].asked);
@@ -400,7 +401,7 @@ impl Model {
     }
 
     /// The names of unknowns: states, then conserved constants, then positions.
-    fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
+    pub(super) fn names_of(&self, unknowns: impl Iterator<Item = u32>) -> Vec<String> {
         let Program { states, conserved, positions, .. } = &self.code.program;
         let names = states.iter().map(|s| &s.name).chain(conserved).chain(positions.iter().map(|p| &p.name));
         let names: Vec<&String> = names.collect();
@@ -544,7 +545,13 @@ impl Model {
     }
 
     /// The residuals and their Jacobian by the unknowns of the group, row by row; `None` where one is not finite.
-    fn linearised(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    pub(super) fn linearised(
+        &mut self,
+        t: f64,
+        routine: &Routine,
+        group: &StartGroup,
+        z: &[f64],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
         let (rows, columns) = (group.conditions.len(), group.unknowns.len());
         let mut jacobian = vec![0.0; rows * columns];
         if columns == 0 {
@@ -562,7 +569,13 @@ impl Model {
     }
 
     /// Runs a routine at the start, with directional derivatives along the given unknowns.
-    fn residuals(&mut self, t: f64, routine: &Routine, z: &[f64], along: Option<&[usize]>) -> Result<(), Failure> {
+    pub(super) fn residuals(
+        &mut self,
+        t: f64,
+        routine: &Routine,
+        z: &[f64],
+        along: Option<&[usize]>,
+    ) -> Result<(), Failure> {
         let states = self.code.program.states.len();
         let constants = states + self.run.conserved.len();
         if z.len() > constants || self.code.program.positions.is_empty() {
@@ -590,7 +603,7 @@ impl Model {
         run.map_err(|error| self.failure(t, error))
     }
 
-    fn start_routine(&mut self, wanted: &[Value]) -> Routine {
+    pub(super) fn start_routine(&mut self, wanted: &[Value]) -> Routine {
         let routine = self.code.layout.start_routine(&self.code.program, wanted);
         self.frame.reserve(&routine);
         routine

@@ -10,17 +10,28 @@ pub fn tick(from: f64, every: f64, index: f64) -> f64 {
     from + if whole { index / per_second } else { index * every }
 }
 
-/// The [`tick`]s, walked through in order.
+/// The [`tick`]s, or given times, walked through in order.
 pub(crate) struct Grid {
     from: f64,
+    /// Time between ticks; the least between given times.
     every: f64,
     next: f64,
     index: f64,
+    /// Given times, and the place of the next one.
+    given: Option<(Vec<f64>, usize)>,
 }
 
 impl Grid {
     pub(crate) fn new(from: f64, every: f64) -> Grid {
-        Grid { from, every, next: from, index: 0.0 }
+        Grid { from, every, next: from, index: 0.0, given: None }
+    }
+
+    /// These times, which ascend.
+    pub(crate) fn at(times: Vec<f64>) -> Grid {
+        let least = times.windows(2).map(|t| t[1] - t[0]).fold(f64::INFINITY, f64::min);
+        let every = if least.is_finite() { least } else { 0.0 };
+        let next = times.first().copied().unwrap_or(f64::INFINITY);
+        Grid { from: next, every, next, index: 0.0, given: Some((times, 0)) }
     }
 
     /// The first time not yet passed.
@@ -40,6 +51,12 @@ impl Grid {
 
     /// Passes all times up to `t`.
     pub(crate) fn pass(&mut self, t: f64) {
+        let slack = self.slack();
+        if let Some((times, next)) = &mut self.given {
+            *next += times[*next..].iter().take_while(|time| **time <= t + slack).count();
+            self.next = times.get(*next).copied().unwrap_or(f64::INFINITY);
+            return;
+        }
         while self.is_due(t) {
             self.index = (self.index + 1.0).max(((t - self.from) / self.every).floor());
             self.next = tick(self.from, self.every, self.index);
@@ -60,6 +77,17 @@ mod tests {
             grid.pass(grid.next());
         }
         assert_eq!(times, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1]);
+    }
+
+    #[test]
+    fn given_times_are_walked_through() {
+        let mut grid = Grid::at(vec![0.1, 0.3, 0.35, 2.0]);
+        let mut times = vec![];
+        while grid.next().is_finite() {
+            times.push(grid.next());
+            grid.pass(grid.next() - 1e-12);
+        }
+        assert_eq!(times, [0.1, 0.3, 0.35, 2.0]);
     }
 
     #[test]

@@ -76,7 +76,11 @@ impl<'a> Run<'a> {
             watched: sink.watches(),
             seen: None,
             sink,
-            samples: options.every.map_or(Samples::EveryStep, |every| Samples::Grid(Grid::new(options.from, every))),
+            samples: match options.every {
+                _ if !options.at.is_empty() => Samples::Grid(Grid::at(options.at.clone())),
+                None => Samples::EveryStep,
+                Some(every) => Samples::Grid(Grid::new(options.from, every)),
+            },
             values: vec![0.0; events.observed()],
             inside: Vec::new(),
             handled: false,

@@ -21,10 +21,10 @@ pub(super) struct ImplicitMidpoint {
 }
 
 impl ImplicitMidpoint {
-    pub(super) fn new(sparsity: &Sparsity) -> ImplicitMidpoint {
+    pub(super) fn new(sparsity: &Sparsity, blocks: usize) -> ImplicitMidpoint {
         let states = sparsity.states();
         ImplicitMidpoint {
-            matrix: StepMatrix::new(sparsity),
+            matrix: StepMatrix::new(sparsity, blocks),
             middle: vec![0.0; states],
             rates: vec![0.0; states],
             sizes: vec![0.0; states],

@@ -14,6 +14,8 @@ const FULL: f64 = 0.25;
 /// needs its rows exchanged.
 pub(super) struct StepMatrix {
     jacobian: Jacobian,
+    /// Rows of one of the equal blocks on the diagonal.
+    block: usize,
     factors: Factors,
 }
 
@@ -23,11 +25,15 @@ enum Factors {
 }
 
 impl StepMatrix {
-    pub(super) fn new(sparsity: &Sparsity) -> StepMatrix {
+    /// For a pattern of so many equal blocks on the diagonal, of which one is factored.
+    pub(super) fn new(sparsity: &Sparsity, blocks: usize) -> StepMatrix {
+        let jacobian = Jacobian::new(sparsity);
+        let sparsity = &sparsity.first_block(blocks);
         let states = sparsity.states();
         let is_full = sparsity.nonzeros() as f64 > FULL * (states * states) as f64;
         StepMatrix {
-            jacobian: Jacobian::new(sparsity),
+            jacobian,
+            block: states,
             factors: match states > LARGEST_DENSE && !is_full {
                 true => Factors::Sparse(Box::new(Sparse::new(sparsity))),
                 false => Factors::Dense(Lu::new(states)),
@@ -51,11 +57,14 @@ impl StepMatrix {
             time: t,
             what: state.map_or("the step".into(), |state| format!("the step of {}", system.state_name(state))),
         };
+        let block = self.block;
         match &mut self.factors {
             Factors::Dense(matrix) => {
                 matrix.set_unit();
                 self.jacobian.visit(system, t, x, |row, column, _, value| {
-                    matrix.add(row, column, -factor * value);
+                    if column < block {
+                        matrix.add(row, column, -factor * value);
+                    }
                     see(row, column, value);
                 })?;
                 matrix.factor().map_err(|column| singular(Some(column), system))
@@ -63,7 +72,9 @@ impl StepMatrix {
             Factors::Sparse(sparse) => {
                 sparse.set_unit();
                 self.jacobian.visit(system, t, x, |row, column, place, value| {
-                    sparse.add(place, -factor * value);
+                    if column < block {
+                        sparse.add(place, -factor * value);
+                    }
                     see(row, column, value);
                 })?;
                 sparse.lu.factor().then_some(()).ok_or_else(|| singular(None, system))
@@ -73,9 +84,11 @@ impl StepMatrix {
 
     /// Replaces `b` by the solution.
     pub(super) fn solve(&mut self, b: &mut [f64]) {
-        match &mut self.factors {
-            Factors::Dense(matrix) => matrix.solve(b),
-            Factors::Sparse(sparse) => sparse.lu.solve(b),
+        for b in b.chunks_mut(self.block.max(1)) {
+            match &mut self.factors {
+                Factors::Dense(matrix) => matrix.solve(b),
+                Factors::Sparse(sparse) => sparse.lu.solve(b),
+            }
         }
     }
 }

@@ -92,11 +92,11 @@ impl FixedMethod {
         }
     }
 
-    fn implicit(self, sparsity: &Sparsity) -> Option<Implicit> {
+    fn implicit(self, sparsity: &Sparsity, blocks: usize) -> Option<Implicit> {
         let linearly = |method: &'static Rosenbrock| Implicit::Linearly(LinearlyImplicit::new(method, sparsity));
         match self {
             FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4 => None,
-            FixedMethod::ImplicitMidpoint => Some(Implicit::Midpoint(ImplicitMidpoint::new(sparsity))),
+            FixedMethod::ImplicitMidpoint => Some(Implicit::Midpoint(ImplicitMidpoint::new(sparsity, blocks))),
             FixedMethod::LinearlyImplicitEuler => Some(linearly(&LINEARLY_IMPLICIT_EULER)),
             FixedMethod::Rosenbrock => Some(linearly(&RODAS3)),
         }
@@ -106,12 +106,17 @@ impl FixedMethod {
 impl FixedStep {
     /// A method for systems whose Jacobian has this pattern.
     pub fn new(method: FixedMethod, sparsity: &Sparsity) -> FixedStep {
+        FixedStep::of_blocks(method, sparsity, 1)
+    }
+
+    /// The same where the Jacobian is made of so many equal blocks on its diagonal.
+    pub fn of_blocks(method: FixedMethod, sparsity: &Sparsity, blocks: usize) -> FixedStep {
         let tableau = method.tableau();
         FixedStep {
             tableau,
             stages: vec![0.0; tableau.map_or(0, |tableau| tableau.nodes.len()) * sparsity.states()],
             trial: vec![0.0; sparsity.states()],
-            implicit: method.implicit(sparsity),
+            implicit: method.implicit(sparsity, blocks),
         }
     }
 

@@ -63,7 +63,7 @@ impl LinearlyImplicit {
         let states = sparsity.states();
         LinearlyImplicit {
             method,
-            matrix: StepMatrix::new(sparsity),
+            matrix: StepMatrix::new(sparsity, 1),
             stages: vec![0.0; method.nodes.len() * states],
             rates: vec![0.0; states],
             time_derivative: vec![0.0; states],

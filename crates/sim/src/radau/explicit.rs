@@ -60,6 +60,9 @@ impl ImplicitSystem for Explicit<'_> {
     fn sparsity(&self) -> &Sparsity {
         &self.sparsity
     }
+    fn blocks(&self) -> usize {
+        self.shared.system().blocks()
+    }
     fn jacobian(&mut self, t: f64, y: &[f64], _: &[f64], dy: &mut [f64], dyp: &mut [f64]) -> Result<(), Failure> {
         dy.fill(0.0);
         dyp.fill(0.0);

@@ -45,7 +45,9 @@ pub(super) struct NoPivot {
 }
 
 impl Matrices {
-    pub(super) fn new(pattern: &Sparsity) -> Matrices {
+    /// For a pattern of so many equal blocks on the diagonal, of which one is factored.
+    pub(super) fn new(pattern: &Sparsity, blocks: usize) -> Matrices {
+        let pattern = &pattern.first_block(blocks);
         let size = pattern.states();
         let is_full = pattern.nonzeros() as f64 > FULL * (size * size) as f64;
         let factors = match size > LARGEST_DENSE && !is_full {
@@ -105,11 +107,22 @@ impl Matrices {
 
     /// Reciprocal of what an equation adds up.
     pub(super) fn row_factor(&self, row: usize) -> f64 {
-        self.rows[row]
+        self.rows[row % self.rows.len()]
     }
 
     /// Replaces `b` by the solution of the real equations.
     pub(super) fn solve_real(&mut self, b: &mut [f64]) {
+        let size = self.rows.len().max(1);
+        b.chunks_mut(size).for_each(|b| self.solve_real_block(b));
+    }
+
+    /// Replaces `re + i im` by the solution of the complex equations.
+    pub(super) fn solve_complex(&mut self, re: &mut [f64], im: &mut [f64]) {
+        let size = self.rows.len().max(1);
+        re.chunks_mut(size).zip(im.chunks_mut(size)).for_each(|(re, im)| self.solve_complex_block(re, im));
+    }
+
+    fn solve_real_block(&mut self, b: &mut [f64]) {
         b.iter_mut().zip(&self.rows).for_each(|(b, row)| *b *= row);
         match &mut self.factors {
             Factors::Dense { real, .. } => real.solve(b),
@@ -118,8 +131,7 @@ impl Matrices {
         b.iter_mut().zip(&self.columns).for_each(|(b, column)| *b *= column);
     }
 
-    /// Replaces `re + i im` by the solution of the complex equations.
-    pub(super) fn solve_complex(&mut self, re: &mut [f64], im: &mut [f64]) {
+    fn solve_complex_block(&mut self, re: &mut [f64], im: &mut [f64]) {
         let scale = |b: &mut [f64], by: &[f64]| b.iter_mut().zip(by).for_each(|(b, by)| *b *= by);
         scale(re, &self.rows);
         scale(im, &self.rows);

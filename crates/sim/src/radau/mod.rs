@@ -164,7 +164,7 @@ impl Radau {
             linear_in_rates: system.semi_explicit().is_some(),
             straight: false,
             has_rate: vec![false; size],
-            matrices: Matrices::new(system.sparsity()),
+            matrices: Matrices::new(system.sparsity(), system.blocks()),
             jacobian: JacobianAge::Stale,
             factored: None,
             newton: newton::Convergence::default(),
@@ -477,7 +477,7 @@ impl Radau {
 
 /// Replaces `b` by the solution of sparse linear equations. `false` if they have none.
 pub(crate) fn solve(pattern: &Sparsity, matrix: &[f64], b: &mut [f64]) -> bool {
-    let (mut matrices, none) = (Matrices::new(pattern), vec![0.0; matrix.len()]);
+    let (mut matrices, none) = (Matrices::new(pattern, 1), vec![0.0; matrix.len()]);
     let factored = matrices.factor((matrix, &none), 0.0, c64::new(0.0, 0.0), &vec![1.0; b.len()]);
     factored.is_ok() && {
         matrices.solve_real(b);

@@ -70,6 +70,10 @@ impl Model {
         self.restart();
         let before = self.run.positions.clone();
         let found = self.search_equilibrium(t, x).and_then(|found| self.in_this_mode(t, found));
+        let found = found.and_then(|found| {
+            self.vary_rest(t, &found.x).map_err(EquilibriumError::Failure)?;
+            Ok(found)
+        });
         if found.is_err() {
             self.run.positions = before;
             self.start_at_positions();
