@@ -9,6 +9,7 @@ mod calculus;
 mod construct;
 mod cost;
 mod elimination;
+mod estimate;
 mod evaluate;
 mod exprs;
 mod field;
@@ -40,6 +41,7 @@ pub use elimination::{
     BackSubstitution, Coefficients, Elimination, Eliminator, NumericPoint, Pivot, Quality, SparseRow, Zero,
     back_substitute, eliminate,
 };
+pub use estimate::{Estimate, Estimates};
 pub use evaluate::{EvaluationOrder, Evaluator};
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub use lowest_terms::LowestTerms;

@@ -59,16 +59,10 @@ impl Exprs {
     /// The values of an expression in the prime field; `None` where they do not decide whether it is zero.
     pub fn residues(&self, e: Expr) -> Option<Residues> {
         let properties = &self.entry(e).properties;
-        let decides = !properties.radical && properties.opaque == [false; 2];
-        self.likely_residues(e).filter(|_| decides)
-    }
-
-    /// The same where they may be others than 0 though the expression vanishes: roots and functions are as random there as
-    /// what they are taken of.
-    pub fn likely_residues(&self, e: Expr) -> Option<Residues> {
         let lanes = self.fingerprint(e);
         let (generic, given) = (lanes[GENERIC.start], lanes[GIVEN.start]);
-        (generic != POISON && given != POISON).then_some(Residues { generic, given })
+        let decides = !properties.radical && properties.opaque == [false; 2] && generic != POISON && given != POISON;
+        decides.then_some(Residues { generic, given })
     }
 }
 

@@ -499,7 +499,11 @@ impl<'a> Builder<'a, '_> {
             ("norm", [a]) if a.shape.len() == 1 => {
                 let pairs: Vec<(&Value, &Value)> = a.items.iter().zip(&a.items).collect();
                 let square = self.inner_product(&pairs, span);
-                let expr = self.exprs.call(Function::Sqrt, &[square.expr]);
+                let expr = match self.exprs.is_number(square.expr).map(crate::algebra::Rational::to_f64) {
+                    // Roots that are kept exactly would stand in everything that is turned about an axis.
+                    Some(square) => self.exprs.float(square.sqrt()),
+                    None => self.exprs.call(Function::Sqrt, &[square.expr]),
+                };
                 Some(Shaped::scalar(Value::number(expr, square.quantity.power(WHOLE / 2))))
             }
             ("cross", [a, b]) if a.shape == [3] && b.shape == [3] => {

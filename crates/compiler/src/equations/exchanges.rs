@@ -92,9 +92,11 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
             return Exchanges::default();
         }
         let Some(row) = rows.of(&mut d.x, symbol).cloned() else { continue };
-        // What moves by lever arms alone keeps to what it hangs on.
-        let divided = |x: &Exprs, e: Expr| !d.is_constant(e) && divides(x, e, &divisors);
-        let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0) && divided(&d.x, t.1)).collect();
+        // Beside a speed without inertia, which has none to be compared by, only what is divided by what may vanish counts:
+        // what moves by lever arms keeps to what it hangs on.
+        let counts = |x: &Exprs, t: &&(Symbol, Expr)| stored.contains_key(&t.0) || divides(x, t.1, &divisors);
+        let ratios: Vec<_> =
+            row.0.iter().filter(|t| independent.contains(&t.0) && !d.is_constant(t.1) && counts(&d.x, t)).collect();
         if ratios.is_empty() || !seen.insert(d.x.untwinned(symbol)) {
             continue;
         }
