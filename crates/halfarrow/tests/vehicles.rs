@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow::{Model, Override, Record, Run, Simulated, Source};
+use halfarrow::{FixedMethod, Method, Model, Override, Record, Run, Simulated, Source};
 
 const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
 
@@ -535,4 +535,73 @@ box.to -> 1:to -> I:load(2)
     close(column(&done, "to.f")[10], 10.0, 1e-9);
     // (1.4^2 j + J) w = 1.4 j w_from + J w_to.
     close(last(&done, "to.f"), (1.4 * 0.5 * 36.0 + 2.0 * 10.0) / (1.96 * 0.5 + 2.0), 1e-9);
+}
+
+/// With hinges along the car and a tie rod beside the lower arm, the upright turns as the coupler of a plane four-bar.
+#[test]
+fn a_double_wishbone_is_a_four_bar_across_the_car() {
+    let text = "World:world -> 1[frame]:car
+DoubleWishbone:arms(
+    lower_front = [0.2, 0.42, -0.27], lower_back = [-0.2, 0.42, -0.27], lower_outer = [0, 0.77, -0.32],
+    upper_front = [0.1, 0.47, 0.1], upper_back = [-0.1, 0.47, 0.1], upper_outer = [0, 0.7, 0.12],
+    tie_inner = [-0.15, 0.42, -0.27], tie_outer = [-0.15, 0.77, -0.32], spindle = [0, 0.8, -0.12],
+    spring_top = [0, 0.52, 0.23], spring_foot = [0, 0.62, -0.3],
+    m_lower = 1.6, c_lower = [0, 0.61, -0.29], J_lower = [0.015, 0.02, 0.035],
+    m_upper = 1, c_upper = [0, 0.6, 0.11], J_upper = [0.006, 0.002, 0.008],
+    m_upright = 2.5, c_upright = [0, 0.77, -0.1], J_upright = [0.014, 0.015, 0.003],
+    k = 60000, l0 = 0.56, c = 0
+)
+car -> arms.body
+car -> arms.rack
+arms.hub -> Body:wheel(m = 25, J = diag([0.35, 0.68, 0.35]))
+output camber = asin(arms.upright.R[3, 2])
+output toe = arms.upright.R[2, 1]
+";
+    let done = run(text, &exact(1.0));
+    let (pivot, outer, hinge, top) = ([0.42, -0.27], [0.77, -0.32], [0.47, 0.1], [0.7, 0.12]);
+    let length = |a: [f64; 2], b: [f64; 2]| f64::hypot(b[0] - a[0], b[1] - a[1]);
+    let (kingpin, upper) = (length(outer, top), length(hinge, top));
+    let angle_of = |a: [f64; 2], b: [f64; 2]| f64::atan2(b[1] - a[1], b[0] - a[0]);
+    let turned = column(&done, "arms.lower.angle");
+    assert!(turned.iter().any(|q| q.abs() > 0.1), "it moves");
+    for (k, q) in turned.iter().enumerate() {
+        let (sin, cos) = q.sin_cos();
+        let arm = [outer[0] - pivot[0], outer[1] - pivot[1]];
+        // The hinge points backward: a positive angle lowers the arm.
+        let foot = [pivot[0] + cos * arm[0] + sin * arm[1], pivot[1] - sin * arm[0] + cos * arm[1]];
+        let d = length(foot, hinge);
+        let inner = ((kingpin * kingpin + d * d - upper * upper) / (2.0 * kingpin * d)).acos();
+        let camber = angle_of(foot, hinge) - inner - angle_of(outer, top);
+        close(column(&done, "camber")[k], camber, 1e-9);
+        close(column(&done, "toe")[k], 0.0, 1e-9);
+    }
+}
+
+/// A whole car, as it stands among the examples: it runs straight, carried by its tyres.
+#[test]
+fn the_sedan_runs_straight_on_its_wheels() {
+    let files = [
+        ("corner.bond", include_str!("../../../examples/sedan/corner.bond")),
+        ("sedan_tyre.tir", include_str!("../../../examples/sedan/sedan_tyre.tir")),
+    ];
+    let files: BTreeMap<String, String> = files.into_iter().map(|(path, text)| (path.into(), text.into())).collect();
+    let source = Source::text("sedan.bond", include_str!("../../../examples/sedan/sedan.bond")).with_files(files);
+    let model = Model::new(source, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let run = Run {
+        to: 1.0,
+        every: Some(0.1),
+        record: Record::All,
+        method: Method::Fixed(FixedMethod::Rk4),
+        step: Some(1e-3),
+        ..Run::default()
+    };
+    let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let weight = 9.81 * (1550.0 + 1.889 + 4.0 * (1.611 + 1.032 + 2.5 + 24.7));
+    let load: f64 = ["fl", "fr", "rl", "rr"].iter().map(|w| last(&done, &format!("load_{w}"))).sum();
+    close(load, weight, 2e-3 * weight);
+    close(last(&done, "y"), 0.0, 1e-6);
+    close(last(&done, "yaw_rate"), 0.0, 1e-6);
+    close(last(&done, "x"), 20.0, 0.05);
+    // Ball joints and tie rods close: the front wheel is where its arms put it.
+    close(last(&done, "roll"), 0.0, 1e-6);
 }

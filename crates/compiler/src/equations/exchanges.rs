@@ -6,13 +6,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Conserved;
 use super::derive::of_the_bond;
 use super::minimal::{Assembled, rows_of};
-use crate::algebra::{Expr, Exprs, Node, Residue, Symbol};
+use crate::algebra::{Expr, Exprs, Node, NumericPoint, Residue, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
 use crate::causal_graph::{CausalGraph, PortState, Role, magnitude_of_slope};
 
 /// Larger tables of ratios are not looked at.
 const MOST: usize = 20_000;
+/// What moves so many times as fast at the start is near a position in which others had better be independent.
+const NEAR_SINGULAR: f64 = 100.0;
 
 /// Which variables depend on which by ratios that vary.
 #[derive(Debug, Clone, Default)]
@@ -76,10 +78,11 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     let mut found = Exchanges::default();
     let mut read: BTreeSet<Symbol> = BTreeSet::new();
     let mut seen: BTreeSet<Symbol> = BTreeSet::new();
-    let weights = weights(d, causal);
+    let mut point = start_point(&d.x, d.graph);
+    let mut weights = weights(d, causal, &point);
     let tracked: BTreeSet<Symbol> =
         assembled.states.iter().map(|s| s.tracked).chain(conserved.iter().map(|c| c.replaced)).collect();
-    let of = |d: &super::Definitions, symbol: Symbol| {
+    let of = |d: &super::Definitions, weights: &BTreeMap<Symbol, f64>, symbol: Symbol| {
         let told_by = stored.get(&symbol).copied().filter(|s| tracked.contains(s)).unwrap_or(symbol);
         Exchanged {
             symbol: of_the_bond(d, causal, symbol),
@@ -94,16 +97,23 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
         let Some(row) = rows.of(&mut d.x, symbol).cloned() else { continue };
         // Beside a speed without inertia, which has none to be compared by, only what is divided by what may vanish counts:
         // what moves by lever arms keeps to what it hangs on.
-        let counts = |x: &Exprs, t: &&(Symbol, Expr)| stored.contains_key(&t.0) || divides(x, t.1, &divisors);
-        let ratios: Vec<_> =
-            row.0.iter().filter(|t| independent.contains(&t.0) && !d.is_constant(t.1) && counts(&d.x, t)).collect();
-        if ratios.is_empty() || !seen.insert(d.x.untwinned(symbol)) {
+        let counts = |x: &Exprs, t: &(Symbol, Expr)| stored.contains_key(&t.0) || divides(x, t.1, &divisors);
+        let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0)).collect();
+        let none = !ratios.iter().any(|t| !d.is_constant(t.1) && counts(&d.x, t));
+        if none || !seen.insert(d.x.untwinned(symbol)) {
             continue;
         }
         read.extend(ratios.iter().map(|t| t.0));
-        found.dependent.push(of(d, symbol));
+        // A speed without inertia has no unit in common with others: against it counts what moves faster than at the start.
+        let free = ratios.iter().filter(|t| !stored.contains_key(&t.0));
+        let first = free.map(|t| point.value(&d.x, t.1).abs()).fold(0.0, f64::max);
+        let weight = weights.get(&symbol).copied().unwrap_or(1.0);
+        if (1.0..NEAR_SINGULAR).contains(&(weight * first)) {
+            weights.insert(symbol, 1.0 / first);
+        }
+        found.dependent.push(of(d, &weights, symbol));
     }
-    found.independent.extend(read.into_iter().map(|symbol| of(d, symbol)));
+    found.independent.extend(read.into_iter().map(|symbol| of(d, &weights, symbol)));
     found
 }
 
@@ -139,13 +149,12 @@ fn divides(x: &Exprs, e: Expr, divisors: &BTreeSet<Residue>) -> bool {
 }
 
 /// The roots of the slopes `X/z` of storages, at the start.
-fn weights(d: &super::Definitions, causal: &CausalGraph) -> BTreeMap<Symbol, f64> {
-    let point = start_point(&d.x, d.graph);
+fn weights(d: &super::Definitions, causal: &CausalGraph, point: &NumericPoint) -> BTreeMap<Symbol, f64> {
     let storages = causal.ports.ports.iter().filter_map(|p| match p.role {
         Role::Independent => Some((p.input, p.port)),
         Role::Dependent => Some((p.output, p.port)),
         _ => None,
     });
-    let weight = |(symbol, port)| Some((symbol, magnitude_of_slope(&d.x, d.graph, &point, port)?.sqrt()));
+    let weight = |(symbol, port)| Some((symbol, magnitude_of_slope(&d.x, d.graph, point, port)?.sqrt()));
     storages.filter_map(weight).collect()
 }
