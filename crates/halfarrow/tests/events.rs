@@ -396,6 +396,24 @@ when t > 0.5 { n = 1 }
     }
 }
 
+/// The same where the ratio is chosen by a condition on a discrete variable.
+#[test]
+fn a_gear_chosen_by_a_condition_is_changed_alike() {
+    let text = "model Gear
+discrete gear = 1
+when t > 1 { gear = 3 }
+1:from -> I:rotor(0.5, f0 = 36)
+from -> TF:wheels(e_out = if gear > 2 then 1.4 else 3.6) -> 1:to -> I:load(2)
+";
+    // N^T (p+ - p-) = 0 with the ratio after it: 18 + 20/1.4 = (0.5 + 2/1.4^2) rotor.f.
+    let wanted = (18.0 + 20.0 / 1.4) / (0.5 + 2.0 / 1.96);
+    for form in FORMS {
+        let done = trace(text, &Run { form, ..exact(2.0) });
+        let found = *column(&done, "rotor.f").last().expect("there are samples");
+        assert!(near(found, wanted, 1e-9), "{form:?} {found} {wanted}");
+    }
+}
+
 #[test]
 fn events_stand_in_instances_and_repetitions() {
     let text = "model Many

@@ -26,8 +26,8 @@ impl Bounded {
         Bounded { value, error: error + ROUNDED * value.abs() }
     }
     fn vanishes(self) -> bool {
-        // Not a number counts as 0: what has no value is no pivot.
-        !(self.value.abs() > BOUNDS * self.error)
+        // What has no value is no pivot.
+        self.value.is_nan() || self.error.is_nan() || self.value.abs() <= BOUNDS * self.error
     }
 }
 

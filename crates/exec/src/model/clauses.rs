@@ -301,12 +301,26 @@ impl Model {
             self.refuse_conflicts(t)?;
             self.change(t, x, round == 0)?;
             self.leave_solutions();
-            self.take_signs(t, x)?;
+            self.take_signs_of_leaps(t, x)?;
             self.find_fired(t, x, &[])?;
         }
         let fired = self.code.program.clauses.iter().zip(&self.events.fired).filter(|(_, fired)| **fired);
         let what: Vec<String> = fired.map(|(c, _)| format!("`{}`", c.name)).collect();
         Err(Failure::Livelock { time: t, what: what.join(", ") })
+    }
+
+    /// Takes the signs of conditions anew after discrete variables have changed; ratios that leap with them act by impulses.
+    fn take_signs_of_leaps(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+        let leaps = self.code.impulses.as_ref().is_some_and(ImpulseBalance::leaps);
+        if leaps {
+            self.events.fired.fill(false);
+            self.take_stored(t, x)?;
+        }
+        self.take_signs(t, x)?;
+        if leaps && self.balance_leaps(t, x)? {
+            self.take_signs(t, x)?;
+        }
+        Ok(())
     }
 
     /// These conditions hold, whatever rounding says.
