@@ -407,7 +407,7 @@ from -> TF:wheels(e_out = if gear > 2 then 1.4 else 3.6) -> 1:to -> I:load(2)
 ";
     // N^T (p+ - p-) = 0 with the ratio after it: 18 + 20/1.4 = (0.5 + 2/1.4^2) rotor.f.
     let wanted = (18.0 + 20.0 / 1.4) / (0.5 + 2.0 / 1.96);
-    for form in [Form::Minimal, Form::Kane, Form::Lagrange] {
+    for form in [Form::Minimal, Form::Kane, Form::Inverted] {
         let done = trace(text, &Run { form, ..exact(2.0) });
         let found = *column(&done, "rotor.f").last().expect("there are samples");
         assert!(near(found, wanted, 1e-9), "{form:?} {found} {wanted}");
