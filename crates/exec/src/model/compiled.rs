@@ -244,7 +244,7 @@ impl Mode {
             .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
             .chain(self.positions.as_ref().map(PositionConstraints::routine))
             .chain(self.motion.as_ref().map(|motion| &motion.rates))
-            .chain(self.exchanges.as_ref().map(Ratios::routine))
+            .chain(self.exchanges.iter().flat_map(Ratios::routines))
             .chain(self.bounds.iter().flat_map(Bounds::routines));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }

@@ -8,9 +8,9 @@ use super::recorded::Recorded;
 use super::{Model, clauses::EventWork};
 use crate::bytecode::{Frame, Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Value};
+use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Reads, Value};
 use halfarrow_sim::Failure;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Variables are exchanged where one moves so many times as fast as the one that stays independent,
@@ -21,6 +21,8 @@ const AFTER_FAILURE: f64 = 1.2;
 const NEAR: f64 = 1.1;
 /// What varies less than by this part of the greatest is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Ratios are looked at where what they are divided by has come to less than this part of what it was when they were last.
+const SMALLER: f64 = 0.95;
 const ITERATIONS: usize = 20;
 
 /// The ratios between variables that could be independent and those that are.
@@ -32,6 +34,8 @@ pub(super) struct Ratios {
     registers: Vec<u32>,
     /// Independent ones, then the dependent ones.
     routine: Routine,
+    /// What ratios are divided by, where it varies.
+    pivots: Routine,
 }
 
 impl Ratios {
@@ -49,16 +53,20 @@ impl Ratios {
         // All of them, or the rest would be looked at as if it stood still.
         let all = known.len() == program.exchanges.independent.len();
         let wanted: Vec<Value> = known.iter().map(|k| k.1).chain(others.iter().map(|o| o.1)).collect();
+        let pivots: BTreeSet<Value> = program.pivot_guards.iter().map(|guard| guard.pivot).collect();
+        let varies = |pivot: &Value| program.values.reads(*pivot) != Reads::PARAMETERS;
+        let pivots: Vec<Value> = pivots.into_iter().filter(varies).collect();
         (all && !known.is_empty() && !others.is_empty()).then(|| Ratios {
             registers: known.iter().map(|k| k.2).collect(),
             independent: known.into_iter().map(|k| k.0).collect(),
             dependent: others.into_iter().map(|o| o.0).collect(),
             routine: layout.routine(program, &wanted),
+            pivots: layout.routine(program, &pivots),
         })
     }
 
-    pub fn routine(&self) -> &Routine {
-        &self.routine
+    pub fn routines(&self) -> [&Routine; 2] {
+        [&self.routine, &self.pivots]
     }
 }
 
@@ -77,6 +85,12 @@ impl Model {
             return Ok(false);
         };
         let most = if failed { AFTER_FAILURE } else { FAR };
+        let smaller = self.is_pivot_smaller(ratios, t, x);
+        if !failed && !smaller {
+            return Ok(false);
+        }
+        self.run.pivots.clear();
+        self.run.pivots.extend(ratios.pivots.outputs.iter().map(|&r| self.frame.r[r as usize]));
         if !self.is_suspicious(ratios, t, x, most) {
             return Ok(false);
         }
@@ -104,6 +118,17 @@ impl Model {
         self.still();
         self.frame.d[register as usize] = 1.0;
         self.frame.run_along(&ratios.routine).is_ok()
+    }
+
+    /// Whether something that ratios are divided by is smaller than when they were last looked at, or has changed its
+    /// sign. Takes no memory.
+    fn is_pivot_smaller(&mut self, ratios: &Ratios, t: f64, x: &[f64]) -> bool {
+        self.place(t, x);
+        if self.frame.run(&ratios.pivots).is_err() || self.run.pivots.is_empty() {
+            return true;
+        }
+        let now = ratios.pivots.outputs.iter().map(|&r| self.frame.r[r as usize]);
+        now.zip(&self.run.pivots).any(|(now, before)| (now / before).is_nan() || now / before <= SMALLER)
     }
 
     /// Whether some variable may move `most` times as fast as all that are independent. Takes no memory.
@@ -203,6 +228,7 @@ impl Model {
         }
         run.mode = mode;
         run.floors = vec![0.0; code.program.conditions.len()];
+        run.pivots.clear();
         run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();

@@ -57,6 +57,8 @@ pub(super) struct Remembered {
     pub extents: Extents,
     /// Of each condition the magnitude below which its operand is on the side that is held.
     pub floors: Vec<f64>,
+    /// What ratios between variables were divided by when it was last seen whether others should be independent.
+    pub pivots: Vec<f64>,
     /// Conditions that have made something happen and are about to hold no longer.
     pub returns: Vec<Return>,
     /// The piece of each input that holds.

@@ -140,6 +140,7 @@ impl Model {
             extents: Extents::default(),
             returns: Vec::with_capacity(code.clauses.conditional.len()),
             floors: vec![0.0; code.program.conditions.len()],
+            pivots: Vec::new(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
