@@ -115,12 +115,15 @@ pub(crate) fn links(
                     let mut parts = vec![right];
                     let terms = Terms::of(&graph.exprs, right, &mut parts);
                     let Ok(reader) = values.reader(&parts) else { continue };
-                    let weight = reader.values(middle, None).map_or(0.0, |v| terms.magnitude(&v));
+                    let weight = reader.values(middle, &[]).map_or(0.0, |v| terms.magnitude(&v));
                     links.push(Link { of, from: Quantity::Number, weight, straight: false });
-                    let moved = |by: f64| moved_by(graph, (scales, settled), &reader, (middle, by), |v| v[0]);
-                    let pairs = moved(MOVED).into_iter().zip(moved(1.0));
+                    let slopes =
+                        |at: &[(Symbol, f64)]| moved_by(graph, (scales, settled), &reader, (middle, at), |v| v[0]);
+                    let near = slopes(&[]);
+                    let tells = tells(settled, near.iter().copied());
+                    let pairs = near.iter().copied().zip(slopes(&far(graph, (scales, settled), &reader)));
                     links.extend(pairs.map(|((from, weight), (_, far))| {
-                        let straight = (weight - far).abs() <= STRAIGHT * weight;
+                        let straight = is_same(weight, far) && tells(from, weight);
                         Link { of, from, weight, straight }
                     }));
                 }
@@ -128,22 +131,26 @@ pub(crate) fn links(
                     let parts: Vec<Expr> = [factor].into_iter().chain(divisor).collect();
                     let Ok(reader) = values.reader(&parts) else { continue };
                     let quotient = |v: &[f64]| v[1..].first().map_or(v[0], |divisor| v[0] / divisor);
-                    let weight = reader.values(middle, None).map_or(0.0, |v| quotient(&v).abs());
-                    links.push(Link { of, from, weight, straight: true });
+                    let weight = reader.values(middle, &[]).map_or(0.0, |v| quotient(&v).abs());
+                    let straight = reader.moves().is_empty() || !settled.is_lost(weight, from, of);
+                    links.push(Link { of, from, weight, straight });
                     // A modulus that vanishes passes nothing on, but moves with what it reads.
                     let made = |v: &[f64]| quotient(v) * right[middle];
-                    let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
+                    let moved = moved_by(graph, (scales, settled), &reader, (middle, &[]), made);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
                 Law::Row { factors, right, of, .. } => {
                     let Ok(reader) = values.reader(&factors) else { continue };
-                    let weights = reader.values(middle, None);
-                    for (k, (_, from)) in right.iter().enumerate() {
-                        let weight = weights.as_ref().map_or(0.0, |v| v[k].abs());
-                        links.push(Link { of, from: *from, weight, straight: true });
-                    }
+                    let weights = reader.values(middle, &[]).unwrap_or_default();
+                    let terms = || right.iter().zip(&weights).map(|((_, from), weight)| (*from, weight.abs()));
+                    let tells = tells(settled, terms());
+                    let fixed = reader.moves().is_empty();
+                    links.extend(terms().map(|(from, weight)| {
+                        let straight = tells(from, weight) && (fixed || !settled.is_lost(weight, from, of));
+                        Link { of, from, weight, straight }
+                    }));
                     let made = |v: &[f64]| v.iter().zip(&right).map(|(f, (column, _))| f * column[middle]).sum();
-                    let moved = moved_by(graph, (scales, settled), &reader, (middle, MOVED), made);
+                    let moved = moved_by(graph, (scales, settled), &reader, (middle, &[]), made);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
                 Law::Sum { .. } | Law::Zero { .. } => {}
@@ -151,6 +158,24 @@ pub(crate) fn links(
         }
     }
     links
+}
+
+/// Which terms of a sum tell how great their variables are: those that are not lost in the others, such as what an
+/// entry of a rotation passes on that is 0 but for rounding.
+fn tells(settled: &Settled, terms: impl Iterator<Item = (Quantity, f64)>) -> impl Fn(Quantity, f64) -> bool {
+    let size = |from: Quantity, weight: f64| weight * settled.beside(from);
+    let greatest = terms.fold(0.0f64, |most, (from, weight)| most.max(size(from, weight)));
+    move |from, weight| size(from, weight) >= LOST * greatest
+}
+
+/// Everything that a law reads moved by its size: what it makes of a variable there is as here if it is a straight line in
+/// it, and no other variable tells how steep.
+fn far(graph: &BondGraph, (scales, settled): (&Scales, &Settled), reader: &Reader) -> Vec<(Symbol, f64)> {
+    reader.moves().iter().map(|&symbol| (symbol, settled.of(scales.of(graph, symbol)))).collect()
+}
+
+fn is_same(near: f64, far: f64) -> bool {
+    (near - far).abs() <= STRAIGHT * near
 }
 
 /// A law by which one quantity makes so much of another.
@@ -395,7 +420,7 @@ impl Check<'_, '_> {
         let scale = self.settled.scale(&[Term::of(of, 1.0)]);
         let mut room = Vec::new();
         for (k, &time) in self.values.times.iter().enumerate() {
-            let Some(found) = reader.values_in(&mut room, k, None) else { continue };
+            let Some(found) = reader.values_in(&mut room, k, &[]) else { continue };
             let off = self.least(reader, k, miss(k, found), |v| miss(k, v));
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
             self.worst.note(off, scale, settled, || {
@@ -416,7 +441,7 @@ impl Check<'_, '_> {
         }
         let beside = |&symbol: &Symbol| {
             let by = BORDER * self.settled.of(self.scales.of(self.graph, symbol));
-            [by, -by].map(|by| reader.values(sample, Some((symbol, by))).map_or(here, |v| miss(&v)))
+            [by, -by].map(|by| reader.values(sample, &[(symbol, by)]).map_or(here, |v| miss(&v)))
         };
         reader
             .moves()
@@ -432,7 +457,7 @@ impl Check<'_, '_> {
             _ => vec![expr],
         };
         let reader = self.values.reader(&parts)?;
-        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(|k| reader.values(k, None)).collect();
+        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(|k| reader.values(k, &[])).collect();
         let size = |v: &Vec<f64>| v.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let greatest = found.iter().flatten().map(size).fold(0.0, f64::max);
         let natural = if parts.len() > 1 { greatest } else { 0.0 };
@@ -461,8 +486,11 @@ pub(crate) fn raw(miss: f64, time: f64, name: &str, what: &str, terms: Vec<Term>
 /// Part of its scale by which a variable may lie beside the border at which a run has changed its branch: rounding.
 const BORDER: f64 = 1e-12;
 
-/// A law is a straight line if its slope differs by no more than this part over a distance of a variable's size.
+/// A law is a straight line if its slope differs by no more than this part where all that it reads is moved by its size.
 const STRAIGHT: f64 = 0.1;
+
+/// Terms below this part of the greatest of their sum are lost in it.
+const LOST: f64 = 1e-3;
 
 /// Part of its scale by which a variable is moved to see what changes with it.
 const MOVED: f64 = 1e-6;
@@ -476,25 +504,31 @@ pub(crate) fn sensitivities(
     sample: usize,
     of: impl Fn(&[f64]) -> f64,
 ) -> Vec<(Quantity, f64)> {
-    moved_by(graph, (scales, settled), reader, (sample, MOVED), of)
+    moved_by(graph, (scales, settled), reader, (sample, &[]), of)
 }
 
-/// The same with every variable moved by a part of its scale.
+/// The same where variables are moved so far.
 fn moved_by(
     graph: &BondGraph,
     (scales, settled): (&Scales, &Settled),
     reader: &Reader,
-    (sample, part): (usize, f64),
+    (sample, from): (usize, &[(Symbol, f64)]),
     of: impl Fn(&[f64]) -> f64,
 ) -> Vec<(Quantity, f64)> {
-    let at = |moved: Option<(Symbol, f64)>| reader.values(sample, moved).map(|v| of(&v));
-    let Some(here) = at(None) else { return Vec::new() };
-    let weight = |symbol: Symbol| {
+    let mut moved = from.to_vec();
+    let Some(here) = reader.values(sample, &moved).map(|v| of(&v)) else { return Vec::new() };
+    let mut weight = |symbol: Symbol| {
         let quantity = scales.of(graph, symbol);
-        let by = part * settled.of(quantity);
-        let change = |by: f64| at(Some((symbol, by))).map(|there| (there - here).abs()).filter(|c| c.is_finite());
-        let most = [by, -by].into_iter().filter_map(change).fold(0.0f64, f64::max);
+        let by = MOVED * settled.of(quantity);
+        let mut change = |by: f64| {
+            let own = from.iter().find(|(s, _)| *s == symbol).map_or(0.0, |m| m.1);
+            moved.insert(0, (symbol, own + by));
+            let there = reader.values(sample, &moved).map(|v| of(&v));
+            moved.remove(0);
+            there.map(|there| (there - here).abs()).filter(|c| c.is_finite())
+        };
+        let most = [by, -by].into_iter().filter_map(&mut change).fold(0.0f64, f64::max);
         (by > 0.0).then(|| (quantity, most / by))
     };
-    reader.moves().iter().copied().filter_map(weight).collect()
+    reader.moves().iter().copied().filter_map(&mut weight).collect()
 }

@@ -21,6 +21,12 @@ const NOISE: f64 = 1e-12;
 /// rounding makes, amplified even more, is no part of it.
 const FLOOR: f64 = 1e-9;
 
+/// What a modulus that moves makes of a quantity is lost below this part of the other.
+const LOST: f64 = 1e-6;
+
+/// What has a magnitude of its own, above rounding of what laws tell, counts as no more times it.
+const AMPLIFIED: f64 = 1e3;
+
 /// From law to law, what stands beside a quantity is passed on so often.
 const NEIGHBOURS: usize = 3;
 
@@ -238,16 +244,21 @@ impl Scales {
             let most = beside.entry(quantity).or_default();
             *most = most.max(*weight);
         }
+        let alone = beside.clone();
         for _ in 0..NEIGHBOURS {
             let near = beside.clone();
             for ((quantity, from), weight) in of_variables.iter().copied() {
+                let told = *weight * near.get(from).copied().unwrap_or(0.0);
+                let own = alone.get(quantity).copied().unwrap_or(0.0);
+                let told = if own > FLOOR * told { told.min(AMPLIFIED * own) } else { told };
                 let most = beside.entry(*quantity).or_default();
-                *most = most.max(*weight * near.get(from).copied().unwrap_or(0.0));
+                *most = most.max(told);
             }
         }
-        self.raise_energies(graph, &mut beside);
+        self.raise_energies(graph, &alone, &mut beside);
         let size = |(&quantity, &beside): (&Quantity, &f64)| {
-            (quantity, Size { own: self.seen(quantity).max(FLOOR * beside), beside })
+            let own = self.seen(quantity).max(FLOOR * beside);
+            (quantity, Size { own, beside, alone: alone.get(&quantity).copied().unwrap_or(0.0) })
         };
         let mut of: BTreeMap<Quantity, Size> = beside.iter().map(size).collect();
         for (stored, least) in self.least_stored(graph) {
@@ -320,11 +331,14 @@ impl Scales {
 
     /// Energies stand beside what storages hold at the sizes of their variables, powers beside these energies in the time of the
     /// run.
-    fn raise_energies(&self, graph: &BondGraph, beside: &mut BTreeMap<Quantity, f64>) {
-        let size = |quantity: Quantity, beside: &BTreeMap<Quantity, f64>| beside.get(&quantity).copied().unwrap_or(0.0);
+    fn raise_energies(&self, graph: &BondGraph, alone: &BTreeMap<Quantity, f64>, beside: &mut BTreeMap<Quantity, f64>) {
+        let size = |quantity: Quantity| {
+            let [own, told] = [alone, &*beside].map(|all| all.get(&quantity).copied().unwrap_or(0.0));
+            if own > FLOOR * told { own } else { told }
+        };
         let held = storages(graph).filter_map(|(port, stored)| {
             let z = graph.storage_symbols(port)?.0;
-            Some(size(self.of(graph, z), beside) * size(Quantity::Of(stored), beside))
+            Some(size(self.of(graph, z)) * size(Quantity::Of(stored)))
         });
         let held = held.fold(0.0, f64::max);
         let ports = graph.outer_ports();
@@ -394,6 +408,8 @@ fn greatest(column: &[f64]) -> f64 {
 struct Size {
     own: f64,
     beside: f64,
+    /// What stands beside it but for what laws tell.
+    alone: f64,
 }
 
 /// The sizes of all quantities as the run stands.
@@ -412,7 +428,7 @@ impl Settled {
     /// The scale of what has these terms.
     pub fn scale(&self, terms: &[Term]) -> Scale {
         terms.iter().fold(Scale { own: LEAST, beside: LEAST }, |most, term| {
-            let Size { own, beside } = self.size(term.quantity);
+            let Size { own, beside, .. } = self.size(term.quantity);
             let part = if term.beside { FLOOR } else { 1.0 };
             Scale { own: most.own.max(part * term.weight * own), beside: most.beside.max(term.weight * beside) }
         })
@@ -428,9 +444,15 @@ impl Settled {
         self.size(quantity).beside
     }
 
+    /// Whether what a modulus makes of one quantity is lost in the other: a modulus that is 0 but for rounding tells nothing of
+    /// what it passes on.
+    pub fn is_lost(&self, weight: f64, from: Quantity, of: Quantity) -> bool {
+        weight * self.size(from).alone < LOST * self.size(of).alone
+    }
+
     fn size(&self, quantity: Quantity) -> Size {
         match quantity {
-            Quantity::Number => Size { own: 1.0, beside: 1.0 },
+            Quantity::Number => Size { own: 1.0, beside: 1.0, alone: 1.0 },
             quantity => self.of.get(&quantity).copied().unwrap_or_default(),
         }
     }

@@ -76,7 +76,7 @@ impl<'v, 'a> Held<'v, 'a> {
             let found = (relative(margin, miss), miss, margin);
             worst = if found.0 > worst.0 { found } else { worst };
         }
-        let ended = |command: &Reader| command.values(k, None).is_some_and(|v| v[0] != 0.0);
+        let ended = |command: &Reader| command.values(k, &[]).is_some_and(|v| v[0] != 0.0);
         if self.commands.iter().any(ended) {
             worst.0 = f64::INFINITY;
             worst.1 = f64::INFINITY;
@@ -87,7 +87,7 @@ impl<'v, 'a> Held<'v, 'a> {
 
 impl Part<'_, '_> {
     fn at(&self, k: usize) -> f64 {
-        let Some(value) = self.reader.values(k, None) else { return 0.0 };
+        let Some(value) = self.reader.values(k, &[]) else { return 0.0 };
         self.column.map_or(value[0], |column| column[k] - value[0])
     }
 }
@@ -116,7 +116,7 @@ fn held<'v, 'a>(
         let middle = values.times.len() / 2;
         let moved = sensitivities(graph, scales, settled, &reader, middle, |v| v[0]);
         let mut terms: Vec<Term> = moved.into_iter().map(|(quantity, weight)| Term::of(quantity, weight)).collect();
-        let found = (0..values.times.len()).filter_map(|k| reader.values(k, None));
+        let found = (0..values.times.len()).filter_map(|k| reader.values(k, &[]));
         let greatest = found.map(|v| v[0].abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
         terms.push(Term::of(Quantity::Number, greatest));
         Ok(Part { reader, column: None, terms, what, vanishes: false })

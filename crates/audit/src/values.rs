@@ -180,11 +180,19 @@ impl<'a> Values<'a> {
         let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
         let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
         let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
-        let order = |e: Expr| EvaluationOrder::new(x, &[e]);
-        let rates: BTreeMap<Symbol, EvaluationOrder> = rates.into_iter().map(|(s, rate)| (s, order(rate))).collect();
-        let column = |s: &Symbol| Some((*s, self.recorded(*s)?));
-        let columns = read.iter().filter_map(column).collect();
-        Ok(Reader { values: self, wanted: EvaluationOrder::new(x, wanted), rates, columns, moves, jumpy, timed })
+        let places: BTreeMap<Symbol, usize> = rates.keys().enumerate().map(|(k, s)| (*s, k)).collect();
+        let read = |wanted: &[Expr]| {
+            let order = EvaluationOrder::new(x, wanted);
+            let source = |&s: &Symbol| match (places.get(&s), self.recorded(s)) {
+                _ if s == time => Source::Time,
+                (Some(&rate), _) => Source::Rate(rate),
+                (None, Some(column)) => Source::Column(s, column),
+                (None, None) => Source::Number(self.parameter(s).unwrap_or(f64::NAN)),
+            };
+            Read { sources: order.symbols().iter().map(source).collect(), order }
+        };
+        let rates = rates.values().map(|&rate| read(&[rate])).collect();
+        Ok(Reader { values: self, wanted: read(wanted), rates, moves, jumpy, timed })
     }
 
     /// The column of a symbol, or of the effort or flow that it is the rate of a stored quantity as.
@@ -260,16 +268,29 @@ impl<'a> Values<'a> {
 /// Expressions at samples.
 pub(crate) struct Reader<'v, 'a> {
     values: &'v Values<'a>,
-    wanted: EvaluationOrder<'a>,
+    wanted: Read<'a>,
     /// Rates of integrated signals among what is read.
-    rates: BTreeMap<Symbol, EvaluationOrder<'a>>,
-    /// What is recorded of what is read.
-    columns: BTreeMap<Symbol, &'a [f64]>,
+    rates: Vec<Read<'a>>,
     /// Recorded symbols among what is read.
     moves: Vec<Symbol>,
     /// Whether a value jumps with the state, and with time.
     jumpy: bool,
     timed: bool,
+}
+
+/// Expressions with where the values of their symbols are.
+struct Read<'a> {
+    order: EvaluationOrder<'a>,
+    sources: Vec<Source<'a>>,
+}
+
+/// Where the value of a symbol is.
+enum Source<'a> {
+    Time,
+    /// By its place among the rates.
+    Rate(usize),
+    Column(Symbol, &'a [f64]),
+    Number(f64),
 }
 
 impl Reader<'_, '_> {
@@ -284,19 +305,14 @@ impl Reader<'_, '_> {
         self.jumpy && (sample == 0 || times[sample] == times[sample - 1])
     }
 
-    /// The values at a sample, one symbol moved by so much; `None` where the law is not clear: at a switch the state stands
+    /// The values at a sample, symbols moved by so much; `None` where the law is not clear: at a switch the state stands
     /// just beyond the border while the old law still holds.
-    pub fn values(&self, sample: usize, moved: Option<(Symbol, f64)>) -> Option<Vec<f64>> {
+    pub fn values(&self, sample: usize, moved: &[(Symbol, f64)]) -> Option<Vec<f64>> {
         self.values_in(&mut Vec::new(), sample, moved).map(<[f64]>::to_vec)
     }
 
     /// The same in memory that is used again.
-    pub fn values_in<'r>(
-        &self,
-        room: &'r mut Vec<f64>,
-        sample: usize,
-        moved: Option<(Symbol, f64)>,
-    ) -> Option<&'r [f64]> {
+    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, sample: usize, moved: &[(Symbol, f64)]) -> Option<&'r [f64]> {
         let values = self.values;
         let side = values.side(sample);
         if self.jumpy && side == Side::Before {
@@ -310,21 +326,24 @@ impl Reader<'_, '_> {
             Side::After if self.timed => t + reach,
             _ => t,
         };
-        Some(self.wanted.values_in(room, &mut |s| self.at(s, sample, t, moved)))
+        Some(self.read(&self.wanted, room, sample, t, moved))
     }
 
-    fn at(&self, symbol: Symbol, sample: usize, t: f64, moved: Option<(Symbol, f64)>) -> f64 {
-        let values = self.values;
-        if symbol == values.graph.time {
-            return t;
-        }
-        if let Some(rate) = self.rates.get(&symbol) {
-            return rate.values(&mut |s| self.at(s, sample, t, moved))[0];
-        }
-        let by = moved.filter(|(s, _)| *s == symbol).map_or(0.0, |(_, by)| by);
-        match self.columns.get(&symbol) {
-            Some(column) => column[sample] + by,
-            None => values.parameters.get(&symbol).copied().unwrap_or(f64::NAN),
-        }
+    fn read<'r>(
+        &self,
+        read: &Read,
+        room: &'r mut Vec<f64>,
+        sample: usize,
+        t: f64,
+        moved: &[(Symbol, f64)],
+    ) -> &'r [f64] {
+        read.order.values_in(room, |k| match read.sources[k] {
+            Source::Time => t,
+            Source::Rate(rate) => self.read(&self.rates[rate], &mut Vec::new(), sample, t, moved)[0],
+            Source::Column(symbol, column) => {
+                column[sample] + moved.iter().find(|(s, _)| *s == symbol).map_or(0.0, |(_, by)| *by)
+            }
+            Source::Number(number) => number,
+        })
     }
 }

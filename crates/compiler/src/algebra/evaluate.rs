@@ -49,7 +49,7 @@ impl<'a> Evaluator<'a> {
         for part in self.pool.below(&[e], &|e| !values.contains_key(&e)) {
             let value = match self.pool.node(part) {
                 Node::Symbol(s) => (self.symbols)(*s),
-                node => node_value(self.pool, node, &|c| self.values[&c]),
+                node => node_value(self.pool, node, |_, part| self.values[&part]),
             };
             self.values.insert(part, value);
         }
@@ -73,35 +73,66 @@ impl<'a> Evaluator<'a> {
 pub struct EvaluationOrder<'a> {
     pool: &'a Exprs,
     /// What is evaluated, parts before wholes.
-    order: Vec<Expr>,
-    /// The values of those that are numbers.
-    numbers: Vec<Option<f64>>,
+    order: Vec<Evaluated<'a>>,
+    /// Where the values of the parts of each stand, one after another.
+    parts: Vec<u32>,
+    symbols: Vec<Symbol>,
     /// Where the values of the expressions stand.
     wanted: Vec<usize>,
+}
+
+/// How a value comes about.
+#[derive(Debug, Clone)]
+enum Evaluated<'a> {
+    Number(f64),
+    /// By its place among the symbols.
+    Symbol(usize),
+    /// With the place of its first part.
+    Node(&'a Node, usize),
 }
 
 impl<'a> EvaluationOrder<'a> {
     /// Of these expressions.
     pub fn new(pool: &'a Exprs, wanted: &[Expr]) -> Self {
-        let order = pool.below(wanted, &|_| true);
-        let wanted = wanted.iter().map(|&e| place(&order, e)).collect();
-        let number = |&e: &Expr| pool.is_number(e).map(|number| number.to_f64());
-        EvaluationOrder { pool, numbers: order.iter().map(number).collect(), order, wanted }
+        let below = pool.below(wanted, &|_| true);
+        let wanted = wanted.iter().map(|&e| place(&below, e)).collect();
+        let (mut parts, mut symbols) = (Vec::new(), Vec::new());
+        let evaluated = |&e: &Expr| match (pool.is_number(e), pool.node(e)) {
+            (Some(number), _) => Evaluated::Number(number.to_f64()),
+            (None, Node::Symbol(symbol)) => {
+                symbols.push(*symbol);
+                Evaluated::Symbol(symbols.len() - 1)
+            }
+            (None, node) => {
+                let first = parts.len();
+                node.for_each_child(|part| parts.push(place(&below, part) as u32));
+                Evaluated::Node(node, first)
+            }
+        };
+        let order = below.iter().map(evaluated).collect();
+        EvaluationOrder { pool, order, parts, symbols, wanted }
+    }
+
+    /// The symbols that they read, in the order in which these are asked for.
+    pub fn symbols(&self) -> &[Symbol] {
+        &self.symbols
     }
 
     /// Their values at given values of symbols; NaN where one is not defined. Each symbol is asked for once.
     pub fn values(&self, symbols: &mut dyn FnMut(Symbol) -> f64) -> Vec<f64> {
-        self.values_in(&mut Vec::new(), symbols).to_vec()
+        self.values_in(&mut Vec::new(), |k| symbols(self.symbols[k])).to_vec()
     }
 
-    /// The same in memory that is used again.
-    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, symbols: &mut dyn FnMut(Symbol) -> f64) -> &'r [f64] {
+    /// The same in memory that is used again, with each symbol by its place among [`symbols`](Self::symbols).
+    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, mut symbol: impl FnMut(usize) -> f64) -> &'r [f64] {
         room.clear();
-        for (&part, number) in self.order.iter().zip(&self.numbers) {
-            let value = match (number, self.pool.node(part)) {
-                (Some(number), _) => *number,
-                (None, Node::Symbol(s)) => symbols(*s),
-                (None, node) => node_value(self.pool, node, &|c| room[place(&self.order, c)]),
+        for evaluated in &self.order {
+            let value = match *evaluated {
+                Evaluated::Number(number) => number,
+                Evaluated::Symbol(k) => symbol(k),
+                Evaluated::Node(node, first) => {
+                    node_value(self.pool, node, |k, _| room[self.parts[first + k] as usize])
+                }
             };
             room.push(value);
         }
@@ -144,30 +175,30 @@ fn truth(value: bool) -> f64 {
     if value { 1.0 } else { 0.0 }
 }
 
-/// The value of a node that is no symbol from the values of its parts.
-fn node_value(pool: &Exprs, node: &Node, at: &dyn Fn(Expr) -> f64) -> f64 {
+/// The value of a node that is no symbol from the values of its parts, each asked for by its place among them and itself.
+fn node_value(pool: &Exprs, node: &Node, at: impl Fn(usize, Expr) -> f64) -> f64 {
     match node {
         Node::Number(value) => value.to_f64(),
         Node::Pi => std::f64::consts::PI,
         Node::Symbol(_) => f64::NAN,
-        Node::Add(terms) => terms.iter().map(|&t| at(t)).sum(),
-        Node::Mul(factors) => factors.iter().map(|&f| at(f)).product(),
-        Node::Pow(base, n) => power(at(*base), pool.is_number(*n).and_then(|n| n.small()), at(*n)),
-        Node::Call(f, x) => f.value(at(x[0]), x.get(1).map_or(0.0, |&y| at(y))),
-        Node::Compare(c, a, b) => truth(c.holds(&at(*a), &at(*b))),
-        Node::And(a, b) => truth(at(*a) != 0.0 && at(*b) != 0.0),
-        Node::Or(a, b) => truth(at(*a) != 0.0 || at(*b) != 0.0),
-        Node::Not(a) => truth(at(*a) == 0.0),
+        Node::Add(terms) => terms.iter().enumerate().map(|(k, &t)| at(k, t)).sum(),
+        Node::Mul(factors) => factors.iter().enumerate().map(|(k, &f)| at(k, f)).product(),
+        Node::Pow(base, n) => power(at(0, *base), pool.is_number(*n).and_then(|n| n.small()), at(1, *n)),
+        Node::Call(f, x) => f.value(at(0, x[0]), x.get(1).map_or(0.0, |&y| at(1, y))),
+        Node::Compare(c, a, b) => truth(c.holds(&at(0, *a), &at(1, *b))),
+        Node::And(a, b) => truth(at(0, *a) != 0.0 && at(1, *b) != 0.0),
+        Node::Or(a, b) => truth(at(0, *a) != 0.0 || at(1, *b) != 0.0),
+        Node::Not(a) => truth(at(0, *a) == 0.0),
         Node::Select(c, a, b) => {
-            if at(*c) != 0.0 {
-                at(*a)
+            if at(0, *c) != 0.0 {
+                at(1, *a)
             } else {
-                at(*b)
+                at(2, *b)
             }
         }
-        Node::Table(t, x) => pool.table1d(*t).value(at(*x)),
-        Node::TableSlope(t, x) => pool.table1d(*t).slope(at(*x)),
-        Node::Whole(a) => at(*a),
+        Node::Table(t, x) => pool.table1d(*t).value(at(0, *x)),
+        Node::TableSlope(t, x) => pool.table1d(*t).slope(at(0, *x)),
+        Node::Whole(a) => at(0, *a),
     }
 }
 
