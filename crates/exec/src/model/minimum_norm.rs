@@ -6,8 +6,15 @@ use faer::linalg::solvers::Solve;
 /// Singular values below this fraction of the greatest count as zero.
 const RANK: f64 = 1e-11;
 
+/// An unknown is weak if its entries are below this fraction of the greatest of their rows.
+const WEAK: f64 = 1e-6;
+
+/// Unknowns are kept out of a step that leaves no more than this part of the greatest residual without them.
+const LEFT: f64 = 1e-9;
+
 /// The shortest of the steps that reduce `jacobian · step + residual` most; rows and columns are weighed so that the
-/// greatest entry of each is 1.
+/// greatest entry of each is 1. Where it is one of many, weak unknowns stay where they are if the others do it: what moves
+/// rates only by rounding would have to go far.
 pub(super) struct MinimumNormStep {
     /// The step.
     pub step: Vec<f64>,
@@ -58,6 +65,19 @@ pub(super) fn weighed_step(
     let sizes: Vec<f64> = (0..columns)
         .map(|j| inverse(greatest(&mut weighed(j).map(|(i, j)| jacobian[i * columns + j] * weights[i]))))
         .collect();
+    let all = solve(jacobian, residual, weights, &sizes)?;
+    let strong: Vec<f64> = sizes.iter().map(|&size| if size * WEAK < 1.0 { size } else { 0.0 }).collect();
+    if all.rank == columns || strong == sizes {
+        return Some(all);
+    }
+    let by_strong = solve(jacobian, residual, all.weights.clone(), &strong)?;
+    let meets = by_strong.meets(jacobian, residual, LEFT);
+    Some(if meets { MinimumNormStep { rank: all.rank, ..by_strong } } else { all })
+}
+
+/// The shortest step where unknowns count in parts of these sizes, without those of size 0.
+fn solve(jacobian: &[f64], residual: &[f64], weights: Vec<f64>, sizes: &[f64]) -> Option<MinimumNormStep> {
+    let (rows, columns) = (residual.len(), sizes.len());
     let matrix = Mat::from_fn(rows, columns, |i, j| jacobian[i * columns + j] * weights[i] * sizes[j]);
     let svd = matrix.thin_svd().ok()?;
     let (u, values, v) = (svd.U(), svd.S().column_vector(), svd.V());
@@ -68,14 +88,14 @@ pub(super) fn weighed_step(
         // One solution alone: elimination keeps its zeros.
         let mut x = Mat::from_fn(rows, 1, |i, _| -residual[i] * weights[i]);
         matrix.partial_piv_lu().solve_in_place(x.as_mut());
-        let step = x.col(0).iter().zip(&sizes).map(|(s, size)| s * size).collect();
+        let step = x.col(0).iter().zip(sizes).map(|(s, size)| s * size).collect();
         return Some(MinimumNormStep { step, rank, weights });
     }
     for k in (0..values.nrows()).filter(|&k| values[k] > limit) {
         let part = (0..rows).map(|i| -u[(i, k)] * residual[i] * weights[i]).sum::<f64>() / values[k];
         solution.iter_mut().enumerate().for_each(|(j, x)| *x += v[(j, k)] * part);
     }
-    Some(MinimumNormStep { step: solution.iter().zip(&sizes).map(|(s, size)| s * size).collect(), rank, weights })
+    Some(MinimumNormStep { step: solution.iter().zip(sizes).map(|(s, size)| s * size).collect(), rank, weights })
 }
 
 /// The shortest of the steps that meet `jacobian · step + residual = 0` best, where each column counts in parts of its size.
@@ -124,6 +144,12 @@ mod tests {
         (jacobian[9], jacobian[11]) = (1.0, 0.5);
         let s = step(&jacobian, &[0.0, 0.0, 0.0, 1.0], 3).unwrap();
         assert!((s.step[0] + 0.5 * s.step[2] + 1.0).abs() < 1e-14, "{:?}", s.step);
+        // What only rounding joins stays.
+        let s = step(&[1.0, 0.0, 1e-17, 0.0, 2.0, 3e-18], &[1.0, 1.0], 3).unwrap();
+        assert!(s.step[2] == 0.0 && (s.step[0] + 1.0).abs() < 1e-14, "{:?}", s.step);
+        // What nothing else meets is met by the weak.
+        let s = step(&[1.0, 0.0, 1e-9, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], &[1.0, 0.0, 0.0], 3).unwrap();
+        assert!(s.step[0].abs() < 1e-12 && (s.step[2] * 1e-9 + 1.0).abs() < 1e-12, "{:?}", s.step);
         // A pendulum on its way to rest: what should be 0 is.
         assert_eq!(step(&[0.0, 1.0, -2.0, -0.5], &[0.0, 1.0], 2).unwrap().step, [0.5, 0.0]);
     }

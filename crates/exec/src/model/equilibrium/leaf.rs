@@ -170,13 +170,22 @@ impl Model {
     pub(super) fn directions(&mut self, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> Option<Directions> {
         let Some(leaf) = leaf else { return Some(Directions::All) };
         let n = x.len();
-        let svd = kept(&self.tangent(leaf, t, x)?)?.svd().ok()?;
+        let kept = kept(&self.tangent(leaf, t, x)?)?;
+        // A state in no relation is a direction by itself.
+        let (joined, alone): (Vec<usize>, Vec<usize>) =
+            (0..n).partition(|&j| (0..kept.nrows()).any(|i| kept[(i, j)] != 0.0));
+        let svd = Mat::from_fn(kept.nrows(), joined.len(), |i, a| kept[(i, joined[a])]).svd().ok()?;
         let (values, v) = (svd.S().column_vector(), svd.V());
         let rank = rank_of(&values.iter().copied().collect::<Vec<_>>());
-        // A state that no way moves but by rounding stays.
-        let entry = |(j, k): (usize, usize)| if v[(j, k)].abs() > CANCELLED { v[(j, k)] } else { 0.0 };
-        let basis = (0..n).flat_map(|j| (rank..n).map(move |k| (j, k))).map(entry).collect();
-        Some(Directions::Basis { columns: n - rank, basis, size: leaf.size.clone() })
+        let columns = n - rank;
+        let mut basis = vec![0.0; n * columns];
+        alone.iter().enumerate().for_each(|(k, &j)| basis[j * columns + k] = 1.0);
+        for (a, &j) in joined.iter().enumerate() {
+            // A state that no way moves but by rounding stays.
+            let ways = (rank..joined.len()).map(|k| if v[(a, k)].abs() > CANCELLED { v[(a, k)] } else { 0.0 });
+            basis[j * columns + alone.len()..][..joined.len() - rank].copy_from_slice(&ways.collect::<Vec<_>>());
+        }
+        Some(Directions::Basis { columns, basis, size: leaf.size.clone() })
     }
 
     /// Where `x` comes to along `step`: there, or along the leaf. `None` if the way does not lead so far.
