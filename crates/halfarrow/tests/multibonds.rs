@@ -646,3 +646,25 @@ Se:push(1) -> I:mass(1)
     let done = run(text, &Run { to: 1.0, ..Run::default() });
     close(last(&done, "to.sum"), 3.0 * 4.0 + 2.0 * 56.0, 1e-12);
 }
+
+/// What is given to a part may read where the part is: its frames do not depend on it.
+#[test]
+fn a_part_may_read_its_own_frame() {
+    let text = "model Own
+import std.multibody
+component Arm(in point[3]; in base : frame; out hub : frame) {
+    let M = diag([1, 2, 1])
+    base -> FixedTranslation:out(d = M*point) -> hub
+}
+component Corner(in height = 0; in body : frame) {
+    Arm:arm(point = [0.3, 1, 0.5])
+    body -> arm.base
+    arm.hub -> Body:mass(m = 1 + height, J = diag([1, 1, 1]))
+}
+World:world -> 1[frame]:ground
+Corner:corner(height = corner.arm.hub.r[1] + 10*corner.arm.hub.r[2] + 100*corner.arm.hub.r[3])
+ground -> corner.body
+output h = corner.height
+";
+    close(last(&run(text, &Run { to: 0.1, ..Run::default() }), "h"), 0.3 + 20.0 + 50.0, 1e-12);
+}

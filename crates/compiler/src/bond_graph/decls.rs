@@ -10,7 +10,7 @@ use super::value::Reading;
 use super::vectors::Shaped;
 use super::{HeldId, HeldKind, InputId, Meaning, Parameter, ParameterKind};
 use crate::algebra::{Expr, Facts, Node};
-use crate::ast::{self, ExprKind};
+use crate::ast::{self, BinaryOp, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::span::Span;
@@ -181,8 +181,10 @@ impl<'a> Builder<'a, '_> {
                     found.push((decl, call.function.span));
                 }
                 let skip = usize::from(super::blocks::is_lagging(call));
+                let whole = super::vectors::is_of_vectors(&call.function.text);
+                let item = if whole { &[] } else { own.1 };
                 for arg in call.args.iter().skip(skip) {
-                    self.collect(here, &arg.value, own, found);
+                    self.collect(here, &arg.value, (own.0, item), found);
                 }
             }
             ExprKind::Rate(inner) => self.collect(here, inner, own, found),
@@ -205,8 +207,13 @@ impl<'a> Builder<'a, '_> {
             }
             ExprKind::Unary(u) => self.collect(here, &u.operand, own, found),
             ExprKind::Binary(b) => {
-                self.collect(here, &b.left, own, found);
-                self.collect(here, &b.right, own, found);
+                let item = match b.op {
+                    // Each entry of a product of matrices reads whole rows and columns.
+                    BinaryOp::Mul if self.may_be_matrix(here, e, own.0) => &[],
+                    _ => own.1,
+                };
+                self.collect(here, &b.left, (own.0, item), found);
+                self.collect(here, &b.right, (own.0, item), found);
             }
             ExprKind::If(i) => {
                 for part in [&i.cond, &i.yes, &i.no] {
@@ -214,6 +221,29 @@ impl<'a> Builder<'a, '_> {
                 }
             }
             ExprKind::Number(_) | ExprKind::Text(_) | ExprKind::Missing => {}
+        }
+    }
+
+    /// Whether an expression may have a matrix in it, by its names alone: shapes are not known yet.
+    fn may_be_matrix(&mut self, here: Here, e: &'a ast::Expr, formals: &[&str]) -> bool {
+        let mut any = |parts: &[&'a ast::Expr]| parts.iter().any(|part| self.may_be_matrix(here, part, formals));
+        match &e.kind {
+            ExprKind::Path(path) => match self.decl_of(here, path, (formals, &[])) {
+                Some(decl) => {
+                    let kind = &self.flat.names.decls[decl].kind;
+                    matches!(kind, DeclKind::Let(_) | DeclKind::Output(_) | DeclKind::Joined(_))
+                }
+                None => self
+                    .family_of(here, path, formals)
+                    .is_some_and(|family| self.flat.names.value_families[family].rank() > 1),
+            },
+            ExprKind::List(list) => list.iter().any(|e| matches!(e.kind, ExprKind::List(_))),
+            ExprKind::Call(call) => super::vectors::is_of_vectors(&call.function.text),
+            ExprKind::Unary(u) => any(&[&u.operand]),
+            ExprKind::Binary(b) => any(&[&b.left, &b.right]),
+            ExprKind::If(i) => any(&[&i.yes, &i.no]),
+            ExprKind::Repeated(_) | ExprKind::Sum(_) | ExprKind::Rate(_) => true,
+            ExprKind::Number(_) | ExprKind::Text(_) | ExprKind::Missing => false,
         }
     }
 

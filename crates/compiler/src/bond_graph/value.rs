@@ -158,8 +158,8 @@ impl<'a> Builder<'a, '_> {
                 _ => self.names_vector(cx, path),
             },
             ExprKind::Call(call) => {
-                let own = VECTOR_FUNCTIONS.iter().any(|f| f.0 == call.function.text);
-                own && !matches!(call.function.text.as_str(), "dot" | "norm")
+                super::vectors::is_of_vectors(&call.function.text)
+                    && !matches!(call.function.text.as_str(), "dot" | "norm")
             }
             ExprKind::Unary(u) => self.has_other_shape(cx, &u.operand),
             ExprKind::Binary(b) => self.has_other_shape(cx, &b.left) || self.has_other_shape(cx, &b.right),

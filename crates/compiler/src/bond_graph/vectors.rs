@@ -136,8 +136,8 @@ impl<'a> Builder<'a, '_> {
             ExprKind::Path(path) => self.names_several(cx, path),
             ExprKind::Rate(inner) => self.may_be_shaped(cx, inner),
             ExprKind::Call(call) => {
-                let own = VECTOR_FUNCTIONS.iter().any(|f| f.0 == call.function.text);
-                own || is_of_one(&call.function.text) && call.args.iter().any(|a| self.may_be_shaped(cx, &a.value))
+                is_of_vectors(&call.function.text)
+                    || is_of_one(&call.function.text) && call.args.iter().any(|a| self.may_be_shaped(cx, &a.value))
             }
             ExprKind::Unary(u) => self.may_be_shaped(cx, &u.operand),
             ExprKind::Binary(b) => {
@@ -585,6 +585,11 @@ impl<'a> Builder<'a, '_> {
 
 fn is_arithmetic(op: BinaryOp) -> bool {
     matches!(op, BinaryOp::Add | BinaryOp::Sub | BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow)
+}
+
+/// Whether a function takes vectors or matrices as wholes.
+pub(super) fn is_of_vectors(name: &str) -> bool {
+    VECTOR_FUNCTIONS.iter().any(|f| f.0 == name)
 }
 
 /// Whether a function takes one number, and so every entry of a vector.
