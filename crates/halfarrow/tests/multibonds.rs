@@ -364,7 +364,9 @@ b -> line.b
 Se:push(2) -> line.axis
 ";
     let (n, arm, crank) = ([0.6, 0.8], 1.0, 0.5);
-    let run_of = |line: &str| run(&text.replace("%line", line), &Run { to: 3.0, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    let run_of = |line: &str| {
+        run(&text.replace("%line", line), &Run { to: 3.0, rtol: 1e-12, every: Some(0.1), ..Run::default() })
+    };
     let straight = run_of("Line:line");
     let along = run_of("LineAlong:line(n = [0.6, 0.8, 0])");
     for (i, t) in times(&straight).iter().enumerate() {
