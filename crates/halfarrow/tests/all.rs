@@ -38,6 +38,8 @@ mod fit;
 mod forms;
 #[path = "growth.rs"]
 mod growth;
+#[path = "iltis.rs"]
+mod iltis;
 #[path = "library_std.rs"]
 mod library_std;
 #[path = "linearize.rs"]

@@ -348,6 +348,51 @@ b -> spring.b
     }
 }
 
+/// Lines between the ends of two arms that are turned: their lengths, and what a force along them asks of the drives.
+#[test]
+fn lines_push_their_ends_apart() {
+    let text = "model Lines
+import std.multibody
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:j -> FixedTranslation:arm(d = [1, 0, 0]) -> 1[frame]:a
+ground -> FixedTranslation:away(d = [3, 0, 0]) -> Revolute:k -> FixedTranslation:crank(d = [0.5, 0, 0]) -> 1[frame]:b
+Sf:turn_j(0.7) -> j.axis
+Sf:turn_k(-1.1) -> k.axis
+%line
+a -> line.a
+b -> line.b
+Se:push(2) -> line.axis
+";
+    let (n, arm, crank) = ([0.6, 0.8], 1.0, 0.5);
+    let run_of = |line: &str| {
+        run(&text.replace("%line", line), &Run { to: 3.0, rtol: 1e-12, every: Some(0.1), ..Run::default() })
+    };
+    let straight = run_of("Line:line");
+    let along = run_of("LineAlong:line(n = [0.6, 0.8, 0])");
+    for (i, t) in times(&straight).iter().enumerate() {
+        let ((sj, cj), (sk, ck)) = ((0.7 * t).sin_cos(), (-1.1 * t).sin_cos());
+        // From one end to the other, and the same by the angles.
+        let d = [3.0 + crank * ck - arm * cj, crank * sk - arm * sj];
+        let by_j = [arm * sj, -arm * cj];
+        let by_k = [-crank * sk, crank * ck];
+        let length = d[0].hypot(d[1]);
+        let e = d.map(|x| x / length);
+        let u = [n[0] * cj - n[1] * sj, n[0] * sj + n[1] * cj];
+        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        // The direction along the arm turns with it.
+        let turned = dot([-u[1], u[0]], d);
+        for (done, length, by_j, by_k) in
+            [(&straight, length, dot(e, by_j), dot(e, by_k)), (&along, dot(u, d), dot(u, by_j) + turned, dot(u, by_k))]
+        {
+            close(column(done, "line.length")[i], length, 1e-9);
+            close(column(done, "line.speed")[i], 0.7 * by_j - 1.1 * by_k, 1e-9);
+            close(column(done, "line.force")[i], -2.0, 1e-12);
+            close(column(done, "turn_j.e")[i], -2.0 * by_j, 1e-9);
+            close(column(done, "turn_k.e")[i], -2.0 * by_k, 1e-9);
+        }
+    }
+}
+
 /// What a matrix transformer says, row by row, with all its strands.
 #[test]
 fn a_matrix_transformer_hands_on_power() {
