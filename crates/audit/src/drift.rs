@@ -177,9 +177,10 @@ impl Relation {
         Some(())
     }
 
-    /// What was found.
+    /// What was found; nothing where the relation has no value.
     pub fn finish(self) -> Drift {
-        let of = |value: f64| self.known.then_some(value);
+        let known = self.known && self.last.is_finite();
+        let of = |value: f64| known.then_some(value);
         let (value, greatest) = (of(self.last), of(self.greatest));
         Drift { relation: self.text, kind: self.kind, value, greatest, resolution: self.resolution }
     }

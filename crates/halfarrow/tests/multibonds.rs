@@ -79,6 +79,21 @@ w -> GY[3]:ejs(skew(body.p))
     }
 }
 
+/// The length of a quaternion is a relation of positions with a closed form, from which its drift is told.
+#[test]
+fn a_quaternion_keeps_its_length() {
+    let text = "model Tumble
+import std.multibody
+World:world -> Free:free(w0 = [0.1, 3, 0.2]) -> Body:body(m = 1, J = diag([1, 2, 3]))
+";
+    let done = run(text, &Run { to: 5.0, every: Some(0.1), ..Run::default() });
+    let [drift] = done.report.audit.drift.as_slice() else { panic!("{:?}", done.report.audit.drift) };
+    let squares = |k: usize| (1..=4).map(|i| column(&done, &format!("free.turning.e[{i}]"))[k].powi(2)).sum::<f64>();
+    let lengthened = squares(times(&done).len() - 1) - squares(0);
+    close(drift.value.expect("it is known").abs(), lengthened.abs() / 2.0, 1e-14);
+    assert_eq!(drift.kind, "closed");
+}
+
 /// A top on its point, at the two rates at which it goes round without nodding: C w3 W - A W^2 cos(th) = m g l.
 #[test]
 fn a_top_precesses_steadily() {

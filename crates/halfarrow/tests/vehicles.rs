@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow::{FixedMethod, Method, Model, Override, Record, Run, Simulated, Source};
+use halfarrow::{FixedMethod, Method, Model, Override, Record, Run, Simulated, Source, Start};
 
 const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
 
@@ -574,6 +574,38 @@ output toe = arms.upright.R[2, 1]
         let camber = angle_of(foot, hinge) - inner - angle_of(outer, top);
         close(column(&done, "camber")[k], camber, 1e-9);
         close(column(&done, "toe")[k], 0.0, 1e-9);
+    }
+}
+
+/// A wheel that hangs on its suspension comes to rest while its spin, on which nothing depends then, stays as it is.
+#[test]
+fn an_equilibrium_leaves_a_free_wheel_its_spin() {
+    let text = "World:world -> Prismatic:up(n = [0, 0, 1]) -> 1[frame]:car
+car -> Body:hull(m = 400, J = diag([1, 1, 1]))
+1:z -> up.axis
+z -> C:k(1/2e4)
+DoubleWishbone:arms(
+    lower_front = [0.2, 0.42, -0.27], lower_back = [-0.2, 0.47, -0.265], lower_outer = [0, 0.77, -0.32],
+    upper_front = [-0.1, 0.47, 0.105], upper_back = [-0.25, 0.51, 0.11], upper_outer = [-0.04, 0.695, 0.105],
+    tie_inner = [-0.2, 0.42, -0.12], tie_outer = [-0.15, 0.77, -0.12], spindle = [0, 0.7979, -0.1199],
+    spring_top = [-0.04, 0.52, 0.23], spring_foot = [0, 0.62, -0.27],
+    m_lower = 1.611, c_lower = [0.0048, 0.6112, -0.2932], J_lower = [0.0151, 0.0207, 0.0355],
+    m_upper = 1.032, c_upper = [-0.1083, 0.5972, 0.1063], J_upper = [0.00591, 0.0019, 0.00769],
+    m_upright = 2.5, c_upright = [-0.0125, 0.7695, -0.1154], J_upright = [0.01428, 0.0151, 0.00331],
+    k = 73574.1, l0 = 0.61331, c = 15054.5
+)
+car -> arms.body
+car -> arms.rack
+Wheel:wheel(m = 24.7, J_axle = 1.08, J_across = 0.35, w0 = 7)
+arms.hub -> wheel -> Body:cap(m = 0.1, J = diag([1e-3, 1e-3, 1e-3]))
+output spin = wheel.speed
+";
+    let done = run(text, &Run { to: 0.1, start: Start::Equilibrium, record: Record::All, ..Run::default() });
+    // The spring carries everything, and nothing moves.
+    let weight = 9.81 * (400.0 + 1.611 + 1.032 + 2.5 + 24.7 + 0.1);
+    for (spring, spin) in column(&done, "k.e").iter().zip(column(&done, "spin")) {
+        close(*spring, -weight, 1e-6);
+        close(*spin, 7.0, 1e-9);
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{BondGraph, Constraint, HeldKind, Kind, Meaning, StorageLaw};
-use crate::algebra::{Expr, Exprs, ONE, SparseRow, Symbol, ZERO, back_substitute, eliminate};
+use crate::algebra::{Expr, Exprs, Node, ONE, SparseRow, Symbol, ZERO, back_substitute, eliminate};
 use crate::sparse::Matching;
 
 /// Parts with more flows than this are searched for rows that are one too many by their structure alone.
@@ -328,21 +328,39 @@ fn classified(x: &mut Exprs, graph: &BondGraph, terms: Vec<(Symbol, Expr)>) -> V
     }
     // Elimination leaves factors on both sides of the line.
     let short: Option<Vec<(Symbol, Expr)>> = terms.iter().map(|&(s, e)| Some((s, in_lowest_terms(x, e)?))).collect();
-    let found = short.filter(|short| *short != terms).and_then(|short| {
-        let mut below: Vec<Expr> = short.iter().map(|t| x.over_and_under(t.1).1).filter(|&e| e != ONE).collect();
-        below.sort();
-        below.dedup();
-        let below = x.mul(&below);
-        let whole: Vec<(Symbol, Expr)> = short
-            .iter()
-            .map(|&(s, e)| {
-                let product = x.mul(&[below, e]);
-                (s, in_lowest_terms(x, product).unwrap_or(product))
-            })
-            .collect();
-        closed(x, graph, &whole).or_else(|| closed(x, graph, &short))
-    });
-    found.unwrap_or(VelocityRelation { terms, integral: Integral::Open })
+    let Some(short) = short.filter(|short| *short != terms) else {
+        return VelocityRelation { terms, integral: Integral::Open };
+    };
+    let mut below: Vec<Expr> = short.iter().flat_map(|t| divisors(x, t.1)).collect();
+    below.sort();
+    below.dedup();
+    let below = x.mul(&below);
+    let whole: Vec<(Symbol, Expr)> = short
+        .iter()
+        .map(|&(s, e)| {
+            let product = x.mul(&[below, e]);
+            (s, in_lowest_terms(x, product).unwrap_or(product))
+        })
+        .collect();
+    let found = closed(x, graph, &whole).or_else(|| closed(x, graph, &short));
+    // Without a line there is a value everywhere.
+    found.unwrap_or(VelocityRelation { terms: whole, integral: Integral::Open })
+}
+
+/// What stands under the line of a product.
+fn divisors(x: &mut Exprs, e: Expr) -> Vec<Expr> {
+    let factors = match x.node(e) {
+        Node::Mul(factors) => factors.to_vec(),
+        _ => vec![e],
+    };
+    let inverse = |factor: Expr| match *x.node(factor) {
+        Node::Pow(base, n) if x.is_number(n).is_some_and(|n| n.signum() < 0) => {
+            let n = x.neg(n);
+            Some(x.pow(base, n))
+        }
+        _ => None,
+    };
+    factors.into_iter().filter_map(inverse).collect()
 }
 
 fn in_lowest_terms(x: &mut Exprs, e: Expr) -> Option<Expr> {

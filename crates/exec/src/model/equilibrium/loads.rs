@@ -11,6 +11,7 @@ const MOST_FOLLOWED: usize = 200;
 /// What stays the same along the path.
 struct LoadPath<'a> {
     leaf: Option<&'a Leaf>,
+    inert: &'a [bool],
     t: f64,
     /// The rates at the start: the loads that hold it at rest, but for their sign.
     load: Vec<f64>,
@@ -31,7 +32,13 @@ struct PathPoint {
 impl Model {
     /// A point near the equilibrium that the start `x` is joined to by equilibria under smaller and smaller loads:
     /// `f(x) = (1 - λ) f(start)` from `λ = 0` to 1, along the path. `None` if the path does not lead there.
-    pub(super) fn release_loads(&mut self, leaf: Option<&Leaf>, t: f64, start: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn release_loads(
+        &mut self,
+        leaf: Option<&Leaf>,
+        inert: &[bool],
+        t: f64,
+        start: &[f64],
+    ) -> Option<Vec<f64>> {
         let n = start.len();
         if n > MOST_FOLLOWED {
             return None;
@@ -49,7 +56,7 @@ impl Model {
             // Nothing changes any rate.
             return None;
         }
-        let path = LoadPath { leaf, t, load, rows, size };
+        let path = LoadPath { leaf, inert, t, load, rows, size };
         let mut point = PathPoint { x: start.to_vec(), part: 0.0 };
         // The direction: states in parts of their size, then the part of the loads.
         let mut along: Vec<f64> = (0..=n).map(|i| f64::from(u8::from(i == n))).collect();
@@ -105,7 +112,8 @@ impl Model {
     /// `f(x) - (1 - λ) load` and its derivatives along the directions, in parts of sizes, and by `λ`, row by row.
     fn homotopy(&mut self, path: &LoadPath, point: &PathPoint) -> Option<(Vec<f64>, Vec<f64>, Directions)> {
         let n = point.x.len();
-        let (rates, jacobian) = self.at_rest(path.t, &point.x).ok()?;
+        let (rates, mut jacobian) = self.at_rest(path.t, &point.x).ok()?;
+        jacobian.iter_mut().enumerate().filter(|(at, _)| path.inert[at % n]).for_each(|(_, v)| *v = 0.0);
         let directions = self.directions(path.leaf, path.t, &point.x)?;
         let columns = directions.count(n);
         let mut along = directions.along(&jacobian, n);

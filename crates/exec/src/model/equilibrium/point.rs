@@ -7,6 +7,9 @@ use super::open_equations::{Entry, OpenEquations, greatest};
 use super::tangent::Tangent;
 use halfarrow_sim::{Failure, Jacobian};
 
+/// Derivatives below this fraction of the greatest of their rate, or by their state, are rounding.
+pub(super) const LOST: f64 = 1e-12;
+
 /// A state with its rates, their derivatives, and the ways in which constraints let it move.
 pub(super) struct LinearisedPoint {
     pub x: Vec<f64>,
@@ -113,11 +116,28 @@ impl LinearisedPoint {
 }
 
 impl Model {
-    /// Rates and ways at a state.
+    /// Which states are inert at `x`, as the spin of a wheel at rest that no axle holds: they change nothing but for rounding.
+    pub(super) fn inert(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
+        let mut entries: Vec<Entry> = Vec::new();
+        let mut jacobian = Jacobian::new(&self.code.sparsity);
+        jacobian.visit(self, t, x, |row, column, _, value| entries.push((row, column, value)))?;
+        let rows = greatest(x.len(), entries.iter().map(|&(i, _, v)| (i, v)));
+        let columns = greatest(x.len(), entries.iter().map(|&(_, j, v)| (j, v)));
+        // How much a state stands out among those that change a rate, and its rate among those that a state changes.
+        let (mut changes, mut changed) = (vec![0.0f64; x.len()], vec![0.0f64; x.len()]);
+        for (i, j, v) in entries {
+            changes[j] = changes[j].max((v * rows[i]).abs());
+            changed[i] = changed[i].max((v * columns[j]).abs());
+        }
+        // The product is the same in whatever unit the state is counted.
+        Ok(changes.iter().zip(&changed).map(|(a, b)| a * b < LOST * LOST).collect())
+    }
+
+    /// Rates and ways at a state; inert states stay.
     pub(super) fn point(
         &mut self,
         jacobian: &mut Jacobian,
-        leaf: Option<&Leaf>,
+        (leaf, inert): (Option<&Leaf>, &[bool]),
         t: f64,
         x: Vec<f64>,
     ) -> Result<LinearisedPoint, Failure> {
@@ -125,7 +145,11 @@ impl Model {
         self.keep_positions();
         let rates = self.dx.clone();
         let mut entries = Vec::with_capacity(self.code.sparsity.nonzeros());
-        jacobian.visit(self, t, &x, |row, column, _, value| entries.push((row, column, value)))?;
+        jacobian.visit(self, t, &x, |row, column, _, value| {
+            if !inert[column] {
+                entries.push((row, column, value));
+            }
+        })?;
         entries.sort_unstable_by_key(|e| (e.1, e.0));
         let ways = match x.len() > FEW_STATES {
             true => self.sparse_ways(leaf, t, &x),

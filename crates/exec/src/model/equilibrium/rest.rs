@@ -1,6 +1,6 @@
 //! When a state counts as one of rest: rates are compared with the terms that they are made of.
 
-use super::point::LinearisedPoint;
+use super::point::{LOST, LinearisedPoint};
 
 /// Rates below this fraction of their own terms count as zero.
 const AT_REST: f64 = 1e-9;
@@ -26,7 +26,10 @@ impl Rest {
     /// Takes a point of the search into account.
     pub fn see(&mut self, at: &LinearisedPoint) {
         let mut terms: Vec<f64> = vec![0.0; at.x.len()];
-        at.entries().for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
+        let (rows, _) = at.weights();
+        // A derivative that is rounding beside the others of its rate makes no term, however far a search has moved the state.
+        let counts = |i: usize, v: f64| (rows[i] * v).abs() > LOST;
+        at.entries().filter(|&(i, _, v)| counts(i, v)).for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
         for ((most, own), rate) in self.terms.iter_mut().zip(terms).zip(&at.rates) {
             *most = most.max(rate.abs()).max(own);
         }
