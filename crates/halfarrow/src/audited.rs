@@ -211,6 +211,12 @@ const GROWN: f64 = 1e3;
 /// A source that is greater than it is for half of the time by this factor has a pole.
 const POLE: f64 = 1e9;
 
+/// It stands above this part of its peak
+const FLANK: f64 = 1e-3;
+
+/// for less than this part of the time.
+const SHARP: f64 = 1e-5;
+
 impl Book {
     /// Keeps the values at `t`.
     fn keep(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
@@ -243,8 +249,18 @@ impl Book {
             let peak = (0..column.len()).max_by(|&a, &b| column[a].abs().total_cmp(&column[b].abs()))?;
             let usual = self.usual(&column);
             let grew = usual > 0.0 && column[peak].abs() > factor * usual;
-            grew.then(|| (self.names[i].as_str(), column[peak], self.times[peak]))
+            (grew && (factor < POLE || self.is_sharp(&column, peak)))
+                .then(|| (self.names[i].as_str(), column[peak], self.times[peak]))
         })
+    }
+
+    /// Whether a peak is too sharp for a pulse, or for what comes or goes.
+    fn is_sharp(&self, column: &[f64], peak: usize) -> bool {
+        let high = |k: usize| column[k].abs() > FLANK * column[peak].abs();
+        let high: f64 =
+            (1..column.len()).filter(|&k| high(k - 1) && high(k)).map(|k| self.times[k] - self.times[k - 1]).sum();
+        let span = self.times.last().zip(self.times.first()).map_or(0.0, |(last, first)| last - first);
+        high < SHARP * span
     }
 
     /// The magnitude that a value stays below for half of the time.

@@ -421,6 +421,17 @@ fn what_is_made_wrong_beside_rounding_is_caught() {
     }
 }
 
+/// What dies away, comes late or is a pulse has no pole.
+#[test]
+fn what_decays_does_not_grow_without_bound() {
+    for source in ["exp(-50*t)", "exp(-(t - 3)^2/0.02)", "if t < 5 then 1e-15 else 1e3"] {
+        let model = text(&format!("model Kick\nSe:kick({source}) -> I:mass(1)\n"));
+        let asked = Run { to: 6.0, every: Some(0.02), ..Run::default() };
+        let done = model.simulate(&asked, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        assert!(done.report.notes.is_empty(), "{source}: {:?}", done.report.notes);
+    }
+}
+
 #[test]
 fn an_impact_that_gives_energy_is_caught() {
     let source = "model Wall\n1:v -> I:m(2, f0 = -1)\nstate x' = v.f from 0.5\n\
