@@ -486,7 +486,7 @@ pub struct Linearize {
     #[arg(long, default_value = "start", value_parser = point)]
     pub at: Point,
     /// Inputs: declared ones, and sources by their names, to whose value the input is added [default: the declared ones, else
-    /// all sources]
+    /// the sources in the model itself, not within its parts]
     #[arg(long, value_name = "NAMES")]
     pub inputs: Vec<String>,
     /// Outputs: anything that can be recorded [default: the declared ones, else the states]

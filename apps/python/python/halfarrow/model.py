@@ -557,7 +557,7 @@ class Model:
         Args:
             at: ``start``, ``equilibrium``, or a time in s.
             between: Inputs of the matrices: inputs of the model, and sources, to whose value the input is added. Nothing:
-                the declared inputs; if there are none, all sources.
+                the declared inputs; if there are none, the sources in the model itself,
             outputs: Outputs of the matrices: anything that can be recorded. Nothing: the declared outputs; if there are none,
                 the states.
             symbolic: Whether ``report["symbolic"]`` has matrices and transfer functions as expressions.

@@ -36,7 +36,7 @@ pub struct Linearize {
     /// Where.
     pub at: Point,
     /// Inputs: declared ones, and sources, to whose value the input is added. `None`: the declared ones; if there are
-    /// none, all sources.
+    /// none, the sources that are written in the model itself, not within its parts.
     pub inputs: Option<Vec<String>>,
     /// Outputs: anything that can be recorded. `None`: the declared ones; if there are none, the states.
     pub outputs: Option<Vec<String>>,
@@ -179,7 +179,8 @@ impl Model {
         };
         let names = match wanted {
             Some(names) => names.to_vec(),
-            None if self.graph.inputs.is_empty() => sources(),
+            // A source within a part is that part's own.
+            None if self.graph.inputs.is_empty() => sources().into_iter().filter(|name| !name.contains('.')).collect(),
             None => declared(),
         };
         let mut model = self.clone();

@@ -60,6 +60,8 @@ pub(crate) struct Run<'a> {
     handled: bool,
     /// Steps in a row that were made again for a crossing that was none then.
     vanished: usize,
+    /// Where a step has failed and other variables were tried.
+    exchanged_at: Option<f64>,
 }
 
 impl<'a> Run<'a> {
@@ -85,6 +87,7 @@ impl<'a> Run<'a> {
             inside: Vec::new(),
             handled: false,
             vanished: 0,
+            exchanged_at: None,
         }
     }
 
@@ -117,6 +120,7 @@ impl<'a> Run<'a> {
             inside,
             handled,
             vanished: 0,
+            exchanged_at: None,
         }
     }
 
@@ -189,8 +193,13 @@ impl<'a> Run<'a> {
         let latest = f64::min(stop.time, self.time + longest);
         let end = match stepper.step(self.time, self.next_sample(), latest, point) {
             Ok(end) => end,
-            Err(_) if self.exchange(&mut *stepper.events(), point, true)? => return Ok(StopReason::Exchange),
-            Err(failure) => return Err(failure),
+            // Where other variables have been tried already they do not help.
+            Err(failure) if self.exchanged_at == Some(self.time) => return Err(failure),
+            Err(failure) => {
+                let exchanged = self.exchange(&mut *stepper.events(), point, true)?;
+                self.exchanged_at = Some(self.time);
+                return if exchanged { Ok(StopReason::Exchange) } else { Err(failure) };
+            }
         };
         self.counts.steps += 1;
         let (end, crossed) = self.accept_step(stepper, end, point)?;
