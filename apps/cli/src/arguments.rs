@@ -432,6 +432,11 @@ pub struct Simulate {
     /// Where to draw the bond graph: a .svg or .png file; may be repeated
     #[arg(long, value_name = "FILE")]
     pub draw: Vec<PathBuf>,
+    /// Where to show the machine as it moves: a .html file, with plots beside it, that opens without a network; results
+    /// are taken 60 times a second where --every does not say. What has a shape is shown: bodies and joints of
+    /// std.multibody and std.planar, and what the model says of its own (`shape`)
+    #[arg(long, value_name = "FILE")]
+    pub animate: Vec<PathBuf>,
 }
 
 /// Axes.

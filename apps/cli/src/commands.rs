@@ -1,6 +1,7 @@
 //! The commands: each gives its exit status.
 
 mod analyse;
+mod animation;
 mod compare;
 mod export;
 mod files;

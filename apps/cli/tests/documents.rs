@@ -74,7 +74,7 @@ fn models_in_the_readme_run() {
 
 #[test]
 fn models_in_the_language_document_run() {
-    snippets_run("docs/language.md", 18);
+    snippets_run("docs/language.md", 19);
 }
 
 #[test]

@@ -71,3 +71,29 @@ fn plots_lay_runs_over_each_other() {
     assert!(bad.status.code() == Some(2) && said(&bad).contains("neither a .csv file nor"), "{}", said(&bad));
     assert_eq!(run(&["--plot-x", "spring.q"]).status.code(), Some(2), "there is no plot");
 }
+
+#[test]
+fn an_animation_is_written_beside_the_rest() {
+    let at = folder("animate");
+    let text = "model Fall\nimport std.multibody\nWorld:world -> Prismatic:guide -> Body:stone(m = 1 kg, J = diag([1, 1, 1]))\n";
+    std::fs::write(at.join("fall.bond"), text).expect("a file");
+    let run = |more: &[&str]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_halfarrow"));
+        program.current_dir(&at).args(["simulate", "fall.bond", "--to", "1"]).args(more).output().expect("it runs")
+    };
+    let done = run(&["--animate", "fall.html", "--out", "film.csv", "--solver", "rk4", "--step", "0.01"]);
+    assert!(done.status.success(), "{}", said(&done));
+    assert!(read(&at, "fall.html").contains("\"stone.solid\""));
+    // Of the steps every second one, and no columns of the picture; the rows are those of a run without it.
+    assert!(run(&["--out", "plain.csv", "--solver", "rk4", "--step", "0.01", "--every", "0.02"]).status.success());
+    assert_eq!(read(&at, "film.csv"), read(&at, "plain.csv"));
+    assert!(
+        run(&["--animate", "all.htm", "--record", "guide.q,stone.solid.r[3]", "--out", "own.csv"]).status.success()
+    );
+    assert!(read(&at, "own.csv").starts_with("t,guide.q,stone.solid.r[3]\n"));
+    assert!(read(&at, "own.csv").lines().count() == 62);
+    let other = run(&["--animate", "fall.svg"]);
+    assert!(other.status.code() == Some(2) && said(&other).contains(".html"), "{}", said(&other));
+    let bare = halfarrow(&at, &["simulate", "--to", "1", "--animate", "x.html"]);
+    assert!(bare.status.code() == Some(2) && said(&bare).contains("nothing to show"), "{}", said(&bare));
+}

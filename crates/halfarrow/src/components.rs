@@ -192,6 +192,10 @@ impl<F: Files> Files for WithLibraries<F> {
         self.0.read(path)
     }
 
+    fn read_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
+        self.0.read_bytes(path)
+    }
+
     fn library(&self, name: &str) -> Option<String> {
         self.0.library(name).or_else(|| Library::text(name).map(str::to_string))
     }

@@ -108,6 +108,8 @@ pub enum Problem {
         /// The Cargo feature that it lacks.
         feature: &'static str,
     },
+    /// A picture of a machine of which nothing has a shape.
+    NoShapes,
     /// A start at rest where there is none.
     NoEquilibrium {
         /// Why there is none.
@@ -216,6 +218,11 @@ impl fmt::Display for Problem {
                 write!(f, "this build cannot {what}: it was made without the feature `{feature}`")
             }
             Problem::NoEquilibrium { reason } => write!(f, "no start at rest: {reason}"),
+            Problem::NoShapes => f.write_str(
+                "there is nothing to show: nothing in this model has a shape; take bodies and joints of std.multibody or \
+                 std.planar, which have, or write where something is and what it looks like, as in \
+                 `shape box:cart(r = [x, 0, 0], R = 0, size = [0.4, 0.2, 0.2])`",
+            ),
             Problem::NoStep => f.write_str("this solver has a fixed step: give it with --step, as in `--step 1e-3`"),
         }
     }

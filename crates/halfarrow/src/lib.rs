@@ -17,12 +17,14 @@
 //! # Ok::<(), halfarrow::Error>(())
 //! ```
 //!
-//! What is heavy is a feature, all of them on by default: `machine` (machine code), `parquet`, `png`, `fmu`, `real_time`.
+//! What is heavy is a feature, all of them on by default: `animation` (pages that move), `machine` (machine code), `parquet`,
+//! `png`, `fmu`, `real_time`.
 //! Without them the library builds for `wasm32-unknown-unknown`; what a build lacks it says where it is asked for.
 #![forbid(unsafe_code)]
 
 mod advice;
 mod alternatives;
+mod animation;
 mod audited;
 mod check;
 mod clock;
@@ -63,6 +65,7 @@ mod verdict;
 mod wall_clock;
 mod watch;
 
+pub use animation::{Body, Curve, FRAMES_PER_SECOND, Form as BodyForm, Link, Mesh, Scene};
 pub use audited::{AuditReport, Deviation, DriftReport};
 pub use check::CheckReport;
 pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};

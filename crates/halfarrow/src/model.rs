@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use halfarrow_compiler::ast;
-use halfarrow_compiler::bond_graph::{BondGraph, Override};
+use halfarrow_compiler::bond_graph::{BondGraph, FileError, Override};
 use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
 use halfarrow_compiler::causal_paths::{CausalPaths, find_paths};
 use halfarrow_compiler::compile::{self, Found, Reached, Text};
@@ -94,6 +94,11 @@ impl Model {
     pub fn source(&self) -> Source {
         let Origin { source, files, .. } = &*self.origin;
         Source::text(source.name(), source.content()).with_files(files.texts())
+    }
+
+    /// The bytes of a file, whose path is seen from where its text is.
+    pub(crate) fn source_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
+        self.origin.source.files().read_bytes(path)
     }
 
     /// The files that it read, by path, libraries that come with the program apart.

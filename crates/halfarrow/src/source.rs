@@ -141,6 +141,10 @@ impl Disk {
 
 impl Files for Disk {
     fn read(&self, path: &str) -> Result<String, FileError> {
+        utf8(self.read_bytes(path)?).map_err(FileError::Unreadable)
+    }
+
+    fn read_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
         let real = match Path::new(path).canonicalize() {
             Ok(real) => real,
             // Nobody learns here what there is elsewhere.
@@ -153,8 +157,7 @@ impl Files for Disk {
         if !self.roots.iter().any(|root| real.starts_with(&root.real)) {
             return Err(self.refusal(path));
         }
-        let bytes = std::fs::read(real).map_err(|why| FileError::Unreadable(why.to_string()))?;
-        utf8(bytes).map_err(FileError::Unreadable)
+        std::fs::read(real).map_err(|why| FileError::Unreadable(why.to_string()))
     }
 }
 
@@ -190,6 +193,10 @@ impl Files for Remembered {
     fn read(&self, path: &str) -> Result<String, FileError> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.entry(path.to_string()).or_insert_with(|| self.files.read(path)).clone()
+    }
+
+    fn read_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
+        self.files.read_bytes(path)
     }
 
     fn library(&self, name: &str) -> Option<String> {

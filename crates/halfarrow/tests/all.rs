@@ -1,5 +1,7 @@
 //! All tests in one program, which is linked once: `cargo test --test all NAME` runs those of one file.
 
+#[path = "animation.rs"]
+mod animation;
 #[path = "api.rs"]
 mod api;
 #[path = "compare.rs"]

@@ -5,11 +5,12 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Method, Model, Problem, Record,
-    Run, RunReport, Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
+    Run, RunReport, Scene, Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
 use super::analyse::form;
+use super::animation;
 use super::picture::{check_names, write_picture};
 use super::plots::{recorded, write_plots};
 use super::with_model;
@@ -25,10 +26,11 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         for path in &arguments.draw {
             write_picture(&model.draw(&DrawOptions::default())?, path)?;
         }
+        let (run, own) = animation::filmed(arguments, model, run(arguments))?;
         let mut progress = Progress::new(arguments.to);
         let stop = stop::on_signals();
         let mut told: Vec<String> = Vec::new();
-        let outcome = model.simulate(&run(arguments), &mut |come| {
+        let outcome = model.simulate(&run, &mut |come| {
             if let Some(note) = come.note {
                 screen::note(&format!("warning: {note}"));
                 told.push(note.to_string());
@@ -38,14 +40,17 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         });
         progress.finish();
         match outcome {
-            Ok(done) => {
-                finish(arguments, model, &done, (&told, None))?;
+            Ok(mut done) => {
+                let scene = animation::scene(arguments, model, &mut done, &own)?;
+                finish(arguments, model, (&done, scene.as_ref()), (&told, None))?;
                 Ok(0)
             }
             Err(Error::Run(stopped)) => {
                 let Stopped { failure, trace, report } = *stopped;
                 screen::note(&format!("error: {failure}"));
-                finish(arguments, model, &Simulated { trace, report }, (&told, Some(&failure.to_string())))?;
+                let mut done = Simulated { trace, report };
+                let scene = animation::scene(arguments, model, &mut done, &own)?;
+                finish(arguments, model, (&done, scene.as_ref()), (&told, Some(&failure.to_string())))?;
                 Ok(3)
             }
             Err(error) => Err(error),
@@ -129,6 +134,11 @@ fn check_files(arguments: &Simulate) -> Result<(), Problem> {
             return Err(Problem::UnknownKind { path: path.clone(), known: vec!["csv", "parquet"] });
         }
     }
+    for path in &arguments.animate {
+        if !["html", "htm"].contains(&extension(path).as_str()) {
+            return Err(Problem::UnknownKind { path: path.clone(), known: vec!["html"] });
+        }
+    }
     check_names(&arguments.plot)?;
     check_names(&arguments.draw)
 }
@@ -146,12 +156,13 @@ fn is_stdout(path: &Path) -> bool {
 fn finish(
     arguments: &Simulate,
     model: &Model,
-    done: &Simulated,
+    (done, scene): (&Simulated, Option<&Scene>),
     (told, error): (&[String], Option<&str>),
 ) -> Result<(), Error> {
     if done.trace.samples() > 0 || error.is_none() {
         model.timed("write", || write_files(arguments, &done.trace))?;
         model.timed("draw", || write_plots(arguments, model, &run(arguments), done))?;
+        model.timed("animate", || animation::write(arguments, scene))?;
     }
     let to_stdout = arguments.out.iter().any(|path| is_stdout(path));
     let untold = done.report.notes.iter().filter(|note| !told.contains(note));

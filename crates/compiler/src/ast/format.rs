@@ -198,6 +198,7 @@ impl<'t> Layout<'t> {
         let word = if node { "" } else { self.pieces[i].text };
         self.colon = match word {
             "constraint" => Colon::After,
+            "shape" => Colon::Tight,
             _ if KEYWORDS.contains(&word) => Colon::Around,
             _ => Colon::Tight,
         };

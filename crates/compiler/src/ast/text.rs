@@ -77,6 +77,10 @@ fn write_statement(out: &mut String, kind: &StatementKind, level: usize) {
             write_block(out, &d.body, level);
         }
         StatementKind::Chain(c) => write_chain(out, c),
+        StatementKind::Shape(e) => {
+            *out += "shape ";
+            write_element(out, e);
+        }
         StatementKind::PortKind(k) => {
             *out += &format!("port {} {{", k.name.text);
             for (i, (word, list)) in [("bond", &k.bonds), ("in", &k.signals)].into_iter().enumerate() {

@@ -109,6 +109,8 @@ pub enum StatementKind {
     For(Box<For>),
     /// `if i == 1 { ... } else { ... }`: statements that are there or not.
     Choice(Box<Choice>),
+    /// `shape box:hull(r = car.r, R = car.R, size = [4, 1.6, 1])`: what a picture of the machine shows.
+    Shape(Box<Element>),
 }
 
 /// A named value: `name : unit = value "doc"` (or the unit after the value).

@@ -13,8 +13,8 @@ use super::set_valued::SetValuedLaw;
 use super::structure::Structure;
 use super::{
     BondGraph, Cell, CellId, Clause, Constraint, ForcedCausality, ForcedStroke, Guess, HeldId, HeldSignal, Input,
-    InputId, IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, SignalId,
-    Variable,
+    InputId, IntegratedSignal, Meaning, Named, Parameter, ParameterId, Preference, Repetition, RepetitionId, Shape,
+    SignalId, Variable,
 };
 use crate::algebra::{Expr, Node, Symbol};
 use crate::ast::Header;
@@ -60,6 +60,7 @@ pub(super) struct Laws {
     pub outputs: Vec<Named>,
     pub constraints: Vec<Constraint>,
     pub set_valued: Vec<SetValuedLaw>,
+    pub shapes: Vec<Shape>,
 }
 
 /// The declarations whose units their variables have.
@@ -83,6 +84,7 @@ impl Laws {
         self.lets.iter_mut().chain(&mut self.outputs).for_each(|n| visit(&mut n.value));
         self.constraints.iter_mut().for_each(|c| visit(&mut c.expr));
         self.set_valued.iter_mut().for_each(|law| law.for_each_expr(visit));
+        self.shapes.iter_mut().flat_map(Shape::values_mut).for_each(|n| visit(&mut n.value));
         for guess in guesses {
             visit(&mut guess.what);
             visit(&mut guess.value);
@@ -130,6 +132,7 @@ impl Builder<'_, '_> {
             guesses: asked.guesses,
             constraints: laws.constraints,
             set_valued: laws.set_valued,
+            shapes: laws.shapes,
             time: self.time,
             repetitions,
             cells,

@@ -365,7 +365,7 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The file from whose folder a file named in the text at `span` is seen; of a new value that of the model.
-    fn file_around(&self, span: Span) -> &str {
+    pub fn file_around(&self, span: Span) -> &str {
         let name = self.sources.name(span.file);
         if name.starts_with(super::overrides::SET) { self.sources.name(FileId(0)) } else { name }
     }

@@ -10,6 +10,7 @@ use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
 use super::names::{self, Name};
 use super::overrides::{self, Override};
+use super::shapes::ShapeDraft;
 use super::uses::Uses;
 use super::wire::{Wiring, wire};
 use super::{BondGraph, Clause, Kind, verify};
@@ -101,6 +102,7 @@ fn build(
     b.later = later;
     let guesses = b.guesses();
     let clauses = b.clauses();
+    let shapes = b.shapes();
     b.settle_units();
     b.finish_blocks();
     let asked = Asked {
@@ -125,7 +127,7 @@ fn build(
     b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
     let faults = faults.into_list();
-    Built { graph: finished(b, title, kinds, (asked, clauses), &relations, &rates), faults, uses }
+    Built { graph: finished(b, title, kinds, (asked, clauses, shapes), &relations, &rates), faults, uses }
 }
 
 /// The graph of what has been read without a fault; `None` if something is missing nevertheless.
@@ -133,7 +135,7 @@ fn finished(
     mut b: Builder<'_, '_>,
     title: &Title,
     kinds: Vec<Option<Kind>>,
-    (asked, clauses): (Asked, Vec<Clause>),
+    (asked, clauses, shapes): (Asked, Vec<Clause>, Vec<ShapeDraft>),
     relations: &[Relation],
     rates: &BTreeMap<Symbol, Expr>,
 ) -> Option<BondGraph> {
@@ -144,7 +146,8 @@ fn finished(
     let set_valued = std::mem::take(&mut b.set_valued);
     let (lets, outputs) = (std::mem::take(&mut b.lets), std::mem::take(&mut b.outputs));
     let (lets, outputs) = (b.whole_named(lets), b.whole_named(outputs));
-    let laws = Laws { structure, signals, held, lets, outputs, constraints, set_valued, clauses };
+    let shapes = shapes.into_iter().map(|shape| b.whole_shape(shape)).collect();
+    let laws = Laws { structure, signals, held, lets, outputs, constraints, set_valued, clauses, shapes };
     b.assemble(title, asked, laws, [rates, &repeated])
 }
 

@@ -1,6 +1,6 @@
 //! The expressions of a graph, visited always in the same order.
 
-use super::{BondGraph, Clause, Kind, ResistorLaw, SetValuedLaw, Storage, StorageLaw, Trigger};
+use super::{BondGraph, Clause, Kind, ResistorLaw, SetValuedLaw, Shape, Storage, StorageLaw, Trigger};
 use crate::algebra::Expr;
 
 impl BondGraph {
@@ -18,6 +18,7 @@ impl BondGraph {
         all.extend(self.lets.iter().chain(&self.outputs).map(|n| n.value));
         all.extend(self.constraints.iter().flat_map(|c| [c.expr, c.multiplier]));
         all.extend(self.set_valued.iter().flat_map(SetValuedLaw::expressions));
+        all.extend(self.shapes.iter().flat_map(Shape::values).map(|n| n.value));
         all.extend(self.guesses.iter().flat_map(|g| [g.what, g.value]));
         all
     }

@@ -11,6 +11,14 @@ pub trait Files {
     /// Why it cannot be read.
     fn read(&self, path: &str) -> Result<String, FileError>;
 
+    /// The bytes of a file that is no text. The path is one as in [`read`](Files::read).
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn read_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
+        self.read(path).map(String::into_bytes)
+    }
+
     /// The text of a library, by its name as in `import std.electrical`.
     fn library(&self, _name: &str) -> Option<String> {
         None

@@ -161,6 +161,16 @@ pub(super) struct Clause<'a> {
     pub span: Span,
 }
 
+/// A `shape`.
+pub(super) struct Pictured<'a> {
+    /// Its full name.
+    pub name: String,
+    /// Where it belongs.
+    pub here: Here,
+    /// As written.
+    pub ast: &'a ast::Element,
+}
+
 /// A bond as drawn, perhaps ending at ports of components.
 pub(super) struct Drawn {
     /// Where it starts.
@@ -214,6 +224,7 @@ pub(super) struct Flat<'a> {
     pub guesses: Vec<(Here, &'a ast::Guess)>,
     pub constraints: Vec<Held<'a>>,
     pub clauses: Vec<Clause<'a>>,
+    pub shapes: Vec<Pictured<'a>>,
     pub faults: Faults,
     /// Where names are used that say what there is and how it is joined.
     pub uses: Uses,
@@ -323,6 +334,7 @@ impl<'a> Flat<'a> {
                 StatementKind::Guess(_) => "a guess",
                 StatementKind::Discrete(_) => "a discrete variable",
                 StatementKind::When(_) => "an event",
+                StatementKind::Shape(_) => "a shape",
                 StatementKind::Prefer(_) | StatementKind::Causality(_) | StatementKind::Stroke(_) => "causality",
                 StatementKind::Domain(d) => {
                     self.refuse_in_import(&d.body);
@@ -390,6 +402,7 @@ impl<'a> Flat<'a> {
                     list.iter().for_each(|d| self.declare_whole(here, here, d, DeclKind::Discrete(d.value.as_ref())));
                 }
                 StatementKind::When(w) => self.clauses.push(Clause { here, ast: w, span: statement.span }),
+                StatementKind::Shape(s) => self.shape(here, s),
             }
         }
     }
@@ -399,6 +412,12 @@ impl<'a> Flat<'a> {
         let name = full_name(&self.names.scopes[here.scope].prefix, &c.name.text, &indices);
         self.place(here.scope, &c.name, &indices, Node::Constraint(self.constraints.len()));
         self.constraints.push(Held { name, here, ast: c, span });
+    }
+
+    fn shape(&mut self, here: Here, ast: &'a ast::Element) {
+        let Some((indices, _)) = self.indices_and_ports(here, ast) else { return };
+        let name = full_name(&self.names.scopes[here.scope].prefix, &ast.name.text, &indices);
+        self.shapes.push(Pictured { name, here, ast });
     }
 
     /// Declares the nodes of a chain and keeps its bonds for later, when all nodes are known.

@@ -42,6 +42,7 @@ mod recognise;
 mod repeat;
 mod scope;
 mod set_valued;
+mod shapes;
 mod start_parameters;
 mod structure;
 mod symbols;
@@ -60,6 +61,7 @@ pub use files::{FileError, Files, NoFiles};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
 pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};
+pub use shapes::{Shape, ShapeArgument, ShapeKind};
 pub use velocity_relations::{Integral, VelocityRelation, velocity_relations};
 pub use verify::verify;
 pub use warnings::warnings;
@@ -152,6 +154,8 @@ pub struct BondGraph {
     /// Set-valued laws, in the order of the text. Their elements have the kind of the present branch, and the last clauses
     /// tell where it ends: see [`in_mode`](BondGraph::in_mode).
     pub set_valued: Vec<SetValuedLaw>,
+    /// What a picture of the machine shows (`shape`), in the order of the text.
+    pub shapes: Vec<Shape>,
     /// Time, as a symbol.
     pub time: Symbol,
     /// The repetitions of statements (`for`).
@@ -700,6 +704,7 @@ impl BondGraph {
             guesses: self.guesses.clone(),
             constraints: self.constraints.clone(),
             set_valued: self.set_valued.clone(),
+            shapes: self.shapes.clone(),
             time: self.time,
             repetitions: self.repetitions.clone(),
             cells: self.cells.clone(),

@@ -226,6 +226,19 @@ impl BondGraph {
                 writeln!(f, "  {} = {}{}", n.name, self.text(n.value), unit(n.unit.as_ref()))?;
             }
         }
+        self.print_shapes(f)
+    }
+
+    fn print_shapes(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if !self.shapes.is_empty() {
+            writeln!(f, "\nshapes")?;
+        }
+        for shape in &self.shapes {
+            writeln!(f, "  {} {}", shape.kind.word(), shape.name)?;
+            for n in shape.values() {
+                writeln!(f, "    {} = {}{}", n.name, self.text(n.value), unit(n.unit.as_ref()))?;
+            }
+        }
         Ok(())
     }
 

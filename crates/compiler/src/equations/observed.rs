@@ -9,7 +9,7 @@ use rustc_hash::FxBuildHasher;
 use super::definitions::Definitions;
 use super::{Guess, InitialCondition, Observed, ObservedKind, Position, State, StateKind, Unavailable};
 use crate::algebra::{Expr, Symbol, SymbolKind};
-use crate::bond_graph::{BondGraph, HeldKind, Kind, Meaning};
+use crate::bond_graph::{BondGraph, HeldKind, Kind, Meaning, Shape};
 use crate::unit::Unit;
 
 /// The name of a state: its variable, or the output or `let` that says the same.
@@ -77,6 +77,10 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
     for input in graph.inputs.values() {
         let e = d.x.sym(input.symbol);
         add(input.name.clone(), Ok(e), input.unit.clone(), ObservedKind::Input, false);
+    }
+    for named in graph.shapes.iter().flat_map(Shape::values) {
+        let value = value_of(d, named.value);
+        add(named.name.clone(), value, named.unit.clone(), ObservedKind::Named, false);
     }
     all
 }

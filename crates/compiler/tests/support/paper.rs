@@ -68,6 +68,7 @@ pub fn empty(name: &str) -> BondGraph {
         held: Table::new(),
         clauses: Vec::new(),
         set_valued: Vec::new(),
+        shapes: Vec::new(),
         lets: Vec::new(),
         outputs: Vec::new(),
         point: None,

@@ -175,6 +175,7 @@ impl Sketch {
             held: self.held.into_iter().collect(),
             clauses: Vec::new(),
             set_valued: Vec::new(),
+            shapes: Vec::new(),
             lets: Vec::new(),
             outputs: Vec::new(),
             point: None,

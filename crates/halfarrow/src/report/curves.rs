@@ -3,9 +3,9 @@
 use halfarrow_trace::{Column, Trace};
 
 /// uPlot 1.6, MIT, as it comes (`uplot/README.md`).
-pub(super) const LIBRARY: &str = include_str!("uplot/uPlot.iife.min.js");
+pub(crate) const LIBRARY: &str = include_str!("uplot/uPlot.iife.min.js");
 /// Its style.
-pub(super) const LIBRARY_STYLE: &str = include_str!("uplot/uPlot.min.css");
+pub(crate) const LIBRARY_STYLE: &str = include_str!("uplot/uPlot.min.css");
 /// One panel a unit, all over the same time; without this program the page keeps its still picture.
 pub(super) const SCRIPT: &str = include_str!("curves.js");
 /// Curves in a panel.

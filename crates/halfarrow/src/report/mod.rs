@@ -18,6 +18,9 @@ use crate::error::Error;
 use crate::input::Input;
 use crate::model::Model;
 use crate::run::{Run, Simulated};
+#[cfg(feature = "animation")]
+pub(crate) use curves::{LIBRARY, LIBRARY_STYLE};
+
 use causality::Decided;
 
 /// Equations of a form that are set; more are counted.

@@ -106,7 +106,7 @@ impl Parser<'_> {
     }
 
     /// `Kind:name[ports](args)`; the kind has been read if it is given.
-    fn element(&mut self, wide: Option<Token>) -> Node {
+    pub(super) fn element(&mut self, wide: Option<Token>) -> Node {
         let kind = wide.unwrap_or_else(|| self.bump());
         let start = self.span_of(kind);
         let widths = if wide.is_some() { self.widths() } else { Vec::new() };

@@ -47,7 +47,7 @@ const MAX_NESTING: usize = 120;
 pub(super) const RESERVED: [&str; 6] = ["and", "else", "if", "not", "or", "then"];
 
 /// Words that begin a statement.
-pub(super) const KEYWORDS: [&str; 17] = [
+pub(super) const KEYWORDS: [&str; 18] = [
     "causality",
     "component",
     "const",
@@ -62,6 +62,7 @@ pub(super) const KEYWORDS: [&str; 17] = [
     "output",
     "param",
     "prefer",
+    "shape",
     "state",
     "stroke",
     "when",

@@ -168,6 +168,7 @@ impl Parser<'_> {
             "discrete" => StatementKind::Discrete(self.declarations(Value::Needed)),
             "when" => StatementKind::When(Box::new(self.when()?)),
             "for" => StatementKind::For(Box::new(self.for_loop()?)),
+            "shape" => StatementKind::Shape(Box::new(self.shape()?)),
             _ => {
                 let hint = "put the other model into a file of its own, or make it a `component`";
                 let fault =
@@ -674,6 +675,17 @@ impl Parser<'_> {
         }
         let value = self.expr();
         Some(Action { reset, target, value, span: self.since(start) })
+    }
+
+    /// `kind:name[i](arguments) "doc"`.
+    fn shape(&mut self) -> Option<Element> {
+        if self.kind() != TokenKind::Ident || self.ahead(1).kind != TokenKind::Colon {
+            self.expected("a shape, as in `box:hull(r = car.r, R = car.R, size = [4, 1.6, 1])`");
+            return None;
+        }
+        let Node::Declared(mut shape) = self.element(None) else { return None };
+        shape.doc = self.doc();
+        Some(*shape)
     }
 
     fn for_loop(&mut self) -> Option<For> {
