@@ -419,7 +419,7 @@ impl Check<'_, '_> {
     ) {
         let scale = self.settled.scale(&[Term::of(of, 1.0)]);
         let mut room = Vec::new();
-        for (k, &time) in self.values.times.iter().enumerate() {
+        for (k, &time) in self.values.times.iter().enumerate().filter(|(k, _)| !reader.is_beyond(*k)) {
             let Some(found) = reader.values_in(&mut room, k, &[]) else { continue };
             let off = self.least(reader, k, miss(k, found), |v| miss(k, v));
             let (graph, scales, settled) = (self.graph, self.scales, self.settled);
@@ -457,7 +457,8 @@ impl Check<'_, '_> {
             _ => vec![expr],
         };
         let reader = self.values.reader(&parts)?;
-        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(|k| reader.values(k, &[])).collect();
+        let at = |k: usize| reader.values(k, &[]).filter(|_| !reader.is_beyond(k));
+        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(at).collect();
         let size = |v: &Vec<f64>| v.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let greatest = found.iter().flatten().map(size).fold(0.0, f64::max);
         let natural = if parts.len() > 1 { greatest } else { 0.0 };

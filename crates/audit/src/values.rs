@@ -178,6 +178,7 @@ impl<'a> Values<'a> {
         let time = self.graph.time;
         let state = |s: Symbol| s != time && !self.parameters.contains_key(&s);
         let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
+        let bent = wanted.iter().any(|&e| self.bends(e, &state));
         let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
         let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
         let places: BTreeMap<Symbol, usize> = rates.keys().enumerate().map(|(k, s)| (*s, k)).collect();
@@ -192,7 +193,7 @@ impl<'a> Values<'a> {
             Read { sources: order.symbols().iter().map(source).collect(), order }
         };
         let rates = rates.values().map(|&rate| read(&[rate])).collect();
-        Ok(Reader { values: self, wanted: read(wanted), rates, moves, jumpy, timed })
+        Ok(Reader { values: self, wanted: read(wanted), rates, moves, jumpy, bent, timed })
     }
 
     /// The column of a symbol, or of the effort or flow that it is the rate of a stored quantity as.
@@ -224,17 +225,27 @@ impl<'a> Values<'a> {
 
     /// Whether an expression jumps where something for which `moves` holds crosses a border.
     fn jumps(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
+        let jumps = |node: &Node| match node {
+            Node::Compare(..) | Node::Table(..) | Node::TableSlope(..) => true,
+            Node::Call(function, _) => matches!(function, Function::Sign | Function::Floor | Function::Mod),
+            _ => false,
+        };
+        self.has_part(e, &jumps, moves)
+    }
+
+    /// Whether an expression has a kink there.
+    fn bends(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
+        let bends = |node: &Node| matches!(node, Node::Call(Function::Min | Function::Max | Function::Abs, _));
+        self.has_part(e, &bends, moves)
+    }
+
+    /// Whether there is such a part in an expression that something moves.
+    fn has_part(&self, e: Expr, is_such: &dyn Fn(&Node) -> bool, moves: &dyn Fn(Symbol) -> bool) -> bool {
         let x = &self.graph.exprs;
         let varies = |e: Expr| x.symbols_of(e).into_iter().any(moves);
         let (mut open, mut seen) = (vec![e], BTreeSet::from([e]));
         while let Some(e) = open.pop() {
-            let jumps = match x.node(e) {
-                Node::Compare(..) => varies(e),
-                Node::Call(Function::Sign | Function::Floor | Function::Mod, _) => varies(e),
-                Node::Table(..) | Node::TableSlope(..) => varies(e),
-                _ => false,
-            };
-            if jumps {
+            if is_such(x.node(e)) && varies(e) {
                 return true;
             }
             x.node(e).for_each_child(|c| {
@@ -276,6 +287,8 @@ pub(crate) struct Reader<'v, 'a> {
     /// Whether a value jumps with the state, and with time.
     jumpy: bool,
     timed: bool,
+    /// Whether a value has a kink where the state crosses a border.
+    bent: bool,
 }
 
 /// Expressions with where the values of their symbols are.
@@ -303,6 +316,12 @@ impl Reader<'_, '_> {
     pub fn jumps_at(&self, sample: usize) -> bool {
         let times = self.values.times;
         self.jumpy && (sample == 0 || times[sample] == times[sample - 1])
+    }
+
+    /// Whether a sample stands before a switch, and a value has a kink: a step of fixed length holds the old branch to its end,
+    /// and is then beyond the border.
+    pub fn is_beyond(&self, sample: usize) -> bool {
+        self.bent && self.values.is_before_jump(sample)
     }
 
     /// The values at a sample, symbols moved by so much; `None` where the law is not clear: at a switch the state stands
