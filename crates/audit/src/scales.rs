@@ -332,15 +332,16 @@ impl Scales {
     /// Energies stand beside what storages hold at the sizes of their variables, powers beside these energies in the time of the
     /// run.
     fn raise_energies(&self, graph: &BondGraph, alone: &BTreeMap<Quantity, f64>, beside: &mut BTreeMap<Quantity, f64>) {
-        let size = |quantity: Quantity| {
-            let [own, told] = [alone, &*beside].map(|all| all.get(&quantity).copied().unwrap_or(0.0));
-            if own > FLOOR * told { own } else { told }
+        let held = |sizes: &BTreeMap<Quantity, f64>| {
+            let size = |quantity: Quantity| sizes.get(&quantity).copied().unwrap_or(0.0);
+            let held = storages(graph).filter_map(|(port, stored)| {
+                let z = graph.storage_symbols(port)?.0;
+                Some(size(self.of(graph, z)) * size(Quantity::Of(stored)))
+            });
+            held.fold(0.0, f64::max)
         };
-        let held = storages(graph).filter_map(|(port, stored)| {
-            let z = graph.storage_symbols(port)?.0;
-            Some(size(self.of(graph, z)) * size(Quantity::Of(stored)))
-        });
-        let held = held.fold(0.0, f64::max);
+        let (own, told) = (held(alone), held(beside));
+        let held = if own > FLOOR * told { own } else { told };
         let ports = graph.outer_ports();
         let energy = beside.entry(Quantity::Energy).or_default();
         *energy = energy.max(held);
