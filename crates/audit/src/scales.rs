@@ -250,7 +250,9 @@ impl Scales {
             for ((quantity, from), weight) in of_variables.iter().copied() {
                 let told = *weight * near.get(from).copied().unwrap_or(0.0);
                 let own = alone.get(quantity).copied().unwrap_or(0.0);
-                let told = if own > FLOOR * told { told.min(AMPLIFIED * own) } else { told };
+                // What is told itself by far greater things than there are makes nothing rounding.
+                let likely = (*weight * alone.get(from).copied().unwrap_or(0.0)).max(told / (AMPLIFIED * AMPLIFIED));
+                let told = if own > FLOOR * likely { told.min(AMPLIFIED * own) } else { told };
                 let most = beside.entry(*quantity).or_default();
                 *most = most.max(told);
             }
