@@ -124,6 +124,24 @@ def independent(model, law):
     return [[*stance(at(z), p["spindle"]), slope(energy, z)] for z in TRAVELS]
 
 
+def steered():
+    """The McPherson strut at its height as drawn, with the rack moved to the left."""
+    drawn = numbers("mcpherson", "arms")
+
+    def at(rack, z):
+        def equations(x):
+            d, d0 = moved(x, drawn["tie_outer"]) - drawn["tie_inner"] - [0, rack, 0], drawn["tie_outer"] - drawn["tie_inner"]
+            return [*mcpherson(drawn, x)[:-1], np.linalg.norm(d) - np.linalg.norm(d0), moved(x, drawn["spindle"])[2] - drawn["spindle"][2] - z]
+
+        return solved(equations, 6, np.zeros(6))
+
+    def energy(x):
+        (top, foot), parts = parts_of("mcpherson", drawn, x)
+        return drawn["k"] / 2 * (np.linalg.norm(foot - top) - drawn["l0"]) ** 2 + G * sum(m * c[2] for m, c in parts)
+
+    return [[*stance(at(rack, 0), drawn["spindle"]), slope(lambda z: energy(at(rack, z)), 0)] for rack in TRAVELS]
+
+
 def rigid_axle(sign):
     p, b = numbers("rigid_axle", "axle"), numbers("rigid_axle", "bar")
 
@@ -153,20 +171,25 @@ def rigid_axle(sign):
     rows = []
     for z in TRAVELS:
         x = at(z, sign * z)
-        rows.append([*stance(x, p["spindle"]), slope(lambda left: energy(left, sign * z), z), twist(x)])
+        # Tension of the left link: its moment about the pivot, by how its length changes with the angle of the arm, holds the bar.
+        end = Rotation.from_rotvec([0, arm(x, np.ones(3)), 0]).apply(b["arm_end"] - b["pivot"] * [1, 0, 1])
+        link = moved(x, b["link_end"]) - b["pivot"] * [1, 0, 1] - end
+        moment = -link @ np.cross([0, 1, 0], end) / np.linalg.norm(link)
+        rows.append([*stance(x, p["spindle"]), slope(lambda left: energy(left, sign * z), z), twist(x), -b["k"] * twist(x) / moment])
     return rows
 
 
 def main():
     found = {law.__name__: independent(law.__name__, law) for law in (double_wishbone, mcpherson, trailing_arm, five_link)}
+    found["mcpherson_steered"] = steered()
     found["rigid_axle"] = rigid_axle(1)
     found["rigid_axle_opposite"] = rigid_axle(-1)
     with open(HERE / "kinematics.csv", "w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        out.writerow(["model", "travel", "camber", "toe", "track", "force", "twist"])
+        out.writerow(["model", "travel", "camber", "toe", "track", "force", "twist", "link"])
         for model, rows in found.items():
             for z, row in zip(TRAVELS, rows):
-                out.writerow([model, f"{z:.2f}", *(f"{round(v, 12) + 0:.10g}" for v in [*row, 0.0][:5])])
+                out.writerow([model, f"{z:.2f}", *(f"{round(v, 12) + 0:.10g}" for v in [*row, 0.0, 0.0][:6])])
 
 
 main()

@@ -602,6 +602,7 @@ fn on_the_bench(text: &str, expected: &str) {
         close(column(&done, "force")[k], row[4], 1e-2);
         if row[5] != 0.0 {
             close(column(&done, "twist")[k], row[5], 1e-7);
+            close(column(&done, "link")[k], row[6], 1e-3);
         }
     }
 }
@@ -623,6 +624,18 @@ fn a_mcpherson_strut_stands_as_its_points_say() {
     let text = include_str!("../../../examples/suspensions/mcpherson.bond");
     on_the_bench(text, "mcpherson");
     on_the_bench(&on_the_right(text, "McPherson:arms("), "mcpherson");
+}
+
+/// Its height stays, the rack goes to the left and to the right.
+#[test]
+fn a_mcpherson_strut_is_steered_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/mcpherson.bond");
+    let text =
+        text.replace("Bench:bench(", "Bench:bench(stride = 0, ").replace("travel = bench.travel", "travel = rack.way");
+    let rack = "car -> Prismatic:rack(n = [0, 1, 0], fixed = 1) -> arms.rack
+Sf:pinion((if t < 4 then 1 else -1)*20e-3*(1 - cos(2*pi*t))) -> rack.axis";
+    let text = text.replace("car -> arms.rack", rack);
+    on_the_bench(&text, "mcpherson_steered");
 }
 
 #[test]
