@@ -117,7 +117,7 @@ output y = top.a.r[2]
 "
             );
             let to = 1.0;
-            let done = run(&text, &Run { to, rtol: 1e-12, every: Some(0.01), ..Run::default() });
+            let done = run(&text, &Run { to, rtol: 1e-12, step: Some(0.01), ..Run::default() });
             for (k, t) in times(&done).iter().enumerate() {
                 let angle = around * t;
                 close(column(&done, "up")[k], theta.cos(), 1e-9);
@@ -153,6 +153,89 @@ shaft -> bearing.a
         let ratio = column(&done, "output.speed")[k] / column(&done, "input.speed")[k];
         close(ratio, cos / (1.0 - sin * sin * a.cos() * a.cos()), 1e-9);
     }
+}
+
+/// The same joint closes a loop: the second shaft stands in a ball bearing that slides along it, at its far end.
+#[test]
+fn a_universal_joint_that_closes_a_loop_turns_unevenly() {
+    let text = "model Cardan
+import std.multibody
+param bend = 0.5235987755982988
+World:world(g = [0, 0, 0]) -> 1[frame]:ground
+ground -> Revolute:input(n = [1, 0, 0], w0 = 2, fixed = 1) -> 1[frame]:yoke -> Body:first(m = 1, J = diag([0.1, 1, 1]))
+ground -> FixedRotation:lean(n = [0, 0, 1], angle = bend) -> FixedTranslation:far(d = [0.7, 0, 0]) -> Prismatic:along(n = [1, 0, 0]) -> SphericalCardan:bearing -> 1[frame]:shaft
+shaft -> Body:second(m = 1, J = diag([0.2, 1, 1]))
+CutUniversal:cross(n1 = [0, 1, 0], n2 = [0, 0, 1])
+yoke -> cross.a
+shaft -> FixedTranslation:fork(d = [-0.7, 0, 0]) -> cross.b
+";
+    assert_eq!(states(text).len(), 2, "{:?}", states(text));
+    let done = run(text, &Run { to: 10.0, rtol: 1e-11, every: Some(0.05), ..Run::default() });
+    assert!(last(&done, "input.angle") > 15.0);
+    let (sin, cos) = (PI / 6.0).sin_cos();
+    for k in 0..times(&done).len() {
+        let a = column(&done, "input.angle")[k];
+        let ratio = column(&done, "bearing.roll.speed")[k] / column(&done, "input.speed")[k];
+        close(ratio, cos / (1.0 - sin * sin * a.cos() * a.cos()), 1e-9);
+        close(column(&done, "along.way")[k].hypot(column(&done, "bearing.yaw.angle")[k]), 0.0, 1e-9);
+    }
+}
+
+/// What a cut joint leaves free to a body with six ways to move is what the joint of that kind gives: on a slope a slide goes
+/// down a parabola, a body on a plane too and turns about its centre, and in a guide it swings as on a prismatic and a ball joint.
+#[test]
+fn cut_joints_leave_what_their_joints_give() {
+    let free = "-> Prismatic:x(n = [1, 0, 0], v0 = 3) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z -> SphericalCardan:turning(w1 = 1, w2 = 0.5)";
+    let (sin, cos) = 0.5f64.sin_cos();
+    let sliding = |cut: &str, center: &str| {
+        format!(
+            "model Slope
+import std.multibody
+World:world -> FixedRotation:lean(n = [0, 1, 0], angle = 0.5) -> 1[frame]:base
+base {free} -> 1[frame]:loose -> Body:b(m = 2, J = diag([0.2, 0.2, 0.2]), c = {center})
+{cut}
+base -> cut.a
+loose -> cut.b
+"
+        )
+    };
+    let exact = Run { to: 0.5, rtol: 1e-11, every: Some(0.05), ..Run::default() };
+    let way = |t: f64| 3.0 * t + 9.81 / 2.0 * sin * t * t;
+    let slide = sliding("CutPrismatic:cut(n = [1, 0, 0])", "[0.3, 0.1, -0.2]").replace("w1 = 1, w2 = 0.5", "");
+    assert_eq!(states(&slide).len(), 2, "{:?}", states(&slide));
+    let done = run(&slide, &exact);
+    times(&done).iter().zip(column(&done, "x.way")).for_each(|(t, x)| close(*x, way(*t), 1e-9));
+    for still in ["y.way", "z.way", "turning.roll.angle", "turning.pitch.angle", "turning.yaw.angle"] {
+        close(last(&done, still), 0.0, 1e-12);
+    }
+    let plane = sliding("CutInplane:cut(n = [0, 0, 1])", "[0, 0, 0]");
+    assert_eq!(states(&plane).len(), 10, "{:?}", states(&plane));
+    let done = run(&plane, &exact);
+    times(&done).iter().zip(column(&done, "x.way")).for_each(|(t, x)| close(*x, way(*t), 1e-9));
+    close(last(&done, "z.way"), 0.0, 1e-12);
+    // The force of the plane acts at the centre, a sphere of inertia keeps turning, and the plane carries the weight across it.
+    close(
+        last(&done, "b.inertia.x.f").hypot(last(&done, "b.inertia.y.f")).hypot(last(&done, "b.inertia.z.f")),
+        f64::hypot(1.0, 0.5),
+        1e-9,
+    );
+    close(last(&done, "cut.above.e").abs(), 2.0 * 9.81 * cos, 1e-8);
+    let guide = sliding("CutInline:cut(n = [0.6, 0, 0.8])", "[0.3, 0.1, -0.2]")
+        .replace("v0 = 3", "v0 = 1.8")
+        .replace("Prismatic:z", "Prismatic:z(v0 = 2.4)");
+    let guide = guide
+        + "base -> Prismatic:guide(n = [0.6, 0, 0.8], v0 = 3) -> SphericalCardan:ball(w1 = 1, w2 = 0.5) -> Body:same(m = 2, J = diag([0.2, 0.2, 0.2]), c = [0.3, 0.1, -0.2])\n";
+    assert_eq!(states(&guide).len(), 16, "{:?}", states(&guide));
+    let done = run(&guide, &exact);
+    for (cut, tree, factor) in [
+        ("x.way", "guide.way", 0.6),
+        ("z.way", "guide.way", 0.8),
+        ("turning.roll.angle", "ball.roll.angle", 1.0),
+        ("turning.yaw.angle", "ball.yaw.angle", 1.0),
+    ] {
+        column(&done, cut).iter().zip(column(&done, tree)).for_each(|(c, t)| close(*c, factor * t, 1e-9));
+    }
+    assert!(last(&done, "ball.yaw.angle").abs() > 0.1);
 }
 
 /// The planar model by transformers and the frames of space tell the same double pendulum.
@@ -657,6 +740,31 @@ Se:motor(1.74) -> fast
     close(last(&done, "pinion.speed"), speed, 1e-9);
     close(last(&done, "wheel.speed"), -speed / 4.0, 1e-9);
     close(last(&done, "slide.speed"), 0.2 * speed, 1e-9);
+}
+
+/// Wheels that turn in a carrier: by Willis the sun turns 1 + z_ring/z_sun times as fast as the carrier, the planets backward.
+#[test]
+fn an_epicyclic_gear_turns_as_willis_says() {
+    let text = "model Epicyclic
+import std.multibody
+import std.mechanical
+World:world(g = [0, 0, 0]) -> Revolute:carrier -> 1[frame]:arms -> Body:cage(m = 1, J = diag([1, 1, 0.3]))
+arms -> Revolute:sun -> Body:sun_wheel(m = 1, J = diag([1, 1, 0.1]))
+arms -> FixedTranslation:out(d = [0.2, 0, 0]) -> Revolute:planet -> Body:planet_wheel(m = 0.5, J = diag([1, 1, 0.02]))
+1:carrier_rate -> carrier.axis
+1:sun_rate -> sun.axis
+1:planet_rate -> planet.axis
+sun_rate -> Gear:outer(ratio = -18/30) -> planet_rate
+planet_rate -> Gear:ring(ratio = -66/18) -> carrier_rate
+Se:motor(2) -> carrier_rate
+";
+    assert_eq!(states(text).iter().filter(|name| name.ends_with(".f")).count(), 1);
+    let done = run(text, &Run { to: 2.0, rtol: 1e-12, step: Some(0.01), ..Run::default() });
+    let (sun, planet) = (1.0 + 66.0 / 30.0, 1.0 - 66.0 / 18.0);
+    let speed = 2.0 / (0.3 + 0.5 * 0.04 + 0.1 * sun * sun + 0.02 * planet * planet) * 2.0;
+    close(last(&done, "carrier.speed"), speed, 1e-9);
+    close(last(&done, "sun.speed") + speed, sun * speed, 1e-9);
+    close(last(&done, "planet.speed") + speed, planet * speed, 1e-9);
 }
 
 /// Of two cardan joints whose yokes stand alike the second takes away what the first does: the outer shafts turn as one.

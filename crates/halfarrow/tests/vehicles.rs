@@ -8,7 +8,8 @@ use halfarrow::{FixedMethod, Method, Model, Override, Record, Run, Simulated, So
 const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
 
 /// Tables of roads, steering, paths and an engine.
-const TABLES: [(&str, &str); 4] = [
+const TABLES: [(&str, &str); 5] = [
+    ("boost.csv", "torque,force\n-12,-4000\n-2,0\n2,0\n12,4000\n"),
     ("road.csv", "x,h\n0,0\n1,0\n2,0.05\n3,0.05\n4,0\n5,0\n"),
     ("steer.csv", "t,angle\n0,0\n1,0\n1.5,0.02\n10,0.02\n"),
     ("path.csv", "x,y\n-100,0\n0,0\n20,0\n40,3\n60,3\n2000,3\n"),
@@ -574,6 +575,122 @@ output toe = arms.upright.R[2, 1]
         let camber = angle_of(foot, hinge) - inner - angle_of(outer, top);
         close(column(&done, "camber")[k], camber, 1e-9);
         close(column(&done, "toe")[k], 0.0, 1e-9);
+    }
+}
+
+/// A suspension of the examples, with changes to its text, moved up and down on its bench: how the wheel stands and what holds it
+/// there, against what its points alone say.
+fn on_the_bench(text: &str, expected: &str) {
+    let bench = ("bench.bond".to_string(), include_str!("../../../examples/suspensions/bench.bond").to_string());
+    let source = Source::text("machine.bond", text).with_files(BTreeMap::from([bench]));
+    let model = Model::new(source, &[]).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)));
+    let run = Run { to: 12.0, rtol: 1e-9, every: Some(1.0), record: Record::All, ..Run::default() };
+    let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}\n{text}", e.render(false)));
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for line in include_str!("../../../examples/suspensions/kinematics.csv").lines() {
+        if let Some(("", row)) = line.strip_prefix(expected).map(|rest| rest.split_once(',').unwrap_or((rest, ""))) {
+            rows.push(row.split(',').map(|x| x.parse().expect("a number")).collect());
+        }
+    }
+    assert_eq!(rows.len(), 9, "{expected}");
+    let travels = column(&done, "travel");
+    for row in rows {
+        let k = travels.iter().position(|z| (z - row[0]).abs() < 1e-8).expect("the wheel comes there");
+        for (name, value) in ["camber", "toe", "track"].into_iter().zip(&row[1..]) {
+            close(column(&done, name)[k], *value, 1e-8);
+        }
+        close(column(&done, "force")[k], row[4], 1e-2);
+        if row[5] != 0.0 {
+            close(column(&done, "twist")[k], row[5], 1e-7);
+            close(column(&done, "link")[k], row[6], 1e-3);
+        }
+    }
+}
+
+/// `text` with the suspension on the right side.
+fn on_the_right(text: &str, suspension: &str) -> String {
+    let right = text.replace(suspension, &format!("{suspension}side = -1, "));
+    right.replace("Bench:bench(", "Bench:bench(side = -1, ")
+}
+
+#[test]
+fn a_double_wishbone_stands_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/double_wishbone.bond");
+    on_the_bench(text, "double_wishbone");
+}
+
+#[test]
+fn a_mcpherson_strut_stands_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/mcpherson.bond");
+    on_the_bench(text, "mcpherson");
+    on_the_bench(&on_the_right(text, "McPherson:arms("), "mcpherson");
+}
+
+/// Its height stays, the rack goes to the left and to the right.
+#[test]
+fn a_mcpherson_strut_is_steered_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/mcpherson.bond");
+    let text =
+        text.replace("Bench:bench(", "Bench:bench(stride = 0, ").replace("travel = bench.travel", "travel = rack.way");
+    let rack = "car -> Prismatic:rack(n = [0, 1, 0], fixed = 1) -> arms.rack
+Sf:pinion((if t < 4 then 1 else -1)*20e-3*(1 - cos(2*pi*t))) -> rack.axis";
+    let text = text.replace("car -> arms.rack", rack);
+    on_the_bench(&text, "mcpherson_steered");
+}
+
+#[test]
+fn a_semi_trailing_arm_stands_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/trailing_arm.bond");
+    on_the_bench(text, "trailing_arm");
+    on_the_bench(&on_the_right(text, "TrailingArm:arms("), "trailing_arm");
+}
+
+#[test]
+fn five_links_stand_as_their_points_say() {
+    let text = include_str!("../../../examples/suspensions/five_link.bond");
+    on_the_bench(text, "five_link");
+    on_the_bench(&on_the_right(text, "FiveLink:arms("), "five_link");
+}
+
+/// A `RigidAxle:` on four links with an `AntiRollBar:`, whose wheels go up together or one against the other.
+#[test]
+fn a_rigid_axle_stands_as_its_points_say() {
+    let text = include_str!("../../../examples/suspensions/rigid_axle.bond");
+    on_the_bench(text, "rigid_axle");
+    on_the_bench(&text.replace("opposite = 0", "opposite = 1"), "rigid_axle_opposite");
+}
+
+/// A steering column with a universal joint moves a rack against a spring: Newton's and Euler's equations, the closed form of
+/// the joint, and the curve of the power assistance.
+#[test]
+fn a_column_steers_a_rack() {
+    let text = "Se:hands(4*sin(3*t)) -> column.wheel
+Column:column(j = 0.03, k = 90, c = 0.8, r = 0.008, bend = 0.4, phase = 0.3, assist = table(\"boost.csv\", column.torque, outside = clamp))
+World:world -> Prismatic:guide(n = [0, 1, 0]) -> Body:rod(m = 3, J = diag([1, 1, 1]))
+column.rack -> 1:rack -> guide.axis
+rack -> C:tyres(k = 2e5)
+rack -> R:friction(900)
+output boost = table(\"boost.csv\", column.torque, outside = clamp)
+output a = guide.rate.f'
+output b = column.hands.f'
+";
+    let done = run(text, &exact(4.0));
+    let (sin, cos) = 0.4f64.sin_cos();
+    // The angle of the shaft after the joint.
+    let after = |a: f64| f64::atan2(a.sin(), cos * a.cos());
+    assert!(column(&done, "column.torque").iter().any(|torque| torque.abs() > 3.0));
+    assert!(column(&done, "column.angle").iter().any(|angle| angle.abs() > 0.3));
+    for k in 0..=100 {
+        let at = |name: &str| column(&done, name)[k];
+        let (q, torque) = (at("column.angle"), at("column.torque"));
+        let ratio = cos / (1.0 - (sin * (q + 0.3).cos()).powi(2));
+        let twist = after(q + 0.3) - after(0.3) - at("guide.way") / 0.008;
+        let rate = ratio * at("column.hands.f") - at("guide.speed") / 0.008;
+        close(torque, 90.0 * twist + 0.8 * rate, 1e-6);
+        close(0.03 * at("b"), 4.0 * (3.0 * 0.04 * k as f64).sin() - ratio * torque, 1e-6);
+        let boost = torque.signum() * 400.0 * (torque.abs() - 2.0).clamp(0.0, 10.0);
+        close(at("boost"), boost, 1e-9);
+        close(3.0 * at("a"), torque / 0.008 + boost - 2e5 * at("guide.way") - 900.0 * at("guide.speed"), 1e-4);
     }
 }
 
