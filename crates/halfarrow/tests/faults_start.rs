@@ -555,3 +555,28 @@ fn pipes_find_their_pressures() {
         assert!((start[name] - wanted).abs() < 1e-13, "{name}: {:e} but {wanted:e}", start[name]);
     }
 }
+
+/// What fits where the search begins, at 0, but for rounding of the constants that conditions subtract, stays there.
+#[test]
+fn what_fits_at_zero_stays_there() {
+    let text = "model Start
+state x' = vx.f
+state y' = vy.f
+state z' = vz.f
+1:vx -> I:ix(1)
+1:vy -> I:iy(1)
+1:vz -> I:iz(1)
+constraint rod: (0.41 + x)^2 + (0.025 + y - 0.1*z)^2 = 0.41^2 + 0.025^2
+constraint rod2: (0.44 + x)^2 + (-0.25 + y + 0.3*z)^2 = 0.44^2 + 0.25^2
+";
+    let hold = "constraint hold: (0.3 + x)^2 + (0.1 + 0.7*y + z)^2 = 0.3^2 + 0.1^2\n";
+    for text in [text.to_string(), format!("{text}{hold}")] {
+        let model = Model::from_text("m.bond", &text, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        let run = Run { to: 1e-6, record: Record::All, ..Run::default() };
+        let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        for name in ["x", "y", "z"] {
+            let column = done.trace.columns.iter().find(|c| c.name == name).expect("it is recorded");
+            assert!(column.values[0].abs() < 1e-14, "{name} {}\n{text}", column.values[0]);
+        }
+    }
+}

@@ -493,8 +493,9 @@ shaft -> HoldingBrake:brake(t_max = 40)
 Se:load(if t < 1 then 0 else 12) -> shaft
 ";
     let done = run(text, &Run { to: 3.0, rtol: 1e-9, every: Some(0.01), ..Run::default() });
-    // The damping while it gives way takes b z_0 of the momentum.
-    close(column(&done, "shaft.f")[20], 10.0 - 20.0 * 0.2 - 0.05, 3e-3);
+    // The damping while it gives way takes b z_0 of the momentum; until then the torque is less, for some z_0/u.
+    let late = 1e-3 / (10.0 / 11.0);
+    close(column(&done, "shaft.f")[20], 10.0 - 20.0 * (0.2 - late) - 0.05, 3e-3);
     close(last(&done, "shaft.f"), 0.0, 1e-9);
     close(last(&done, "brake.z"), 12.0 / 40.0 * 1e-3, 1e-9);
     close(last(&done, "brake.torque"), 12.0, 1e-6);

@@ -4,14 +4,16 @@
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Program, StartGroup, Value};
+use halfarrow_compiler::program::{Op, Program, StartGroup, Value};
 use halfarrow_sim::{Affected, Failure};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A start condition is met if its residual is below this fraction of the sum of its terms' magnitudes.
 const MET: f64 = 1e-9;
 /// Relative rounding error of an unknown whose exact value is 0, beside the largest unknown of its group.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Relative rounding error of a sum, beside what it adds up.
+const TERMS: f64 = 4.0 * f64::EPSILON;
 /// Weight of a constraint relative to a start value in the least-squares solution of contradicting conditions.
 const FIRM: f64 = 1e4;
 /// Most passes over the conditions that have one open unknown.
@@ -248,8 +250,7 @@ impl Model {
             if group.conditions.iter().all(|&c| unknowns.met[c]) {
                 continue;
             }
-            let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
-            let routine = self.start_routine(&wanted);
+            let routine = self.routine_of(&group);
             let known = group.unknowns.iter().all(|&u| unknowns.known[u as usize]);
             if known && self.is_met(t, &routine, &group, &unknowns.z) {
                 continue;
@@ -296,19 +297,46 @@ impl Model {
     }
 
     fn solve_part(&mut self, t: f64, group: &StartGroup, unknowns: &mut Unknowns) -> Result<(), StartError> {
-        let wanted: Vec<Value> = group.conditions.iter().map(|&c| self.code.program.start[c].residual).collect();
-        let routine = self.start_routine(&wanted);
+        let routine = self.routine_of(group);
         self.solve_group(t, &routine, group, unknowns)
     }
 
     fn is_met(&mut self, t: f64, routine: &Routine, group: &StartGroup, z: &[f64]) -> bool {
         let Some((residual, jacobian)) = self.linearised(t, routine, group, z) else { return false };
-        self.unmet(group, z, &residual, &jacobian).is_empty()
+        self.unmet((group, routine), z, &residual, &jacobian).is_empty()
+    }
+
+    /// The residuals of a group, and behind them what each of them adds up.
+    pub(super) fn routine_of(&mut self, group: &StartGroup) -> Routine {
+        let program = &self.code.program;
+        let residuals = group.conditions.iter().map(|&c| program.start[c].residual);
+        let terms = residuals.clone().flat_map(|residual| terms_of(program, residual));
+        let wanted: Vec<Value> = residuals.chain(terms).collect();
+        self.start_routine(&wanted)
+    }
+
+    /// What rounding leaves of each residual of a group: of what it adds up, where the routine has been run.
+    fn rounding_of(&self, group: &StartGroup, routine: &Routine) -> Vec<f64> {
+        let mut terms = routine.outputs[group.conditions.len()..].iter();
+        let program = &self.code.program;
+        let sum = |&c: &usize| {
+            let count = terms_of(program, program.start[c].residual).len();
+            let sum: f64 = terms.by_ref().take(count).map(|&out| self.frame.r[out as usize].abs()).sum();
+            TERMS * sum
+        };
+        group.conditions.iter().map(sum).collect()
     }
 
     /// Indices of the group's conditions that do not hold.
-    pub(super) fn unmet(&self, group: &StartGroup, z: &[f64], residual: &[f64], jacobian: &[f64]) -> Vec<usize> {
+    pub(super) fn unmet(
+        &self,
+        (group, routine): (&StartGroup, &Routine),
+        z: &[f64],
+        residual: &[f64],
+        jacobian: &[f64],
+    ) -> Vec<usize> {
         let n = group.unknowns.len();
+        let terms = self.rounding_of(group, routine);
         let asked = |i: usize| {
             let register = self.code.layout.registers.get(&self.code.program.start[group.conditions[i]].asked);
             register.map_or(0.0, |&r| self.frame.r[r as usize].abs())
@@ -328,7 +356,8 @@ impl Model {
         let weight = |j: usize| (0..rows.len()).fold(0.0f64, |most, i| most.max(share(i, j)));
         let weighed = group.unknowns.iter().enumerate().map(|(j, &u)| weight(j) * z[u as usize].abs());
         let rounding = ROUNDING * weighed.fold(0.0, f64::max);
-        let missed = |i: &usize| residual[*i].abs() > MET * size(*i) + rounding * rows[*i] || residual[*i].is_nan();
+        let most = |i: usize| terms[i].max(MET * size(i) + rounding * rows[i]);
+        let missed = |i: &usize| residual[*i].abs() > most(*i) || residual[*i].is_nan();
         (0..residual.len()).filter(missed).collect()
     }
 
@@ -360,7 +389,7 @@ impl Model {
                 }
                 if let Some(at) = self.linearised(t, routine, group, &z) {
                     let (z, residual, jacobian) = self.nearest(at_time, z, at, &movable);
-                    if self.unmet(group, &z, &residual, &jacobian).is_empty() {
+                    if self.unmet((group, routine), &z, &residual, &jacobian).is_empty() {
                         all.z = z;
                         group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
                         return Ok(());
@@ -389,7 +418,7 @@ impl Model {
                 break;
             }
         }
-        if self.unmet(group, &z, &residual, &jacobian).is_empty() {
+        if self.unmet((group, routine), &z, &residual, &jacobian).is_empty() {
             all.z = z;
             group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
             return Ok(());
@@ -559,11 +588,11 @@ impl Model {
         }
         for (j, &unknown) in group.unknowns.iter().enumerate() {
             self.residuals(t, routine, z, Some(&[unknown as usize])).ok()?;
-            for (i, &out) in routine.outputs.iter().enumerate() {
+            for (i, &out) in routine.outputs[..rows].iter().enumerate() {
                 jacobian[i * columns + j] = self.frame.d[out as usize];
             }
         }
-        let residual: Vec<f64> = routine.outputs.iter().map(|&out| self.frame.r[out as usize]).collect();
+        let residual: Vec<f64> = routine.outputs[..rows].iter().map(|&out| self.frame.r[out as usize]).collect();
         let finite = residual.iter().chain(&jacobian).all(|v| v.is_finite());
         finite.then_some((residual, jacobian))
     }
@@ -631,4 +660,20 @@ fn greatest_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
 /// The weights of conditions: the inverses of their largest derivatives.
 fn weights_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
     greatest_of(jacobian, rows, columns).into_iter().map(minimum_norm::inverse).collect()
+}
+
+/// What a value adds up, each once.
+fn terms_of(program: &Program, value: Value) -> Vec<Value> {
+    let (mut open, mut seen, mut terms) = (vec![value], BTreeSet::new(), Vec::new());
+    while let Some(value) = open.pop() {
+        if !seen.insert(value) {
+            continue;
+        }
+        match program.values.op(value) {
+            Op::Add(a, b) | Op::Sub(a, b) => open.extend([b, a]),
+            Op::Neg(a) => open.push(a),
+            _ => terms.push(value),
+        }
+    }
+    terms
 }

@@ -63,15 +63,13 @@ impl Model {
 
     /// Differentiates the unknowns of a group of start conditions.
     fn vary_group(&mut self, t: f64, z: &[f64], group: &StartGroup, moved: &mut [Vec<f64>]) -> Result<(), StartError> {
-        let program = &self.code.program;
-        let wanted: Vec<_> = group.conditions.iter().map(|&c| program.start[c].residual).collect();
-        let routine = self.start_routine(&wanted);
+        let routine = self.routine_of(group);
         let without = |name: String, reason: &str| StartError::Failure(Model::without_derivative(t, name, reason));
         let names = |model: &Model, group: &StartGroup| model.names_of(group.unknowns.iter().copied()).join(", ");
         let Some((residual, jacobian)) = self.linearised(t, &routine, group, z) else {
             return Err(without(names(self, group), "its start conditions have no finite derivative there"));
         };
-        let (n, unmet) = (group.unknowns.len(), self.unmet(group, z, &residual, &jacobian));
+        let (n, unmet) = (group.unknowns.len(), self.unmet((group, &routine), z, &residual, &jacobian));
         // Freedom that nobody asked for has given way.
         let rows: Vec<usize> = (0..residual.len()).filter(|i| !unmet.contains(i)).collect();
         let matrix: Vec<f64> = rows.iter().flat_map(|&i| jacobian[i * n..][..n].iter().copied()).collect();
