@@ -432,6 +432,14 @@ fn what_decays_does_not_grow_without_bound() {
     }
 }
 
+/// What changes its side over and over is told by the name of what it asks for.
+#[test]
+fn a_condition_that_chatters_is_named() {
+    let model = text("model Chatter\n1:v -> I:m(1, f0 = 0.5)\nv -> R:dry(e = 2*sign(f))\n");
+    let failure = run_or_none(&model, &Run { to: 2.0, ..Run::default() }).expect("it stands still").to_string();
+    assert!(failure.contains("a condition on `m.f` changes its side over and over"), "{failure}");
+}
+
 #[test]
 fn an_impact_that_gives_energy_is_caught() {
     let source = "model Wall\n1:v -> I:m(2, f0 = -1)\nstate x' = v.f from 0.5\n\

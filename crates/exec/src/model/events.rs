@@ -7,10 +7,14 @@ use super::positions::Motion;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
+use halfarrow_compiler::program::Value;
 use halfarrow_sim::{Affected, Events, Failure};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Modes that one instant leads through at most.
 const MOST_MODES: usize = 200;
+/// As many variables tell which condition is meant.
+const MOST_NAMES: usize = 3;
 
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
@@ -326,6 +330,28 @@ impl Events for Model {
 
     fn indicators(&self) -> usize {
         self.code.switching.iter().map(|&c| self.code.program.conditions[c].kind.switches()).sum()
+    }
+
+    fn indicator_name(&self, indicator: usize) -> String {
+        let program = &self.code.program;
+        let switches =
+            self.code.switching.iter().flat_map(|&c| std::iter::repeat_n(c, program.conditions[c].kind.switches()));
+        let operand = switches.map(|c| program.conditions[c].operand).nth(indicator);
+        // The variables with names that it is nearest to.
+        let named: BTreeMap<Value, &str> =
+            program.observed.iter().rev().filter_map(|o| Some((*o.value.as_ref().ok()?, o.name.as_str()))).collect();
+        let (mut level, mut seen): (Vec<Value>, BTreeSet<Value>) = (operand.into_iter().collect(), BTreeSet::new());
+        while !level.is_empty() {
+            let names: BTreeSet<&str> = level.iter().filter_map(|value| named.get(value).copied()).collect();
+            if !names.is_empty() {
+                let names: Vec<String> = names.into_iter().take(MOST_NAMES).map(|name| format!("`{name}`")).collect();
+                return format!("a condition on {}", names.join(", "));
+            }
+            let mut below = Vec::new();
+            level.iter().for_each(|&value| program.values.op(value).for_each_operand(|operand| below.push(operand)));
+            level = below.into_iter().filter(|&value| seen.insert(value)).collect();
+        }
+        format!("condition {}", indicator + 1)
     }
 
     fn event_indicators(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
