@@ -522,10 +522,9 @@ fn moved_by(
         let quantity = scales.of(graph, symbol);
         let by = MOVED * settled.of(quantity);
         let mut change = |by: f64| {
-            let own = from.iter().find(|(s, _)| *s == symbol).map_or(0.0, |m| m.1);
-            moved.insert(0, (symbol, own + by));
+            moved.push((symbol, by));
             let there = reader.values(sample, &moved).map(|v| of(&v));
-            moved.remove(0);
+            moved.pop();
             there.map(|there| (there - here).abs()).filter(|c| c.is_finite())
         };
         let most = [by, -by].into_iter().filter_map(&mut change).fold(0.0f64, f64::max);

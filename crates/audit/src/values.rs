@@ -360,7 +360,7 @@ impl Reader<'_, '_> {
             Source::Time => t,
             Source::Rate(rate) => self.read(&self.rates[rate], &mut Vec::new(), sample, t, moved)[0],
             Source::Column(symbol, column) => {
-                column[sample] + moved.iter().find(|(s, _)| *s == symbol).map_or(0.0, |(_, by)| *by)
+                moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)
             }
             Source::Number(number) => number,
         })

@@ -30,11 +30,18 @@ impl Model {
     /// # Errors
     /// Nothing of the model has a shape, or a file of a surface cannot be read.
     pub fn pictured(&self) -> Result<Vec<String>, Problem> {
+        let pictured = self.read_by_shapes()?;
+        let mut meshes = self.graph.shapes.iter().filter(|shape| shape.kind == ShapeKind::Mesh);
+        meshes.try_for_each(|shape| self.mesh(shape).map(drop))?;
+        Ok(pictured)
+    }
+
+    /// The same without a look at files.
+    fn read_by_shapes(&self) -> Result<Vec<String>, Problem> {
         let shapes = &self.graph.shapes;
         if shapes.iter().all(|shape| matches!(shape.kind, ShapeKind::Grid | ShapeKind::Nothing)) {
             return Err(Problem::NoShapes);
         }
-        shapes.iter().filter(|shape| shape.kind == ShapeKind::Mesh).try_for_each(|shape| self.mesh(shape).map(drop))?;
         Ok(shapes.iter().flat_map(Shape::values).map(|named| named.name.clone()).collect())
     }
 
@@ -63,7 +70,7 @@ impl Model {
     /// # Errors
     /// Nothing has a shape, the trace lacks what a shape reads or is empty, or a file of a surface cannot be read.
     pub fn scene(&self, trace: &Trace) -> Result<Scene, Problem> {
-        let pictured = self.pictured()?;
+        let pictured = self.read_by_shapes()?;
         scene::Stage::new(self, trace)?.scene(&pictured)
     }
 }

@@ -34,8 +34,7 @@ impl Model {
     /// `f(x) = (1 - λ) f(start)` from `λ = 0` to 1, along the path. `None` if the path does not lead there.
     pub(super) fn release_loads(
         &mut self,
-        leaf: Option<&Leaf>,
-        inert: &[bool],
+        (leaf, inert): (Option<&Leaf>, &[bool]),
         t: f64,
         start: &[f64],
     ) -> Option<Vec<f64>> {

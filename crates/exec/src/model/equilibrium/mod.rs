@@ -90,15 +90,16 @@ impl Model {
     fn search_equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let leaf = self.leaf(t, x);
         let leaf = leaf.as_ref();
-        let inert = self.inert(t, x).map_err(EquilibriumError::Failure)?;
-        let inert = inert.as_slice();
-        let refused = match self.settle(leaf, inert, t, x).and_then(|found| self.audited(leaf, t, found)) {
+        let mut jacobian = Jacobian::new(self.sparsity());
+        let inert = self.inert(&mut jacobian, t, x).map_err(EquilibriumError::Failure)?;
+        let within = (leaf, inert.as_slice());
+        let refused = match self.settle(&mut jacobian, within, t, x).and_then(|found| self.audited(leaf, t, found)) {
             Err(EquilibriumError::Failure(failure)) => return Err(EquilibriumError::Failure(failure)),
             Err(refused) => refused,
             found => return found,
         };
-        let released = self.release_loads(leaf, inert, t, x);
-        let settled = released.and_then(|near| self.settle(leaf, inert, t, &near).ok());
+        let released = self.release_loads(within, t, x);
+        let settled = released.and_then(|near| self.settle(&mut jacobian, within, t, &near).ok());
         settled.and_then(|found| self.audited(leaf, t, found).ok()).ok_or(refused)
     }
 
@@ -115,16 +116,15 @@ impl Model {
     /// evolution relaxation), until it is Newton's again. Inert states stay.
     fn settle(
         &mut self,
-        leaf: Option<&Leaf>,
-        inert: &[bool],
+        jacobian: &mut Jacobian,
+        (leaf, inert): (Option<&Leaf>, &[bool]),
         t: f64,
         x: &[f64],
     ) -> Result<Equilibrium, EquilibriumError> {
-        let mut jacobian = Jacobian::new(self.sparsity());
         let mut pseudo_step = f64::INFINITY;
         let mut least: Option<LeastRates> = None;
         let mut rest = Rest::new(x.len());
-        let mut at = self.point(&mut jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
+        let mut at = self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
         for iteration in 0..ITERATIONS {
             rest.see(&at);
             let Some(newton) = at.newton_step() else { break };
@@ -155,7 +155,7 @@ impl Model {
                     let known = self.rates_at(t, trial).is_ok();
                     known && (norm(&self.dx) < before || !pseudo_step.is_infinite())
                 });
-                match nearer.and_then(|trial| self.point(&mut jacobian, (leaf, inert), t, trial).ok()) {
+                match nearer.and_then(|trial| self.point(jacobian, (leaf, inert), t, trial).ok()) {
                     Some(next) => break Some(next),
                     _ if damping < least_damping => break None,
                     _ => damping *= 0.5,

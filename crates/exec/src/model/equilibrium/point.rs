@@ -117,10 +117,8 @@ impl LinearisedPoint {
 
 impl Model {
     /// Which states are inert at `x`, as the spin of a wheel at rest that no axle holds: they change nothing but for rounding.
-    pub(super) fn inert(&mut self, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
-        let mut entries: Vec<Entry> = Vec::new();
-        let mut jacobian = Jacobian::new(&self.code.sparsity);
-        jacobian.visit(self, t, x, |row, column, _, value| entries.push((row, column, value)))?;
+    pub(super) fn inert(&mut self, jacobian: &mut Jacobian, t: f64, x: &[f64]) -> Result<Vec<bool>, Failure> {
+        let entries = self.derivatives(jacobian, t, x)?;
         let rows = greatest(x.len(), entries.iter().map(|&(i, _, v)| (i, v)));
         let columns = greatest(x.len(), entries.iter().map(|&(_, j, v)| (j, v)));
         // How much a state stands out among those that change a rate, and its rate among those that a state changes.
@@ -144,12 +142,8 @@ impl Model {
         self.rates_at(t, &x)?;
         self.keep_positions();
         let rates = self.dx.clone();
-        let mut entries = Vec::with_capacity(self.code.sparsity.nonzeros());
-        jacobian.visit(self, t, &x, |row, column, _, value| {
-            if !inert[column] {
-                entries.push((row, column, value));
-            }
-        })?;
+        let mut entries = self.derivatives(jacobian, t, &x)?;
+        entries.retain(|entry| !inert[entry.1]);
         entries.sort_unstable_by_key(|e| (e.1, e.0));
         let ways = match x.len() > FEW_STATES {
             true => self.sparse_ways(leaf, t, &x),
@@ -174,10 +168,16 @@ impl Model {
     pub(in crate::model) fn at_rest(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         self.rates_at(t, x)?;
         let rates = self.dx.clone();
-        let mut entries = Vec::new();
         let mut jacobian = Jacobian::new(&self.code.sparsity);
-        jacobian.visit(self, t, x, |row, column, _, value| entries.push((row, column, value)))?;
+        let entries = self.derivatives(&mut jacobian, t, x)?;
         Ok((rates, row_by_row(&entries, x.len())))
+    }
+
+    /// The derivatives of rates: row, column and value.
+    fn derivatives(&mut self, jacobian: &mut Jacobian, t: f64, x: &[f64]) -> Result<Vec<Entry>, Failure> {
+        let mut entries = Vec::with_capacity(self.code.sparsity.nonzeros());
+        jacobian.visit(self, t, x, |row, column, _, value| entries.push((row, column, value)))?;
+        Ok(entries)
     }
 }
 

@@ -26,15 +26,15 @@ impl Rest {
     /// Takes a point of the search into account.
     pub fn see(&mut self, at: &LinearisedPoint) {
         let mut terms: Vec<f64> = vec![0.0; at.x.len()];
-        let (rows, _) = at.weights();
+        let weights = at.weights();
         // A derivative that is rounding beside the others of its rate makes no term, however far a search has moved the state.
-        let counts = |i: usize, v: f64| (rows[i] * v).abs() > LOST;
+        let counts = |i: usize, v: f64| (weights.0[i] * v).abs() > LOST;
         at.entries().filter(|&(i, _, v)| counts(i, v)).for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
         for ((most, own), rate) in self.terms.iter_mut().zip(terms).zip(&at.rates) {
             *most = most.max(rate.abs()).max(own);
         }
         self.fastest = at.fastest_pair();
-        self.joined = joined(at);
+        self.joined = joined(at, &weights);
     }
 
     /// Whether all rates vanish as far as their own terms tell.
@@ -68,8 +68,7 @@ impl Rest {
 
 /// What the terms of each rate would add up to, were all states that are joined by rates as great as the greatest of them,
 /// where each counts by what it does to rates.
-fn joined(at: &LinearisedPoint) -> Vec<f64> {
-    let (rows, columns) = at.weights();
+fn joined(at: &LinearisedPoint, (rows, columns): &(Vec<f64>, Vec<f64>)) -> Vec<f64> {
     let mut component: Vec<usize> = (0..at.x.len()).collect();
     at.entries().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| {
         let (a, b) = (root(&mut component, i), root(&mut component, j));
