@@ -1577,8 +1577,12 @@ def references(arguments):
             # Variants in turn, where the machine has several.
             options = variants(machine)
             name, text, record = options[seed % len(options)]
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
             verdict = check(machine, arguments.binary, folder, (start, end, margin), only=name)[0][0][1]
-            if verdict == "OK":
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            if verdict == "OK" and after.ru_utime - before.ru_utime > 0.08:
+                pass  # The test shall take seconds in a build that is slow.
+            elif verdict == "OK":
                 found.append(reference(machine, name, text, record, start, end))
             else:
                 left.append(f"{seed} {name}: {verdict}")
@@ -1586,7 +1590,7 @@ def references(arguments):
         seed += 1
     head = {
         "made by": f"python3 random_trees.py references --binary halfarrow --count {arguments.count} random_trees.json",
-        "by": "Newton and Euler in maximal coordinates; the program is asked only which machines to leave out",
+        "by": "Newton and Euler in maximal coordinates; the program is asked only which machines to leave out, and which take it more than 0.08 s",
         "left out": left, "to": TO, "start off": START, "end off": END,
     }
     with open(arguments.out, "w") as file:
