@@ -1,9 +1,10 @@
 //! Random machines of `std.multibody` and `std.planar`, trees and loops, against Newton and Euler in maximal coordinates:
 //! `multibody/random_trees.py` draws them, and computes what is to come. What it found over many more is in docs/TESTING.md.
 
+use std::collections::BTreeMap;
+
 use halfarrow::{Model, Record, Run};
 use serde::Deserialize;
-use std::collections::BTreeMap;
 
 #[derive(Deserialize)]
 struct References {
