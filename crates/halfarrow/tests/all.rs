@@ -54,6 +54,8 @@ mod multibonds;
 mod names;
 #[path = "planar.rs"]
 mod planar;
+#[path = "random_trees.rs"]
+mod random_trees;
 #[path = "repeated.rs"]
 mod repeated;
 #[path = "report.rs"]

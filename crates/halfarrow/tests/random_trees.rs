@@ -1,0 +1,93 @@
+//! Random machines of `std.multibody` and `std.planar`, trees and loops, against Newton and Euler in maximal coordinates:
+//! `multibody/random_trees.py` draws them, and computes what is to come. What it found over many more is in docs/TESTING.md.
+
+use std::collections::BTreeMap;
+
+use halfarrow::{Model, Record, Run};
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+struct References {
+    to: f64,
+    #[serde(rename = "start off")]
+    start_off: BTreeMap<String, f64>,
+    #[serde(rename = "end off")]
+    end_off: BTreeMap<String, f64>,
+    machines: Vec<Machine>,
+}
+
+#[derive(Deserialize)]
+struct Machine {
+    seed: u32,
+    kind: String,
+    variant: String,
+    text: String,
+    /// What is recorded, with spaces between.
+    names: String,
+    /// For each of them the first letter of its class: position, velocity, acceleration, reaction.
+    class: String,
+    /// The greatest of each class at the start and at the end: errors are shares of it.
+    scales: [[f64; 4]; 2],
+    start: Vec<f64>,
+    end: Vec<f64>,
+}
+
+const CLASSES: [&str; 4] = ["position", "velocity", "acceleration", "reaction"];
+
+/// What is wrong with a machine; nothing if all is right.
+fn faults(machine: &Machine, references: &References) -> Vec<String> {
+    let names: Vec<String> = machine.names.split(' ').map(String::from).collect();
+    let run = Run {
+        to: references.to,
+        every: Some(references.to),
+        rtol: 1e-12,
+        record: Record::Names(names.clone()),
+        ..Run::default()
+    };
+    let done = match Model::from_text("machine.bond", &machine.text, &[]).and_then(|m| m.simulate(&run, &mut |_| true))
+    {
+        Ok(done) => done,
+        Err(error) => return vec![error.render(false)],
+    };
+    let mut found = Vec::new();
+    for (i, (name, class)) in names.iter().zip(machine.class.chars()).enumerate() {
+        let k = CLASSES.iter().position(|c| c.starts_with(class)).expect("one of the four");
+        let column = done.trace.columns.iter().find(|c| &c.name == name).expect("it is recorded");
+        let (first, last) = (column.values[0], column.values[column.values.len() - 1]);
+        for (at, value, expected, off, scale) in [
+            ("start", first, machine.start[i], references.start_off[CLASSES[k]], machine.scales[0][k]),
+            ("end", last, machine.end[i], references.end_off[CLASSES[k]], machine.scales[1][k]),
+        ] {
+            let error = (value - expected).abs() / scale;
+            // What is not a number is not close.
+            if error.is_nan() || error > off {
+                found.push(format!(
+                    "{name} at the {at}: {value} instead of {expected}, off by {error:.1e} of its class"
+                ));
+            }
+        }
+    }
+    found
+}
+
+/// Places, velocities, accelerations of all bodies and reactions that are unique, at the start and after 0.3 s.
+#[test]
+fn random_machines_move_as_newton_and_euler_say() {
+    let references: References = serde_json::from_str(include_str!("multibody/random_trees.json")).expect("it is JSON");
+    assert_eq!(references.machines.len(), 40);
+    let mut all = String::new();
+    for machine in &references.machines {
+        let found = faults(machine, &references);
+        if !found.is_empty() {
+            all += &format!(
+                "machine {} ({}, {}):\n{}\n{}\n",
+                machine.seed,
+                machine.kind,
+                machine.variant,
+                found.join("\n"),
+                machine.text
+            );
+        }
+    }
+    assert!(all.is_empty(), "{all}");
+}
