@@ -46,6 +46,10 @@ mod iltis;
 mod library_std;
 #[path = "linearize.rs"]
 mod linearize;
+#[path = "machines_satellite.rs"]
+mod machines_satellite;
+#[path = "machines_stewart.rs"]
+mod machines_stewart;
 #[path = "mechanisms.rs"]
 mod mechanisms;
 #[path = "multibonds.rs"]
