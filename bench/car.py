@@ -40,12 +40,12 @@ int main(int argc, char **argv)
     struct timespec from, to;
     long k;
     (void)argc;
-    if (NAME_reset(&m) != 0 || NAME_start(&m, 0.0) != 0) { return 1; }
     for (k = 0; k < count; ++k) {
+        if (k % 20000 == 0 && (NAME_reset(&m) != 0 || NAME_start(&m, 0.0) != 0)) { return 1; } /* nothing drives it */
         m.u[0] = TURN; /* to and fro */
-        clock_gettime(CLOCK_MONOTONIC, &from);
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &from);
         if (NAME_step(&m) != 0) { fprintf(stderr, "%g s: %s\n", m.t, NAME_message(&m)); return 2; }
-        clock_gettime(CLOCK_MONOTONIC, &to);
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &to);
         times[k] = (to.tv_sec - from.tv_sec) * 1e9 + (to.tv_nsec - from.tv_nsec);
     }
     qsort(times, count, sizeof times[0], order);
@@ -54,7 +54,7 @@ int main(int argc, char **argv)
 }
 """
 # Inputs at which a car goes in bends that it keeps on.
-TURNS = {"sedan": "0.2 * sin(m.t)", "iltis": "0.003 * sin(m.t)"}
+TURNS = {"sedan": "0.08 * sin(m.t)", "iltis": "0.003 * sin(m.t)"}
 
 
 def timed(*command):
@@ -72,7 +72,7 @@ def exported(program, car, method):
     name = next(folder.glob("*.h")).stem
     header = (folder / f"{name}.h").read_text()
     states = re.search(r"double x\[(\d+)\];", header).group(1)
-    (folder / "rates.c").write_text(RATES.replace("NAME", name).replace("STATES", states))
+    (folder / "rates.c").write_text(RATES.replace("CLOCK_MONOTONIC", "CLOCK_THREAD_CPUTIME_ID").replace("NAME", name).replace("STATES", states))
     (folder / "steps.c").write_text(STEPS.replace("NAME", name).replace("TURN", TURNS[car]))
     code = folder / f"{name}.o"
     compile_ = timed("cc", "-O2", "-Wall", "-ffp-contract=off", "-c", "-o", code, folder / f"{name}.c")
@@ -172,19 +172,24 @@ def mujoco_sedan():
     machine = mujoco.MjModel.from_xml_string(mjcf("tendon"))
     data = mujoco.MjData(machine)
 
-    def steps(count):
+    def begin():
         mujoco.mj_resetData(machine, data)
         data.qvel[0] = 20.0
         for name in CORNERS:
             data.qvel[machine.joint(f"wheel_{name}").dofadr[0]] = 20.0 / 0.34
-        times = np.empty(count)
+
+    def steps(count):
+        times, touching = np.empty(count), 0
         for k in range(count):
-            data.ctrl[0] = -0.05 * 0.2 * math.sin(data.time)
-            from_ = time.perf_counter_ns()
+            if k % 20000 == 0:  # nothing drives it
+                begin()
+            data.ctrl[0] = -0.05 * 0.08 * math.sin(data.time)
+            from_ = time.thread_time_ns()
             mujoco.mj_step(machine, data)
-            times[k] = time.perf_counter_ns() - from_
-        assert np.isfinite(data.qpos).all() and np.hypot(*data.qvel[:2]) > 5.0, "MuJoCo's car is lost"
-        assert data.ncon == 4, "a wheel of MuJoCo's car does not touch"
+            times[k] = time.thread_time_ns() - from_
+            touching += data.ncon
+        assert np.isfinite(data.qpos).all() and abs(data.qpos[2]) < 0.5, "MuJoCo's car is lost"
+        assert touching > 3.5 * count, f"of MuJoCo's wheels {touching / count:.2f} touch"
         return {"ns": float(np.median(times)), "p99": float(np.percentile(times, 99)), "worst": float(times.max())}
 
     mujoco.mj_step(machine, data, nstep=5000)
@@ -215,10 +220,10 @@ def pinocchio_sedan():
 
     def timer(call):
         def nanoseconds(count):
-            from_ = time.perf_counter()
+            from_ = time.thread_time()
             for _ in range(count):
                 call()
-            return (time.perf_counter() - from_) / count * 1e9
+            return (time.thread_time() - from_) / count * 1e9
 
         return nanoseconds
 
@@ -266,7 +271,7 @@ def steps(program):
     peer, arms, open_, speeds, equations = mujoco_sedan()
     print(f"\nMuJoCo's sedan: {speeds} speeds, {equations} equations of loops; lower arms at rest at {', '.join(f'{a:.4f}' for a in arms)} rad;")
     print(f"its loops are open by {open_ * 1e3:.2f} mm at most")
-    print("\nA step of 1 ms, of", count, "in bends at 20 m/s; medians of", ROUNDS, "rounds in turns, the worst of all\n")
+    print("\nA step of 1 ms, of", count, "in bends at 20 m/s, time of the processor; medians of", ROUNDS, "rounds in turns, the worst of all\n")
     row("", "median", "99 %", "worst", "against MuJoCo", "export", "compiled", "object")
     row(*["---"] * 8)
     made = {}
