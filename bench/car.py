@@ -292,7 +292,7 @@ def steps(program):
     middle = lambda key, what: statistics.median(one[what] for one in found[key])
     base = middle("MuJoCo", "ns")
     for key in found:
-        cost = [] if key == "MuJoCo" else [f"{made[key]['export']:.1f} s", f"{made[key]['compile']:.1f} s", f"{made[key]['size'] / 1e6:.2f} MB"]
+        cost = [""] * 3 if key == "MuJoCo" else [f"{made[key]['export']:.1f} s", f"{made[key]['compile']:.1f} s", f"{made[key]['size'] / 1e6:.2f} MB"]
         name = key if key == "MuJoCo" else f"{key[0]}, {key[1]}"
         row(name, micro(middle(key, "ns")), micro(middle(key, "p99")), micro(max(one["worst"] for one in found[key])), ratio(middle(key, "ns"), base), *cost)
 

@@ -68,7 +68,7 @@ def main():
     words.add_argument("--program", default="halfarrow", help="the program halfarrow")
     program = words.parse_args().program
     with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path("/tmp/b/un"); folder.mkdir(exist_ok=True)
+        folder = pathlib.Path(name)
         turn = folder / "steer.csv"
         turn.write_text("t,steer\n0,0\n1,0\n1.5,0.16\n")
         still = simulated(program, folder, "sedan", "--set", "u0=0", "--to", 1.5, "--every", 0.01, "--input", f"steer={turn}", record=["car.rack.way"])
