@@ -46,6 +46,10 @@ mod iltis;
 mod library_std;
 #[path = "linearize.rs"]
 mod linearize;
+#[path = "machines_bicycle.rs"]
+mod machines_bicycle;
+#[path = "machines_robot.rs"]
+mod machines_robot;
 #[path = "mechanisms.rs"]
 mod mechanisms;
 #[path = "multibonds.rs"]
