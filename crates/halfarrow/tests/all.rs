@@ -50,6 +50,10 @@ mod linearize;
 mod machines_satellite;
 #[path = "machines_stewart.rs"]
 mod machines_stewart;
+#[path = "machines_bicycle.rs"]
+mod machines_bicycle;
+#[path = "machines_robot.rs"]
+mod machines_robot;
 #[path = "mechanisms.rs"]
 mod mechanisms;
 #[path = "multibonds.rs"]

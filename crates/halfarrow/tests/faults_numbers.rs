@@ -290,6 +290,34 @@ fn a_preference_that_cannot_be_met_is_told() {
     assert_eq!(warned("prefer up.f\n"), Vec::<String>::new());
 }
 
+/// Of rates without a storage of their own those stay independent that are preferred, in whatever order they stand in the model.
+#[test]
+fn a_preference_holds_among_rates_without_storages() {
+    let text = "model Rates
+1:a -> TF:ta(cos(qa)) -> 0:s
+1:b -> TF:tb(cos(qb)) -> s
+1:c -> TF:tc(cos(qc)) -> s
+Sf:rest(0) -> s
+a -> TF:ra(2 + cos(qa)) -> 0:na -> I:ia(1)
+b -> TF:rb(2 + cos(qb)) -> 0:nb -> I:ib(1)
+c -> TF:rc(2 + cos(qc)) -> 0:nc -> I:ic(1)
+state qa' = a.f
+state qb' = b.f
+state qc' = c.f
+";
+    for (prefer, independent) in
+        [("", ["a.f", "b.f"]), ("prefer c.f, b.f\n", ["b.f", "c.f"]), ("prefer c.f\n", ["a.f", "c.f"])]
+    {
+        let model = model(&format!("{text}{prefer}"));
+        let states = model.equations(halfarrow::Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false))).states;
+        let mut rates: Vec<_> = states.into_iter().map(|s| s.name).filter(|name| name.ends_with(".f")).collect();
+        rates.sort();
+        assert_eq!(rates, independent, "{prefer}");
+        let found = model.check().unwrap_or_else(|e| panic!("{}", e.render(false)));
+        assert!(found.diagnostics.0.iter().all(|d| d.code.name != "C009"), "{prefer}");
+    }
+}
+
 /// All rods of a window lie on the floor: it may fold either way, and no choice of variables helps.
 #[test]
 fn a_truly_singular_position_says_what_vanishes() {

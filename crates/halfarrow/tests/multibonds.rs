@@ -680,6 +680,33 @@ output place = coin.a.r
     }
 }
 
+/// A disc on a table that turns about a slanted axis: by its own coordinates and as a body that touches the table.
+#[test]
+fn a_disc_rolls_alike_by_its_coordinates_and_by_its_contact() {
+    let text = "model Discs
+import std.multibody
+World:world -> Revolute:table(n = [0.6, 0, 0.8]) -> 1[frame]:ground
+Sf:turned(0.4) -> table.axis
+ground -> RollingDisc:disc(radius = 0.4, lean0 = 0.3, yaw_speed = 1.5, spin_speed = 6) -> Body:one(m = 2, J = diag([0.08, 0.16, 0.08]))
+ground -> Prismatic:x(n = [1, 0, 0]) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z(q0 = 0.4*cos(0.3)) -> Revolute:yaw(w0 = 1.5) -> Revolute:lean(n = [1, 0, 0], q0 = 0.3, fixed = 1) -> Revolute:spin(n = [0, 1, 0], w0 = 6) -> 1[frame]:rim
+rim -> Body:two(m = 2, J = diag([0.08, 0.16, 0.08]))
+RollingContact:contact(radius = 0.4)
+ground -> contact.a
+rim -> contact.b
+prefer yaw.rate.f, lean.rate.f, spin.rate.f
+output one = one.a.r
+output two = two.a.r
+output low = contact.place[3]
+";
+    let done = run(text, &Run { to: 2.0, rtol: 1e-11, every: Some(0.1), ..Run::default() });
+    for k in 0..times(&done).len() {
+        for i in 1..4 {
+            close(column(&done, &format!("one[{i}]"))[k], column(&done, &format!("two[{i}]"))[k], 1e-9);
+        }
+        close(column(&done, "low")[k], 0.0, 1e-12);
+    }
+}
+
 /// A cart on one wheel: a constant torque at the axle, turned by a constant rate.
 #[test]
 fn a_wheel_rolls_where_it_is_steered() {

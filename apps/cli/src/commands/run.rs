@@ -296,7 +296,9 @@ fn summary(report: &RunReport) -> String {
 fn drifts(audit: &AuditReport) -> String {
     let line = |drift: &DriftReport| {
         let open = match drift.kind {
-            "nonholonomic" => return format!("nonholonomic: {} = 0 binds speeds and no positions\n", drift.relation),
+            "nonholonomic" => {
+                return format!("nonholonomic: {} = 0 binds speeds and no positions\n", brief(&drift.relation));
+            }
             "closed" => "",
             "open" => " = 0, of positions without a closed form,",
             _ => " = 0, which may or may not bind positions,",
@@ -306,9 +308,20 @@ fn drifts(audit: &AuditReport) -> String {
             Some(value) if value.abs() < drift.resolution => format!("below {:.0e}", drift.resolution),
             Some(value) => format!("{value:.1e} at the end, {:.1e} at most", drift.greatest.unwrap_or(f64::NAN)),
         };
-        format!("drift: {}{open} {end}\n", drift.relation)
+        format!("drift: {}{open} {end}\n", brief(&drift.relation))
     };
     audit.drift.iter().map(line).collect()
+}
+
+/// A relation by its beginning where it is long; the whole of it is in JSON.
+fn brief(relation: &str) -> String {
+    const LONGEST: usize = 300;
+    match relation.char_indices().nth(LONGEST) {
+        Some((end, _)) => {
+            format!("{}… ({} characters, all of them with --json)", &relation[..end], relation.chars().count())
+        }
+        None => relation.into(),
+    }
 }
 
 /// The greatest miss of each kind.

@@ -360,7 +360,8 @@ impl StoragePreferences {
             None => {
                 let (speed, reaction) = kept_variable(x, graph, junction, flow);
                 self.why.insert(speed, why);
-                self.virtual_speeds.push(Virtual { junction, speed, reaction });
+                let preferred = matches!(why, Kept::Preferred);
+                self.virtual_speeds.push(Virtual { junction, speed, reaction, preferred });
                 vec![speed]
             }
         }

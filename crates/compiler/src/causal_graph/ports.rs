@@ -38,6 +38,8 @@ pub struct Virtual {
     pub speed: Symbol,
     /// Symbol of the conjugate, which vanishes.
     pub reaction: Symbol,
+    /// Whether the modeller prefers it; then it stands in the order of what is preferred.
+    pub preferred: bool,
 }
 
 /// The solved part of the junction structure.
@@ -345,8 +347,13 @@ impl Net {
     /// Storages in descending priority as independent ones.
     pub fn storage_order(&self, preferences: &CausalityPreferences) -> Vec<usize> {
         let mut order = self.ports_where(|o| matches!(o, Offer::Storage(_) | Offer::Virtual(_)));
+        let speeds = &preferences.virtual_speeds;
+        let asked = |p: usize| {
+            let speed = self.symbols[self.ports[p].given()];
+            speeds.iter().position(|v| v.preferred && v.speed == speed).unwrap_or(speeds.len())
+        };
         order.sort_by_key(|&p| match self.ports[p].port {
-            None => (1, 0, p),
+            None => (1, asked(p), p),
             Some(port) => match preferences.independent.iter().position(|&i| i == port) {
                 Some(rank) => (0, rank, p),
                 None => (2 + usize::from(preferences.derivative.contains(&port)), 0, p),

@@ -64,7 +64,7 @@ fn random_preferences(
         let kind = &graph.elements[junction].kind;
         if matches!(kind, Kind::Zero | Kind::One) && dice.percent(8) {
             let (speed, reaction) = kept_variable(x, graph, junction, matches!(kind, Kind::One));
-            asked.virtual_speeds.push(Virtual { junction, speed, reaction });
+            asked.virtual_speeds.push(Virtual { junction, speed, reaction, preferred: false });
         }
     }
     asked
