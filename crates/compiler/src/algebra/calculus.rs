@@ -13,8 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) enum By {
     /// A symbol, wherever it stands.
     Symbol(Symbol),
-    /// A symbol or a whole where it stands outside of wholes.
-    Atom(Expr),
+    /// Time, along a motion in which each symbol has its rate.
+    Time,
 }
 
 impl Exprs {
@@ -42,25 +42,36 @@ impl Exprs {
         self.slope(e, by)
     }
 
-    /// What an expression is made of if wholes in it are taken as they are: symbols and wholes. `None` if it has no wholes.
-    pub fn atoms(&self, e: Expr) -> Option<Vec<Expr>> {
-        let order = self.around_wholes(&[e]);
-        order.iter().any(|&part| matches!(self.node(part), Node::Whole(_))).then(|| {
-            order.into_iter().filter(|&part| matches!(self.node(part), Node::Whole(_) | Node::Symbol(_))).collect()
-        })
+    /// The parts of an expression whose derivative by time is not known yet, those within others first; what keeps its
+    /// value is left out, as `varies` tells of symbols.
+    pub fn undifferentiated(&self, e: Expr, varies: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
+        self.below(&[e], &|part| !self.derivatives.contains_key(&(part, By::Time)) && self.depends_on_any(part, varies))
     }
 
-    /// The derivative by one of the [`atoms`](Exprs::atoms), the others held, whatever they are made of.
-    pub fn derivative_by_atom(&mut self, e: Expr, atom: Expr) -> Expr {
-        let by = By::Atom(atom);
-        self.derivatives.insert((atom, by), ONE);
-        for part in self.around_wholes(&[e]) {
-            if !self.derivatives.contains_key(&(part, by)) && !matches!(self.node(part), Node::Whole(_)) {
-                let slope = self.derivative_of_node(part, by);
-                self.derivatives.insert((part, by), slope);
-            }
-        }
-        self.slope(e, by)
+    /// The derivative of a part by time, from those of the parts that it is made of, as far as [`set_rate`](Exprs::set_rate)
+    /// has told them; what it has not told keeps its value.
+    pub fn rate_of_node(&mut self, part: Expr) -> Expr {
+        self.derivative_of_node(part, By::Time)
+    }
+
+    /// The derivative of a part by time, if it was told.
+    pub fn known_rate(&self, part: Expr) -> Option<Expr> {
+        self.derivatives.get(&(part, By::Time)).copied()
+    }
+
+    /// Tells the derivative of a part by time.
+    pub fn set_rate(&mut self, part: Expr, rate: Expr) {
+        self.derivatives.insert((part, By::Time), rate);
+    }
+
+    /// Forgets all derivatives by time: they belong to one motion.
+    pub fn forget_rates(&mut self) {
+        self.derivatives.retain(|(_, by), _| *by != By::Time);
+    }
+
+    /// Whether an expression has wholes in it.
+    pub fn has_wholes(&self, e: Expr) -> bool {
+        self.around_wholes(&[e]).iter().any(|&part| matches!(self.node(part), Node::Whole(_)))
     }
 
     /// The expression with expressions in place of symbols, all at once.

@@ -80,7 +80,7 @@ impl<'a> Builder<'a, '_> {
     /// depend on where it is: otherwise they would be divided by what vanishes wherever the constraint is met.
     pub fn leave_out_idle(&mut self, kinds: &mut [Option<Kind>], sides: &mut [Sides]) {
         let mut wholes: Vec<Expr> = Vec::new();
-        let mut visit = |x: &Exprs, e: Expr| wholes.extend(x.atoms(e).is_some().then_some(e));
+        let mut visit = |x: &Exprs, e: Expr| wholes.extend(x.has_wholes(e).then_some(e));
         kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut |e| visit(&self.exprs, *e)));
         sides.iter().for_each(|side| visit(&self.exprs, side.expr));
         let displacement =

@@ -3,9 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Unavailable;
-use rustc_hash::FxHashMap;
-
-use crate::algebra::{Expr, Exprs, Node, Symbol};
+use crate::algebra::{Expr, Exprs, Symbol, ZERO};
 use crate::bond_graph::{BondGraph, HeldKind, Meaning};
 use crate::ids::Map;
 
@@ -62,13 +60,14 @@ pub struct Definitions<'a> {
     /// Symbols that have no value, with the reason.
     pub missing: BTreeMap<Symbol, Unavailable>,
     rates: Map<Symbol, Symbol>,
-    /// The time derivatives of wholes.
-    rates_of_wholes: FxHashMap<Expr, Expr>,
+    /// Symbols in the rates of what is no integrated signal: they may be unknowns.
+    open: BTreeSet<Symbol>,
 }
 
 impl<'a> Definitions<'a> {
     /// Nothing defined yet.
-    pub fn new(x: Exprs, graph: &'a BondGraph) -> Self {
+    pub fn new(mut x: Exprs, graph: &'a BondGraph) -> Self {
+        x.forget_rates();
         Definitions {
             x,
             graph,
@@ -83,7 +82,7 @@ impl<'a> Definitions<'a> {
             of_laws: BTreeSet::new(),
             missing: BTreeMap::new(),
             rates: Map::new(),
-            rates_of_wholes: FxHashMap::default(),
+            open: BTreeSet::new(),
         }
     }
 
@@ -140,14 +139,11 @@ impl<'a> Definitions<'a> {
 
     /// The time derivative of an expression. Symbols whose rates it needs are defined on the way.
     pub fn rate(&mut self, e: Expr) -> Result<Expr, Unavailable> {
-        if let Some(atoms) = self.x.atoms(e) {
-            return self.rate_by_atoms(e, atoms);
+        if self.x.has_wholes(e) {
+            return self.rate_by_parts(e);
         }
         let mut terms = Vec::new();
-        for symbol in self.x.symbols_of(e) {
-            if self.constants.contains(&symbol) || matches!(self.meaning(symbol), Some(Meaning::Parameter(_))) {
-                continue;
-            }
+        for symbol in self.varying(e) {
             let slope = self.x.derivative(e, symbol);
             if self.x.is_zero(slope) {
                 continue;
@@ -161,30 +157,35 @@ impl<'a> Definitions<'a> {
         Ok(self.x.add(&terms))
     }
 
-    /// The time derivative of an expression with wholes in it: what they are made of is differentiated once.
-    fn rate_by_atoms(&mut self, e: Expr, atoms: Vec<Expr>) -> Result<Expr, Unavailable> {
-        let mut terms = Vec::with_capacity(atoms.len());
-        for atom in atoms {
-            let slope = self.x.derivative_by_atom(e, atom);
-            if self.x.is_zero(slope) {
-                continue;
-            }
-            let rate = match *self.x.node(atom) {
-                Node::Whole(part) => match self.rates_of_wholes.get(&part) {
-                    Some(&known) => known,
-                    None => {
-                        let rate = self.rate(part)?;
-                        let rate = self.x.whole(rate);
-                        *self.rates_of_wholes.entry(part).or_insert(rate)
-                    }
-                },
-                _ => self.rate(atom)?,
-            };
-            if self.x.is_number(rate).is_none_or(|rate| !rate.is_zero()) {
-                terms.push(self.x.mul(&[slope, rate]));
+    /// The time derivative of a long expression, part by part from the symbols up: each part that it is made of is
+    /// differentiated once, whoever else is made of it, so that it takes operations in proportion to those of its value.
+    /// What reads no rate of a speed stays a whole: it is a coefficient of the speeds.
+    fn rate_by_parts(&mut self, e: Expr) -> Result<Expr, Unavailable> {
+        let symbols = self.varying(e);
+        for &symbol in &symbols {
+            let own = self.x.sym(symbol);
+            if self.x.known_rate(own).is_none() {
+                let rate = self.rate_of(symbol)?;
+                if !matches!(self.meaning(symbol), Some(Meaning::Signal(_))) {
+                    self.open.extend(self.x.symbols_of(rate));
+                }
+                self.x.set_rate(own, rate);
             }
         }
-        Ok(self.x.add(&terms))
+        for part in self.x.undifferentiated(e, &|s| symbols.contains(&s)) {
+            let rate = self.x.rate_of_node(part);
+            let open = self.x.depends_on_any(rate, &|s| self.open.contains(&s));
+            let rate = if open { rate } else { self.x.whole(rate) };
+            self.x.set_rate(part, rate);
+        }
+        Ok(self.x.known_rate(e).unwrap_or(ZERO))
+    }
+
+    /// The symbols in an expression that may change while it runs.
+    fn varying(&self, e: Expr) -> BTreeSet<Symbol> {
+        let varies =
+            |&s: &Symbol| !self.constants.contains(&s) && !matches!(self.meaning(s), Some(Meaning::Parameter(_)));
+        self.x.symbols_of(e).into_iter().filter(varies).collect()
     }
 
     /// The time derivative of a symbol.
