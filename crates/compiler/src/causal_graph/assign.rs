@@ -738,6 +738,7 @@ fn erase(graph: &BondGraph, strokes: &mut Table<BondId, Stroke>, undetermined: &
 fn merge(ports: &mut Ports, solved: Solved) {
     ports.ports.extend(solved.ports);
     ports.definitions.extend(solved.definitions);
+    ports.loops.extend(solved.loops);
     ports.watched.extend(solved.watched);
     ports.degenerate.extend(solved.degenerate);
     ports.undetermined.extend(solved.undetermined);

@@ -35,9 +35,14 @@ pub(super) fn matched_rows(x: &mut Exprs, rows: &[SparseRow], done: &Elimination
     Some(definitions)
 }
 
+/// The columns of a block, each with the row of the junction structure that it is matched to.
+pub(super) type Block = Vec<(usize, SparseRow)>;
+
 /// Definitions block by block.
 pub(super) struct BlockRows {
     pub rows: Vec<Row>,
+    /// Blocks of several columns, as the elements write their rows.
+    pub loops: Vec<Block>,
     /// What the blocks are divided by; none of them may vanish.
     pub divisors: Vec<Expr>,
     /// The values of the divisors, of either sign.
@@ -68,8 +73,12 @@ pub(super) fn block_rows(
 ) -> Option<BlockRows> {
     let rows: Vec<&SparseRow> = done.pivots.iter().map(|p| &rows[p.source]).collect();
     let row_of = matching(x, &rows, done, true)?;
-    let mut found =
-        BlockRows { rows: Vec::with_capacity(row_of.len()), divisors: Vec::new(), residues: BTreeSet::new() };
+    let mut found = BlockRows {
+        rows: Vec::with_capacity(row_of.len()),
+        loops: Vec::new(),
+        divisors: Vec::new(),
+        residues: BTreeSet::new(),
+    };
     let blocks = blocks(&rows, &row_of);
     if blocks.iter().any(|columns| columns.len() > most) {
         return None;
@@ -78,6 +87,9 @@ pub(super) fn block_rows(
         columns.sort_unstable();
         let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
         let before = (columns.len() > 1).then(|| x.assumed());
+        if columns.len() > 1 {
+            found.loops.push(columns.iter().copied().zip(own.iter().cloned()).collect());
+        }
         let mut work = Eliminator::new(x, own, 0);
         if let Some(point) = point {
             work = work.near(point.clone());

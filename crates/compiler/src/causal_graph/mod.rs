@@ -77,6 +77,8 @@ pub struct Ports {
     pub ports: Vec<PortState>,
     /// Definitions of variables by other variables, triangular: substituted in turn they end at inputs.
     pub definitions: Map<Symbol, Combination>,
+    /// Loops among these definitions, as the elements write them.
+    pub loops: Vec<LoopRows>,
     /// Divisors that are not known to be nonzero: they are guarded during a run.
     pub watched: Vec<Expr>,
     /// Expressions that vanish at the given parameters only.
@@ -94,6 +96,9 @@ pub struct Ports {
     /// Relations among imposed variables alone that the structure implies; they hold, or there would have been an error.
     pub demands: Vec<Combination>,
 }
+
+/// A loop of the junction structure: each of its variables with a row in which it occurs, a sum that vanishes.
+pub type LoopRows = Vec<(Symbol, Combination)>;
 
 /// Why a variable has priority as an independent one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

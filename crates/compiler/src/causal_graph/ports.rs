@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::matched::{BlockRows, block_rows, matched_rows};
-use super::{Combination, PortState, Role};
+use super::matched::{Block, BlockRows, block_rows, matched_rows};
+use super::{Combination, LoopRows, PortState, Role};
 use crate::algebra::{
     Assumptions, Coefficients, Elimination, Eliminator, Expr, Exprs, NumericPoint, ONE, SparseRow, Symbol,
     back_substitute, eliminate,
@@ -51,6 +51,8 @@ pub struct Solved {
     pub virtual_speeds: Vec<Virtual>,
     /// Triangular definitions, as short as the elements write them where that can be.
     pub definitions: Vec<(Symbol, Combination)>,
+    /// Loops of definitions, each as the elements write it.
+    pub loops: Vec<LoopRows>,
     /// Relations among source variables alone that the structure implies: each `Σ = 0` with minimal support.
     pub demands: Vec<Combination>,
     /// Divisors to be guarded during a run.
@@ -373,6 +375,11 @@ impl Net {
         (self.symbols[column], self.combination(&row))
     }
 
+    /// A loop by its symbols.
+    pub(super) fn loop_rows(&self, block: Block) -> LoopRows {
+        block.into_iter().map(|(column, row)| (self.symbols[column], self.combination(&row.0))).collect()
+    }
+
     /// The result of an elimination as roles, definitions and relations.
     pub fn solved(
         &self,
@@ -442,7 +449,10 @@ impl Net {
         let parts = exact && matched.is_none() && done.watched.iter().any(|&e| is_divided(x, e));
         let whole = matched.unwrap_or_else(|| reduced_rows(x, &done, regular.as_ref()));
         let (rows, watched) = match before.filter(|_| parts).and_then(|before| self.parted(x, &done, before, &whole)) {
-            Some(BlockRows { rows, divisors, .. }) => (rows, divisors),
+            Some(BlockRows { rows, loops, divisors, .. }) => {
+                solved.loops = loops.into_iter().map(|block| self.loop_rows(block)).collect();
+                (rows, divisors)
+            }
             None => (whole, regular.map_or(done.watched, |regular| vec![regular.determinant])),
         };
         solved.definitions.extend(rows.into_iter().map(|row| self.definition(row)));

@@ -36,6 +36,7 @@ impl Net {
             None => {
                 let blocks = x.if_found(|x| block_rows(x, &self.rows, &done, BLOCK, point))?;
                 solved.watched = blocks.divisors;
+                solved.loops = blocks.loops.into_iter().map(|block| self.loop_rows(block)).collect();
                 blocks.rows
             }
         };

@@ -10,6 +10,7 @@ use super::EquationStep;
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
 use super::supports::Supports;
+use super::symmetry::mirrored;
 use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
@@ -24,6 +25,9 @@ const LONGEST: u64 = 600;
 const FEW: usize = 32;
 /// What is tried for the number of unknowns that a variable may read in a larger loop.
 const LONGEST_ROWS: [usize; 5] = [usize::MAX, 16, 8, 4, 2];
+
+/// Matrices of so many rates are looked at for entries that mirror each other.
+const MIRRORED: usize = 4;
 
 /// Loops with more variables than this are not written out to see whether terms that are no linear forms cancel.
 const WRITTEN_OUT: usize = 64;
@@ -107,7 +111,7 @@ fn is_direct(d: &Definitions, symbol: Symbol) -> bool {
 }
 
 /// Strongly connected components of the definitions, those that are read first.
-fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Vec<Symbol>> {
+pub(super) fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Vec<Symbol>> {
     let graph = dependency_graph(&d.x, symbols, |s| d.of[&s].expr());
     let sorted = |nodes: Vec<_>| {
         let mut set: Vec<Symbol> = nodes.into_iter().map(|n| graph[n]).collect();
@@ -157,12 +161,15 @@ fn block(
     // A matrix that closes positions may be singular anywhere, and the start is to find its own way around that.
     let positions = torn.iter().any(|s| d.computed.contains(s));
     let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
-    let Some((named, rows)) = forms else {
+    let Some((named, mut rows)) = forms else {
         let inner = body.clone();
         ordered.steps.push(EquationStep::Newton { unknowns: torn, body: inner, residuals, elements });
         ordered.assign(body);
         return Ok(());
     };
+    if (MIRRORED..=FEW).contains(&torn.len()) && torn.iter().all(|s| first.contains(s)) {
+        mirrored(&mut d.x, &mut rows, &named, &ordered.steps);
+    }
     ordered.named.extend(&named);
     ordered.assign(named);
     let x = &mut d.x;
@@ -280,7 +287,7 @@ impl Ordered {
 
 /// The variables at which a loop is torn: all that have no value of their own, be it that their law cannot be inverted
 /// or that its inverse may end where Newton looks; then preferred ones, then a minimum set of the others.
-fn tear(d: &Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Vec<Symbol> {
+pub(super) fn tear(d: &Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Vec<Symbol> {
     let looked_for = |s: &Symbol| matches!(d.of[s], Definition::Implicit(_)) || d.written.contains_key(s);
     let mut torn: BTreeSet<Symbol> = symbols.iter().copied().filter(looked_for).collect();
     for preferred in [true, false] {

@@ -6,6 +6,7 @@ use std::rc::Rc;
 use petgraph::unionfind::UnionFind;
 
 use super::definitions::{Definition, Definitions};
+use super::loops::by_gains;
 use super::rows::Rows;
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
@@ -116,6 +117,9 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
     for (symbol, row) in rows.definitions(&mut d.x) {
         let value = row.expr(&mut d.x);
         d.set(symbol, value);
+    }
+    for own in &causal.ports.loops {
+        by_gains(&mut d, own, &mut rows);
     }
     let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), deferred: Vec::new() };
     assembled.imposed_and_algebraic(causal);

@@ -16,6 +16,7 @@ mod freedom;
 mod independent_rows;
 mod index;
 mod jumps;
+mod loops;
 mod minimal;
 mod momenta;
 mod observed;
@@ -25,6 +26,7 @@ mod relations;
 mod rows;
 mod stiff;
 mod supports;
+mod symmetry;
 mod verify;
 
 use std::collections::BTreeSet;

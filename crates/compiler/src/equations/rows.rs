@@ -58,6 +58,11 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Whether nothing is imposed by the source that gives a variable.
+    pub fn is_zero(&self, input: Symbol) -> bool {
+        self.zero.contains(&input)
+    }
+
     /// The port that gives a variable.
     pub fn giver(&self, input: Symbol) -> Option<&'a PortState> {
         self.givers.get(&input).copied()

@@ -130,10 +130,10 @@ impl Differentiation {
 
     fn of_block(&mut self, block: BlockId) -> Vec<SparseGradient> {
         let (matrix, right, shared) = match self.blocks[block].clone() {
-            Block::Linear { matrix, right, .. } => {
+            Block::Linear { matrix, right, shared, .. } => {
                 let unknowns: Vec<Value> = (0..right.len()).map(|i| self.solution(block, i)).collect();
                 let right = self.right_of_linear(&matrix, &right, &unknowns);
-                (matrix, right, unknowns.first().copied())
+                (matrix, right, shared.or(unknowns.first().copied()))
             }
             Block::Newton { residuals, jacobian, .. } => {
                 let (matrix, right) = self.right_of_newton(block, &residuals, &jacobian);

@@ -59,6 +59,9 @@ use crate::sparse::{SparseMatrix, SymbolicFactors};
 use crate::unit::Unit;
 use dataflow::Dataflow;
 
+/// Linear blocks of at most so many unknowns are small: what shares their factors has their entries too.
+pub const SMALL: usize = 12;
+
 id!(
     /// A value: an entry of [`Program::values`].
     Value

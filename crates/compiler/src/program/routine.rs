@@ -2,7 +2,7 @@
 
 use super::op::Op;
 use super::values::Reads;
-use super::{Block, BlockId, Program, Value};
+use super::{Block, BlockId, Program, SMALL, Value};
 use crate::ids::{Id, id};
 use crate::sparse::Pattern;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -79,7 +79,7 @@ pub enum Method {
     Linear {
         /// The block that has factored the same matrix, if there is one.
         shared: Option<BlockId>,
-        /// The entries of the matrix; none where factors are shared.
+        /// The entries of the matrix; none where the factors of a large one are shared.
         matrix: Vec<Arg>,
         /// The right-hand side.
         right: Vec<Arg>,
@@ -443,7 +443,8 @@ impl<'a> Builder<'a> {
         let method = match &program.blocks[block] {
             Block::Linear { right, .. } => {
                 let (shared, right) = (program.shared(block), of(self, right));
-                let own = if shared.is_none() { matrix.entries() } else { &[] };
+                // Whoever shares no factors, or differentiates, forms a small matrix again.
+                let own = if shared.is_none() || matrix.size() <= SMALL { matrix.entries() } else { &[] };
                 Method::Linear { shared, matrix: of(self, own), right }
             }
             Block::Newton { residuals, .. } => {

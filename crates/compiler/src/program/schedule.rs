@@ -12,7 +12,7 @@ use super::start::place_guesses;
 use super::values::Reads;
 use super::{
     Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Position,
-    PositionRelation, Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify,
+    PositionRelation, Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify, SMALL,
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
@@ -36,6 +36,7 @@ pub fn schedule(equations: &Equations) -> Program {
         graph,
         lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
         blocks: Table::new(),
+        factored: FxHashMap::default(),
         pivot_guards: Vec::new(),
         nonsmooth: Vec::new(),
         positions: equations.positions.iter().map(|p| p.symbol).collect(),
@@ -84,10 +85,15 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     }
 }
 
+/// An entry of a matrix: row, column, value.
+type Entry = (usize, usize, Value);
+
 struct Schedule<'a> {
     graph: &'a BondGraph,
     lower: Lowering<'a>,
     blocks: Table<BlockId, Block>,
+    /// Matrices with the first solution of the linear block that factors them.
+    factored: FxHashMap<Vec<Entry>, Value>,
     pivot_guards: Vec<PivotGuard>,
     /// Conditions inside Newton blocks, as seen from outside.
     nonsmooth: Vec<ConditionId>,
@@ -179,8 +185,17 @@ impl Schedule<'_> {
         let matrix = Arc::new(Matrix::new(matrix.map(|&e| self.lower.value(e))));
         let right = right.iter().map(|&e| self.lower.value(e)).collect();
         let elements = self.concerned(elements, unknowns);
-        let block = self.blocks.push(Block::Linear { matrix, right, shared: None, elements });
+        let entries: Vec<Entry> =
+            matrix.values.pattern().places().zip(matrix.values.entries()).map(|((i, j), &e)| (i, j, e)).collect();
+        let symmetric = matrix.values.is_symmetric();
+        let shared = self.factored.get(&entries).copied();
+        let block = self.blocks.push(Block::Linear { matrix, right, shared, elements });
         self.solved(block, unknowns);
+        // Symmetric ones are solved where they stand, by fewer operations than it takes to fetch their factors.
+        if shared.is_none() && !symmetric && unknowns.len() <= SMALL {
+            let solution = self.lower.defined(unknowns[0]).expect("it was solved for");
+            self.factored.insert(entries, solution);
+        }
     }
 
     fn newton(&mut self, unknowns: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr], elements: &[ElementId]) {

@@ -5,7 +5,7 @@
 
 use super::instruction::{Operation, Register, Routine, Solve};
 use super::registers::Layout;
-use halfarrow_compiler::program::{Arg, Code, Method, Op, Step};
+use halfarrow_compiler::program::{Arg, BlockId, Code, Method, Op, Step};
 use std::collections::BTreeMap;
 
 /// Operations that are packed together.
@@ -74,7 +74,8 @@ impl Packed {
     /// Code in packed order. `slot` is where it finds what it reads: below `fixed`, or a local that far above.
     pub fn of(code: &Code, fixed: u32, solves: &[Solve], slot: impl Fn(Arg) -> u32) -> Packed {
         let item = |step| PackedItem::of(step, fixed, &slot);
-        let items: Vec<PackedItem> = code.steps.iter().map(item).collect();
+        let mut items: Vec<PackedItem> = code.steps.iter().map(item).collect();
+        after_factors(&mut items);
         let outputs: Vec<u32> = code.outputs.iter().map(|&a| slot(a)).collect();
         let values = fixed + code.values.len() as u32;
         let order = packed_order(&items, values);
@@ -95,6 +96,18 @@ impl PackedItem<'_> {
         let mut reads = Vec::new();
         step.for_each_read(|a| reads.push(slot(a)));
         PackedItem { kind, step, reads, writes: step.defines().iter().map(|out| fixed + out.0).collect() }
+    }
+}
+
+/// Blocks that share factors come after the one that makes them, as if they read what that one finds.
+fn after_factors(items: &mut [PackedItem]) {
+    let mut found: BTreeMap<BlockId, u32> = BTreeMap::new();
+    for item in items {
+        let Step::Solve(solve) = item.step else { continue };
+        if let Method::Linear { shared: Some(of), .. } = solve.method {
+            item.reads.push(found[&of]);
+        }
+        found.insert(solve.block, item.writes[0]);
     }
 }
 
@@ -202,8 +215,6 @@ impl Slots {
                         runs.push(PackedStep::Guard { pivot: reads[0], scale: reads[1] });
                     }
                     (None, Step::Solve(solve)) => {
-                        let alone = !matches!(solve.method, Method::Linear { shared: Some(_), .. });
-                        assert!(alone, "rates and recorded values share no factors");
                         let solve = number_of[&solve.block.0];
                         let block = &solves[solve];
                         let reads = reads.into_iter().zip(read_by(block)).collect();

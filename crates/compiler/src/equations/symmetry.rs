@@ -1,0 +1,213 @@
+//! Linear equations whose matrix is symmetric, as mass matrices are: an entry and its mirror image have one value, and the one
+//! is kept that takes fewer operations.
+//!
+//! Whether two entries are equal is told by their values at points where every variable has a value of its own: they come
+//! about in different ways, one through speeds and one through forces, and no rewriting leads from one to the other.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::EquationStep;
+use crate::algebra::{Evaluator, Expr, Exprs, Node, Symbol};
+use crate::ids::Id;
+
+/// Points at which entries are compared.
+const POINTS: usize = 3;
+/// Entries are equal that differ by no more than this part of them.
+const ROUNDING: f64 = 1e-10;
+
+/// An entry of a matrix: row, column.
+type Place = (usize, usize);
+
+/// Puts one expression in the place of two entries that mirror each other and have equal values, or opposite ones. `rows`:
+/// the entries by their columns; `right`: right-hand sides, which are evaluated in any case; `named`: names for parts of
+/// both, with their values; `steps`: what is evaluated before.
+pub fn mirrored(
+    x: &mut Exprs,
+    rows: &mut [(Vec<(usize, Expr)>, Expr)],
+    named: &[(Symbol, Expr)],
+    steps: &[EquationStep],
+) {
+    let mut entries: BTreeMap<Place, Expr> = BTreeMap::new();
+    for (i, (row, _)) in rows.iter().enumerate() {
+        entries.extend(row.iter().map(|&(j, e)| ((i, j), e)));
+    }
+    let pairs = entries.iter().filter(|((i, j), _)| i < j);
+    let pairs: Vec<(Place, Expr, Expr)> =
+        pairs.filter_map(|(&(i, j), &e)| Some(((i, j), e, *entries.get(&(j, i))?))).collect();
+    let signs = signs(x, &pairs, named, steps);
+    let values: FxHashMap<Symbol, Expr> = named.iter().copied().collect();
+    let mut needed = Needed { values: &values, seen: FxHashSet::default() };
+    rows.iter().for_each(|row| _ = needed.add(x, row.1));
+    entries.iter().filter(|((i, j), _)| i == j).for_each(|(_, &e)| _ = needed.add(x, e));
+    for (((i, j), upper, lower), sign) in pairs.into_iter().zip(signs) {
+        if sign == 0 || upper == lower {
+            continue;
+        }
+        let (from, to) =
+            if needed.count(x, upper) <= needed.count(x, lower) { ((i, j), (j, i)) } else { ((j, i), (i, j)) };
+        let kept = entries[&from];
+        needed.add(x, kept);
+        let value = if sign > 0 { kept } else { x.neg(kept) };
+        let place = rows[to.0].0.iter_mut().find(|e| e.0 == to.1).expect("it is an entry");
+        place.1 = value;
+    }
+}
+
+/// For each pair of entries 1 if they are equal, -1 if they are opposite, 0 if neither.
+fn signs(x: &Exprs, pairs: &[(Place, Expr, Expr)], named: &[(Symbol, Expr)], steps: &[EquationStep]) -> Vec<i8> {
+    let mut signs: Vec<Option<i8>> = vec![None; pairs.len()];
+    let roots: Vec<Expr> = pairs.iter().flat_map(|p| [p.1, p.2]).collect();
+    let order = before(x, &roots, named, steps);
+    for point in 0..POINTS {
+        let known = values(x, point, named, steps, &order);
+        let mut at = |s: Symbol| known.get(&s).copied().unwrap_or_else(|| somewhere(point, s));
+        let mut values = Evaluator::new(x, &mut at);
+        for (pair, sign) in pairs.iter().zip(&mut signs) {
+            let (upper, lower) = (values.value(pair.1), values.value(pair.2));
+            let equal = |a: f64, b: f64| (a - b).abs() <= ROUNDING * (a.abs() + b.abs());
+            let here = if equal(upper, lower) {
+                1
+            } else if equal(upper, -lower) {
+                -1
+            } else {
+                0
+            };
+            *sign = Some(sign.map_or(here, |before| if before == here { here } else { 0 }));
+        }
+    }
+    signs.into_iter().map(|sign| sign.unwrap_or(0)).collect()
+}
+
+/// The steps that expressions rest on, in order.
+fn before(x: &Exprs, roots: &[Expr], named: &[(Symbol, Expr)], steps: &[EquationStep]) -> Vec<usize> {
+    let named: FxHashMap<Symbol, Expr> = named.iter().copied().collect();
+    let mut of: FxHashMap<Symbol, usize> = FxHashMap::default();
+    for (k, step) in steps.iter().enumerate() {
+        match step {
+            EquationStep::Assign { symbol, .. } => _ = of.insert(*symbol, k),
+            EquationStep::Linear { unknowns, .. } => of.extend(unknowns.iter().map(|&s| (s, k))),
+            EquationStep::Newton { .. } | EquationStep::Guard { .. } => {}
+        }
+    }
+    let (mut found, mut seen) = (BTreeSet::new(), FxHashSet::default());
+    let mut open: Vec<Symbol> = roots.iter().flat_map(|&e| x.symbols_of(e)).collect();
+    while let Some(symbol) = open.pop() {
+        if !seen.insert(symbol) {
+            continue;
+        }
+        if let Some(&value) = named.get(&symbol) {
+            open.extend(x.symbols_of(value));
+        } else if let Some(&k) = of.get(&symbol)
+            && found.insert(k)
+        {
+            match &steps[k] {
+                EquationStep::Assign { value, .. } => open.extend(x.symbols_of(*value)),
+                EquationStep::Linear { matrix, right, .. } => {
+                    open.extend(matrix.entries().iter().chain(right).flat_map(|&e| x.symbols_of(e)));
+                }
+                _ => {}
+            }
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// The values of all variables that these steps define, and of the names, at a point.
+fn values(
+    x: &Exprs,
+    point: usize,
+    named: &[(Symbol, Expr)],
+    steps: &[EquationStep],
+    order: &[usize],
+) -> FxHashMap<Symbol, f64> {
+    let mut known: FxHashMap<Symbol, f64> = FxHashMap::default();
+    let mut parts: FxHashMap<Expr, f64> = FxHashMap::default();
+    let mut evaluate = |e: Expr, known: &FxHashMap<Symbol, f64>| {
+        let mut at = |s: Symbol| known.get(&s).copied().unwrap_or_else(|| somewhere(point, s));
+        let mut values = Evaluator::knowing(x, &mut at, std::mem::take(&mut parts));
+        let value = values.value(e);
+        parts = values.into_known();
+        value
+    };
+    for &k in order {
+        match &steps[k] {
+            EquationStep::Assign { symbol, value } => {
+                let value = evaluate(*value, &known);
+                known.insert(*symbol, value);
+            }
+            EquationStep::Linear { unknowns, matrix, right, .. } => {
+                let n = unknowns.len();
+                let full: Vec<f64> = matrix.dense(crate::algebra::ZERO).iter().map(|&e| evaluate(e, &known)).collect();
+                let right = right.iter().map(|&e| evaluate(e, &known)).collect();
+                known.extend(unknowns.iter().copied().zip(solved(n, full, right)));
+            }
+            EquationStep::Newton { .. } | EquationStep::Guard { .. } => {}
+        }
+    }
+    for &(symbol, value) in named {
+        let value = evaluate(value, &known);
+        known.insert(symbol, value);
+    }
+    known
+}
+
+/// The solution of linear equations with a full matrix; not finite if it has none.
+fn solved(n: usize, mut full: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
+    for k in 0..n {
+        let pivot =
+            (k..n).max_by(|&a, &b| full[a * n + k].abs().total_cmp(&full[b * n + k].abs())).expect("it has rows");
+        (0..n).for_each(|j| full.swap(k * n + j, pivot * n + j));
+        right.swap(k, pivot);
+        for i in k + 1..n {
+            let factor = full[i * n + k] / full[k * n + k];
+            (k..n).for_each(|j| full[i * n + j] -= factor * full[k * n + j]);
+            right[i] -= factor * right[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let sum: f64 = (k + 1..n).map(|j| full[k * n + j] * right[j]).sum();
+        right[k] = (right[k] - sum) / full[k * n + k];
+    }
+    right
+}
+
+/// A value between 1 and 2 that no other symbol has at this point.
+fn somewhere(point: usize, symbol: Symbol) -> f64 {
+    let irrational = [0.618_033_988_749_894_9, 0.414_213_562_373_095_1, 0.732_050_807_568_877_2][point];
+    1.0 + (irrational * (symbol.index() as f64 + 1.0)).fract()
+}
+
+/// What is evaluated anyway.
+struct Needed<'a> {
+    values: &'a FxHashMap<Symbol, Expr>,
+    seen: FxHashSet<Expr>,
+}
+
+impl Needed<'_> {
+    /// Adds all that an expression is made of.
+    fn add(&mut self, x: &Exprs, e: Expr) {
+        let new = self.new(x, e);
+        self.seen.extend(new);
+    }
+
+    /// How much is new in an expression.
+    fn count(&self, x: &Exprs, e: Expr) -> usize {
+        self.new(x, e).len()
+    }
+
+    fn new(&self, x: &Exprs, e: Expr) -> FxHashSet<Expr> {
+        let (mut new, mut open) = (FxHashSet::default(), vec![e]);
+        while let Some(e) = open.pop() {
+            if self.seen.contains(&e) || !new.insert(e) {
+                continue;
+            }
+            match x.node(e) {
+                Node::Symbol(s) => open.extend(self.values.get(s)),
+                node => node.for_each_child(|c| open.push(c)),
+            }
+        }
+        new
+    }
+}
