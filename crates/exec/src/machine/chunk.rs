@@ -43,6 +43,21 @@ pub(super) enum ChunkItem<'a> {
     Solve(&'a Solve),
 }
 
+impl ChunkItem<'_> {
+    /// Whether it may stop the run, or ask for the bytecode; `inline`: functions are written out.
+    pub fn may_fail(&self, inline: bool) -> bool {
+        match self {
+            ChunkItem::Op(Operation { op, .. }) => inline && is_written_out(op),
+            ChunkItem::Guard { .. } | ChunkItem::Solve(_) => true,
+        }
+    }
+}
+
+/// Whether a function is one of those that are written out, for usual arguments, where they are few.
+pub(super) fn is_written_out(op: &Op<Register>) -> bool {
+    matches!(op, Op::Call(Function::Sin | Function::Cos | Function::Exp | Function::Log, _))
+}
+
 /// Translates items, then stores the registers that are live behind them.
 pub(super) struct Chunk<'a, 'b> {
     w: Writer<'a>,
@@ -56,6 +71,8 @@ pub(super) struct Chunk<'a, 'b> {
     keep: Value,
     r: BTreeMap<Register, Value>,
     d: BTreeMap<Register, Value>,
+    /// Registers that are stored as soon as they are written: nothing in the chunk can go wrong.
+    at_once: BTreeSet<Register>,
     /// Registers that are only read: loaded again after a call rather than saved over it.
     loaded: BTreeSet<Register>,
     /// 0, or the first thing that is wrong.
@@ -91,6 +108,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
             keep,
             r: BTreeMap::new(),
             d: BTreeMap::new(),
+            at_once: BTreeSet::new(),
             loaded: BTreeSet::new(),
             status: None,
             good: None,
@@ -106,6 +124,11 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.direct = Some(direct);
     }
 
+    /// From now on these registers are stored as soon as they are written, so that no value waits for the end.
+    pub fn stores_at_once(&mut self, registers: &[Register]) {
+        self.at_once.extend(registers);
+    }
+
     pub fn item(&mut self, item: ChunkItem) {
         match item {
             ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
@@ -117,7 +140,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
     /// Stores registers that it has written unless something is wrong or unusual, and returns the status.
     pub fn end(mut self, written: &[Register]) -> Writer<'a> {
         self.stop_unless_fine();
-        for &register in written {
+        for register in written.iter().filter(|r| !self.at_once.contains(r)).copied() {
             let value = self.r[&register];
             self.w.store(self.values, register, value);
             if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
@@ -201,8 +224,15 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let slope = self.along.then(|| slope(self));
         self.loaded.remove(&register);
         self.r.insert(register, value);
+        let at_once = self.at_once.contains(&register);
+        if at_once {
+            self.w.store(self.values, register, value);
+        }
         if let Some(slope) = slope {
             self.d.insert(register, slope);
+            if at_once {
+                self.w.store(self.derivatives, register, slope);
+            }
         }
     }
 

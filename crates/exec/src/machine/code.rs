@@ -1,13 +1,12 @@
 //! Compiled routines and how they run.
 
-use super::chunk::{ChunkContext, ChunkItem};
+use super::chunk::{ChunkContext, ChunkItem, is_written_out};
 use super::functions::{Ends, Functions, Plan};
 use super::live::Live;
 use super::memory::{ArrayLengths, Operands};
 use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD, WRITTEN_OUT};
 use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Routine, Solve, SolveError};
-use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::program::{Op, Program};
+use halfarrow_compiler::program::Program;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
@@ -104,7 +103,7 @@ fn steps<'a>(
     let inline = inlines(operations(&routine.code));
     let mut live = Live::of(&routine.outputs);
     let mut steps = Vec::new();
-    for code in cuts(routine, &written_out).into_iter().rev() {
+    for code in cuts(routine, &written_out, inline).into_iter().rev() {
         match routine.code[code.clone()] {
             [Instruction::Solve { solve }] if !written_out[solve as usize] => {
                 live.before_solve(&routine.solves[solve as usize]);
@@ -139,11 +138,12 @@ fn inner_segments<'a>(solve: &'a Solve, along: bool, plans: &mut Vec<Plan<'a>>) 
     segments
 }
 
-/// Where a routine is cut: chunks, and solve blocks by themselves.
-fn cuts(routine: &Routine, written_out: &[bool]) -> Vec<Range<usize>> {
+/// Where a routine is cut: chunks, and solve blocks by themselves. Where there are several chunks, what may fail has its own:
+/// the others store what they write as they go.
+fn cuts(routine: &Routine, written_out: &[bool], inline: bool) -> Vec<Range<usize>> {
     let mut cuts = Vec::new();
-    let mut from = 0;
-    let mut size = 0;
+    let (mut from, mut size, mut failing) = (0, 0, false);
+    let several = routine.code.len() > CHUNK;
     for (at, instruction) in routine.code.iter().enumerate() {
         let mut weight = 1;
         if let Instruction::Solve { solve } = *instruction {
@@ -155,6 +155,12 @@ fn cuts(routine: &Routine, written_out: &[bool]) -> Vec<Range<usize>> {
             }
             weight = routine.solves[solve as usize].matrix.len();
         }
+        let fails = item(routine, instruction).may_fail(inline);
+        if several && fails != failing && from < at {
+            cuts.push(from..at);
+            (from, size) = (at, 0);
+        }
+        failing = fails;
         size += weight;
         if size >= CHUNK {
             cuts.push(from..at + 1);
@@ -190,9 +196,7 @@ fn item<'a>(routine: &'a Routine, instruction: &'a Instruction) -> ChunkItem<'a>
 
 /// Whether functions are inlined: not where there are many, as that takes long to compile.
 fn inlines<'a>(code: impl Iterator<Item = &'a Operation>) -> bool {
-    let wanted =
-        |o: &&Operation| matches!(o.op, Op::Call(Function::Sin | Function::Cos | Function::Exp | Function::Log, _));
-    code.filter(wanted).count() <= INLINE
+    code.filter(|o| is_written_out(&o.op)).count() <= INLINE
 }
 
 fn operations(code: &[Instruction]) -> impl Iterator<Item = &Operation> {

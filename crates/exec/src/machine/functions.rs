@@ -99,6 +99,9 @@ impl Maker {
             Ends::Stores(registers) => self.made(isa, &[types::I64; 5], |writer, arguments| {
                 let parameters = std::array::from_fn(|i| arguments[i]);
                 let mut chunk = Chunk::new(writer, parameters, context, plan.along, plan.inline);
+                if !plan.items.iter().any(|item| item.may_fail(plan.inline)) {
+                    chunk.stores_at_once(registers);
+                }
                 plan.items.iter().for_each(|&item| chunk.item(item));
                 chunk.end(registers)
             }),

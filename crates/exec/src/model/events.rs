@@ -28,7 +28,7 @@ impl Model {
             let blocks = self.code.rates.solves.iter().map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
             let code = self.code.clone();
-            self.follow_motion(t, x, code.motion.as_ref())?;
+            self.follow_motion(t, x, code.motion.as_ref(), true)?;
         }
         if !self.recorded.blocks.is_empty() {
             self.place(t, x);
@@ -36,17 +36,18 @@ impl Model {
             let blocks = self.recorded.blocks.iter();
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
             let recorded = self.recorded.clone();
-            self.follow_motion(t, x, recorded.motion.as_ref())?;
+            self.follow_motion(t, x, recorded.motion.as_ref(), false)?;
         }
         Ok(())
     }
 
-    /// Notes how computed positions move at `(t, x)`.
-    fn follow_motion(&mut self, t: f64, x: &[f64], motion: Option<&Motion>) -> Result<(), Failure> {
+    /// Notes how computed positions move at `(t, x)`: `own` those that the rates need, else those of recorded values.
+    fn follow_motion(&mut self, t: f64, x: &[f64], motion: Option<&Motion>, own: bool) -> Result<(), Failure> {
         let Some(motion) = motion else { return Ok(()) };
         motion.blocks.iter().for_each(|(block, _)| self.frame.solvers[block.0 as usize].newton.arrive(t));
         self.place(t, x);
-        self.frame.run(&motion.rates).map_err(|error| self.failure(t, error))?;
+        let run = if own { self.once(What::Motion, false).map(|_| ()) } else { self.frame.run(&motion.rates) };
+        run.map_err(|error| self.failure(t, error))?;
         for (block, rates) in &motion.blocks {
             let Frame { r, solvers, .. } = &mut self.frame;
             let rates = motion.rates.outputs[rates.clone()].iter().map(|&rate| r[rate as usize]);

@@ -5,6 +5,7 @@ use super::compiled::ModeId;
 use super::machine::Tiers;
 use super::minimum_norm;
 use super::recorded::Recorded;
+use super::system::What;
 use super::{Model, clauses::EventWork};
 use crate::bytecode::{Frame, Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
@@ -35,7 +36,7 @@ pub(super) struct Ratios {
     /// Independent ones, then the dependent ones.
     routine: Routine,
     /// What ratios are divided by, where it varies.
-    pivots: Routine,
+    pub(super) pivots: Routine,
 }
 
 impl Ratios {
@@ -124,7 +125,7 @@ impl Model {
     /// sign. Takes no memory.
     fn is_pivot_smaller(&mut self, ratios: &Ratios, t: f64, x: &[f64]) -> bool {
         self.place(t, x);
-        if self.frame.run(&ratios.pivots).is_err() || self.run.pivots.is_empty() {
+        if self.once(What::Pivots, false).is_err() || self.run.pivots.is_empty() {
             return true;
         }
         let now = ratios.pivots.outputs.iter().map(|&r| self.frame.r[r as usize]);

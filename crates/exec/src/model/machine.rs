@@ -43,6 +43,10 @@ pub enum Evaluated {
     Indicators,
     /// All derivatives of the rates at once.
     Jacobian,
+    /// How positions that constraints determine move, at the end of each step.
+    Motion,
+    /// What is divided by where other variables could be independent, at the end of each step.
+    Pivots,
 }
 
 /// How a routine was run, and why.
@@ -88,13 +92,20 @@ struct Tier {
 /// All routines. Copies of a model share what was made before.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tiers {
-    of: [Tier; 5],
+    of: [Tier; 7],
     execution: Execution,
     expected: Option<Expected>,
 }
 
-const ALL: [Evaluated; 5] =
-    [Evaluated::Rates, Evaluated::Directions, Evaluated::Recorded, Evaluated::Indicators, Evaluated::Jacobian];
+const ALL: [Evaluated; 7] = [
+    Evaluated::Rates,
+    Evaluated::Directions,
+    Evaluated::Recorded,
+    Evaluated::Indicators,
+    Evaluated::Jacobian,
+    Evaluated::Motion,
+    Evaluated::Pivots,
+];
 
 impl Evaluated {
     /// What it is called.
@@ -105,6 +116,8 @@ impl Evaluated {
             Evaluated::Recorded => "recorded",
             Evaluated::Indicators => "event indicators",
             Evaluated::Jacobian => "jacobian",
+            Evaluated::Motion => "rates of positions",
+            Evaluated::Pivots => "pivots",
         }
     }
 
@@ -116,6 +129,8 @@ impl Evaluated {
             (What::Recorded, false) => Some(Evaluated::Recorded),
             (What::Indicators, false) => Some(Evaluated::Indicators),
             (What::Jacobian, false) => Some(Evaluated::Jacobian),
+            (What::Motion, false) => Some(Evaluated::Motion),
+            (What::Pivots, false) => Some(Evaluated::Pivots),
             (_, true) => None,
         }
     }
@@ -126,6 +141,8 @@ impl Evaluated {
             Evaluated::Recorded => Some(&recorded.routine),
             Evaluated::Indicators => (!mode.switching.is_empty()).then_some(&mode.indicators),
             Evaluated::Jacobian => mode.jacobian.as_ref().map(|jacobian| &jacobian.routine),
+            Evaluated::Motion => mode.motion.as_ref().map(|motion| &motion.rates),
+            Evaluated::Pivots => mode.exchanges.as_ref().map(|ratios| &ratios.pivots),
         }
     }
 }

@@ -15,21 +15,27 @@ pub(super) enum What {
     Indicators,
     /// The Jacobian of the rates, if the model has its code.
     Jacobian,
+    /// The rates of positions that constraints determine, if there are any.
+    Motion,
+    /// What is divided by where other variables could be independent, if there are any.
+    Pivots,
 }
 
 impl Model {
-    fn once(&mut self, what: What, along: bool) -> Result<bool, SolveError> {
+    pub(super) fn once(&mut self, what: What, along: bool) -> Result<bool, SolveError> {
         self.before_evaluation(what, along);
         let routine = match what {
             What::Rates => &self.code.rates,
             What::Recorded => &self.recorded.routine,
             What::Indicators => &self.code.indicators,
             What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
+            What::Motion => &self.code.motion.as_ref().expect("asked for only where they are").rates,
+            What::Pivots => &self.code.exchanges.as_ref().expect("asked for only where they are").pivots,
         };
         self.frame.begin(match what {
             What::Rates => self.code.batches.as_ref(),
             What::Recorded => self.recorded.batches.as_ref(),
-            What::Indicators | What::Jacobian => None,
+            What::Indicators | What::Jacobian | What::Motion | What::Pivots => None,
         });
         match (self.tiers.code(what, along), along) {
             (Some(code), _) => code.run(&mut self.frame, routine)?,

@@ -100,16 +100,36 @@ impl Lu {
     }
 
     fn factor_general(&mut self) -> Result<(), usize> {
-        let n = self.size;
-        self.factors.copy_from_slice(&self.matrix);
+        match self.size {
+            2 => self.factor_of_size(2),
+            3 => self.factor_of_size(3),
+            4 => self.factor_of_size(4),
+            5 => self.factor_of_size(5),
+            6 => self.factor_of_size(6),
+            n => self.factor_of_size(n),
+        }
+    }
+
+    /// For a size that is known where this is called: loops of a few turns are then unrolled.
+    #[inline(always)]
+    fn factor_of_size(&mut self, n: usize) -> Result<(), usize> {
+        let Lu { matrix, factors, order, scale, .. } = self;
+        let (matrix, factors) = (&matrix[..n * n], &mut factors[..n * n]);
+        let (order, scale) = (&mut order[..n], &mut scale[..n]);
+        factors.copy_from_slice(matrix);
         for row in 0..n {
-            self.order[row] = row;
-            self.scale[row] = self.factors[row * n..][..n].iter().fold(f64::MIN_POSITIVE, |most, a| most.max(a.abs()));
+            order[row] = row;
+            scale[row] = factors[row * n..][..n].iter().fold(f64::MIN_POSITIVE, |most, a| most.max(a.abs()));
         }
         for k in 0..n {
-            let pivot = self.pivot(k).ok_or(k)?;
-            self.swap(k, pivot);
-            let (upper, lower) = self.factors.split_at_mut((k + 1) * n);
+            let pivot = pivot(n, factors, scale, k).ok_or(k)?;
+            if pivot != k {
+                let (upper, lower) = factors.split_at_mut(pivot * n);
+                upper[k * n..][..n].swap_with_slice(&mut lower[..n]);
+                order.swap(k, pivot);
+                scale.swap(k, pivot);
+            }
+            let (upper, lower) = factors.split_at_mut((k + 1) * n);
             let pivot_row = &upper[k * n..];
             for row in lower.chunks_exact_mut(n) {
                 if row[k] != 0.0 {
@@ -132,16 +152,30 @@ impl Lu {
             b[0] /= self.factors[0];
             return;
         }
-        let mut rest = std::mem::take(&mut self.rest);
+        match n {
+            2 => self.solve_of_size(2, b),
+            3 => self.solve_of_size(3, b),
+            4 => self.solve_of_size(4, b),
+            5 => self.solve_of_size(5, b),
+            6 => self.solve_of_size(6, b),
+            n => self.solve_of_size(n, b),
+        }
+    }
+
+    /// By general factors, for a size that is known where this is called.
+    #[inline(always)]
+    fn solve_of_size(&mut self, n: usize, b: &mut [f64]) {
+        let Lu { matrix, factors, order, work, rest, .. } = self;
+        let (matrix, factors, order) = (&matrix[..n * n], &factors[..n * n], &order[..n]);
+        let (work, rest, b) = (&mut work[..n], &mut rest[..n], &mut b[..n]);
         rest.copy_from_slice(b);
-        self.substitute(b);
-        for (row, rest) in self.matrix.chunks_exact(n).zip(rest.iter_mut()) {
+        substitute(n, factors, order, work, b);
+        for (row, rest) in matrix.chunks_exact(n).zip(rest.iter_mut()) {
             *rest = row.iter().zip(b.iter()).fold(*rest, |sum, (a, x)| sum - a * x);
         }
-        self.substitute(&mut rest);
+        substitute(n, factors, order, work, rest);
         // A refinement that is no small correction is none: the equations are not finite.
-        b.iter_mut().zip(&rest).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
-        self.rest = rest;
+        b.iter_mut().zip(rest.iter()).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
     }
 
     fn solve_definite(&self, b: &mut [f64]) {
@@ -172,41 +206,36 @@ impl Lu {
             (0..n).map(|k| self.order[k + 1..].iter().filter(|&&later| later < self.order[k]).count()).sum();
         (minuses + exchanges).is_multiple_of(2)
     }
+}
 
-    fn substitute(&mut self, b: &mut [f64]) {
-        let n = self.size;
-        for row in 0..n {
-            let factors = &self.factors[row * n..row * n + row];
-            self.work[row] = less_products(b[self.order[row]], factors, &self.work[..row]);
-        }
-        for row in (0..n).rev() {
-            let factors = &self.factors[row * n..(row + 1) * n];
-            b[row] = less_products(self.work[row], &factors[row + 1..], &b[row + 1..]) / factors[row];
+#[inline(always)]
+fn substitute(n: usize, factors: &[f64], order: &[usize], work: &mut [f64], b: &mut [f64]) {
+    for row in 0..n {
+        let own = &factors[row * n..row * n + row];
+        work[row] = less_products(b[order[row]], own, &work[..row]);
+    }
+    for row in (0..n).rev() {
+        let own = &factors[row * n..(row + 1) * n];
+        b[row] = less_products(work[row], &own[row + 1..], &b[row + 1..]) / own[row];
+    }
+}
+
+/// The row to bring to place `k`: the diagonal one if it is good enough. `None` if all are 0 to rounding.
+#[inline(always)]
+fn pivot(n: usize, factors: &[f64], scale: &[f64], k: usize) -> Option<usize> {
+    let weight = |row: usize| factors[row * n + k].abs() / scale[row];
+    let own = weight(k);
+    let (mut best, mut greatest) = (k, own);
+    for row in k + 1..n {
+        let weight = weight(row);
+        if weight > greatest || weight.is_nan() {
+            (best, greatest) = (row, weight);
         }
     }
-
-    /// The row to bring to place `k`: the diagonal one if it is good enough. `None` if all are 0 to rounding.
-    fn pivot(&self, k: usize) -> Option<usize> {
-        let weight = |row: usize| self.factors[row * self.size + k].abs() / self.scale[row];
-        let mut best = k;
-        for row in k + 1..self.size {
-            if weight(row) > weight(best) || weight(row).is_nan() {
-                best = row;
-            }
-        }
-        let best = if weight(k) >= THRESHOLD * weight(best) { k } else { best };
-        (weight(best) > f64::EPSILON * self.size as f64 && weight(best).is_finite()).then_some(best)
+    if own >= THRESHOLD * greatest {
+        (best, greatest) = (k, own);
     }
-
-    fn swap(&mut self, a: usize, b: usize) {
-        if a != b {
-            let n = self.size;
-            let (upper, lower) = self.factors.split_at_mut(b * n);
-            upper[a * n..][..n].swap_with_slice(&mut lower[..n]);
-            self.order.swap(a, b);
-            self.scale.swap(a, b);
-        }
-    }
+    (greatest > f64::EPSILON * n as f64 && greatest.is_finite()).then_some(best)
 }
 
 /// Whether a pivot of a positive symmetric matrix is above rounding of the diagonal entry that it comes from.
@@ -215,6 +244,7 @@ fn is_definite(pivot: f64, entry: f64, size: usize) -> bool {
 }
 
 /// `start - a·b`: the sum of groups of four products, each of the four places apart, then the products that are left.
+#[inline(always)]
 fn less_products(start: f64, a: &[f64], b: &[f64]) -> f64 {
     let (groups_a, rest_a) = a.as_chunks::<4>();
     let (groups_b, rest_b) = b.as_chunks::<4>();
