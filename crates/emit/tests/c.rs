@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use common::{Exported, Rows, build, build_with, diodes, export, models, own};
+use common::{Exported, Rows, build, build_with, diodes, export, models, own, wishbone};
 use halfarrow_compiler::algebra::math;
 use halfarrow_emit::Method;
 use halfarrow_sim::{Events, System};
@@ -26,6 +26,7 @@ fn c_does_what_the_interpreter_does() {
         }
     }
     all.extend([Method::Rk4, Method::ImplicitMidpoint].map(|method| export(&diodes(), method, 1e-3)));
+    all.push(export(&wishbone(), Method::Rk4, 1e-3));
     assert!(all.len() >= 50, "{} models", all.len());
     check("c", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.simulate(STEPS));
 }

@@ -46,14 +46,14 @@ mod iltis;
 mod library_std;
 #[path = "linearize.rs"]
 mod linearize;
-#[path = "machines_satellite.rs"]
-mod machines_satellite;
-#[path = "machines_stewart.rs"]
-mod machines_stewart;
 #[path = "machines_bicycle.rs"]
 mod machines_bicycle;
 #[path = "machines_robot.rs"]
 mod machines_robot;
+#[path = "machines_satellite.rs"]
+mod machines_satellite;
+#[path = "machines_stewart.rs"]
+mod machines_stewart;
 #[path = "mechanisms.rs"]
 mod mechanisms;
 #[path = "multibonds.rs"]

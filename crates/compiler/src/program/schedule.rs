@@ -12,7 +12,8 @@ use super::start::place_guesses;
 use super::values::Reads;
 use super::{
     Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Position,
-    PositionRelation, Program, Relations, StartCondition, StartGuess, State, Trigger, Value, events, triggers, verify, SMALL,
+    PositionRelation, Program, Relations, SMALL, StartCondition, StartGuess, State, Trigger, Value, events, triggers,
+    verify,
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};

@@ -23,6 +23,11 @@ impl Files for Disk {
     fn read(&self, path: &str) -> Result<String, FileError> {
         fs::read_to_string(path).map_err(|why| FileError::Unreadable(why.to_string()))
     }
+
+    fn library(&self, name: &str) -> Option<String> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../library");
+        fs::read_to_string(root.join(name.replace('.', "/")).with_extension("bond")).ok()
+    }
 }
 
 /// A model, written and ready to be run.
@@ -58,6 +63,11 @@ pub fn own(name: &str) -> PathBuf {
 /// Diodes: where rounding hides small unknowns, and where a law overflows at rest.
 pub fn diodes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/diodes.bond")
+}
+
+/// A double wishbone: a loop in space that is solved by gains.
+pub fn wishbone() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/wishbone.bond")
 }
 
 /// A model whose structure is another where two of its parameters differ.

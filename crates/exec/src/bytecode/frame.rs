@@ -241,7 +241,10 @@ impl Frame {
         }
         solver.factors.solve(&mut solver.x);
         if ALONG {
-            assert!(solve.shared.is_none() || !solve.matrix.is_empty(), "what shares large factors is itself a derivative");
+            assert!(
+                solve.shared.is_none() || !solve.matrix.is_empty(),
+                "what shares large factors is itself a derivative"
+            );
             for (i, rate) in solver.rate.iter_mut().enumerate() {
                 let row = solve.pattern.row(i).map(|e| (solve.matrix[e], solve.pattern.columns()[e]));
                 let moved: f64 = row.map(|(m, column)| d[m as usize] * solver.x[column as usize]).sum();
