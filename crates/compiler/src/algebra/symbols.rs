@@ -27,6 +27,13 @@ pub enum SymbolKind {
         /// The unknown.
         by: Symbol,
     },
+    /// What a variable beside a loop does to one at which the loop is torn.
+    LoopGain {
+        /// The variable at which it is torn.
+        of: Symbol,
+        /// The variable beside it.
+        by: Symbol,
+    },
     /// What a variable of a loop is where all unknowns of the loop are zero.
     Bias(Symbol),
 }
@@ -143,6 +150,12 @@ impl Exprs {
     pub fn gain(&mut self, of: Symbol, by: Symbol) -> Symbol {
         let name = format!("{}.by.{}", self.name(of), self.name(by));
         self.made_of(SymbolKind::Gain { of, by }, &name)
+    }
+
+    /// What a variable beside a loop does to one at which the loop is torn, as a symbol.
+    pub fn loop_gain(&mut self, of: Symbol, by: Symbol) -> Symbol {
+        let name = format!("{}.by.{}", self.name(of), self.name(by));
+        self.made_of(SymbolKind::LoopGain { of, by }, &name)
     }
 
     /// What a variable of a loop is where all unknowns of the loop are zero, as a symbol.

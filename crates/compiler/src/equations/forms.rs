@@ -35,6 +35,24 @@ pub struct LinearForms {
 impl LinearForms {
     /// The forms of the variables of a loop, in order of evaluation; `None` if one of them is no linear form.
     pub fn new(x: &mut Exprs, unknowns: &[Symbol], body: &[(Symbol, Expr)]) -> Option<LinearForms> {
+        LinearForms::of(x, unknowns, body, LinearForms::with_names)
+    }
+
+    /// The same with wholes in the place of names.
+    pub fn of_wholes(x: &mut Exprs, unknowns: &[Symbol], body: &[(Symbol, Expr)]) -> Option<LinearForms> {
+        LinearForms::of(x, unknowns, body, |_, x, _, _, mut form| {
+            form.coefficients.values_mut().for_each(|e| *e = x.whole(*e));
+            form.rest = x.whole(form.rest);
+            form
+        })
+    }
+
+    fn of(
+        x: &mut Exprs,
+        unknowns: &[Symbol],
+        body: &[(Symbol, Expr)],
+        short: impl Fn(&mut LinearForms, &mut Exprs, Symbol, &[Symbol], LinearForm) -> LinearForm,
+    ) -> Option<LinearForms> {
         let mut forms = LinearForms::default();
         for (k, &unknown) in unknowns.iter().enumerate() {
             let coefficients = BTreeMap::from([(k, x.int(1))]);
@@ -42,7 +60,7 @@ impl LinearForms {
         }
         for &(symbol, value) in body {
             let form = forms.of_expr(x, value)?;
-            let form = forms.with_names(x, symbol, unknowns, form);
+            let form = short(&mut forms, x, symbol, unknowns, form);
             forms.of.insert(symbol, form);
         }
         Some(forms)

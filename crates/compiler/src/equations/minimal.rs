@@ -13,6 +13,7 @@ use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
 use crate::bond_graph::{
     ElementId, IntegratedSignal, Kind, Meaning, PortCausality, PortRef, ResistorLaw, Storage, StorageLaw,
 };
+use crate::causal_graph::start_point::start_point;
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role, Virtual, imposes_effort};
 
 /// A state of the minimal form before it is ordered.
@@ -118,8 +119,9 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
         let value = row.expr(&mut d.x);
         d.set(symbol, value);
     }
-    for own in &causal.ports.loops {
-        by_gains(&mut d, own, &mut rows);
+    if !causal.ports.loops.is_empty() {
+        let mut point = start_point(&d.x, graph);
+        causal.ports.loops.iter().for_each(|own| by_gains(&mut d, own, &mut rows, &mut point));
     }
     let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), deferred: Vec::new() };
     assembled.imposed_and_algebraic(causal);

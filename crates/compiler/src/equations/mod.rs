@@ -20,6 +20,7 @@ mod loops;
 mod minimal;
 mod momenta;
 mod observed;
+mod points;
 mod position_relations;
 mod positions;
 mod relations;

@@ -29,6 +29,8 @@ pub struct Rows<'a> {
     residues: Map<Symbol, Row>,
     /// Rows that are written with short coefficients, over inputs and variables that are not; none for those.
     short: Map<Symbol, Option<Combination>>,
+    /// Variables that are written out over inputs, since terms cancel in them.
+    cancelling: BTreeSet<Symbol>,
 }
 
 impl<'a> Rows<'a> {
@@ -43,7 +45,7 @@ impl<'a> Rows<'a> {
         let one = causal.graph.exprs.residue(ONE);
         let residues = known.iter().map(|(&s, row)| (s, row.0.iter().map(|t| (t.0, one)).collect())).collect();
         let short = known.iter().map(|(&s, row)| (s, Some(row.clone()))).collect();
-        Rows { ports: Some(ports), givers, zero, known, residues, short }
+        Rows { ports: Some(ports), givers, zero, known, residues, short, cancelling: BTreeSet::new() }
     }
 
     /// No rows: where variables are defined along strokes they may run in circles.
@@ -55,12 +57,18 @@ impl<'a> Rows<'a> {
             known: Map::new(),
             residues: Map::new(),
             short: Map::new(),
+            cancelling: BTreeSet::new(),
         }
     }
 
     /// Whether nothing is imposed by the source that gives a variable.
     pub fn is_zero(&self, input: Symbol) -> bool {
         self.zero.contains(&input)
+    }
+
+    /// Whether terms cancel in a variable, which [`definitions`](Rows::definitions) has written out for that.
+    pub fn cancels(&self, symbol: Symbol) -> bool {
+        self.cancelling.contains(&symbol)
     }
 
     /// The port that gives a variable.
@@ -178,6 +186,7 @@ impl<'a> Rows<'a> {
             all.insert(symbol, row);
         }
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent);
+        self.cancelling = needed;
         for_junctions(&mut all, &independent.map(|p| p.output).collect());
         let last = |mut symbol: Symbol| {
             while let Some(&[(other, ONE)]) = all.get(&symbol).map(|row| &row.0[..]) {

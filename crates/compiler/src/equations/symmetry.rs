@@ -9,13 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EquationStep;
+use super::points::{POINTS, ROUNDING, solved, somewhere};
 use crate::algebra::{Evaluator, Expr, Exprs, Node, Symbol};
-use crate::ids::Id;
-
-/// Points at which entries are compared.
-const POINTS: usize = 3;
-/// Entries are equal that differ by no more than this part of them.
-const ROUNDING: f64 = 1e-10;
 
 /// An entry of a matrix: row, column.
 type Place = (usize, usize);
@@ -151,32 +146,6 @@ fn values(
         known.insert(symbol, value);
     }
     known
-}
-
-/// The solution of linear equations with a full matrix; not finite if it has none.
-fn solved(n: usize, mut full: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
-    for k in 0..n {
-        let pivot =
-            (k..n).max_by(|&a, &b| full[a * n + k].abs().total_cmp(&full[b * n + k].abs())).expect("it has rows");
-        (0..n).for_each(|j| full.swap(k * n + j, pivot * n + j));
-        right.swap(k, pivot);
-        for i in k + 1..n {
-            let factor = full[i * n + k] / full[k * n + k];
-            (k..n).for_each(|j| full[i * n + j] -= factor * full[k * n + j]);
-            right[i] -= factor * right[k];
-        }
-    }
-    for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|j| full[k * n + j] * right[j]).sum();
-        right[k] = (right[k] - sum) / full[k * n + k];
-    }
-    right
-}
-
-/// A value between 1 and 2 that no other symbol has at this point.
-fn somewhere(point: usize, symbol: Symbol) -> f64 {
-    let irrational = [0.618_033_988_749_894_9, 0.414_213_562_373_095_1, 0.732_050_807_568_877_2][point];
-    1.0 + (irrational * (symbol.index() as f64 + 1.0)).fract()
 }
 
 /// What is evaluated anyway.

@@ -1,0 +1,71 @@
+//! Points at which expressions are compared by their values.
+
+use crate::algebra::Symbol;
+use crate::ids::Id;
+
+/// How many points are tried.
+pub const POINTS: usize = 3;
+/// Values are equal that differ by no more than this part of them.
+pub const ROUNDING: f64 = 1e-10;
+
+/// The solution of linear equations with a full matrix; not finite if it has none.
+pub fn solved(n: usize, mut full: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
+    for k in 0..n {
+        let pivot =
+            (k..n).max_by(|&a, &b| full[a * n + k].abs().total_cmp(&full[b * n + k].abs())).expect("it has rows");
+        (0..n).for_each(|j| full.swap(k * n + j, pivot * n + j));
+        right.swap(k, pivot);
+        for i in k + 1..n {
+            let factor = full[i * n + k] / full[k * n + k];
+            (k..n).for_each(|j| full[i * n + j] -= factor * full[k * n + j]);
+            right[i] -= factor * right[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let sum: f64 = (k + 1..n).map(|j| full[k * n + j] * right[j]).sum();
+        right[k] = (right[k] - sum) / full[k * n + k];
+    }
+    right
+}
+
+/// A value between 1 and 2 that no other symbol has at this point.
+pub fn somewhere(point: usize, symbol: Symbol) -> f64 {
+    let irrational = [0.618_033_988_749_894_9, 0.414_213_562_373_095_1, 0.732_050_807_568_877_2][point];
+    1.0 + (irrational * (symbol.index() as f64 + 1.0)).fract()
+}
+
+/// The smallest pivot of a full matrix by the greatest one, rows and then columns weighed by their greatest entry and pivots
+/// sought everywhere; 0 if an entry is not finite.
+pub fn least_pivot(n: usize, mut full: Vec<f64>) -> f64 {
+    let greatest =
+        |full: &[f64], at: &dyn Fn(usize) -> usize| (0..n).fold(0.0f64, |most, k| most.max(full[at(k)].abs()));
+    for i in 0..n {
+        let scale = greatest(&full, &|k| i * n + k);
+        (0..n).for_each(|k| full[i * n + k] /= scale);
+    }
+    for j in 0..n {
+        let scale = greatest(&full, &|k| k * n + j);
+        (0..n).for_each(|k| full[k * n + j] /= scale);
+    }
+    if !full.iter().all(|a| a.is_finite()) {
+        return 0.0;
+    }
+    let (mut first, mut last) = (0.0, 0.0);
+    for k in 0..n {
+        let places = (k..n).flat_map(|i| (k..n).map(move |j| (i, j)));
+        let size = |&(i, j): &(usize, usize)| full[i * n + j].abs();
+        let (i, j) = places.max_by(|a, b| size(a).total_cmp(&size(b))).expect("there are entries");
+        last = full[i * n + j].abs();
+        first = if k == 0 { last } else { first };
+        if last == 0.0 {
+            return 0.0;
+        }
+        (0..n).for_each(|c| full.swap(k * n + c, i * n + c));
+        (0..n).for_each(|r| full.swap(r * n + k, r * n + j));
+        for row in k + 1..n {
+            let factor = full[row * n + k] / full[k * n + k];
+            (k..n).for_each(|c| full[row * n + c] -= factor * full[k * n + c]);
+        }
+    }
+    last / first
+}
