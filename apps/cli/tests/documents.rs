@@ -78,6 +78,23 @@ fn models_in_the_language_document_run() {
 }
 
 #[test]
+fn models_in_the_multibody_document_run() {
+    snippets_run("docs/multibody.md", 6);
+}
+
+#[test]
+fn the_multibody_document_shows_the_library() {
+    let library = document("library/std/multibody.bond");
+    let snippets = blocks(&document("docs/multibody.md"), "bond");
+    let shown = snippets.iter().filter(|s| s.starts_with("component ") || s.starts_with("port "));
+    let parts: Vec<_> = shown.map(|s| s.split_once("\n}").expect("a closing brace").0).collect();
+    assert_eq!(parts.len(), 2);
+    for part in parts {
+        assert!(library.contains(part), "{part}");
+    }
+}
+
+#[test]
 fn the_readme_shows_what_is_printed() {
     let shown = blocks(&document("README.md"), "text");
     let commands: Vec<_> = shown.iter().filter_map(|b| b.strip_prefix("$ halfarrow ")).collect();
