@@ -1,6 +1,9 @@
 //! Closed loops: positions that follow from others, and runs past positions where one set of variables does not do.
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
+use std::fs;
+use std::path::Path;
+
 use halfarrow::{Error, Failure, FixedMethod, Form, Method, Model, Record, Reduce, Run, Simulated, Sweep, Vary};
 
 fn model(text: &str) -> Model {
@@ -415,6 +418,15 @@ fn a_model_runs_again_after_exchanges() {
     kept.set("m", 2.0).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let heavy = kept.simulate(&wanted, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
     assert_eq!(heavy.trace, run(&OVER.replace("m = 1 kg", "m = 2 kg"), &wanted).trace);
+}
+
+/// Where others become independent all that is carried over is known, what follows from parameters alone too.
+#[test]
+fn what_parameters_determine_is_carried_over() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/exchanged_mode.bond");
+    let text = fs::read_to_string(path).expect("the model is there");
+    let done = run(&text, &Run { to: 0.3, rtol: 1e-12, every: Some(0.1), ..Run::default() });
+    assert!(done.report.exchanges > 0);
 }
 
 /// Kites, antiparallelograms and a rod as long as its crank pass the positions through which another motion leads, by every

@@ -51,14 +51,14 @@ struct Others {
 impl Compiled {
     /// The code of a program. Derivatives of the rates come from directions, a group of columns at a time.
     pub fn new(program: Program) -> Compiled {
-        Compiled::of(Mode::new(program, None))
+        Compiled::of(Mode::new(program, None, false))
     }
 
     /// The same with the code of all derivatives of the rates by the states at once:
     /// [`System::jacobian`](halfarrow_sim::System) has them.
     pub fn with_jacobian(program: Program) -> Compiled {
         let differentiated = program.jacobian();
-        Compiled::of(Mode::new(differentiated.program, Some(differentiated.entries)))
+        Compiled::of(Mode::new(differentiated.program, Some(differentiated.entries), false))
     }
 
     fn of(first: Mode) -> Compiled {
@@ -184,19 +184,21 @@ impl Mode {
     /// A program as code, with all derivatives at once where `other` has them.
     fn of(program: Program, other: &Mode) -> Mode {
         match other.jacobian {
-            None => Mode::new(program, None),
+            None => Mode::new(program, None, true),
             Some(_) => {
                 let differentiated = program.jacobian();
-                Mode::new(differentiated.program, Some(differentiated.entries))
+                Mode::new(differentiated.program, Some(differentiated.entries), true)
             }
         }
     }
 
-    fn new(program: Program, entries: Option<Vec<JacobianEntry>>) -> Mode {
+    /// `later`: runs change to it, and may leave it again.
+    fn new(program: Program, entries: Option<Vec<JacobianEntry>>, later: bool) -> Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let kept = program.position_relations.iter().flat_map(|r| r.values());
-        // Where branches end, all variables of the graph are taken over into the next mode.
-        let carried = program.variables.values().copied().filter(|_| !program.set_valued.is_empty());
+        // Where branches end, or others become independent, all variables of the graph are taken over into the next mode.
+        let changes = later || !program.set_valued.is_empty() || !program.exchanges.independent.is_empty();
+        let carried = program.variables.values().copied().filter(|_| changes);
         let more: Vec<Value> = derivatives.chain(program.relations.values()).chain(kept).chain(carried).collect();
         let layout = Layout::new(&program, &more);
         let rates: Vec<Value> = program.states.iter().map(|s| s.rate).collect();
