@@ -594,3 +594,20 @@ fn a_loop_does_not_move_what_is_outside_of_it() {
         assert!((start["out.speed"] - 1.0).abs() < 1e-12, "{digits}: {}", start["out.speed"]);
     }
 }
+
+/// Three of the constraints that close a four-bar read nothing that moves, wherever its base leans to.
+#[test]
+fn a_leaning_four_bar_starts() {
+    let text = fault("leaning");
+    let start = |angle: &str| {
+        let text = text.replace("angle = 0.02", &format!("angle = {angle}"));
+        start_of(&model(&text), Form::Minimal, Start::Given)
+    };
+    let level = start("0");
+    for angle in ["0.01", "0.02", "0.1", "0.3", "1.3"] {
+        let leaning = start(angle);
+        for joint in ["j1.q", "j2.q", "j3.q"] {
+            assert!((leaning[joint] - level[joint]).abs() < 1e-13, "{angle}: {} {}", leaning[joint], level[joint]);
+        }
+    }
+}

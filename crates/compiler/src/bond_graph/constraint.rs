@@ -13,7 +13,7 @@ use super::flatten::Held;
 use super::structure::Structure;
 use super::value::Reading;
 use super::{BondId, Constraint, ElementId, Kind, Meaning};
-use crate::algebra::{Expr, Exprs, Facts, MINUS_ONE, ONE, Symbol};
+use crate::algebra::{Expr, Exprs, Facts, MINUS_ONE, ONE, Symbol, ZERO};
 use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -164,6 +164,8 @@ impl<'a> Builder<'a, '_> {
             self.fault(d.hint("name displacements of elements (`spring.q`), or states whose rate is a flow"));
             return None;
         }
+        // Numbers whose sum is 0 are not so in floats.
+        let expr = if terms.is_empty() { ZERO } else { expr };
         Some(Relation { at: sides.at, expr, holonomic, terms, rest, restitution: sides.restitution, span: sides.span })
     }
 
