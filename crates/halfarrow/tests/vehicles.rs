@@ -190,6 +190,37 @@ fn a_driven_wheel_obeys_newton() {
     assert!(last(&done, "x.speed") > 17.0);
 }
 
+/// A wheel that is spun up far beyond what the road takes: a real-time step of 1 ms follows the deflection, which ends where
+/// its law balances, V x + S (x - 1.5) x = S with x = u/s_x.
+#[test]
+fn a_wheel_spins_up_at_a_step_of_a_millisecond() {
+    for (torque, fast) in [(900.0, 2.0e3), (3000.0, 7.5e3)] {
+        let text = format!(
+            "World:world -> Prismatic:forward(n = [1, 0, 0], v0 = 10 m/s) -> Prismatic:up(q0 = 0.335 m, fixed = 1) -> wheel
+Wheel:wheel(m = 60, J_axle = 1.08, J_across = 0.6, w0 = 30) -> Tyre:tyre(file = \"sedan.tir\")
+Se:engine({torque}) -> 1:axle -> wheel.axle
+output x = tyre.u/tyre.s_x, slides = -tyre.sx
+"
+        );
+        let step = Run {
+            to: 3.0,
+            every: Some(0.1),
+            method: Method::Fixed(FixedMethod::Rk4),
+            step: Some(1e-3),
+            ..Run::default()
+        };
+        let (stepped, precise) = (run(&text, &step), run(&text, &exact(3.0)));
+        let [x, slides, u] = ["x", "slides", "tyre.u"].map(|name| last(&stepped, name));
+        let speed = last(&stepped, "forward.speed");
+        assert!(last(&stepped, "wheel.speed") > fast);
+        close(speed * x + slides * (x - 1.5) * x, slides, 1e-3 * slides);
+        close(u, last(&precise, "tyre.u"), 1e-6);
+        close(speed, last(&precise, "forward.speed"), 1e-3);
+        let largest = column(&stepped, "tyre.u").iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+        assert!(largest < 0.5, "{largest}");
+    }
+}
+
 /// On a slope with its brake closed a wheel comes to rest and stays there; the tyre carries the weight along the slope.
 #[test]
 fn a_wheel_stands_still_on_a_slope() {
