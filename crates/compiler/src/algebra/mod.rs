@@ -33,7 +33,6 @@ mod symbol_sets;
 mod symbols;
 mod table;
 mod text;
-mod unit_vector;
 mod zero;
 
 pub use assumptions::{Assumption, Assumptions, Holds};
@@ -57,7 +56,6 @@ pub use text::{
     Names, Place, PlainNames, Sort, ascii, latex, latex_name, latex_owner, mathml, mathml_name, mathml_owner, unicode,
     unicode_name,
 };
-pub use unit_vector::unit_vector;
 
 #[cfg(test)]
 mod tests;
