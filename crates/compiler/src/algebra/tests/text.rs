@@ -32,6 +32,11 @@ prints! {
     third ascii: "x/3" => "x/3";
     two_thirds ascii: "2*x/3" => "2*x/3";
     many_digits ascii: "0.8432708698133384*0.8690672397953783*x" => "0.7328590872285258*x";
+    long_quotient ascii: "1.125899906842624e15*x/1.134749184297165e15" => "0.9922015564522991*x";
+    long_quotient_below ascii: "a*1.125899906842624e15/(b*1.134749184297165e15)" => "0.9922015564522991*a/b";
+    long_quotient_unicode unicode: "1.125899906842624e15*sin(q)/1.134749184297165e15" => "0.9922 sin q";
+    long_quotient_latex latex: "11*x/1.134749184297165e15/3" => "3.2313\\cdot 10^{-15} x";
+    short_quotient unicode: "355*x/113" => "355 x/113";
     lone_third ascii: "1/3" => "1/3";
     small_number ascii: "1.4e-13" => "1.4e-13";
     large_number ascii: "6.02e23*x" => "6.02e23*x";

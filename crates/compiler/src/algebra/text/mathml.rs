@@ -184,7 +184,7 @@ fn relation(c: Comparison) -> &'static str {
 }
 
 fn number(value: &Rational) -> (String, Binding) {
-    let Some((digits, exponent)) = numbers::decimal(value) else {
+    let Some((digits, exponent)) = numbers::decimal(value, true) else {
         return (format!("<mn>{value}</mn>"), Binding::Atom);
     };
     match numbers::layout(&digits, exponent) {

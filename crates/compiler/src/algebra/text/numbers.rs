@@ -3,15 +3,29 @@
 use super::super::rational::Rational;
 use num_bigint::BigInt;
 
+/// Digits of a decimal that stands for a number exactly: more than a float has.
+const MOST: usize = 17;
+/// Digits in texts for people of a number that no decimal is exactly.
+const ROUNDED: usize = 5;
+
 /// The digits and the power of ten of a number of 0 or more: `digits * 10^exponent`, no zeros at the end. `None` if it is
-/// a fraction of integers that are no longer than a float, and no decimal of at most 17 digits. Of longer ones the digits
-/// of the nearest float, with which is computed.
-pub(super) fn decimal(value: &Rational) -> Option<(String, i32)> {
+/// a fraction of integers that are shorter than a decimal, and no decimal of at most 17 digits. Of longer ones the digits of
+/// the nearest float, with which is computed, or where it is `rounded` for people the first few of them.
+pub(super) fn decimal(value: &Rational, rounded: bool) -> Option<(String, i32)> {
+    let of_text = |text: &str| Rational::from_decimal(text).and_then(|v| exact_decimal(&v));
     exact_decimal(value).or_else(|| {
         let float = value.to_f64();
-        let as_float = value.small().is_none() || Rational::from_f64(float).as_ref() == Some(value);
-        as_float.then(|| Rational::from_decimal(&format!("{float:e}")))?.and_then(|v| exact_decimal(&v))
+        let short = value.small().is_some_and(|(above, below)| digits(above) + digits(below) <= MOST);
+        match Rational::from_f64(float).as_ref() == Some(value) {
+            false if short => None,
+            false if rounded => of_text(&format!("{float:.*e}", ROUNDED - 1)),
+            _ => of_text(&format!("{float:e}")),
+        }
     })
+}
+
+fn digits(n: i64) -> usize {
+    n.unsigned_abs().checked_ilog10().map_or(1, |log| log as usize + 1)
 }
 
 fn exact_decimal(value: &Rational) -> Option<(String, i32)> {
@@ -44,7 +58,7 @@ fn exact_decimal(value: &Rational) -> Option<(String, i32)> {
         return Some(("0".into(), 0));
     }
     let exponent = i32::try_from(zeros).ok()? - i32::try_from(power).ok()?;
-    (kept.len() <= 17).then(|| (kept.to_owned(), exponent))
+    (kept.len() <= MOST).then(|| (kept.to_owned(), exponent))
 }
 
 /// A decimal as plain text if that is short, else with a power of ten: the mantissa and the exponent, 0 for none.

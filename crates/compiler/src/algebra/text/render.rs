@@ -114,7 +114,10 @@ impl Renderer<'_> {
     }
 
     fn number(&self, value: &Rational) -> (String, Binding) {
-        let Some((digits, exponent)) = numbers::decimal(value) else { return (value.to_string(), Binding::Atom) };
+        let rounded = self.style != Style::Ascii;
+        let Some((digits, exponent)) = numbers::decimal(value, rounded) else {
+            return (value.to_string(), Binding::Atom);
+        };
         match (numbers::layout(&digits, exponent), self.style) {
             ((mantissa, 0), _) => (mantissa, Binding::Atom),
             ((mantissa, power), Style::Ascii) => (format!("{mantissa}e{power}"), Binding::Atom),

@@ -90,7 +90,7 @@ impl Shaper<'_> {
 
     fn number(&self, value: &Rational) -> (bool, Shape) {
         let size = value.abs();
-        let shape = if super::numbers::decimal(&size).is_some() {
+        let shape = if super::numbers::decimal(&size, false).is_some() {
             Shape::Number(size)
         } else {
             let part = |n: num_bigint::BigInt| Shape::Number(Rational::from_big(n.into()));
@@ -325,7 +325,7 @@ fn number_parts(value: &Rational) -> (Vec<Shape>, Vec<Shape>) {
         if n.is_one() { Vec::new() } else { vec![Shape::Number(n)] }
     };
     let unit = value.small().is_some_and(|(n, d)| n == 1 && d < 10);
-    if unit || super::numbers::decimal(value).is_none() {
+    if unit || super::numbers::decimal(value, false).is_none() {
         return (part(value.numerator()), part(value.denominator()));
     }
     if value.is_one() { (Vec::new(), Vec::new()) } else { (vec![Shape::Number(value.clone())], Vec::new()) }
@@ -336,7 +336,7 @@ fn power(base: Shape, n: &Rational) -> Shape {
         Some((1, 1)) => base,
         Some((1, 2)) => Shape::Root(Box::new(base)),
         _ => {
-            let exponent = if super::numbers::decimal(n).is_some() {
+            let exponent = if super::numbers::decimal(n, false).is_some() {
                 Shape::Number(n.clone())
             } else {
                 let (above, below) = number_parts(n);
