@@ -43,6 +43,9 @@ fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u
     let loaded = source(&arguments.model).map_err(Error::from).and_then(|source| Model::new(source, &set));
     let outcome = loaded.and_then(|model| {
         screen::warn(model.warnings());
+        if let Some(absent) = model.absent() {
+            return Err(absent.into());
+        }
         let status = go_on(&model);
         if arguments.timings {
             note_timings(&model.timings(), begun);

@@ -1,7 +1,7 @@
 //! What can go wrong, and whose fault it is.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use halfarrow_compiler::compile::Found;
 use halfarrow_compiler::diagnostic::{codes, to_json};
@@ -43,6 +43,13 @@ pub enum Problem {
         path: PathBuf,
         /// What the system says.
         why: String,
+    },
+    /// A file that has no model in it, only components.
+    NoModel {
+        /// Which file.
+        name: String,
+        /// The components in it.
+        components: Vec<String>,
     },
     /// A variable that is asked for and does not exist.
     UnknownVariable {
@@ -178,6 +185,15 @@ impl fmt::Display for Problem {
         match self {
             Problem::Unreadable { path, why } => write!(f, "{} cannot be read: {why}", path.display()),
             Problem::Unwritable { path, why } => write!(f, "{} cannot be written: {why}", path.display()),
+            Problem::NoModel { name, components } => {
+                let file = Path::new(name).file_name().map_or(name.as_str().into(), |file| file.to_string_lossy());
+                let used = components.first().map_or("a component of it".to_string(), |c| format!("`{c}:name`"));
+                write!(
+                    f,
+                    "there is no model in {name}, only components: write one in a file beside it that begins with `model \
+                     Name`, has `import \"{file}\"` and uses {used}"
+                )
+            }
             Problem::UnknownVariable { name, nearest } => {
                 write!(f, "there is no variable `{name}`")?;
                 match nearest {

@@ -12,6 +12,7 @@ use halfarrow_compiler::compile::{self, Found, Reached, Text};
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Equations, Form, derive_equations};
 use halfarrow_compiler::program::{Program, schedule};
+use halfarrow_compiler::span::FileId;
 
 use crate::error::{Error, Problem};
 use crate::source::{Remembered, Source};
@@ -114,6 +115,22 @@ impl Model {
     /// Its name, as the text says.
     pub fn name(&self) -> &str {
         &self.graph.name
+    }
+
+    /// Why there is nothing to ask of it: the file has only components.
+    pub fn absent(&self) -> Option<Problem> {
+        if !self.graph.name.is_empty() || self.graph.elements.iter().next().is_some() {
+            return None;
+        }
+        let source = &self.origin.source;
+        let read = ast::parse(source.content(), FileId(0)).ast;
+        let component = |statement: &ast::Statement| match &statement.kind {
+            ast::StatementKind::Component(component) => Some(component.name.text.clone()),
+            _ => None,
+        };
+        let components: Vec<String> = read.statements.iter().filter_map(component).collect();
+        let name = source.name().to_string();
+        (!components.is_empty()).then_some(Problem::NoModel { name, components })
     }
 
     /// Everything that is odd about it: warnings of all stages.
