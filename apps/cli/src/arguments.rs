@@ -303,6 +303,12 @@ pub struct Equations {
     /// How to write them
     #[arg(long, default_value = "text")]
     pub format: Format,
+    /// All of them, however long; else of more than 2000 lines of text the short ones and a summary
+    #[arg(long)]
+    pub all: bool,
+    /// Write them, all of them, into this file
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// Methods of integration.

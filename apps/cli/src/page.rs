@@ -1,5 +1,6 @@
 //! Text that fits the terminal: tables, equations, lines.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::io::{self, IsTerminal};
 
@@ -52,10 +53,37 @@ impl Page {
         self.wide_table(header, rows.into_iter().map(|row| row.to_vec()))
     }
 
+    /// The same with cells of at most so many lines below their rows: what is longer ends with `…`.
+    pub fn brief_table<const N: usize>(
+        self,
+        header: [&str; N],
+        rows: impl IntoIterator<Item = [String; N]>,
+        lines: usize,
+    ) -> String {
+        let header = header.map(str::to_string).to_vec();
+        let rows = rows.into_iter().map(|row| Row::of(row.to_vec())).collect();
+        Table { header, rows, lines }.fitting(self.width).iter().map(Table::text).collect()
+    }
+
     /// A table with as many columns as its header; see [`Page::table`].
     pub fn wide_table(self, header: Vec<String>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-        let table = Table { header, rows: rows.into_iter().map(Row::of).collect() };
+        let table = Table { header, rows: rows.into_iter().map(Row::of).collect(), lines: usize::MAX };
         table.fitting(self.width).iter().map(Table::text).collect()
+    }
+
+    /// How many columns it has.
+    pub fn columns(self) -> usize {
+        self.width
+    }
+
+    /// Characters on so many lines.
+    pub fn room(self, lines: usize) -> usize {
+        self.width.saturating_mul(lines)
+    }
+
+    /// A line as [`Page::line`] has it, on at most so many lines: what is longer ends with `…`.
+    pub fn brief_line(self, line: &str, lines: usize) -> String {
+        cut(fold_whole(line, self.width), lines, self.width).join("\n") + "\n"
     }
 }
 
@@ -76,12 +104,19 @@ impl Row {
     fn of(cells: Vec<String>) -> Row {
         Row { cells, below: Vec::new() }
     }
+
+    /// The same row with some cells, with or without what stands below.
+    fn with(&self, cells: Vec<String>, below: bool) -> Row {
+        Row { cells, below: if below { self.below.clone() } else { Vec::new() } }
+    }
 }
 
 #[derive(Debug, Clone)]
 struct Table {
     header: Vec<String>,
     rows: Vec<Row>,
+    /// Lines that a cell takes at most below its row.
+    lines: usize,
 }
 
 impl Table {
@@ -98,28 +133,49 @@ impl Table {
         self.widths().iter().map(|w| w + 3).sum::<usize>() + 1
     }
 
+    /// The width without some columns.
+    fn width_without(&self, columns: &BTreeSet<usize>) -> usize {
+        let widths = self.widths().into_iter().enumerate().filter(|(column, _)| !columns.contains(column));
+        widths.map(|(_, w)| w + 3).sum::<usize>() + 1
+    }
+
     /// The same in one table or several that are not wider than this, where that goes.
     fn fitting(mut self, most: usize) -> Vec<Table> {
-        let mut moved: Vec<(usize, Vec<String>)> = Vec::new();
+        let mut moved: BTreeMap<usize, Vec<String>> = BTreeMap::new();
         while self.width() > most {
             let widths = self.widths();
             let longer = |&column: &usize| widths[column] > width(&self.header[column]).max(CELL);
             let Some(column) = (1..widths.len()).filter(longer).max_by_key(|&c| (widths[c], c)) else { break };
-            moved.push((column, self.take(column)));
+            moved.insert(column, self.take(column));
         }
-        if self.width() > most && self.header.len() > 2 {
-            return self.in_parts(most);
+        // Where that is not enough, the short cells of these columns follow.
+        let mut emptied: BTreeSet<usize> = BTreeSet::new();
+        while self.width_without(&emptied) > most {
+            let widths = self.widths();
+            let left = moved.keys().copied().filter(|column| !emptied.contains(column));
+            let Some(column) = left.max_by_key(|&c| (widths[c], c)) else { break };
+            emptied.insert(column);
+            for (row, cell) in self.rows.iter_mut().zip(moved.get_mut(&column).expect("it was moved")) {
+                if cell.is_empty() {
+                    *cell = std::mem::take(&mut row.cells[column]);
+                }
+            }
         }
-        moved.sort_by_key(|m| m.0);
-        let room = self.width().max(most.min(USUAL)) - 4;
+        let own = self.width_without(&emptied);
+        let parted = own > most && self.header.len() - emptied.len() > 2;
+        let room = if parted { most } else { own.max(most.min(USUAL)) } - 4;
         for (column, cells) in moved {
             let label = self.header[column].clone();
             for (row, cell) in self.rows.iter_mut().zip(cells).filter(|(_, cell)| !cell.is_empty()) {
                 let label = if label.is_empty() { String::new() } else { format!("{label}: ") };
-                row.below.extend(fold(&format!("  {label}{cell}"), room));
+                row.below.extend(cut(fold_whole(&format!("  {label}{cell}"), room), self.lines, room));
             }
         }
-        self.without_empty_columns()
+        for &column in emptied.iter().rev() {
+            self.remove(column);
+        }
+        let table = self.without_empty_columns();
+        if parted { table.in_parts(most) } else { vec![table] }
     }
 
     /// Takes the long cells out of a column.
@@ -133,15 +189,19 @@ impl Table {
     }
 
     /// Without the columns whose cells all stand below their rows.
-    fn without_empty_columns(mut self) -> Vec<Table> {
+    fn without_empty_columns(mut self) -> Table {
         for column in (1..self.header.len()).rev() {
             let empty = self.rows.iter().all(|row| row.cells[column].is_empty());
             if empty && self.rows.iter().any(|row| !row.below.is_empty()) {
-                self.header.remove(column);
-                self.rows.iter_mut().for_each(|row| _ = row.cells.remove(column));
+                self.remove(column);
             }
         }
-        vec![self]
+        self
+    }
+
+    fn remove(&mut self, column: usize) {
+        self.header.remove(column);
+        self.rows.iter_mut().for_each(|row| _ = row.cells.remove(column));
     }
 
     /// Columns in tables of their own, each with the first column.
@@ -158,11 +218,13 @@ impl Table {
             used += widths[column] + 3;
         }
         let pick = |cells: &[String], columns: &[usize]| columns.iter().map(|&c| cells[c].clone()).collect();
-        let part = |columns: &Vec<usize>| Table {
+        // What stands below its row stands in the first of them.
+        let part = |(at, columns): (usize, &Vec<usize>)| Table {
             header: pick(&self.header, columns),
-            rows: self.rows.iter().map(|row| Row::of(pick(&row.cells, columns))).collect(),
+            rows: self.rows.iter().map(|row| row.with(pick(&row.cells, columns), at == 0)).collect(),
+            lines: self.lines,
         };
-        parts.iter().map(part).collect()
+        parts.iter().enumerate().map(part).collect()
     }
 
     fn text(&self) -> String {
@@ -215,6 +277,26 @@ pub fn fold(line: &str, most: usize) -> Vec<String> {
     pieces
 }
 
+/// As [`fold`], with nothing longer: what has no place to break is broken anywhere.
+fn fold_whole(line: &str, most: usize) -> Vec<String> {
+    let chunks = |piece: String| {
+        let letters: Vec<char> = piece.chars().collect();
+        letters.chunks(most.max(1)).map(|chunk| chunk.iter().collect()).collect::<Vec<String>>()
+    };
+    fold(line, most).into_iter().flat_map(chunks).collect()
+}
+
+/// The first pieces, the last ending with `…` if there are more.
+fn cut(mut pieces: Vec<String>, lines: usize, most: usize) -> Vec<String> {
+    if pieces.len() > lines {
+        pieces.truncate(lines);
+        if let Some(last) = pieces.last_mut() {
+            *last = format!("{}…", last.chars().take(most.saturating_sub(1)).collect::<String>().trim_end());
+        }
+    }
+    pieces
+}
+
 /// What makes a place to break worse: beyond the width, in the first third, in brackets, at a product, farther left.
 type Merit = (bool, bool, isize, u8, std::cmp::Reverse<usize>);
 
@@ -264,11 +346,15 @@ fn after_function(text: &[char]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Row, Table, fold, width};
+    use super::{Page, Row, Table, fold, width};
 
     fn table(rows: &[[&str; 4]]) -> Table {
         let header = ["class", "between", "gain", "value"].map(str::to_string).to_vec();
-        Table { header, rows: rows.iter().map(|row| Row::of(row.map(str::to_string).to_vec())).collect() }
+        Table {
+            header,
+            rows: rows.iter().map(|row| Row::of(row.map(str::to_string).to_vec())).collect(),
+            lines: usize::MAX,
+        }
     }
 
     #[test]
@@ -302,9 +388,31 @@ mod tests {
         let text = table(&[["2", "R1 - R2", gain, "-0.6"]]).fitting(60)[0].text();
         assert!(text.lines().all(|line| width(line) <= 60), "{text}");
         assert!(text.contains("gain: -(a + b)/(c + d)") && !text.contains("┆ gain"), "{text}");
+        let name = "machine.platform.inertia.x - machine.platform.mass.y";
+        let rows = [["1", name, gain, "-0.6"], ["1", "a - b", "-1", "-0.123456789012"]];
+        let parts = table(&rows).fitting(40);
+        let text: String = parts.iter().map(Table::text).collect();
+        assert!(text.lines().all(|line| width(line) <= 40), "{text}");
+        let told = ["platform.mass.y", "between: a - b", "gain: -1", "0.6", "0.123456789012", "(k + l)"];
+        assert!(told.iter().all(|told| text.contains(told)), "{text}");
         let long = "member".repeat(3);
         let rows: Vec<[&str; 4]> = (0..3).map(|_| ["1", long.as_str(), "x", long.as_str()]).collect();
         let parts = table(&rows).fitting(30);
         assert!(parts.iter().all(|part| part.width() <= 30), "{parts:?}");
+    }
+
+    #[test]
+    fn brief_tables_and_lines_are_cut() {
+        let page = Page { width: 60 };
+        let gain: Vec<String> = (0..500).map(|i| format!("k{i}*x{i}")).collect();
+        let long = [gain.join(" + "), "v".repeat(700)];
+        for cell in long {
+            let text = page.brief_table(["class", "gain"], [["2".to_string(), cell.clone()]], 4);
+            assert!(text.lines().all(|line| width(line) <= 60), "{text}");
+            assert!(text.lines().count() == 9 && text.contains('…'), "{text}");
+            let line = page.brief_line(&cell, 2);
+            assert!(line.lines().count() == 2 && line.ends_with("…\n"), "{line}");
+        }
+        assert_eq!(page.brief_line("a = b", 2), "a = b\n");
     }
 }

@@ -492,3 +492,86 @@ fn a_model_reads_only_what_is_allowed() {
     let allowed = halfarrow(&folder, &["check", "car/model.bond", "--allow", "lib"]);
     assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
 }
+
+const ARMS: &str = "model Arms
+import std.multibody
+World:world -> Free:floating(x0 = [0, 0, 1]) -> 1[frame]:car
+car -> Body:hull(m = 100, J = diag([10, 20, 30]), c = [0, 0, 0.7])
+car -> Revolute:hinge(n = [1, 0, 0]) -> Body:arm(m = 2, J = diag([0.1, 0.2, 0.3]), c = [0, 0.5, 0])
+";
+
+/// Of multibonds: paths with the strands that they run between, storages in one line where all strands are alike, and no row
+/// wider than the page.
+#[test]
+fn loops_of_multibonds_fit_the_page() {
+    let here = folder("strands");
+    let file = write(&here, "arms.bond", ARMS);
+    for width in ["60", "80", "150"] {
+        let text = stdout(&halfarrow(&here, &["loops", &file, "--width", width]));
+        let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+        assert!(widest <= width.parse().unwrap(), "{widest}\n{text}");
+        for told in ["hull.inertia.x - hull.mass.y", "-0.049*hull.m", "hull.mass[3]", "hull.inertia[3]", "velocity transformation"] {
+            assert!(text.contains(told), "{told}\n{text}");
+        }
+        assert!(!text.contains("hull.mass.x.f ="), "{text}");
+        let paths = text.matches("in minimal form: velocity transformation").count();
+        assert!(paths == 10 || width == "150", "{paths}\n{text}");
+    }
+    let report = json(&halfarrow(&here, &["loops", &file, "--json"]));
+    let elements = &report["paths"][0]["elements"];
+    assert_eq!(elements, &serde_json::json!(["hull.inertia.x", "hull.mass.y"]));
+    let mass = report["storages"].as_array().unwrap().iter().find(|s| s["name"] == "hull.mass.x").unwrap();
+    assert!(mass["follows"].as_str().unwrap().len() > 400 && !mass["follows"].as_str().unwrap().contains('…'));
+    assert_eq!(mass["from"][0], "hull.inertia.y.f", "{}", mass["from"]);
+}
+
+/// Gains that take pages are cut, and said to be.
+#[test]
+fn long_gains_are_cut() {
+    let here = folder("long_gains");
+    let names: Vec<String> = (0..60).map(|i| format!("reading_of_a_long_name_{i}")).collect();
+    let law = names.iter().map(|n| format!("{n}*sin({n})")).collect::<Vec<_>>().join(" + ");
+    let inputs: String = names.iter().map(|n| format!("input {n} = 1\n")).collect();
+    let text = format!("model Long\n{inputs}Se:s(1) -> 1:n -> R:a(e = ({law})*f)\nn -> TF:t(f_out = 2) -> 0:m -> R:b(3)\nm -> I:mass(1)\nn -> 0:k -> R:c(1)\nk -> R:d(e = ({law})*f)\n");
+    let file = write(&here, "long.bond", &text);
+    let short = stdout(&halfarrow(&here, &["loops", &file]));
+    assert!(short.contains('…') && short.contains("--json") && short.lines().count() < 60, "{short}");
+    assert!(short.lines().all(|line| line.chars().count() <= 80), "{short}");
+    let whole = stdout(&halfarrow(&here, &["loops", &file, "--json"]));
+    assert!(whole.contains("reading_of_a_long_name_59") && !whole.contains('…'));
+}
+
+#[test]
+fn components_alone_are_no_model() {
+    let here = folder("components_alone");
+    let file = write(&here, "parts.bond", "component Lamp(port p) \"lamp\" {\n    p -> R:wire(3 ohm)\n}\n");
+    assert_eq!(status(&halfarrow(&here, &["check", &file])), 0);
+    for command in ["loops", "equations", "simulate"] {
+        let output = halfarrow(&here, &[command, &file]);
+        assert_eq!(status(&output), 2, "{command}");
+        let told = stderr(&output);
+        for part in ["there is no model in parts.bond", "`import \"parts.bond\"`", "`Lamp:name`"] {
+            assert!(told.contains(part), "{command}: {told}");
+        }
+        assert!(output.stdout.is_empty(), "{command}");
+    }
+}
+
+/// Of equations that nobody reads the size is told, and how to get them.
+#[test]
+fn long_equations_are_told_in_brief() {
+    let here = folder("brief");
+    assert_eq!(status(&halfarrow(&here, &["new", "--family", "ladder", "1200"])), 0);
+    let brief = stdout(&halfarrow(&here, &["equations", "ladder.bond"]));
+    assert!(brief.lines().count() < 700, "{}", brief.lines().count());
+    for told in ["states", "│ 1200", "operations of one evaluation", "--only NAME", "--all", "--out FILE", "q_c[1]' = "] {
+        assert!(brief.contains(told), "{told}\n{brief}");
+    }
+    let all = stdout(&halfarrow(&here, &["equations", "ladder.bond", "--all"]));
+    assert!(all.lines().count() > 2000 && !all.contains('…'), "{}", all.lines().count());
+    let written = halfarrow(&here, &["equations", "ladder.bond", "--out", "all.txt"]);
+    assert_eq!(stdout(&written), "all.txt is written\n");
+    assert_eq!(fs::read_to_string(here.join("all.txt")).unwrap(), all);
+    let report = json(&halfarrow(&here, &["equations", "ladder.bond", "--json"]));
+    assert_eq!(report["equations"].as_array().map(Vec::len), Some(1200));
+}

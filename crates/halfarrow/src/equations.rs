@@ -2,10 +2,10 @@
 
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::diagnostic::nearest;
-use halfarrow_compiler::equations::{Algebraic, AlgebraicRole, Equations, Form, StateKind};
+use halfarrow_compiler::equations::{Algebraic, AlgebraicRole, EquationStep, Equations, Form, StateKind};
 use halfarrow_compiler::textbook::{
-    Shown, Style, only, print, print_certificate, print_definitions, print_events, print_expr, print_form,
-    print_meanings, print_symbol, show,
+    Shown, Style, events_within, meanings_within, only, print, print_certificate, print_definitions, print_events,
+    print_expr, print_form, print_meanings, print_symbol, print_within, show,
 };
 use serde::Serialize;
 
@@ -105,6 +105,57 @@ pub struct StateReport {
     pub unit: Option<String>,
 }
 
+/// The equations for people, up to a length.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BriefEquations {
+    /// The form.
+    pub form: Form,
+    /// The equations; what is longer than a line may be ends with `…`.
+    pub text: Vec<String>,
+    /// What the names in them stand for.
+    pub legend: Vec<String>,
+    /// What happens at events.
+    pub events: Vec<String>,
+    /// See [`EquationsReport::certificate`].
+    pub certificate: Vec<String>,
+    /// Differentiation index.
+    pub index: u8,
+    /// Numbers of equations.
+    pub counts: Count,
+    /// How large they are, if not all of them stand here.
+    pub size: Option<EquationsSize>,
+}
+
+/// How large equations are that are too long to be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EquationsSize {
+    /// Number of states.
+    pub states: usize,
+    /// Number of equations.
+    pub equations: usize,
+    /// Number of names that stand in them for parts of them.
+    pub names: usize,
+    /// Numbers of unknowns of the systems of linear equations that are solved at each evaluation.
+    pub linear: Vec<usize>,
+    /// The same of those that are solved by iteration.
+    pub iterated: Vec<usize>,
+    /// Operations of one evaluation, if they can be counted.
+    pub operations: Option<usize>,
+}
+
+/// How long equations may be for people, in characters and lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Length {
+    /// Characters on a line.
+    pub width: usize,
+    /// Lines up to which all of them are told.
+    pub lines: usize,
+    /// Where they are longer, lines of one equation.
+    pub each: usize,
+    /// Where they are longer, equations, and names of parts that fit a line.
+    pub most: usize,
+}
+
 impl Model {
     /// The equations in a form.
     ///
@@ -157,6 +208,80 @@ impl Model {
 }
 
 impl Model {
+    /// The equations for people: all of them, or if these take too many lines their size and the short ones.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn equations_in_brief(&self, form: Form, length: Length) -> Result<BriefEquations, Error> {
+        let shown = show(self.equations_in(form)?);
+        let equations = &shown.equations;
+        let whole = length.width.saturating_mul(length.lines);
+        let mut lines = 0;
+        // All of it, or nothing as soon as it is too long.
+        let fitting = |printed: &mut dyn Iterator<Item = String>, lines: &mut usize| {
+            let mut kept = Vec::new();
+            for line in printed {
+                *lines += line.chars().count() / length.width.max(1) + 1;
+                if *lines > length.lines {
+                    return None;
+                }
+                kept.push(line);
+            }
+            Some(kept)
+        };
+        let all = fitting(&mut print_within(&shown, Style::Unicode, whole), &mut lines)
+            .and_then(|text| Some((text, fitting(&mut meanings_within(&shown, Style::Unicode, whole), &mut lines)?)))
+            .and_then(|(text, legend)| {
+                let events = events_within(&shown, Style::Unicode, whole);
+                Some((text, legend, fitting(&mut events.into_iter(), &mut lines)?))
+            });
+        let (text, legend, events, size) = match all {
+            Some((text, legend, events)) => (text, legend, events, None),
+            None => {
+                let most = length.width * length.each;
+                let text = print_within(&shown, Style::Unicode, most).take(length.most).collect();
+                let names = meanings_within(&shown, Style::Unicode, length.width);
+                let short = names.filter(|line| !line.ends_with('…')).take(length.most).collect();
+                let events = events_within(&shown, Style::Unicode, most).into_iter().take(length.most).collect();
+                (text, short, events, Some(self.size(&shown)))
+            }
+        };
+        Ok(BriefEquations {
+            form,
+            text,
+            legend,
+            events,
+            certificate: print_certificate(&shown),
+            index: equations.index,
+            counts: form_count(equations),
+            size,
+        })
+    }
+
+    fn size(&self, shown: &Shown) -> EquationsSize {
+        let equations = &shown.equations;
+        let (mut linear, mut iterated) = (Vec::new(), Vec::new());
+        for step in &equations.steps {
+            match step {
+                EquationStep::Linear { unknowns, .. } => linear.push(unknowns.len()),
+                EquationStep::Newton { unknowns, .. } => iterated.push(unknowns.len()),
+                _ => {}
+            }
+        }
+        let operations = match equations.form {
+            Form::Minimal => self.system(equations).map(|system| system.operations()),
+            _ => self.form_system(equations).map(|system| system.operations()),
+        };
+        EquationsSize {
+            states: equations.states.len(),
+            equations: shown.display.len(),
+            names: shown.definitions.iter().filter(|d| !d.of_dependent).count(),
+            linear,
+            iterated,
+            operations: operations.ok().map(|counted| counted.total()),
+        }
+    }
+
     /// A form as text: counts, index, unknowns with what they are there for, equations.
     ///
     /// # Errors

@@ -72,7 +72,7 @@ pub use compare::{Compare, CompareReport, Convergence, OperationsReport, Referen
 pub use compiled::Compiled;
 pub use components::{Component, Entry, Library};
 pub use draw::{NamedRuns, Picture};
-pub use equations::{AlgebraicReport, Breaks, EquationsReport, StateReport};
+pub use equations::{AlgebraicReport, Breaks, BriefEquations, EquationsReport, EquationsSize, Length, StateReport};
 pub use error::{Error, Problem};
 pub use execution::RoutineReport;
 pub use export::{CostReport, Export, ExportReport, Exported, Target};

@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use halfarrow_compiler::algebra::{Exprs, Names, PlainNames, Symbol, ZERO, ascii};
-use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind};
+use halfarrow_compiler::algebra::{Exprs, Names, PlainNames, Symbol, ZERO, ascii, ascii_within};
+use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind};
 use halfarrow_compiler::causal_graph::{
     CausalGraph, Combination, PortState, Role, Stroke, by_hand, kept_junctions, state_rank,
 };
 use halfarrow_compiler::causal_paths::{self, CausalPaths, Path, counts};
 use halfarrow_compiler::equations::{EquationStep, Equations, Form, StateKind};
 use halfarrow_compiler::ids::{Id, Map};
-use halfarrow_compiler::textbook::{Style, print_expr, show};
+use halfarrow_compiler::textbook::{Style, print_expr_within, show};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -60,7 +60,7 @@ pub struct StateMatrix {
 pub struct LoopReport {
     /// 1 storage to storage, 2 resistor to resistor, 3 resistor to itself, 4 inside the junction structure.
     pub class: u8,
-    /// What it runs between.
+    /// What it runs between; of a multibond the strand.
     pub elements: Vec<String>,
     /// All elements that it meets, in order.
     pub route: Vec<String>,
@@ -104,6 +104,11 @@ pub struct StorageReport {
     pub independent: bool,
     /// The independent variables from which the dependent one follows, in the model language.
     pub follows: Option<String>,
+    /// The independent variables that stand in `follows`.
+    pub from: Vec<String>,
+    /// The element whose strand it is, and how many that has; `None` if it is no strand of a multibond.
+    #[serde(skip)]
+    pub strand_of: Option<(String, usize)>,
 }
 
 /// A conserved quantity.
@@ -148,22 +153,36 @@ impl Model {
     /// # Errors
     /// The model has errors.
     pub fn loops(&self) -> Result<LoopsReport, Error> {
+        self.loops_within(usize::MAX)
+    }
+
+    /// The same with expressions of so many characters: what is longer ends with `…`. No determinants, which people do not
+    /// read.
+    ///
+    /// # Errors
+    /// The model has errors.
+    pub fn loops_in_brief(&self, most: usize) -> Result<LoopsReport, Error> {
+        self.loops_within(most)
+    }
+
+    fn loops_within(&self, most: usize) -> Result<LoopsReport, Error> {
         let causal = self.causal_graph()?;
-        let counted = counts(&causal, &self.paths_of(&causal));
+        let of_causal = self.paths_of(&causal);
+        let counted = counts(&causal, &of_causal);
         let drawn = CausalGraph { strokes: by_hand(&causal), ..causal.clone() };
-        let paths = self.paths_of(&drawn);
+        let paths = if drawn.strokes == causal.strokes { of_causal } else { self.paths_of(&drawn) };
         let equations = self.equations_of(&causal, Form::Minimal)?;
         let start = self.values_at_start(&equations);
         let blocks = Blocks::of(&causal.graph, &equations);
-        let report = |path| loop_report(&causal.graph, &paths, path, (&equations, &blocks), &start);
+        let report = |path| loop_report(&causal.graph, &paths, path, (&equations, &blocks), (&start, most));
         Ok(LoopsReport {
             model: self.graph.name.clone(),
             kept: kept_variables(&causal),
             paths: paths.paths.iter().map(report).collect(),
             complete: paths.complete,
-            components: components(&paths),
-            storages: storages(&causal),
-            conserved: conserved(&equations),
+            components: components(&paths, most == usize::MAX),
+            storages: storages(&causal, most),
+            conserved: conserved(&equations, most),
             counts: Counts {
                 break_form: counted.break_form.into(),
                 inverted: counted.inverted.into(),
@@ -201,21 +220,45 @@ fn loop_report(
     paths: &CausalPaths,
     path: &Path,
     (equations, blocks): (&Equations, &Blocks),
-    start: &BTreeMap<String, f64>,
+    (start, most): (&BTreeMap<String, f64>, usize),
 ) -> LoopReport {
     let x = &paths.exprs;
     let names = |list: &[ElementId]| list.iter().map(|&e| graph.elements[e].name.clone()).collect();
     let value = x.eval(path.gain, &mut |symbol| value_of(x, symbol, start));
     LoopReport {
         class: path.class,
-        elements: names(&path.elements),
+        elements: path.elements.iter().flat_map(|&e| ends(graph, path, e)).collect(),
         route: names(&path.route),
         bonds: path.signals.iter().map(|(bond, _)| bond.index() as u32 + 1).collect(),
-        gain: ascii(x, path.gain, &PlainNames(x)),
+        gain: ascii_within(x, path.gain, &PlainNames(x), most),
         gain_value: value.is_finite().then_some(value),
         breaks: path.breaks.iter().map(|&s| x.name(s).to_string()).collect(),
         resolution: resolution(path, equations, blocks),
     }
+}
+
+/// The names of what a path meets of an element at one of its ends: of a multibond the strands.
+fn ends(graph: &BondGraph, path: &Path, element: ElementId) -> Vec<String> {
+    let at = &graph.elements[element];
+    if at.kind.is_inner() || at.ports.len() < 2 {
+        return vec![at.name.clone()];
+    }
+    let mut met: Vec<usize> = Vec::new();
+    for &(bond, _) in &path.signals {
+        met.extend(at.ports.iter().position(|p| p.bond == bond).filter(|port| !met.contains(port)));
+    }
+    met.into_iter().map(|port| at.part_name(port)).collect()
+}
+
+/// How many strands an element has: one that has a port for each bond of a multibond, with names that only strands have.
+fn strands(element: &Element) -> Option<usize> {
+    let of = element.ports.len();
+    let is_strand = |(at, name): (usize, &str)| match of {
+        ..=3 => ["x", "y", "z"][at] == name,
+        _ => name.strip_prefix('[').and_then(|n| n.strip_suffix(']')) == Some(&(at + 1).to_string()),
+    };
+    let names = element.ports.iter().map(|port| port.name.as_str());
+    (of > 1 && !element.kind.is_inner() && names.enumerate().all(is_strand)).then_some(of)
 }
 
 /// The value of a symbol: of a parameter as given, of anything else at the start; NaN if unknown.
@@ -262,8 +305,15 @@ impl Blocks {
 
 fn resolution(path: &Path, equations: &Equations, blocks: &Blocks) -> String {
     if path.class == 1 {
-        let dependent: Vec<&str> = path.breaks.iter().map(|&s| equations.graph.exprs.name(s)).collect();
-        return format!("velocity transformation: {} is eliminated with its storage", dependent.join(", "));
+        let graph = &equations.graph;
+        let dependent: Vec<&str> = path.breaks.iter().map(|&s| graph.exprs.name(s)).collect();
+        let within = match path.elements[..] {
+            [element] if strands(&graph.elements[element]).is_some() => {
+                format!("; both ends are strands of {}, which move together", graph.elements[element].name)
+            }
+            _ => String::new(),
+        };
+        return format!("velocity transformation: {} is eliminated with its storage{within}", dependent.join(", "));
     }
     blocks.resolution(&path.route.iter().chain(&path.elements).copied().collect())
 }
@@ -272,20 +322,20 @@ fn plural(n: usize) -> &'static str {
     if n == 1 { "" } else { "s" }
 }
 
-fn components(paths: &CausalPaths) -> Vec<ComponentReport> {
+fn components(paths: &CausalPaths, with_determinants: bool) -> Vec<ComponentReport> {
     let x = &paths.exprs;
     let report = |c: &causal_paths::Component| ComponentReport {
         size: c.signals.len(),
         breaks: c.breaks.iter().map(|&s| x.name(s).to_string()).collect(),
         exact: c.exact,
         lower_bound: c.lower_bound,
-        determinant: c.determinant.map(|d| ascii(x, d, &PlainNames(x))),
+        determinant: c.determinant.filter(|_| with_determinants).map(|d| ascii(x, d, &PlainNames(x))),
         singular: c.singular,
     };
     paths.components.iter().map(report).collect()
 }
 
-fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
+fn storages(causal: &CausalGraph, most: usize) -> Vec<StorageReport> {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
     let mut known: Map<Symbol, Combination> = Map::new();
@@ -295,16 +345,21 @@ fn storages(causal: &CausalGraph) -> Vec<StorageReport> {
     let of_storages = causal.ports.ports.iter().filter(|s| graph.storage_symbols(s.port).is_some());
     let mut report = |state: &PortState| {
         let (co_energy, _) = graph.storage_symbols(state.port).expect("a storage");
+        let mut from = Vec::new();
         let follows = (state.role == Role::Dependent).then(|| {
             let combination = causal.ports.resolve(&mut x, co_energy, &mut known);
+            from = combination.0.iter().map(|&(symbol, _)| OneName(&x).ascii(symbol)).collect();
             let value = combination.expr(&mut x);
-            format!("{} = {}", x.name(co_energy), ascii(&x, value, &OneName(&x)))
+            format!("{} = {}", x.name(co_energy), ascii_within(&x, value, &OneName(&x), most))
         });
+        let element = &graph.elements[state.port.element];
         StorageReport {
             name: graph.port_name(state.port),
             causality: if integral(causal, state) { "integral" } else { "derivative" },
             independent: state.role == Role::Independent,
             follows,
+            from,
+            strand_of: strands(element).map(|of| (element.name.clone(), of)),
         }
     };
     of_storages.map(&mut report).collect()
@@ -347,14 +402,14 @@ fn integral(causal: &CausalGraph, state: &PortState) -> bool {
     at_storage == matches!(graph.elements[state.port.element].kind, Kind::Inertance(_))
 }
 
-fn conserved(equations: &Equations) -> Vec<ConservedReport> {
+fn conserved(equations: &Equations, most: usize) -> Vec<ConservedReport> {
     if equations.conserved.is_empty() {
         return Vec::new();
     }
     let shown = show(equations.clone());
     let report = |c: &halfarrow_compiler::equations::Conserved| ConservedReport {
         name: c.name.clone(),
-        value: print_expr(&shown, c.value, Style::Ascii),
+        value: print_expr_within(&shown, c.value, Style::Ascii, most),
     };
     shown.equations.conserved.iter().map(report).collect()
 }

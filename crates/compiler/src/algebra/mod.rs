@@ -53,8 +53,8 @@ pub use symbol_sets::Symbols;
 pub use symbols::{SymbolKind, dotted};
 pub use table::{Interpolation, Outside, Table1d, TableError, TableId};
 pub use text::{
-    Names, Place, PlainNames, Sort, ascii, latex, latex_name, latex_owner, mathml, mathml_name, mathml_owner, unicode,
-    unicode_name,
+    Names, Place, PlainNames, Sort, ascii, ascii_within, latex, latex_name, latex_owner, mathml, mathml_name,
+    mathml_owner, mathml_within, unicode, unicode_name, unicode_within,
 };
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ mod text;
 pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
 pub use only::only;
 pub use text::{
-    Style, print, print_certificate, print_definitions, print_dependent, print_events, print_expr, print_form,
-    print_meanings, print_sides, print_symbol,
+    Style, dependent_within, events_within, meanings_within, print, print_certificate, print_definitions,
+    print_dependent, print_events, print_expr, print_expr_within, print_form, print_meanings, print_symbol,
+    print_within, sides_within,
 };

@@ -6,8 +6,8 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{Dependent, DisplayEquation, Shown, ShownDefinition, places};
 use crate::algebra::{
-    Expr, Exprs, Names, Place, Sort, Symbol, ascii, dotted, latex, latex_name, latex_owner, mathml, mathml_name,
-    mathml_owner, unicode, unicode_name,
+    Expr, Exprs, Names, Place, Sort, Symbol, ascii, ascii_within, dotted, latex, latex_name, latex_owner, mathml_name,
+    mathml_owner, mathml_within, unicode_name, unicode_within,
 };
 use crate::bond_graph::{Action, BondGraph, Clause, Element, ElementId, Kind, Meaning, Trigger};
 use crate::causal_paths::Refusal;
@@ -31,38 +31,63 @@ pub enum Style {
 
 /// The equations, one a line. For people, sources that vary in time stand by name; [`print_meanings`] has their values.
 pub fn print(shown: &Shown, style: Style) -> Vec<String> {
-    print_sides(shown, style).into_iter().map(|(left, right)| equal(&left, &right, style)).collect()
+    print_within(shown, style, usize::MAX).collect()
+}
+
+/// The equations, one at a time, with sides of at most so many characters: what is longer ends with `…`. Of MathML so many
+/// parts, with `…` for each that is left out.
+pub fn print_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<Item = String> {
+    sides_within(shown, style, most).map(move |(left, right)| equal(&left, &right, style))
 }
 
 /// The same, left and right sides apart.
-pub fn print_sides(shown: &Shown, style: Style) -> Vec<(String, String)> {
-    let names = Written::of(shown);
-    let side = |e: Expr| expression(e, &names, style);
-    let sides = |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
-    shown.display.iter().map(sides).map(|(left, right)| (side(left), side(right))).collect()
+pub fn sides_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<Item = (String, String)> {
+    let names = Written::within(shown, most);
+    let sides = move |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
+    let side = move |e: Expr| expression(e, &names, style);
+    shown.display.iter().map(sides).map(move |(left, right)| (side(left), side(right)))
+}
+
+/// What stands behind the names, one at a time; see [`print_meanings`] and [`print_within`].
+pub fn meanings_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<Item = String> {
+    let names = Written::within(shown, most);
+    meant(shown, style).map(move |(symbol, value)| definition(symbol, value, &names, style))
 }
 
 /// What stands behind the names in the equations: parts of them that would make them too long, sources that vary in
 /// time, states that are sums of stored quantities, conserved quantities.
 pub fn print_meanings(shown: &Shown, style: Style) -> Vec<String> {
-    let names = Written::of(shown);
+    meanings_within(shown, style, usize::MAX).collect()
+}
+
+fn meant(shown: &Shown, style: Style) -> impl Iterator<Item = (Symbol, Expr)> {
+    let parts = defined(shown, false, style);
     let conserved = shown.equations.conserved.iter().map(|c| (c.symbol, c.value));
-    let all = shown.sources.iter().copied().chain(shown.equations.meanings.iter().copied()).chain(conserved);
-    let mut lines = print_definitions(shown, style);
-    lines.extend(all.map(|(symbol, value)| definition(symbol, value, &names, style)));
-    lines
+    parts.chain(shown.sources.iter().copied()).chain(shown.equations.meanings.iter().copied()).chain(conserved)
+}
+
+fn defined(shown: &Shown, of_dependent: bool, style: Style) -> impl Iterator<Item = (Symbol, Expr)> {
+    let value = move |d: &ShownDefinition| if style == Style::Ascii { d.closed } else { d.value };
+    let wanted = shown.definitions.iter().filter(move |d| d.of_dependent == of_dependent);
+    wanted.map(move |d| (d.symbol, value(d)))
 }
 
 /// The names that the equations have for parts of them, each with what it stands for. For people, sources that vary in
 /// time stand by name.
 pub fn print_definitions(shown: &Shown, style: Style) -> Vec<String> {
-    definitions(shown, false, style)
+    let names = Written::of(shown);
+    defined(shown, false, style).map(|(symbol, value)| definition(symbol, value, &names, style)).collect()
 }
 
 /// What happens at events, one a line: `when f_v < 0:  f_ball⁺ = -e f_ball`. A variable with a plus is that after the event,
 /// all others are those before it.
 pub fn print_events(shown: &Shown, style: Style) -> Vec<String> {
-    let names = Written::of(shown);
+    events_within(shown, style, usize::MAX)
+}
+
+/// The same with expressions of at most so many characters; see [`print_within`].
+pub fn events_within(shown: &Shown, style: Style, most: usize) -> Vec<String> {
+    let names = Written::within(shown, most);
     let graph = &shown.equations.graph;
     let after = |action: &Action| {
         let (own, value) = (name(action.target, &names, style), expression(action.value, &names, style));
@@ -108,18 +133,14 @@ pub fn print_events(shown: &Shown, style: Style) -> Vec<String> {
 
 /// The dependent storages, each with its row of `S`, one a line, and behind them the names that only they read.
 pub fn print_dependent(shown: &Shown, style: Style) -> Vec<String> {
-    let names = Written::of(shown);
-    let line = |d: &Dependent| definition(d.variable, d.value, &names, style);
-    let mut lines: Vec<String> = shown.dependent.iter().map(line).collect();
-    lines.extend(definitions(shown, true, style));
-    lines
+    dependent_within(shown, style, usize::MAX).collect()
 }
 
-fn definitions(shown: &Shown, of_dependent: bool, style: Style) -> Vec<String> {
-    let names = Written::of(shown);
-    let value = |d: &ShownDefinition| if style == Style::Ascii { d.closed } else { d.value };
-    let wanted = shown.definitions.iter().filter(|d| d.of_dependent == of_dependent);
-    wanted.map(|d| definition(d.symbol, value(d), &names, style)).collect()
+/// The same, one at a time; see [`print_within`].
+pub fn dependent_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<Item = String> {
+    let names = Written::within(shown, most);
+    let rows = shown.dependent.iter().map(|d: &Dependent| (d.variable, d.value));
+    rows.chain(defined(shown, true, style)).map(move |(symbol, value)| definition(symbol, value, &names, style))
 }
 
 /// A form in few lines: counts, index, unknowns with what they are there for, equations.
@@ -199,6 +220,11 @@ pub fn print_expr(shown: &Shown, e: Expr, style: Style) -> String {
     expression(e, &Written::of(shown), style)
 }
 
+/// The same up to so many characters; see [`print_within`].
+pub fn print_expr_within(shown: &Shown, e: Expr, style: Style, most: usize) -> String {
+    expression(e, &Written::within(shown, most), style)
+}
+
 /// One symbol in the names of these equations.
 pub fn print_symbol(shown: &Shown, symbol: Symbol, style: Style) -> String {
     name(symbol, &Written::of(shown), style)
@@ -225,11 +251,11 @@ fn name(symbol: Symbol, names: &Written, style: Style) -> String {
 }
 
 fn expression(e: Expr, names: &Written, style: Style) -> String {
-    match style {
-        Style::Ascii => ascii(names.x, e, names),
-        Style::Unicode => unicode(names.x, e, names),
-        Style::Latex => latex(names.x, e, names),
-        Style::MathMl => mathml(names.x, e, names),
+    match (style, names.most) {
+        (Style::Ascii, most) => ascii_within(names.x, e, names, most),
+        (Style::Unicode, most) => unicode_within(names.x, e, names, most),
+        (Style::Latex, _) => latex(names.x, e, names),
+        (Style::MathMl, most) => mathml_within(names.x, e, names, most),
     }
 }
 
@@ -242,10 +268,16 @@ struct Written<'a> {
     rate_of: BTreeMap<Symbol, Symbol>,
     sources: BTreeMap<Symbol, String>,
     places: BTreeMap<Symbol, Place>,
+    /// How long an expression may get.
+    most: usize,
 }
 
 impl<'a> Written<'a> {
     fn of(shown: &'a Shown) -> Self {
+        Written::within(shown, usize::MAX)
+    }
+
+    fn within(shown: &'a Shown, most: usize) -> Self {
         let equations = &shown.equations;
         let mut states = BTreeMap::new();
         for state in &equations.states {
@@ -255,7 +287,7 @@ impl<'a> Written<'a> {
         let rate_of = equations.states.iter().map(|s| (s.rate, s.symbol)).collect();
         let sources = shown.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
         let places = places::of(shown);
-        Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, rate_of, sources, places }
+        Written { x: &equations.graph.exprs, aliases: &shown.aliases, states, rate_of, sources, places, most }
     }
 
     /// The name that an output or `let` gives, or what a source is called, for people.

@@ -94,3 +94,20 @@ fn what_is_printed_reads_back() {
         assert_eq!(read(&mut x, &printed), e, "{text} printed as {printed}");
     }
 }
+
+#[test]
+fn long_text_is_cut_at_its_limit() {
+    let mut x = Exprs::default();
+    let e = read(&mut x, "a*(b - c)*x + sin(q)*(y + z)/M + exp(x*y)*b");
+    let whole = ascii(&x, e, &PlainNames(&x));
+    let length = whole.chars().count();
+    for most in 1..length {
+        let cut = ascii_within(&x, e, &PlainNames(&x), most);
+        assert!(cut.ends_with('…') && cut.chars().count() <= most + 1, "{most}: {cut}");
+    }
+    for most in [length, usize::MAX] {
+        assert_eq!(ascii_within(&x, e, &PlainNames(&x), most), whole);
+    }
+    let cut = unicode_within(&x, e, &PlainNames(&x), 12);
+    assert!(unicode(&x, e, &PlainNames(&x)).starts_with(cut.trim_end_matches('…')), "{cut}");
+}

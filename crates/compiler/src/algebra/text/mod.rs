@@ -51,10 +51,39 @@ pub fn latex(x: &Exprs, e: Expr, names: &dyn Names) -> String {
 /// assert_eq!(mathml(&x, e, &PlainNames(&x)), "<mfrac><mrow><mi>a</mi></mrow><mrow><mi>ω</mi></mrow></mfrac>");
 /// ```
 pub fn mathml(x: &Exprs, e: Expr, names: &dyn Names) -> String {
-    mathml::mathml(&shape::shape(x, e, names), names)
+    mathml_within(x, e, names, usize::MAX)
+}
+
+/// As [`mathml`], up to so many parts: `…` stands for each that is left out.
+pub fn mathml_within(x: &Exprs, e: Expr, names: &dyn Names, most: usize) -> String {
+    mathml::mathml(&shape::shape(x, e, names, most), names)
+}
+
+/// As [`ascii`], up to so many characters: what is longer ends with `…`. What is left out is not put into words first.
+pub fn ascii_within(x: &Exprs, e: Expr, names: &dyn Names, most: usize) -> String {
+    within(x, e, names, Style::Ascii, most)
+}
+
+/// As [`unicode`], up to so many characters: what is longer ends with `…`.
+pub fn unicode_within(x: &Exprs, e: Expr, names: &dyn Names, most: usize) -> String {
+    within(x, e, names, Style::Unicode, most)
 }
 
 fn print(x: &Exprs, e: Expr, names: &dyn Names, style: Style) -> String {
-    let shape = shape::shape(x, e, names);
+    let shape = shape::shape(x, e, names, usize::MAX);
     render::render(&shape, names, style)
+}
+
+fn within(x: &Exprs, e: Expr, names: &dyn Names, style: Style, most: usize) -> String {
+    if most == usize::MAX {
+        return print(x, e, names, style);
+    }
+    // A part has at least one character, and is seldom put into shape more than once.
+    let shape = shape::shape(x, e, names, most.saturating_mul(4));
+    let text = render::render(&shape, names, style);
+    let end = text.char_indices().nth(most).map(|(at, _)| at);
+    match [text.find('…'), end].into_iter().flatten().min() {
+        Some(end) => format!("{}…", text[..end].trim_end()),
+        None => text,
+    }
 }

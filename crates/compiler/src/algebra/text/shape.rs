@@ -35,8 +35,9 @@ pub(super) enum Shape {
 const DEEPEST: usize = 200;
 const LONGEST: usize = 20_000;
 
-pub(super) fn shape(x: &Exprs, e: Expr, names: &dyn Names) -> Shape {
-    Shaper { x, names, depth: 0, parts: 0 }.shape(e)
+/// Parts that come after so many are left out; of all expressions those after [`LONGEST`].
+pub(super) fn shape(x: &Exprs, e: Expr, names: &dyn Names, most: usize) -> Shape {
+    Shaper { x, names, depth: 0, parts: 0, most: most.min(LONGEST) }.shape(e)
 }
 
 struct Shaper<'a> {
@@ -44,6 +45,7 @@ struct Shaper<'a> {
     names: &'a dyn Names,
     depth: usize,
     parts: usize,
+    most: usize,
 }
 
 /// A factor: base and exponent.
@@ -52,7 +54,7 @@ type Factor = (Expr, Rational);
 impl Shaper<'_> {
     fn shape(&mut self, e: Expr) -> Shape {
         self.parts += 1;
-        if self.depth > DEEPEST || self.parts > LONGEST {
+        if self.depth > DEEPEST || self.parts > self.most {
             return Shape::LeftOut;
         }
         self.depth += 1;
@@ -121,7 +123,7 @@ impl Shaper<'_> {
         let varies = terms.iter().any(|&t| self.varies(t));
         for &term in terms {
             self.parts += 1;
-            if self.parts > LONGEST {
+            if self.parts > self.most {
                 let last = TermPlace { end: 2, sort: Some(Sort::Rate), family: u8::MAX, index: u32::MAX };
                 shaped.push((last, term, false, Shape::LeftOut));
                 break;
