@@ -4,12 +4,12 @@ mod causality;
 mod curves;
 mod page;
 
-use halfarrow_compiler::algebra::{PlainNames, mathml};
+use halfarrow_compiler::algebra::{PlainNames, mathml_within};
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::find_paths;
 use halfarrow_compiler::equations::{AlgebraicRole, Form, StateKind};
 use halfarrow_compiler::textbook::{
-    Style, print_certificate, print_dependent, print_events, print_meanings, print_sides, print_symbol, show,
+    Style, dependent_within, events_within, meanings_within, print_certificate, print_symbol, show, sides_within,
 };
 use halfarrow_draw::DrawOptions;
 
@@ -25,6 +25,11 @@ use causality::Decided;
 
 /// Equations of a form that are set; more are counted.
 const MOST: usize = 80;
+
+/// Parts of an expression that are set; `…` stands for what comes after them.
+const PARTS: usize = 300;
+/// Characters of a page that lines of equations take together; further lines are counted.
+const LONGEST: usize = 400_000;
 
 /// What stands in the report.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +113,7 @@ struct FormText {
     equations: Vec<(String, String)>,
     left_out: usize,
     meanings: Vec<String>,
+    meanings_left_out: usize,
 }
 
 impl Model {
@@ -118,7 +124,7 @@ impl Model {
     pub fn report(&self, report: &Report, progress: &mut dyn FnMut(f64, &str) -> bool) -> Result<Page, Error> {
         progress(0.0, "equations");
         let causal = self.causal_graph()?;
-        let loops = self.loops()?;
+        let loops = self.loops_in_brief(6 * PARTS)?;
         let minimal = show(self.equations_in(Form::Minimal)?);
         let to = match report.to {
             Some(to) => to,
@@ -177,7 +183,7 @@ impl Model {
             decided: causality::decided(&causal, &loops),
             paths: path_rows(&causal, &loops),
             paths_complete: loops.complete,
-            dependent: print_dependent(&minimal, Style::MathMl),
+            dependent: first(dependent_within(&minimal, Style::MathMl, PARTS), String::len).0,
             conserved: loops.conserved.iter().map(|c| format!("{} = {}", c.name, c.value)).collect(),
             forms: together(forms),
             comparison,
@@ -207,7 +213,7 @@ impl Model {
         let mut remarks = Vec::new();
         let content = self.equations_in(form).map_err(|error| crate::compare::short(&error)).map(|equations| {
             let shown = show(equations);
-            remarks = print_events(&shown, Style::Unicode);
+            remarks = events_within(&shown, Style::Unicode, 6 * PARTS);
             remarks.extend(print_certificate(&shown));
             let equations = &shown.equations;
             let counts = equations.counts;
@@ -222,9 +228,9 @@ impl Model {
                 };
                 (print_symbol(&shown, a.symbol, Style::MathMl), cause)
             });
-            let mut lines = print_sides(&shown, Style::MathMl);
-            let left_out = lines.len().saturating_sub(MOST);
-            lines.truncate(MOST);
+            let length = |(left, right): &(String, String)| left.len() + right.len();
+            let (lines, left_out) = first(sides_within(&shown, Style::MathMl, PARTS), length);
+            let (meanings, meanings_left_out) = first(meanings_within(&shown, Style::MathMl, PARTS), String::len);
             let algebraic_count = counts.algebraic + equations.implicit.len();
             FormText {
                 counts: format!(
@@ -234,18 +240,40 @@ impl Model {
                 unknowns: states.chain(algebraic).take(MOST).collect(),
                 equations: lines,
                 left_out,
-                meanings: print_meanings(&shown, Style::MathMl).into_iter().take(MOST).collect(),
+                meanings,
+                meanings_left_out,
             }
         });
         FormPart { forms: vec![form], content, remarks: vec![(form, remarks)] }
     }
 }
 
+impl FormPart {
+    /// Whether all of its equations stand here: those of others are the same only if nothing of them is left out.
+    fn is_whole(&self) -> bool {
+        let Ok(text) = &self.content else { return true };
+        let sides = text.equations.iter().flat_map(|(left, right)| [left, right]);
+        text.left_out + text.meanings_left_out == 0 && !sides.chain(&text.meanings).any(|line| line.contains('…'))
+    }
+}
+
+/// The first lines, and how many are left out after them: as many as one reads, by their number and by their length.
+fn first<T>(mut lines: impl Iterator<Item = T>, length: impl Fn(&T) -> usize) -> (Vec<T>, usize) {
+    let mut kept = Vec::new();
+    let mut whole = 0;
+    while kept.len() < MOST && whole < LONGEST {
+        let Some(line) = lines.next() else { break };
+        whole += length(&line);
+        kept.push(line);
+    }
+    (kept, lines.count())
+}
+
 /// Forms with the same equations as one part, at the place of the first.
 fn together(parts: Vec<FormPart>) -> Vec<FormPart> {
     let mut kept: Vec<FormPart> = Vec::new();
     for part in parts {
-        match kept.iter_mut().find(|k| k.content == part.content) {
+        match kept.iter_mut().find(|k| k.content == part.content && k.is_whole()) {
             Some(same) => {
                 same.forms.extend(part.forms);
                 same.remarks.extend(part.remarks);
@@ -264,7 +292,7 @@ fn path_rows(causal: &CausalGraph, loops: &crate::loops::LoopsReport) -> Vec<Pat
         between: told.elements.join(" – "),
         route: told.route.join(" → "),
         bonds: told.bonds.iter().map(u32::to_string).collect::<Vec<_>>().join(" "),
-        gain: mathml(x, path.gain, &PlainNames(x)),
+        gain: mathml_within(x, path.gain, &PlainNames(x), PARTS),
         value: told.gain_value,
         breaks: told.breaks.join(", "),
         fate: told.resolution.clone(),

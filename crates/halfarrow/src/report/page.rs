@@ -212,6 +212,11 @@ fn form_text(text: &FormText) -> Markup {
         @if !text.meanings.is_empty() {
             p.soft { "where" }
             ul.math { @for line in &text.meanings { li { (math(line)) } } }
+            @if text.meanings_left_out > 0 { p.soft { "and " (text.meanings_left_out) " more names" } }
+        }
+        @let cut = |math: &String| math.contains('…');
+        @if text.left_out + text.meanings_left_out > 0 || text.meanings.iter().chain(text.equations.iter().map(|e| &e.1)).any(cut) {
+            p.soft { "All of it: " code { "halfarrow equations MODEL --out FILE" } "." }
         }
         @let unknowns: Vec<&(String, &str)> = text.unknowns.iter().filter(|u| u.1 != "storage").collect();
         @if !unknowns.is_empty() {
