@@ -63,6 +63,37 @@ fn a_rest_that_is_far_away_is_no_magnitude() {
     }
 }
 
+/// A rate that states change by rounding alone has no rest, however far. The reference is the same machine by classical Runge-Kutta
+/// with steps of 1e-4 s.
+#[test]
+fn a_rest_by_rounding_is_no_magnitude() {
+    let model = fault("rest_by_rounding");
+    let asked = |method, step, rtol| Run {
+        to: 0.3,
+        every: Some(0.1),
+        rtol,
+        method,
+        step,
+        record: Record::Names(vec!["j0.q".into(), "j1.roll.q".into(), "j1.yaw.rate.f".into()]),
+        ..Run::default()
+    };
+    let done = |asked: Run| -> (Vec<f64>, f64) {
+        let done = run(&model, asked);
+        let greatest = done.report.tolerances.iter().fold(0.0, |most: f64, kept| most.max(kept.scale));
+        (done.trace.columns.iter().filter(|c| c.name != "t").flat_map(|c| c.values.clone()).collect(), greatest)
+    };
+    let (wanted, _) = done(asked(Method::Fixed(FixedMethod::Rk4), Some(1e-4), 1e-6));
+    for method in [Method::Auto, Method::Explicit, Method::Bdf, Method::Radau] {
+        for (rtol, within) in [(1e-6, 1e-4), (1e-12, 1e-9)] {
+            let (values, greatest) = done(asked(method, None, rtol));
+            assert!(greatest < 100.0, "{method:?}: a scale of {greatest:e}");
+            for (value, wanted) in values.into_iter().zip(&wanted) {
+                assert!((value - wanted).abs() < within, "{method:?}, {rtol:e}: {value}, not {wanted}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_chain_takes_the_steps_that_its_motion_asks_for() {
     let steps = [1e-8, 1e-9, 1e-10, 1e-11].map(|rtol| {

@@ -26,6 +26,8 @@ const FIRST_GUESSES: [f64; 10] = [0.0, 1e-6, 1e-3, 1.0, -1.0, -1e-3, 30.0, -30.0
 const BESIDE: f64 = 1e-3;
 /// A derivative below this fraction of the largest one by the same unknown is rounding error.
 const NOISE: f64 = 1e-14;
+/// A state whose own size changes a rate by less than this part of it acts on it by rounding alone.
+const ROUNDED: f64 = 1e-12;
 /// Largest trusted ratio of an extrapolated to a given magnitude: beyond it lie directions with next to no stiffness.
 const FAR: f64 = 1e3;
 /// Models with more states are not linearised to estimate typical magnitudes.
@@ -157,22 +159,25 @@ impl Model {
     /// linearised equations, and their changes within the shortest time constant of these. 0 for states at rest at zero.
     ///
     /// The equilibrium is sought along directions that the junction structure allows: a displacement that depends on others,
-    /// moved alone, would change no rate by more than rounding error.
+    /// moved alone, would change no rate by more than rounding error. Neither would a state that acts on a rate by rounding
+    /// alone: a rate that no state brings to 0 has no equilibrium.
     pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
         if n > MOST_LINEARISED {
             return sizes;
         }
-        let Ok((rates, jacobian)) = self.at_rest(t, x) else { return sizes };
+        let Ok((rates, mut jacobian)) = self.at_rest(t, x) else { return sizes };
         let Some(directions) = self.first_directions(t, x) else { return sizes };
+        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+        let fastest =
+            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
+        let reaches = reaches(&jacobian, &rates, &sizes, fastest);
+        silence(&mut jacobian, &rates, &reaches);
         let Some(way) = minimum_norm::step(&directions.along(&jacobian, n), &rates, directions.count(n)) else {
             return sizes;
         };
         let step = directions.step(&way.step);
-        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
-        let fastest =
-            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
         for (i, size) in sizes.iter_mut().enumerate() {
             let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum();
             let soon = if fastest > 0.0 { pull.max(rates[i].abs()) / fastest } else { 0.0 };
@@ -645,6 +650,35 @@ impl Model {
     }
 }
 
+/// How far each state is from 0, or soon will be: what its rate makes of it in the shortest time, and where that is 0 as well
+/// what the others make of it. 0 where nothing moves it.
+fn reaches(jacobian: &[f64], rates: &[f64], sizes: &[f64], fastest: f64) -> Vec<f64> {
+    let n = sizes.len();
+    if fastest == 0.0 {
+        return sizes.to_vec();
+    }
+    let mut reaches: Vec<f64> = sizes.iter().zip(rates).map(|(size, rate)| size.max(rate.abs() / fastest)).collect();
+    loop {
+        let pulled = |i: usize| (0..n).map(|j| (jacobian[i * n + j] * reaches[j]).abs()).sum::<f64>() / fastest;
+        let next: Vec<f64> = (0..n).map(|i| if reaches[i] == 0.0 { pulled(i) } else { reaches[i] }).collect();
+        // Each round reaches one more at least, or none any more.
+        if next == reaches {
+            return reaches;
+        }
+        reaches = next;
+    }
+}
+
+/// Takes derivatives out by which a state that is `reaches` from 0 changes a rate by no more than rounding.
+fn silence(jacobian: &mut [f64], rates: &[f64], reaches: &[f64]) {
+    for (row, rate) in jacobian.chunks_mut(reaches.len().max(1)).zip(rates) {
+        let rounded = |(derivative, reach): &(&mut f64, &f64)| {
+            **reach > 0.0 && derivative.abs() * **reach <= ROUNDED * rate.abs()
+        };
+        row.iter_mut().zip(reaches).filter(rounded).for_each(|(derivative, _)| *derivative = 0.0);
+    }
+}
+
 /// The largest derivative of each condition; where all of them are rounding errors beside those of other conditions by the
 /// same unknown, the largest of these, so that rounding errors are not scaled up.
 fn greatest_of(jacobian: &[f64], rows: usize, columns: usize) -> Vec<f64> {
@@ -676,4 +710,28 @@ fn terms_of(program: &Program, value: Value) -> Vec<Value> {
         }
     }
     terms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_acts_by_rounding_alone_is_silent() {
+        // A slide whose rate of 6 an angle changes by rounding; the angle has a spring, at rest and at 0.3 rad.
+        let jacobian = [0.0, 0.0, 3e-16, 0.0, 0.0, -15.0, 0.0, 1.0, 0.0];
+        for sizes in [[0.0, 0.0, 0.3], [0.0, 0.0, 0.0]] {
+            let rates = [6.0, 4.5, 0.0];
+            let reaches = reaches(&jacobian, &rates, &sizes, 15f64.sqrt());
+            let mut silent = jacobian;
+            silence(&mut silent, &rates, &reaches);
+            assert_eq!(silent, [0.0, 0.0, 0.0, 0.0, 0.0, -15.0, 0.0, 1.0, 0.0], "{sizes:?}");
+        }
+        // A weight on a spring that is neither stretched nor moves yet: all of it counts.
+        let jacobian = [0.0, -1e-3, 1.0, 0.0];
+        let reaches = reaches(&jacobian, &[9.81, 0.0], &[0.0, 0.0], 1e-3f64.sqrt());
+        let mut silent = jacobian;
+        silence(&mut silent, &[9.81, 0.0], &reaches);
+        assert_eq!(silent, jacobian);
+    }
 }
