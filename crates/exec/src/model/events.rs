@@ -7,7 +7,9 @@ use super::positions::Motion;
 use super::system::What;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
-use halfarrow_compiler::program::Value;
+use halfarrow_compiler::bond_graph::HeldKind;
+use halfarrow_compiler::ids::Id;
+use halfarrow_compiler::program::{EventTrigger, Op, Reads, Value};
 use halfarrow_sim::{Affected, Events, Failure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -233,6 +235,31 @@ impl Model {
     }
 }
 
+impl Model {
+    /// Whether time, an input or a delay reaches one of these values but through a condition, which changes at an event.
+    fn moves_with_time(&self, seen: &[Value]) -> bool {
+        let program = &self.code.program;
+        let has_event = |condition| program.conditions[condition].trigger != EventTrigger::RecordedOnly;
+        let varies = |value: &Value| program.values.reads(*value) != Reads::PARAMETERS;
+        let mut reached = vec![false; program.values.len()];
+        seen.iter().for_each(|value| reached[value.index()] = true);
+        for (value, op) in program.values.iter().rev().filter(|(value, _)| varies(value)) {
+            if !reached[value.index()] {
+                continue;
+            }
+            match op {
+                Op::Time => return true,
+                Op::Input(input) if !self.inputs()[input as usize].is_constant() => return true,
+                Op::Held(held) if program.held[held as usize].kind == HeldKind::Delay => return true,
+                Op::Sign(condition, _) | Op::Floor(condition, _) if has_event(condition) => {}
+                Op::Solution(block, _) => program.blocks[block].reads().for_each(|read| reached[read.index()] = true),
+                _ => op.for_each_operand(|read| reached[read.index()] = true),
+            }
+        }
+        false
+    }
+}
+
 impl Events for Model {
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
         let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
@@ -293,6 +320,15 @@ impl Events for Model {
         let idle = self.code.motion.iter().chain(&self.recorded.motion).flat_map(|motion| &motion.idle);
         let longest = idle.map(|block| self.frame.solvers[block.0 as usize].newton.longest_way());
         longest.fold(f64::INFINITY, f64::min)
+    }
+
+    fn stands_still(&self) -> bool {
+        let program = &self.code.program;
+        let recorded = self.recorded.chosen.iter().filter_map(|&i| program.observed[i].value.clone().ok());
+        let watched = program.conditions.values().filter(|condition| condition.trigger == EventTrigger::State);
+        let rates = program.states.iter().map(|state| state.rate);
+        let seen: Vec<Value> = recorded.chain(watched.map(|condition| condition.operand)).chain(rates).collect();
+        !self.moves_with_time(&seen)
     }
 
     fn note_magnitudes(&mut self, t: f64, x: &[f64], magnitudes: &[f64]) -> Result<(), Failure> {

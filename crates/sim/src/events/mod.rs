@@ -128,6 +128,12 @@ pub trait Events {
         f64::INFINITY
     }
 
+    /// Whether nothing that is seen of it changes between two time events as long as no state does. Then a system without
+    /// states stands still from one to the next.
+    fn stands_still(&self) -> bool {
+        false
+    }
+
     /// The step that ends at `(t, point)` is accepted, or the run starts there: Newton starting points and delay buffers,
     /// which belong to the model's memory, move on. Times never decrease from call to call.
     ///

@@ -11,7 +11,7 @@ use crate::events::Events;
 use crate::shared::Shared;
 use crate::{Crawl, Failure, Summary, System};
 
-/// Longest step of a system without states, as a part of the run.
+/// Longest step of a system without states that moves with time, as a part of the run.
 const SHORT: f64 = 1e-3;
 
 /// Steps tried in vain one after the other that rounding may be the reason of.
@@ -82,8 +82,9 @@ impl<'i, 's> Controlled<'i, 's> {
         stiffness: Option<Stiffness>,
     ) -> Self {
         let states = method.state().len();
-        // Without states no error tells how far a step may go: laws are followed in short ones.
-        let blind = (states == 0).then_some(SHORT * (run.options.to - run.options.from));
+        // Without states no error tells how far a step may go: what time moves is followed in short ones.
+        let blind = states == 0 && !shared.events().stands_still();
+        let blind = blind.then_some(SHORT * (run.options.to - run.options.from));
         Controlled {
             shared,
             method,

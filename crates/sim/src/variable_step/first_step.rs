@@ -20,6 +20,9 @@ pub(super) fn first_step(
     rates: &mut [f64],
 ) -> Result<f64, Failure> {
     system.rates(t, x, rates)?;
+    if x.is_empty() {
+        return Ok(longest);
+    }
     let (size, speed) = (tolerances.norm(x, x), tolerances.norm(rates, x));
     // A state that is zero but for rounding says nothing about the time in which it changes.
     let unknown = size < 1e-5 || speed < 1e-5 || size / speed <= LEAST * t.abs();

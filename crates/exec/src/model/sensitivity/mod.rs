@@ -364,6 +364,10 @@ impl Events for Varied<'_> {
         self.model.longest_step()
     }
 
+    fn stands_still(&self) -> bool {
+        self.model.stands_still()
+    }
+
     fn accept(&mut self, t: f64, y: &[f64]) -> Result<(), Failure> {
         self.model.accept(t, &y[..self.n])
     }
