@@ -510,7 +510,13 @@ fn loops_of_multibonds_fit_the_page() {
         let text = stdout(&halfarrow(&here, &["loops", &file, "--width", width]));
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
         assert!(widest <= width.parse().unwrap(), "{widest}\n{text}");
-        for told in ["hull.inertia.x - hull.mass.y", "-0.049*hull.m", "hull.mass[3]", "hull.inertia[3]", "velocity transformation"] {
+        for told in [
+            "hull.inertia.x - hull.mass.y",
+            "-0.049*hull.m",
+            "hull.mass[3]",
+            "hull.inertia[3]",
+            "velocity transformation",
+        ] {
             assert!(text.contains(told), "{told}\n{text}");
         }
         assert!(!text.contains("hull.mass.x.f ="), "{text}");
@@ -532,7 +538,9 @@ fn long_gains_are_cut() {
     let names: Vec<String> = (0..60).map(|i| format!("reading_of_a_long_name_{i}")).collect();
     let law = names.iter().map(|n| format!("{n}*sin({n})")).collect::<Vec<_>>().join(" + ");
     let inputs: String = names.iter().map(|n| format!("input {n} = 1\n")).collect();
-    let text = format!("model Long\n{inputs}Se:s(1) -> 1:n -> R:a(e = ({law})*f)\nn -> TF:t(f_out = 2) -> 0:m -> R:b(3)\nm -> I:mass(1)\nn -> 0:k -> R:c(1)\nk -> R:d(e = ({law})*f)\n");
+    let text = format!(
+        "model Long\n{inputs}Se:s(1) -> 1:n -> R:a(e = ({law})*f)\nn -> TF:t(f_out = 2) -> 0:m -> R:b(3)\nm -> I:mass(1)\nn -> 0:k -> R:c(1)\nk -> R:d(e = ({law})*f)\n"
+    );
     let file = write(&here, "long.bond", &text);
     let short = stdout(&halfarrow(&here, &["loops", &file]));
     assert!(short.contains('…') && short.contains("--json") && short.lines().count() < 60, "{short}");
@@ -564,7 +572,8 @@ fn long_equations_are_told_in_brief() {
     assert_eq!(status(&halfarrow(&here, &["new", "--family", "ladder", "1200"])), 0);
     let brief = stdout(&halfarrow(&here, &["equations", "ladder.bond"]));
     assert!(brief.lines().count() < 700, "{}", brief.lines().count());
-    for told in ["states", "│ 1200", "operations of one evaluation", "--only NAME", "--all", "--out FILE", "q_c[1]' = "] {
+    for told in ["states", "│ 1200", "operations of one evaluation", "--only NAME", "--all", "--out FILE", "q_c[1]' = "]
+    {
         assert!(brief.contains(told), "{told}\n{brief}");
     }
     let all = stdout(&halfarrow(&here, &["equations", "ladder.bond", "--all"]));

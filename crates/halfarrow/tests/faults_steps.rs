@@ -113,24 +113,24 @@ fn a_place_that_rounding_moves_is_known_as_its_speed_is() {
 #[test]
 fn what_stands_still_takes_one_step() {
     let still = "-> 1:a -> R:r(2)\nSf:hold(0) -> a\n";
-    let steps = |text_: String, inputs: Vec<Input>| {
+    let steps = |told: String| {
         let record = Record::Names(vec!["r.e".into(), "hold.e".into()]);
-        let done = run(&text(&text_), Run { to: 0.1, inputs, record, ..Run::default() });
+        let done = run(&text(&told), Run { to: 0.1, record, ..Run::default() });
         (done.report.steps, done.trace.columns.iter().find(|c| c.name == "hold.e").expect("recorded").values.clone())
     };
-    let (taken, values) = steps(format!("model M\nSe:push(1) {still}"), vec![]);
+    let (taken, values) = steps(format!("model M\nSe:push(1) {still}"));
     assert!(taken == 1 && values.iter().all(|v| v.abs() == 1.0), "{taken} steps, {values:?}");
     // To a jump, and on from there.
-    let (taken, values) = steps(format!("model M\nSe:push(if t < 0.05 then 1 else 2) {still}"), vec![]);
+    let (taken, values) = steps(format!("model M\nSe:push(if t < 0.05 then 1 else 2) {still}"));
     assert!(taken == 2 && values.last().is_some_and(|v| v.abs() == 2.0), "{taken} steps, {values:?}");
-    let (taken, _) = steps(format!("model M\nSe:push(sample(t, 0.02)) {still}"), vec![]);
+    let (taken, _) = steps(format!("model M\nSe:push(sample(t, 0.02)) {still}"));
     assert!(taken <= 6, "{taken} steps");
     // What moves is followed.
     for moving in ["sin(t)", "delay(t, 0.01)", "if sin(40*t) > 0.5 then 1 else 2"] {
-        let (taken, _) = steps(format!("model M\nSe:push({moving}) {still}"), vec![]);
+        let (taken, _) = steps(format!("model M\nSe:push({moving}) {still}"));
         assert!(taken >= 3, "{moving}: {taken} steps");
     }
-    let (taken, _) = steps(format!("model M\nSe:push(sin(t)) {still}"), vec![]);
+    let (taken, _) = steps(format!("model M\nSe:push(sin(t)) {still}"));
     assert!((1000..=1010).contains(&taken), "{taken} steps");
 }
 
