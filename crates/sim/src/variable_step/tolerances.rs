@@ -138,8 +138,7 @@ impl Tolerances {
             magnitudes.iter_mut().zip(by).for_each(|(magnitude, by)| *magnitude = magnitude.max(*by));
         };
         raise(&mut self.magnitudes, &self.greatest);
-        if let Some(couplings) = surroundings(system, (t, x), interval) {
-            let least = couplings.least(&self.magnitudes);
+        if let Some((_, least)) = surroundings(system, (t, x), interval, &self.magnitudes) {
             raise(&mut self.magnitudes, &least);
         }
     }
@@ -182,8 +181,8 @@ impl Tolerances {
         if self.given.is_some() {
             return false;
         }
-        let Some(couplings) = surroundings(system, (t, x), interval) else { return false };
-        let reach = couplings.shortest.max(h);
+        let Some((shortest, _)) = surroundings(system, (t, x), interval, &self.magnitudes) else { return false };
+        let reach = shortest.max(h);
         let before = self.absolute(1.0);
         for time in [t, t + h] {
             // What becomes of states that have a magnitude is looked for again when they have it.
@@ -192,9 +191,8 @@ impl Tolerances {
                 break;
             }
             let Some(rounding) = rounding(system, time, x, &self.magnitudes) else { continue };
-            let mut clear: Vec<f64> = rounding.iter().map(|rounding| CLEAR * reach * rounding).collect();
-            couplings.pass_on(reach, &mut clear);
-            for (state, clear) in clear.into_iter().enumerate() {
+            for (state, rounding) in rounding.iter().enumerate() {
+                let clear = CLEAR * reach * rounding;
                 if clear.is_finite() && (!ahead || self.magnitudes[state] == UNKNOWN) {
                     self.floors[state] = self.floors[state].max(clear);
                 }
