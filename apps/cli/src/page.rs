@@ -393,7 +393,7 @@ mod tests {
         let parts = table(&rows).fitting(40);
         let text: String = parts.iter().map(Table::text).collect();
         assert!(text.lines().all(|line| width(line) <= 40), "{text}");
-        let told = ["platform.mass.y", "between: a - b", "gain: -1", "0.6", "0.123456789012", "(k + l)"];
+        let told = ["platform.mass.y", "┆ a - b", "┆ -1", "-0.6", "value: -0.123456789012", "(k + l)"];
         assert!(told.iter().all(|told| text.contains(told)), "{text}");
         let long = "member".repeat(3);
         let rows: Vec<[&str; 4]> = (0..3).map(|_| ["1", long.as_str(), "x", long.as_str()]).collect();
