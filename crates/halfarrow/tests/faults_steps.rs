@@ -94,6 +94,22 @@ fn a_rest_by_rounding_is_no_magnitude() {
     }
 }
 
+/// A body that nothing moves but the rounding of what others do to each other: its place is no better known than its speed. It took
+/// 7,764 steps; 86 are enough where it moves.
+#[test]
+fn a_place_that_rounding_moves_is_known_as_its_speed_is() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/satellite/slew.bond");
+    let text =
+        std::fs::read_to_string(&path).expect("an example").replace(":satellite()", ":satellite(v0 = [0, 0, 0])");
+    let folder = temp_dir::TempDir::new().expect("a folder");
+    let at = |name: &str| folder.child(name);
+    std::fs::write(at("slew.bond"), text).expect("written");
+    std::fs::copy(path.with_file_name("satellite.bond"), at("satellite.bond")).expect("copied");
+    let model = Model::load(&at("slew.bond"), &[]).unwrap_or_else(|error| panic!("{}", error.render(false)));
+    let report = run(&model, Run { to: 3.0, ..Run::default() }).report;
+    assert!(report.steps < 2000, "{} steps", report.steps);
+}
+
 #[test]
 fn what_stands_still_takes_one_step() {
     let still = "-> 1:a -> R:r(2)\nSf:hold(0) -> a\n";

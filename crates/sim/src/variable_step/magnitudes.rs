@@ -19,6 +19,9 @@ const RIPPLE: f64 = 1e-4;
 /// Strength of an exchange relative to the strongest of the same state below which it may be what rounding left.
 const WEAK: f64 = 1e-6;
 
+/// Couplings over which what is not known of a state is passed on.
+const PASSED_ON: usize = 8;
+
 /// Steps of the growth of a matrix's powers, of which the last half is believed.
 const POWERS: usize = 16;
 
@@ -35,7 +38,7 @@ pub fn magnitudes(system: &mut dyn HybridSystem, (t, x): (f64, &[f64]), span: f6
     let mut magnitudes: Vec<f64> = x.iter().zip(system.scales()).map(|(x, scale)| scale.max(x.abs())).collect();
     let before = magnitudes.clone();
     guess_magnitudes(system, (t, x), interval, &mut magnitudes)?;
-    let least = surroundings(system, (t, x), interval, &magnitudes).map(|(_, least)| least);
+    let least = surroundings(system, (t, x), interval).map(|couplings| couplings.least(&magnitudes));
     let floors = [before, least.unwrap_or_default()];
     for floor in floors {
         magnitudes.iter_mut().zip(floor).for_each(|(magnitude, floor)| *magnitude = magnitude.max(floor));
@@ -90,19 +93,12 @@ pub(super) fn guess_magnitudes(
     Ok(())
 }
 
-/// What the system knows of its states where it stands at `(t, x)`, `interval` s before the next jump: the shortest time, in s,
-/// and the least magnitude that each state is to have beside the others. `None` where there are no rates.
-pub(super) fn surroundings(
-    system: &mut dyn System,
-    (t, x): (f64, &[f64]),
-    interval: f64,
-    magnitudes: &[f64],
-) -> Option<(f64, Vec<f64>)> {
+/// How the states act on each other where the system stands at `(t, x)`, `interval` s before the next jump. `None` where there are
+/// no rates.
+pub(super) fn surroundings(system: &mut dyn System, (t, x): (f64, &[f64]), interval: f64) -> Option<Couplings> {
     let mut jacobian = Jacobian::new(system.sparsity());
     let entries = entries(system, &mut jacobian, t, x, &mut vec![0.0; x.len()]).ok()?;
-    let couplings = Couplings::new(entries, interval, x.len());
-    let least = couplings.exchanged(magnitudes).iter().map(|magnitude| RIPPLE * magnitude).collect();
-    Some((couplings.shortest, least))
+    Some(Couplings::new(entries, interval, x.len()))
 }
 
 /// Absolute values of the Jacobian that are not 0; writes the rates.
@@ -124,7 +120,7 @@ fn entries(
 }
 
 /// How the states act on each other.
-struct Couplings {
+pub(super) struct Couplings {
     /// Sorted by column.
     entries: Vec<Nonzero>,
     /// First entry of each column, and the end of the last.
@@ -134,7 +130,7 @@ struct Couplings {
     /// Rate at which each state decays or grows by itself, in 1/s.
     own: Vec<f64>,
     /// The shortest time that the system knows, in s; at most the way to the next jump.
-    shortest: f64,
+    pub(super) shortest: f64,
     interval: f64,
 }
 
@@ -148,6 +144,28 @@ impl Couplings {
         }
         let shortest = shortest_time(&entries, states).min(interval);
         Couplings { entries, starts, neighbours, own, shortest, interval }
+    }
+
+    /// The least magnitude that each state is to have beside the others.
+    pub(super) fn least(&self, magnitudes: &[f64]) -> Vec<f64> {
+        self.exchanged(magnitudes).iter().map(|magnitude| RIPPLE * magnitude).collect()
+    }
+
+    /// Raises what is not known of each state to what the others make of it in a time of at most `reach`: a displacement is no
+    /// better known than its speed.
+    pub(super) fn pass_on(&self, reach: f64, unknown: &mut [f64]) {
+        for _ in 0..PASSED_ON {
+            let before = unknown.to_vec();
+            for &(on, by, action) in self.entries.iter().filter(|(on, by, _)| on != by) {
+                let reached = action * self.time(on, by, action).min(reach) * before[by];
+                if reached.is_finite() {
+                    unknown[on] = unknown[on].max(reached);
+                }
+            }
+            if *unknown == before[..] {
+                return;
+            }
+        }
     }
 
     fn column(&self, column: usize) -> &[Nonzero] {

@@ -17,6 +17,10 @@ const ROUNDING: f64 = 1e-15;
 /// How far the error allowed in a step is above what rounding makes of it.
 const CLEAR: f64 = 10.0;
 
+/// What others leave unknown of a state, as part of its magnitude, from which on the state is itself made of rounding. Below it what
+/// they do is told from rounding, as where a machine passes a position in which rates are rounding for a moment.
+const NOISE: f64 = 1e-5;
+
 /// Part of the way to the next jump at which rounding is looked for where a state has no magnitude yet: sources may grow.
 const AHEAD: f64 = 0.1;
 
@@ -138,7 +142,8 @@ impl Tolerances {
             magnitudes.iter_mut().zip(by).for_each(|(magnitude, by)| *magnitude = magnitude.max(*by));
         };
         raise(&mut self.magnitudes, &self.greatest);
-        if let Some((_, least)) = surroundings(system, (t, x), interval, &self.magnitudes) {
+        if let Some(couplings) = surroundings(system, (t, x), interval) {
+            let least = couplings.least(&self.magnitudes);
             raise(&mut self.magnitudes, &least);
         }
     }
@@ -181,8 +186,8 @@ impl Tolerances {
         if self.given.is_some() {
             return false;
         }
-        let Some((shortest, _)) = surroundings(system, (t, x), interval, &self.magnitudes) else { return false };
-        let reach = shortest.max(h);
+        let Some(couplings) = surroundings(system, (t, x), interval) else { return false };
+        let reach = couplings.shortest.max(h);
         let before = self.absolute(1.0);
         for time in [t, t + h] {
             // What becomes of states that have a magnitude is looked for again when they have it.
@@ -191,8 +196,12 @@ impl Tolerances {
                 break;
             }
             let Some(rounding) = rounding(system, time, x, &self.magnitudes) else { continue };
-            for (state, rounding) in rounding.iter().enumerate() {
-                let clear = CLEAR * reach * rounding;
+            let clear: Vec<f64> = rounding.iter().map(|rounding| CLEAR * reach * rounding).collect();
+            let mut passed_on = clear.clone();
+            couplings.pass_on(reach, &mut passed_on);
+            for (state, (own, passed_on)) in clear.into_iter().zip(passed_on).enumerate() {
+                let is_noise = passed_on > NOISE * self.magnitudes[state];
+                let clear = if is_noise { passed_on } else { own };
                 if clear.is_finite() && (!ahead || self.magnitudes[state] == UNKNOWN) {
                     self.floors[state] = self.floors[state].max(clear);
                 }
