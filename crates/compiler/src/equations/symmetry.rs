@@ -34,8 +34,8 @@ pub fn mirrored(
     let signs = signs(x, &pairs, named, steps);
     let values: FxHashMap<Symbol, Expr> = named.iter().copied().collect();
     let mut needed = Needed { values: &values, seen: FxHashSet::default() };
-    rows.iter().for_each(|row| _ = needed.add(x, row.1));
-    entries.iter().filter(|((i, j), _)| i == j).for_each(|(_, &e)| _ = needed.add(x, e));
+    rows.iter().for_each(|row| needed.add(x, row.1));
+    entries.iter().filter(|((i, j), _)| i == j).for_each(|(_, &e)| needed.add(x, e));
     for (((i, j), upper, lower), sign) in pairs.into_iter().zip(signs) {
         if sign == 0 || upper == lower {
             continue;
@@ -157,16 +157,16 @@ struct Needed<'a> {
 impl Needed<'_> {
     /// Adds all that an expression is made of.
     fn add(&mut self, x: &Exprs, e: Expr) {
-        let new = self.new(x, e);
+        let new = self.not_yet(x, e);
         self.seen.extend(new);
     }
 
     /// How much is new in an expression.
     fn count(&self, x: &Exprs, e: Expr) -> usize {
-        self.new(x, e).len()
+        self.not_yet(x, e).len()
     }
 
-    fn new(&self, x: &Exprs, e: Expr) -> FxHashSet<Expr> {
+    fn not_yet(&self, x: &Exprs, e: Expr) -> FxHashSet<Expr> {
         let (mut new, mut open) = (FxHashSet::default(), vec![e]);
         while let Some(e) = open.pop() {
             if self.seen.contains(&e) || !new.insert(e) {
