@@ -17,5 +17,5 @@ pub use machine::MachineError;
 pub use model::{
     Alternatives, Compiled, Equilibrium, EquilibriumError, Evaluated, Executed, Execution, Expected, ImplicitMemory,
     ImplicitModel, InputError, Linearised, Memory, ModeId, Model, Operations, ParameterError, Quantity, Reason,
-    RecordError, Setup, StartConflict, StartError, StartValue, Varied, WideModel,
+    RecordError, Setup, StartConflict, StartError, StartValue, Tape, Taped, Varied, WideModel,
 };

@@ -1,7 +1,9 @@
 //! A sink that records every step for the audit.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
+use std::rc::Rc;
 
 use halfarrow_audit::{self as audit, Audit, Auditor, DriftKind, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
@@ -338,6 +340,27 @@ impl Audited<'_, exec::Model> {
         done
     }
 
+    /// Runs it, as [`simulate`], so that it can be followed backwards: with what it leaves behind, and the number of the first
+    /// recorded value that was asked for.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    #[allow(clippy::result_large_err, reason = "a run fails once")]
+    pub fn simulate_taped(
+        &mut self,
+        options: &Options,
+        x: &mut [f64],
+        sink: &mut dyn Sink,
+    ) -> Result<(Summary, exec::Tape, usize), Stopped> {
+        let first = self.book.names.len();
+        let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
+        let mut taped = exec::Taped::new(self.model);
+        let mut sink = Numbering { sink: &mut sink, observations: taped.observations(), sampled: Vec::new() };
+        let summary = simulate(&mut taped, options, x, &mut sink)?;
+        let sampled = sink.sampled;
+        Ok((summary, taped.into_tape(&sampled), first))
+    }
+
     /// Names the source behind rates that are not finite, if there is one.
     pub fn explain(&mut self, stopped: &Stopped) -> Failure {
         let failure = stopped.failure.clone();
@@ -396,6 +419,35 @@ impl Sink for Auditing<'_> {
     fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
         self.book.neglected.clear();
         self.book.neglected.extend(absolute.iter().map(|error| error / self.rtol));
+        self.sink.tolerances(magnitudes, absolute);
+    }
+    fn crawls(&mut self, crawl: &Crawl) {
+        self.sink.crawls(crawl);
+    }
+}
+
+/// The sink that notes which observations were samples.
+struct Numbering<'a> {
+    sink: &'a mut dyn Sink,
+    observations: Rc<Cell<usize>>,
+    sampled: Vec<usize>,
+}
+
+impl Sink for Numbering<'_> {
+    fn sample(&mut self, t: f64, values: &[f64]) {
+        self.sampled.push(self.observations.get());
+        self.sink.sample(t, values);
+    }
+    fn watches(&self) -> bool {
+        self.sink.watches()
+    }
+    fn watch(&mut self, t: f64, values: &[f64]) -> Result<(), Failure> {
+        self.sink.watch(t, values)
+    }
+    fn progress(&mut self, t: f64) -> ControlFlow<()> {
+        self.sink.progress(t)
+    }
+    fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
         self.sink.tolerances(magnitudes, absolute);
     }
     fn crawls(&mut self, crawl: &Crawl) {

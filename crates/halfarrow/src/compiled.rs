@@ -35,7 +35,7 @@ use crate::sweep::known_parameter;
 pub struct Compiled {
     model: Arc<Model>,
     form: Form,
-    ready: Ready,
+    pub(crate) ready: Ready,
     /// Whether reactions that are not unique are shared.
     shares: bool,
     /// What was set, in SI units.

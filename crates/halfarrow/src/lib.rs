@@ -39,6 +39,7 @@ mod execution;
 mod export;
 mod families;
 mod fit;
+mod gradient;
 mod input;
 mod interface;
 #[cfg(feature = "fmu")]
@@ -78,6 +79,7 @@ pub use execution::RoutineReport;
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
 pub use families::Family;
 pub use fit::{Estimate, Fit, FitParameter, FitReport};
+pub use gradient::{Gradient, Objective, Slope};
 pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;

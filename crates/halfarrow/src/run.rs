@@ -26,6 +26,7 @@ use crate::compiled::Ready;
 use crate::cost;
 use crate::error::{Error, Problem};
 use crate::execution::{RoutineReport, execute, executed};
+use crate::gradient::{Taped, is_stiff};
 use crate::input::{Input, connect};
 use crate::model::Model;
 use crate::sensitivity::{By, column, quantities, vary, with_derivatives};
@@ -211,6 +212,14 @@ pub struct Progress<'a> {
     pub note: Option<&'a str>,
 }
 
+/// A run that is about to begin.
+struct Begun {
+    start: Vec<f64>,
+    options: Options,
+    by: Vec<By>,
+    notes: Vec<String>,
+}
+
 /// A run that stopped before its end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stopped {
@@ -310,25 +319,45 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let begun = Moment::now();
+        let Begun { start, options, by, notes } = self.begin_explicit(&mut system, run)?;
+        timings.start = begun.elapsed().as_secs_f64();
+        self.integrate(&mut system, start, (&options, run.execution, &by), (notes, None), progress)
+    }
+
+    /// A run that can be followed backwards.
+    pub(crate) fn run_taped(
+        &self,
+        system: &mut exec::Model,
+        run: &Run,
+        progress: &mut dyn FnMut(Progress<'_>) -> bool,
+    ) -> Result<(Vec<By>, Options, Simulated, Taped), Error> {
+        let Begun { start, options, by, notes } = self.begin_explicit(system, run)?;
+        let mut taped = None;
+        let done = self.integrate(system, start, (&options, run.execution, &[]), (notes, Some(&mut taped)), progress);
+        let done = judged(done, &Made::by(run))?;
+        Ok((by, options, done, taped.expect("a run that came to its end")))
+    }
+
+    /// Finds the start of a run, and what is known before it.
+    fn begin_explicit(&self, system: &mut exec::Model, run: &Run) -> Result<Begun, Error> {
         if run.method.asks_for_derivatives() {
             system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
         }
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
-        let mut notes = choose(&mut system, &run.record)?;
+        let mut notes = choose(system, &run.record)?;
         notes.extend(projected(system.program(), run)?);
-        let by = quantities(&system, run)?;
-        vary(&mut system, &by)?;
-        let start = self.start(&mut system, run.start)?;
-        timings.start = begun.elapsed().as_secs_f64();
+        let by = quantities(system, run)?;
+        vary(system, &by)?;
+        let start = self.start(system, run.start)?;
         let options = options(run)?;
         if options.check(start.len()).is_ok() {
-            cost::check(&system, &start, &options, system.observed())?;
+            cost::check(system, &start, &options, system.observed())?;
         }
         if let (Method::Fixed(method), Some(step)) = (options.method, options.step) {
-            notes.extend(advice(&system, &start, method, step));
-            notes.extend(off_step(&system, step));
+            notes.extend(advice(system, &start, method, step));
+            notes.extend(off_step(system, step));
         }
-        self.integrate(&mut system, start, (&options, run.execution, &by), notes, progress)
+        Ok(Begun { start, options, by, notes })
     }
 
     fn run_form(
@@ -366,7 +395,7 @@ impl Model {
             cost::check(system.reference_mut(), &x, &options, recorded)?;
         }
         match explicit {
-            true => self.integrate(&mut system.into_form(), y, (&options, run.execution, &[]), notes, progress),
+            true => self.integrate(&mut system.into_form(), y, (&options, run.execution, &[]), (notes, None), progress),
             false => self.integrate_implicit(&mut system, (y, yp), (&options, run.execution), notes, progress),
         }
     }
@@ -376,7 +405,7 @@ impl Model {
         system: &mut exec::Model,
         mut x: Vec<f64>,
         (options, execution, by): (&Options, Execution, &[By]),
-        notes: Vec<String>,
+        (notes, taped): (Vec<String>, Option<&mut Option<Taped>>),
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder::new(system, by, notes, progress);
@@ -384,7 +413,13 @@ impl Model {
         let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
-        let mut outcome = audited.simulate(options, &mut x, &mut sink);
+        let mut outcome = match taped {
+            None => audited.simulate(options, &mut x, &mut sink),
+            Some(taped) => audited.simulate_taped(options, &mut x, &mut sink).map(|(summary, tape, first)| {
+                *taped = Some(Taped { tape, first, stiff: is_stiff(options, &summary) });
+                summary
+            }),
+        };
         if let Err(stopped) = &mut outcome {
             stopped.failure = audited.explain(stopped);
         }

@@ -38,6 +38,8 @@ mod faults_strokes;
 mod fit;
 #[path = "forms.rs"]
 mod forms;
+#[path = "gradient.rs"]
+mod gradient;
 #[path = "growth.rs"]
 mod growth;
 #[path = "iltis.rs"]

@@ -3,6 +3,7 @@
 //! [`System`] or an [`ImplicitSystem`] with [`Events`], whose algebra, tables and units are the system's own affair.
 #![forbid(unsafe_code)]
 
+mod adjoint;
 mod driver;
 mod events;
 mod failure;
@@ -23,6 +24,7 @@ mod system;
 mod variable_step;
 pub mod wide;
 
+pub use adjoint::{Backwards, Transposed, follow_back, step_back};
 pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary, tick};
 pub use events::Events;
 pub use failure::{Affected, Failure, Leap};

@@ -41,6 +41,13 @@ impl Sparsity {
         Sparsity::from_columns((0..columns).map(|column| self.column(column).to_vec()))
     }
 
+    /// The pattern with rows for columns.
+    pub fn transposed(&self) -> Sparsity {
+        let mut columns = vec![Vec::new(); self.states()];
+        self.entries().for_each(|(row, column)| columns[row].push(column));
+        Sparsity::from_columns(columns)
+    }
+
     /// Number of columns, which is that of the rows.
     pub fn states(&self) -> usize {
         self.starts.len() - 1

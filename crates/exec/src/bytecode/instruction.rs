@@ -64,3 +64,22 @@ pub(crate) struct Routine {
     /// What it was made of.
     pub source: program::Code,
 }
+
+impl Routine {
+    /// Every register that it reads, those that it has written before too.
+    pub fn for_each_read(&self, mut see: impl FnMut(Register)) {
+        for instruction in &self.code {
+            match instruction {
+                Instruction::Op(operation) => operation.op.for_each_operand(&mut see),
+                Instruction::Parameter { default, .. } => see(*default),
+                Instruction::Guard { pivot, scale, .. } => [*pivot, *scale].into_iter().for_each(&mut see),
+                Instruction::Solve { solve } => {
+                    let solve = &self.solves[*solve as usize];
+                    solve.code.iter().for_each(|operation| operation.op.for_each_operand(&mut see));
+                    solve.outer.iter().chain(&solve.matrix).chain(&solve.right).for_each(|&register| see(register));
+                }
+            }
+        }
+        self.outputs.iter().for_each(|&register| see(register));
+    }
+}

@@ -10,6 +10,7 @@ mod newton;
 mod orientation;
 mod packed;
 mod registers;
+mod reverse;
 mod wide;
 
 pub(crate) use block_batch::BlockBatches;
@@ -26,4 +27,5 @@ pub(crate) use instruction::{Instruction, Operation, Routine, Solve};
 pub(crate) use newton::Followed;
 pub(crate) use packed::Packed;
 pub(crate) use registers::Layout;
+pub(crate) use reverse::Weights;
 pub(crate) use wide::{HasFrame, Vector, WideFrame};

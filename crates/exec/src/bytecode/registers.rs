@@ -98,6 +98,12 @@ impl Layout {
         Allocator::new(self, &FxHashMap::default()).routine(program.start_routine(wanted).code)
     }
 
+    /// The code of a routine with a register of its own for every value, so that all are there when it has run.
+    pub fn keeping(&self, source: &Code) -> Routine {
+        let fixed = FxHashMap::default();
+        Allocator { keeps: true, ..Allocator::new(self, &fixed) }.routine(source.clone())
+    }
+
     /// The same, with all divisors guarded that vary.
     pub fn guarded_routine(&self, program: &Program, wanted: &[Value]) -> Routine {
         Allocator::new(self, &FxHashMap::default()).routine(program.guarded_routine(wanted).code)
@@ -143,11 +149,13 @@ struct Allocator<'a> {
     free: Vec<Register>,
     next: Register,
     solves: Vec<Solve>,
+    /// Whether no register is given away again.
+    keeps: bool,
 }
 
 impl<'a> Allocator<'a> {
     fn new(layout: &'a Layout, fixed: &'a FxHashMap<u32, Register>) -> Self {
-        Allocator { layout, fixed, free: Vec::new(), next: layout.size, solves: Vec::new() }
+        Allocator { layout, fixed, free: Vec::new(), next: layout.size, solves: Vec::new(), keeps: false }
     }
 
     fn routine(mut self, source: Code) -> Routine {
@@ -262,7 +270,7 @@ impl<'a> Allocator<'a> {
     }
 
     fn take(&mut self) -> Register {
-        self.free.pop().unwrap_or_else(|| {
+        self.free.pop().filter(|_| !self.keeps).unwrap_or_else(|| {
             self.next += 1;
             self.next - 1
         })

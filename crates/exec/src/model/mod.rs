@@ -42,7 +42,7 @@ pub use linear::Linearised;
 pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
 pub use operations::Operations;
-pub use sensitivity::{Quantity, Varied};
+pub use sensitivity::{Quantity, Tape, Taped, Varied};
 pub use setup::Setup;
 pub use wide::WideModel;
 

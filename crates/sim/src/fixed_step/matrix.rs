@@ -16,6 +16,8 @@ pub(super) struct StepMatrix {
     jacobian: Jacobian,
     /// Rows of one of the equal blocks on the diagonal.
     block: usize,
+    /// Whether the matrix is the transposed one.
+    transposed: bool,
     factors: Factors,
 }
 
@@ -34,11 +36,18 @@ impl StepMatrix {
         StepMatrix {
             jacobian,
             block: states,
+            transposed: false,
             factors: match states > LARGEST_DENSE && !is_full {
                 true => Factors::Sparse(Box::new(Sparse::new(sparsity))),
                 false => Factors::Dense(Lu::new(states)),
             },
         }
+    }
+
+    /// The same for the transposed matrix.
+    pub(super) fn transposed(sparsity: &Sparsity) -> StepMatrix {
+        let matrix = StepMatrix::new(&sparsity.transposed(), 1);
+        StepMatrix { jacobian: Jacobian::new(sparsity), transposed: true, ..matrix }
     }
 
     /// Factors the matrix for the Jacobian at `(t, x)`, and shows its entries: `see(row, column, value)`.
@@ -57,8 +66,20 @@ impl StepMatrix {
             time: t,
             what: state.map_or("the step".into(), |state| format!("the step of {}", system.state_name(state))),
         };
-        let block = self.block;
+        let (block, transposed) = (self.block, self.transposed);
         match &mut self.factors {
+            Factors::Dense(matrix) if transposed => {
+                matrix.set_unit();
+                self.jacobian.visit(system, t, x, |row, column, _, value| matrix.add(column, row, -factor * value))?;
+                matrix.factor().map_err(|column| singular(Some(column), system))
+            }
+            Factors::Sparse(sparse) if transposed => {
+                sparse.set_unit();
+                self.jacobian.visit(system, t, x, |row, column, _, value| {
+                    sparse.add_at((column, row), -factor * value);
+                })?;
+                sparse.lu.factor().then_some(()).ok_or_else(|| singular(None, system))
+            }
             Factors::Dense(matrix) => {
                 matrix.set_unit();
                 self.jacobian.visit(system, t, x, |row, column, _, value| {
@@ -96,6 +117,7 @@ impl StepMatrix {
 /// A sparse matrix and its factors.
 struct Sparse {
     lu: SparseLu<f64>,
+    pattern: Sparsity,
     /// Where the nonzeros of the Jacobian and the diagonal stand.
     places: Vec<usize>,
     diagonal: Vec<usize>,
@@ -108,6 +130,7 @@ impl Sparse {
             lu: SparseLu::new(&pattern),
             places: sparsity.entries().map(|(row, column)| pattern.place(row, column)).collect(),
             diagonal: (0..sparsity.states()).map(|i| pattern.place(i, i)).collect(),
+            pattern,
         }
     }
 
@@ -119,5 +142,10 @@ impl Sparse {
 
     fn add(&mut self, place: usize, value: f64) {
         self.lu.values()[self.places[place]] += value;
+    }
+
+    fn add_at(&mut self, (row, column): (usize, usize), value: f64) {
+        let place = self.pattern.place(row, column);
+        self.lu.values()[place] += value;
     }
 }

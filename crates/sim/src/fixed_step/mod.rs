@@ -5,12 +5,14 @@
 //! the rates jump, of its square where they only bend. Where a crossing changes states or discrete variables it is located, by
 //! shorter steps from the same start, in a number of them that is bounded.
 
+mod back;
 mod implicit_midpoint;
 mod matrix;
 mod rosenbrock;
 mod ticks;
 
 use crate::{Affected, Failure, Sparsity, System};
+pub use back::StepBack;
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 pub(crate) use ticks::{Ticks, target};

@@ -178,6 +178,23 @@ impl Lu {
         b.iter_mut().zip(rest.iter()).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
     }
 
+    /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
+    pub fn solve_transposed(&mut self, b: &mut [f64]) {
+        if self.definite {
+            return self.solve_definite(b);
+        }
+        let n = self.size;
+        let Lu { matrix, factors, order, work, rest, .. } = self;
+        rest.copy_from_slice(b);
+        substitute_transposed(n, factors, order, work, b);
+        for (row, x) in matrix.chunks_exact(n).zip(&*b) {
+            rest.iter_mut().zip(row).for_each(|(rest, a)| *rest -= a * x);
+        }
+        substitute_transposed(n, factors, order, work, rest);
+        // As in `solve`.
+        b.iter_mut().zip(rest.iter()).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
+    }
+
     fn solve_definite(&self, b: &mut [f64]) {
         let n = self.size;
         // A zero without a minus stays as it is when nothing is taken off it, so that zeros may be left out.
@@ -217,6 +234,21 @@ fn substitute(n: usize, factors: &[f64], order: &[usize], work: &mut [f64], b: &
     for row in (0..n).rev() {
         let own = &factors[row * n..(row + 1) * n];
         b[row] = less_products(work[row], &own[row + 1..], &b[row + 1..]) / own[row];
+    }
+}
+
+fn substitute_transposed(n: usize, factors: &[f64], order: &[usize], work: &mut [f64], b: &mut [f64]) {
+    work.copy_from_slice(b);
+    for k in 0..n {
+        let (upper, left) = (&factors[k * n + k..(k + 1) * n], &mut work[k..]);
+        left[0] /= upper[0];
+        let (solved, left) = left.split_at_mut(1);
+        left.iter_mut().zip(&upper[1..]).for_each(|(left, u)| *left -= u * solved[0]);
+    }
+    for k in (0..n).rev() {
+        let (left, solved) = work.split_at_mut(k);
+        left.iter_mut().zip(&factors[k * n..]).for_each(|(left, l)| *left -= l * solved[0]);
+        b[order[k]] = work[k];
     }
 }
 
@@ -328,6 +360,40 @@ mod tests {
         assert_eq!(solve_as(&[&[1.0, 2.0], &[2.0, 4.0]], &[1.0, 1.0], true), Err(1));
         assert_eq!(solve_as(&[&[0.0, 1.0], &[1.0, 0.0]], &[2.0, 3.0], true), Ok(vec![3.0, 2.0]));
         assert_eq!(solve_as(&[&[f64::NAN, 0.0], &[0.0, 1.0]], &[1.0, 1.0], true), Err(0));
+    }
+
+    #[test]
+    fn transposed_equations_have_their_own_solutions() {
+        let mut seed = 7.0f64;
+        let mut next = || {
+            seed = (seed * 16807.0) % 2147483647.0;
+            seed / 2147483647.0 - 0.5
+        };
+        for n in 1..9 {
+            for symmetric in [false, true] {
+                let half: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| next()).collect()).collect();
+                let entry = |i: usize, j: usize| match symmetric {
+                    true => (0..n).map(|k| half[i][k] * half[j][k]).sum::<f64>() + f64::from(u8::from(i == j)),
+                    false => half[i][j],
+                };
+                let b: Vec<f64> = (0..n).map(|_| next()).collect();
+                let of = |turned: bool| {
+                    let mut lu = Lu::new(n, symmetric);
+                    (0..n * n).for_each(|k| {
+                        lu.matrix()[k] = if turned { entry(k % n, k / n) } else { entry(k / n, k % n) };
+                    });
+                    lu.factor().unwrap();
+                    lu
+                };
+                let (mut here, mut there) = (b.clone(), b.clone());
+                of(false).solve_transposed(&mut here);
+                of(true).solve(&mut there);
+                let most = there.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+                for (x, y) in here.iter().zip(&there) {
+                    assert!((x - y).abs() <= 1e-12 * most, "{n} {symmetric}: {x} {y}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -62,6 +62,14 @@ impl Factors {
         }
     }
 
+    /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
+    pub fn solve_transposed(&mut self, b: &mut [f64]) {
+        match self {
+            Factors::Full(lu, _) => lu.solve_transposed(b),
+            Factors::Sparse(lu) => lu.solve_transposed(b),
+        }
+    }
+
     /// Whether the determinant of the factored matrix is above zero.
     pub fn is_positive(&self) -> bool {
         match self {

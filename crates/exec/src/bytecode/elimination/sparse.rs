@@ -135,6 +135,44 @@ impl SparseLu {
         self.rest = rest;
     }
 
+    /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
+    pub fn solve_transposed(&mut self, b: &mut [f64]) {
+        if let (true, Some(lu)) = (self.is_full, &mut self.full) {
+            return lu.solve_transposed(b);
+        }
+        let symbolic = Arc::clone(&self.symbolic);
+        let mut rest = std::mem::take(&mut self.rest);
+        rest.copy_from_slice(b);
+        self.substitute_transposed(&symbolic, b);
+        for (place, &row) in symbolic.rows.iter().enumerate() {
+            for entry in symbolic.matrix.row(place) {
+                let column = symbolic.columns[symbolic.matrix.columns()[entry] as usize];
+                rest[column as usize] -= self.matrix[entry] * b[row as usize];
+            }
+        }
+        self.substitute_transposed(&symbolic, &mut rest);
+        // As in `solve`.
+        b.iter_mut().zip(&rest).filter(|(_, r)| r.is_finite()).for_each(|(x, r)| *x += r);
+        self.rest = rest;
+    }
+
+    fn substitute_transposed(&mut self, symbolic: &SymbolicFactors, b: &mut [f64]) {
+        let SparseLu { lower, upper, inverse, work, .. } = self;
+        work.iter_mut().zip(&symbolic.columns).for_each(|(work, &column)| *work = b[column as usize]);
+        for place in 0..symbolic.columns.len() {
+            work[place] *= inverse[place];
+            for (u, &j) in upper[symbolic.upper.row(place)].iter().zip(symbolic.upper.columns_of(place)) {
+                work[j as usize] -= u * work[place];
+            }
+        }
+        for (place, &row) in symbolic.rows.iter().enumerate().rev() {
+            for (l, &k) in lower[symbolic.lower.row(place)].iter().zip(symbolic.lower.columns_of(place)) {
+                work[k as usize] -= l * work[place];
+            }
+            b[row as usize] = work[place];
+        }
+    }
+
     fn substitute(&mut self, symbolic: &SymbolicFactors, b: &mut [f64]) {
         let SparseLu { lower, upper, inverse, work, .. } = self;
         for (place, &row) in symbolic.rows.iter().enumerate() {
@@ -213,6 +251,13 @@ mod tests {
             lu.solve(&mut x);
             let mut left = b.clone();
             pattern.places().zip(&entries).for_each(|((i, j), e)| left[i] -= e * x[j]);
+            let mut turned = b.clone();
+            lu.solve_transposed(&mut turned);
+            let mut of_turned = b.clone();
+            pattern.places().zip(&entries).for_each(|((i, j), e)| of_turned[j] -= e * turned[i]);
+            let most = turned.iter().chain(&b).fold(0.0f64, |most, x| most.max(x.abs()));
+            let missed = of_turned.iter().fold(0.0f64, |most, r| most.max(r.abs()));
+            assert!(missed <= 1e-14 * most.max(1.0), "{seed} {heavy}: {missed:e} of {most:e}, transposed");
             let size = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let rest = left.iter().fold(0.0f64, |most, r| most.max(r.abs()));
             assert!(rest <= 1e-14 * size.max(1.0), "{seed} {heavy}: {rest:e} of {size:e}");

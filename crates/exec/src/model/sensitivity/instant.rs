@@ -13,7 +13,7 @@ use halfarrow_sim::{Events, Failure, System};
 /// Instants of several conditions that differ by less than this part are one.
 const SAME: f64 = 1e-6;
 /// Rates that differ by less than this part do not jump.
-const SMOOTH: f64 = 1e-9;
+pub(super) const SMOOTH: f64 = 1e-9;
 /// What equations for derivatives may miss, as part of their terms.
 const MET: f64 = 1e-8;
 

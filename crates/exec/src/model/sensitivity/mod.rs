@@ -5,8 +5,12 @@
 //! method integrates as any other. Its Jacobian is given as the blocks `∂f/∂x` along its diagonal alone: Newton solves for the
 //! derivatives right after the states by the same factors, and second derivatives are not needed. At events see [`instant`]. Source: [MalyPetzold].
 
+mod back;
 mod instant;
 mod start;
+mod tape;
+
+pub use tape::{Tape, Taped};
 
 use super::Model;
 use crate::bytecode::Routine;
@@ -26,6 +30,8 @@ pub enum Quantity {
     State(usize),
     /// An input that is constant.
     Input(usize),
+    /// Nothing that has a name: what moves is said otherwise.
+    Nothing,
 }
 
 /// How all that a run carries moves with each of some quantities.
@@ -174,6 +180,13 @@ impl Model {
         run.map(|()| slopes).map_err(|error| self.failure(t, error))
     }
 
+    /// That there is no derivative where other variables become independent.
+    fn in_other_variables(time: f64) -> Failure {
+        let reason =
+            "the run goes on with other independent variables there, and derivatives are not taken over into these";
+        Model::without_derivative(time, "the states", reason)
+    }
+
     /// That there is no derivative.
     fn without_derivative(time: f64, what: impl Into<String>, reason: impl Into<String>) -> Failure {
         Failure::NotDifferentiable { time, what: what.into(), reason: reason.into() }
@@ -231,6 +244,15 @@ impl<'m> Varied<'m> {
 }
 
 impl Model {
+    /// The present value of a parameter or a constant input, in SI units.
+    pub fn value_of(&self, quantity: Quantity) -> Option<f64> {
+        match quantity {
+            Quantity::Parameter(index) => Some(self.frame.r[self.code.layout.parameters as usize + index]),
+            Quantity::Input(index) => Some(self.frame.r[self.code.layout.inputs as usize + index]),
+            Quantity::Start(_) | Quantity::State(_) | Quantity::Nothing => None,
+        }
+    }
+
     /// The magnitude of a quantity, 0 where it is not known.
     pub fn size_of(&self, quantity: Quantity) -> f64 {
         let register = |r: Option<u32>| r.map_or(0.0, |r| self.frame.r[r as usize].abs());
@@ -238,6 +260,7 @@ impl Model {
         match quantity {
             Quantity::Parameter(index) => register(Some(layout.parameters + index as u32)),
             Quantity::Input(index) => register(Some(layout.inputs + index as u32)),
+            Quantity::Nothing => 0.0,
             Quantity::State(index) => self.run.scales.get(index).copied().unwrap_or(0.0),
             Quantity::Start(index) => register(layout.registers.get(&self.code.program.start[index].asked).copied()),
         }
@@ -338,9 +361,7 @@ impl Events for Varied<'_> {
         if !self.model.exchange_independent(t, &mut y[..self.n], failed)? {
             return Ok(false);
         }
-        let reason =
-            "the run goes on with other independent variables there, and derivatives are not taken over into these";
-        Err(Model::without_derivative(t, "the states", reason))
+        Err(Model::in_other_variables(t))
     }
 
     fn note_magnitudes(&mut self, t: f64, y: &[f64], magnitudes: &[f64]) -> Result<(), Failure> {
