@@ -395,6 +395,10 @@ pub struct Simulate {
     /// `d(body.f)/d(ks)`; may be repeated
     #[arg(long, value_name = "NAMES")]
     pub sensitivity: Vec<String>,
+    /// Differentiate one number that the run comes to, such as `rms(travel)` or `final(body.f)`, by what --sensitivity names, else
+    /// by all parameters, at the cost of a few runs
+    #[arg(long, value_name = "NUMBER")]
+    pub gradient: Option<String>,
     /// Put positions that only speeds keep together back onto the relations between them after each step
     #[arg(long)]
     pub project: bool,

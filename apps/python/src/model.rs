@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use halfarrow::{
-    Compare, Compiled, DrawOptions, DrawnPaths, Error, Export, Form, Library, Override, Picture, PlotOptions, Real,
-    Report, Source, Stage, Target,
+    Compare, Compiled, DrawOptions, DrawnPaths, Error, Export, Form, Gradient, Library, Override, Picture, PlotOptions,
+    Problem, Real, Reduce, Report, Source, Stage, Target, Trace,
 };
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBytes};
 use pythonize::pythonize;
@@ -84,6 +85,17 @@ fn overrides(set: Overrides) -> Vec<Override> {
 /// Does something without the interpreter, which may fail.
 fn tried<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
     apart(py, work).map_err(|error| raised(py, error))
+}
+
+/// What an objective of Python gives for a run.
+fn asked(py: Python<'_>, objective: &Py<PyAny>, trace: &Trace) -> PyResult<(f64, Vec<Vec<f64>>)> {
+    let times = PyArray1::from_slice(py, &trace.times);
+    let columns: Vec<_> = trace.columns.iter().map(|c| PyArray1::from_slice(py, &c.values)).collect();
+    let names: Vec<&str> = trace.columns.iter().map(|c| c.name.as_str()).collect();
+    let told = objective.bind(py).call1((times, names, columns))?;
+    let (value, weights): (f64, Vec<PyReadonlyArray1<'_, f64>>) = told.extract()?;
+    let weights = weights.iter().map(|w| Ok(w.to_vec()?)).collect::<PyResult<_>>()?;
+    Ok((value, weights))
 }
 
 #[pymethods]
@@ -225,6 +237,51 @@ impl Model {
         });
         let seconds = begun.elapsed().as_secs_f64();
         Ended::of(py, outcome, seconds, watcher)
+    }
+
+    /// A run, and the derivatives of a number that it comes to: of a text such as `rms(travel)`, or of what `objective` gives
+    /// for times, names and columns, with its derivatives by the columns. Of each the name, the unit, the present value and the
+    /// derivative; then by what there is none, and why.
+    #[allow(clippy::type_complexity, reason = "a row of plain values")]
+    fn gradient(
+        &self,
+        py: Python<'_>,
+        options: RunOptions,
+        given: Inputs<'_>,
+        values: Values,
+        objective: Py<PyAny>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(f64, Vec<(String, String, Option<f64>, f64)>, Vec<(String, String)>, Ended)> {
+        let run = options.run(given)?;
+        let reduce = match objective.extract::<String>(py) {
+            Ok(text) => Some(Reduce::parse(&text).map_err(refused)?),
+            Err(_) => None,
+        };
+        let (mut watcher, mut begun, mut thrown) = (Watcher::new(progress), Instant::now(), None);
+        let outcome = apart(py, || {
+            let mut go_on = |told: halfarrow::Progress<'_>| watcher.go_on(|| (told.time,));
+            let compiled = self.compiled_with(run.form, &values)?;
+            begun = Instant::now();
+            let mut number = |trace: &Trace| match &reduce {
+                Some(reduce) => reduce.objective(trace),
+                None => Python::attach(|py| asked(py, &objective, trace)).map_err(|error| {
+                    thrown = Some(error);
+                    Problem::BadOption { reason: "the objective has raised".into() }.into()
+                }),
+            };
+            compiled.gradient(&run, &mut number, &mut go_on)
+        });
+        let seconds = begun.elapsed().as_secs_f64();
+        if let Some(error) = thrown {
+            return Err(error);
+        }
+        let (found, run) = match outcome {
+            Ok(Gradient { value, slopes, without, run }) => ((value, slopes, without), Ok(run)),
+            Err(error) => ((f64::NAN, Vec::new(), Vec::new()), Err(error)),
+        };
+        let ended = Ended::of(py, run, seconds, watcher)?;
+        let slopes = found.1.into_iter().map(|s| (s.name, s.unit, s.at, s.slope)).collect();
+        Ok((found.0, slopes, found.2, ended))
     }
 
     /// A sweep in memory, on all cores or on one thread.

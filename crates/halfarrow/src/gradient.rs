@@ -88,14 +88,15 @@ impl Model {
             return Err(Problem::BadOption { reason }.into());
         }
         if let Some((at, _)) = weights.iter().enumerate().find(|(_, w)| w.iter().any(|w| !w.is_finite())) {
-            let reason =
-                format!("the derivative by {} is not a finite number everywhere", run.trace.columns[at].name);
+            let reason = format!("the derivative by {} is not a finite number everywhere", run.trace.columns[at].name);
             return Err(Problem::BadOption { reason }.into());
         }
         // From declared units to SI units.
-        let factors: Vec<f64> = units(&system)[taped.first..].iter().map(|unit| unit.as_ref().map_or(1.0, step)).collect();
-        let rows: Vec<f64> =
-            (0..samples).flat_map(|k| weights.iter().zip(&factors).map(move |(column, factor)| column[k] * factor)).collect();
+        let factors: Vec<f64> =
+            units(&system)[taped.first..].iter().map(|unit| unit.as_ref().map_or(1.0, step)).collect();
+        let rows: Vec<f64> = (0..samples)
+            .flat_map(|k| weights.iter().zip(&factors).map(move |(column, factor)| column[k] * factor))
+            .collect();
         let method = (options.method, taped.stiff);
         let slopes = taped.tape.gradient(&mut system, (taped.first, &rows), method, options.rtol);
         let slopes = slopes.map_err(|failure| self.stopped(failure))?;

@@ -114,7 +114,9 @@ fn all_models_agree_with_the_way_forth() {
             .take(6)
             .collect();
         let asked = run(&by, to);
-        for (method, step, most) in [(Method::Auto, None, 1e-5), (Method::Fixed(FixedMethod::Rk4), Some(to / 1024.0), 1e-9)] {
+        for (method, step, most) in
+            [(Method::Auto, None, 1e-5), (Method::Fixed(FixedMethod::Rk4), Some(to / 1024.0), 1e-9)]
+        {
             let asked = Run { method, step, ..asked.clone() };
             // A step that is too long for a stiff model fails both ways.
             if step.is_some() && model.simulate(&asked, &mut |_| true).is_err() {
@@ -181,7 +183,7 @@ c -> R:damper(b)
     let given = Run { inputs: vec![("lift".into(), Input::Constant(50.0))], ..run(&["lift", "m"], 0.5) };
     by_all_methods(&car, &given, 1e-3);
     let times: Vec<f64> = (0..20).map(|i| 0.03 * f64::from(i)).collect();
-    let values = times.iter().map(|t| 300.0 * (9.0 * t).sin()).collect();
+    let values = times.iter().map(|t| 300.0 * libm::sin(9.0 * t)).collect();
     let moving = Run { inputs: vec![("lift".into(), Input::Series { times, values })], ..run(&["k", "m", "b"], 0.5) };
     by_all_methods(&car, &moving, 1e-3);
     by_all_methods(&car, &Run { start: Start::Equilibrium, ..run(&["m", "k", "g"], 0.5) }, 1e-3);
@@ -242,7 +244,8 @@ c -> R:cubic[3](e = a[7]*f + abs(f)*f*a[8])
 
 #[test]
 fn reductions_are_those_of_sweeps() {
-    let drop = model("model Drop\nparam m = 2 kg, b = 1\nSe:weight(9.81*m) -> 1:j -> I:mass(m, f0 = -1)\nj -> R:air(b)\n");
+    let drop =
+        model("model Drop\nparam m = 2 kg, b = 1\nSe:weight(9.81*m) -> 1:j -> I:mass(m, f0 = -1)\nj -> R:air(b)\n");
     let by = ["m", "b"];
     for kind in ["initial", "final", "min", "max", "max_abs", "mean", "rms"] {
         let wanted = Reduce::parse(&format!("{kind}(mass.f)")).expect("a reduction");

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
-    AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Method, Model, Problem, Record,
-    Run, RunReport, Scene, Simulated, Start, Stopped, Trace, csv_text, listed, write_csv, write_parquet,
+    AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Gradient, Method, Model, Problem,
+    Record, Reduce, Run, RunReport, Scene, Simulated, Slope, Start, Stopped, Trace, csv_text, listed, write_csv,
+    write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -30,19 +31,23 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         let mut progress = Progress::new(arguments.to);
         let stop = stop::on_signals();
         let mut told: Vec<String> = Vec::new();
-        let outcome = model.simulate(&run, &mut |come| {
+        let mut reach = |come: halfarrow::Progress<'_>| {
             if let Some(note) = come.note {
                 screen::note(&format!("warning: {note}"));
                 told.push(note.to_string());
             }
             progress.reach(come.time);
             !stop.load(Relaxed)
-        });
+        };
+        let outcome = match &arguments.gradient {
+            None => model.simulate(&run, &mut reach).map(|done| (done, None)),
+            Some(number) => gradient(model, &run, number, &mut reach),
+        };
         progress.finish();
         match outcome {
-            Ok(mut done) => {
+            Ok((mut done, gradient)) => {
                 let scene = animation::scene(arguments, model, &mut done, &own)?;
-                finish(arguments, model, (&done, scene.as_ref()), (&told, None))?;
+                finish(arguments, model, (&done, gradient.as_ref(), scene.as_ref()), (&told, None))?;
                 Ok(0)
             }
             Err(Error::Run(stopped)) => {
@@ -50,12 +55,36 @@ pub fn simulate(arguments: &Simulate) -> u8 {
                 screen::note(&format!("error: {failure}"));
                 let mut done = Simulated { trace, report };
                 let scene = animation::scene(arguments, model, &mut done, &own)?;
-                finish(arguments, model, (&done, scene.as_ref()), (&told, Some(&failure.to_string())))?;
+                finish(arguments, model, (&done, None, scene.as_ref()), (&told, Some(&failure.to_string())))?;
                 Ok(3)
             }
             Err(error) => Err(error),
         }
     })
+}
+
+/// What a gradient is of, and what it comes to.
+type Differentiated = (String, Gradient);
+
+/// A run that is followed backwards.
+fn gradient(
+    model: &Model,
+    run: &Run,
+    number: &str,
+    reach: &mut dyn FnMut(halfarrow::Progress<'_>) -> bool,
+) -> Result<(Simulated, Option<Differentiated>), Error> {
+    let wanted = Reduce::parse(number)?;
+    let name = || wanted.variable.clone();
+    let record = match &run.record {
+        Record::Default => Record::Also(vec![name()]),
+        Record::Names(names) if !names.contains(&wanted.variable) => {
+            Record::Names(names.iter().cloned().chain([name()]).collect())
+        }
+        other => other.clone(),
+    };
+    let run = Run { record, sensitivities: run.sensitivities.clone(), ..run.clone() };
+    let found = model.gradient(&run, &mut |trace| wanted.objective(trace), reach)?;
+    Ok((found.run.clone(), Some((number.trim().to_string(), found))))
 }
 
 fn run(arguments: &Simulate) -> Run {
@@ -156,7 +185,7 @@ fn is_stdout(path: &Path) -> bool {
 fn finish(
     arguments: &Simulate,
     model: &Model,
-    (done, scene): (&Simulated, Option<&Scene>),
+    (done, gradient, scene): (&Simulated, Option<&Differentiated>, Option<&Scene>),
     (told, error): (&[String], Option<&str>),
 ) -> Result<(), Error> {
     if done.trace.samples() > 0 || error.is_none() {
@@ -173,12 +202,15 @@ fn finish(
     }
     if arguments.model.model.json {
         if !to_stdout {
-            screen::print_json(&json_of(arguments, model, done, error))?;
+            screen::print_json(&json_of(arguments, model, (done, gradient), error))?;
         }
     } else if to_stdout {
         screen::note(summary(&done.report).trim_end());
     } else if done.trace.samples() > 0 || error.is_none() {
         screen::print(&(values(&done.trace, Page::of(&arguments.page)) + &summary(&done.report)))?;
+    }
+    if let (Some(gradient), false, false) = (gradient, arguments.model.model.json, to_stdout) {
+        screen::print(&slopes(gradient, done, Page::of(&arguments.page)))?;
     }
     Ok(())
 }
@@ -196,8 +228,18 @@ fn write_files(arguments: &Simulate, trace: &Trace) -> Result<(), Error> {
 }
 
 /// The report, the columns and, if they are written nowhere else, the values.
-fn json_of(arguments: &Simulate, model: &Model, done: &Simulated, error: Option<&str>) -> Value {
+fn json_of(
+    arguments: &Simulate,
+    model: &Model,
+    (done, gradient): (&Simulated, Option<&Differentiated>),
+    error: Option<&str>,
+) -> Value {
     let mut object = json!(done.report);
+    if let Some((of, gradient)) = gradient {
+        let without: serde_json::Map<_, _> =
+            gradient.without.iter().map(|(name, why)| (name.clone(), json!(why))).collect();
+        object["gradient"] = json!({"of": of, "value": gradient.value, "slopes": gradient.slopes, "without": without});
+    }
     if let Some(error) = error {
         object["error"] = json!(error);
     }
@@ -261,6 +303,32 @@ fn values(trace: &Trace, page: Page) -> String {
     });
     page.table(["variable", "unit", "start", "end", "least", "greatest"], rows)
         + &more(columns, "name those of interest with --record, or write all with --out")
+}
+
+/// A number, and its derivatives; beside each what a change of one percent does.
+fn slopes((of, gradient): &Differentiated, done: &Simulated, page: Page) -> String {
+    let variable = of.split_once('(').map_or("", |(_, rest)| rest.trim_end_matches(')').trim());
+    let unit = done.trace.columns.iter().find(|c| c.name == variable).map_or("", |c| c.unit.as_str());
+    let per = |by: &str| match (unit, by) {
+        (unit, "") => unit.to_string(),
+        ("" | "1", by) => format!("1/({by})"),
+        (unit, by) => format!("({unit})/({by})"),
+    };
+    // Of many those that matter most.
+    let mut sorted: Vec<_> = gradient.slopes.iter().collect();
+    if gradient.slopes.len() > LONG {
+        let effect = |slope: &Slope| (slope.at.unwrap_or(0.0) * slope.slope).abs();
+        sorted.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
+    }
+    let rows = sorted.into_iter().take(shown(gradient.slopes.len())).map(|slope| {
+        let percent = slope.at.map_or(String::new(), |at| screen::short(0.01 * at * slope.slope));
+        [slope.name.clone(), screen::short(slope.slope), per(&slope.unit), percent]
+    });
+    let without = gradient.without.iter().map(|(name, why)| format!("not by {name}: {why}\n"));
+    format!("{of} = {} {unit}\n", screen::short(gradient.value))
+        + &page.table(["by", "derivative", "unit", "of 1 %"], rows)
+        + &more(gradient.slopes.len(), "--json has them")
+        + &without.collect::<String>()
 }
 
 fn summary(report: &RunReport) -> String {

@@ -42,6 +42,12 @@ Differentiate it, fit it
 >>> d["travel", "ks"].shape, d.units["travel", "ks"]
 ((5,), '(mm)/(N/m)')
 
+    ``gradient`` gives the derivatives of one number by all parameters, at the cost of a few runs:
+
+>>> g = car.gradient("rms(travel)", to=4, every=0.01, road=0.1)
+>>> list(g), g.units["ks"]
+(['ms', 'ks', 'b'], 'N/m')
+
 Look at it near a point
     ``linearize`` gives matrices, poles, zeros, ``bode()``, ``to_control()``:
 
@@ -87,6 +93,7 @@ from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
 from .linear import Linearization
 from .loops import Loops
+from .gradients import Gradient, Recorded
 from .model import Input, Model, Parameter, Variable, load, model
 from .picture import Picture
 from .result import Audit, Result
@@ -106,6 +113,7 @@ __all__ = [
     "Experiment",
     "FileError",
     "Fit",
+    "Gradient",
     "Input",
     "Interrupted",
     "Library",
@@ -117,6 +125,7 @@ __all__ = [
     "Parameter",
     "Picture",
     "Profile",
+    "Recorded",
     "Result",
     "RunError",
     "Sensitivities",

@@ -36,6 +36,7 @@ from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
 from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
+from .gradients import Gradient, Objective, asked, variables
 from .linear import Linearization
 from .loops import Loops
 from .picture import Picture
@@ -467,6 +468,71 @@ class Model:
         result = Result(self, ended, to)
         _conclude(ended, result)
         return Sensitivities(result, quantities)
+
+    def gradient(
+        self,
+        of: Objective,
+        to: float,
+        by: str | Sequence[str] = (),
+        *,
+        every: float | None = None,
+        at: npt.ArrayLike | None = None,
+        method: Method = "auto",
+        step: float | None = None,
+        rtol: float = 1e-6,
+        atol: float | None = None,
+        start: Literal["given", "equilibrium"] = "given",
+        record: str | Sequence[str] | None = None,
+        also: str | Sequence[str] = (),
+        execution: Literal["auto", "bytecode", "machine"] = "auto",
+        sample: float | None = None,
+        parameters: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        progress: Any = None,
+        **values: Any,
+    ) -> Gradient:
+        """The derivatives of one number that a run comes to by any number of parameters, at the cost of a few runs: the run is
+        followed backwards (adjoint method), step by step where steps have a fixed length, else along its path to the same
+        tolerance; through events, solve blocks and the start. Every step is kept meanwhile. Few parameters and many numbers:
+        ``sensitivities``.
+
+        Args:
+            of: What is differentiated: ``"rms(travel)"`` or ``("travel", "rms")`` with a reduction of ``sweep``; weights of the
+                samples by the names of variables, whose weighted sum it is; or a function that is given what was recorded, by
+                name (``"t"``: the times), and gives the number and its derivatives by what was recorded, arrays by name.
+            by: Parameters, constant inputs, and start values such as ``body.q(0)``; nothing: all parameters.
+            to, every, at, method, step, rtol, atol, start, record, also, execution, sample, parameters, inputs, progress,
+                values: As in ``simulate``; a linearly implicit method cannot be taken.
+
+        Returns:
+            The derivatives by name, with ``value`` and the run as ``result``.
+
+        Raises:
+            UsageError: a quantity is unknown, or the model is no differentiable function of it.
+            RunError: the run stopped, or has come to where there is no derivative, which is told with time and place.
+            UnknownNameError, Interrupted: as in ``simulate``.
+
+        Warns:
+            AuditWarning, ModelWarning: as in ``simulate``.
+        """
+        set_values, given = self._split(values, parameters, inputs)
+        more = [*([also] if isinstance(also, str) else also), *variables(of)]
+        recorded = _recorded(record, [name for name in dict.fromkeys(more) if name != record and name not in (record or ())])
+        options = _options(
+            to=to, every=every, at=_times(at), method=method, step=step, rtol=rtol, atol=atol, form="minimal", start=start,
+            record=recorded, project=False, minimum_norm=False, stiffness=None, damping=None,
+            execution=execution, sensitivities=[by] if isinstance(by, str) else list(by),
+        )  # fmt: skip
+        sample = sample or every or step or to / _POINTS
+        sent = all_given(given, to, sample)
+        with Bar(progress, to, self.name, "s") as bar:
+            value, slopes, without, ended = self._core.gradient(
+                options, sent, set_values, asked(of), bar.reach if bar else None
+            )
+            bar.reach(ended.reached)
+        result = Result(self, ended, to)
+        _conclude(ended, result)
+        return Gradient(value, slopes, without, result)
 
     def fit(
         self,

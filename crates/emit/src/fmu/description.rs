@@ -74,8 +74,8 @@ fn interfaces(export: &Export, version: Version, name: &str) -> String {
             )
         }
         Version::V3 => {
-            let common =
-                "canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" providesDirectionalDerivatives=\"true\"";
+            let common = "canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" \
+                          providesDirectionalDerivatives=\"true\" providesAdjointDerivatives=\"true\"";
             format!(
                 "  <ModelExchange modelIdentifier=\"{name}\" needsCompletedIntegratorStep=\"{follows}\" {common}/>\n\
                  \x20 <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \

@@ -350,6 +350,14 @@ def derivatives(where, file):
             fmu.api.setContinuousStates((ctypes.c_double * len(x))(*x), len(x))
 
     structure = {u.variable.name: {d.name for d in u.dependencies} for u in fmu.description.derivatives + fmu.description.outputs}
+    if fmu.version == 3:
+        # Weighted sums of the columns.
+        references, weights = [v.valueReference for v in known], [math.cos(1.0 + 3.0 * i) for i in range(len(unknowns))]
+        adjoint = list(fmu.api.getAdjointDerivative(unknowns, references, weights, len(references))) if references else []
+        for reference, found in zip(references, adjoint):
+            terms = [w * s for w, s in zip(weights, fmu.api.getDirectionalDerivative(unknowns, [reference], [1.0]))]
+            if not abs(found - sum(terms)) <= 1e-12 * sum(map(abs, terms)):
+                fault(where, f"the adjoint derivative by {reference} is {found}, not {sum(terms)}")
     for variable, at in known.items():
         exact = list(fmu.api.getDirectionalDerivative(unknowns, [variable.valueReference], [1.0]))
         h = 1e-6 * max(abs(at), 1e-3)

@@ -416,21 +416,14 @@ static int ha_advance_to(ha_fmu *f, double from, double length)
     return 1;
 }
 
-/* Derivatives of rates and outputs along a direction of states and inputs. */
-static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const unsigned *knowns, size_t columns, const double *seed, double *result)
+/* Derivatives of all rates and outputs along a direction of states and inputs. */
+static int ha_along(ha_fmu *f, const unsigned *knowns, size_t columns, const double *seed, double *dv, double *dy)
 {
     double v[HA_NX > 0 ? HA_NX : 1];
     double w[HA_NU > 0 ? HA_NU : 1];
-    double dv[HA_NX > 0 ? HA_NX : 1];
-    double dy[HA_NY > 0 ? HA_NY : 1];
     size_t i;
     memset(v, 0, sizeof v);
     memset(w, 0, sizeof w);
-    memset(dv, 0, sizeof dv);
-    memset(dy, 0, sizeof dy);
-    if (!ha_started(f)) {
-        return 0;
-    }
     for (i = 0; i < columns; ++i) {
         const int r = knowns[i] < HA_REFERENCES ? (int)knowns[i] : -1;
         if (r >= HA_FIRST_STATE && r < HA_FIRST_DERIVATIVE) {
@@ -438,20 +431,43 @@ static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const 
         } else if (r >= HA_FIRST_INPUT && r < HA_FIRST_PARAMETER) {
             w[r - HA_FIRST_INPUT] = seed[i];
         } else {
-            return ha_refuse(f, "directional derivatives are taken by states and inputs");
+            return ha_refuse(f, "derivatives are taken by states and inputs");
         }
     }
     if ($model_directional(&f->s.m, f->s.m.t, f->s.m.x, v, w, dv, dy) != $MODEL_OK) {
         return ha_without_value(f);
     }
+    return 1;
+}
+
+/* That of one of them. */
+static int ha_of(ha_fmu *f, unsigned unknown, const double *dv, const double *dy, double *result)
+{
+    const int r = unknown < HA_REFERENCES ? (int)unknown : -1;
+    if (r >= HA_FIRST_DERIVATIVE && r < HA_FIRST_INPUT) {
+        *result = dv[r - HA_FIRST_DERIVATIVE];
+    } else if (r >= HA_FIRST_OUTPUT && r < HA_FIRST_INDICATOR) {
+        *result = dy[r - HA_FIRST_OUTPUT];
+    } else {
+        return ha_refuse(f, "derivatives are those of outputs and of derivatives of states");
+    }
+    return 1;
+}
+
+/* Derivatives of rates and outputs along a direction of states and inputs. */
+static int ha_direction(ha_fmu *f, const unsigned *unknowns, size_t rows, const unsigned *knowns, size_t columns, const double *seed, double *result)
+{
+    double dv[HA_NX > 0 ? HA_NX : 1];
+    double dy[HA_NY > 0 ? HA_NY : 1];
+    size_t i;
+    memset(dv, 0, sizeof dv);
+    memset(dy, 0, sizeof dy);
+    if (!ha_started(f) || !ha_along(f, knowns, columns, seed, dv, dy)) {
+        return 0;
+    }
     for (i = 0; i < rows; ++i) {
-        const int r = unknowns[i] < HA_REFERENCES ? (int)unknowns[i] : -1;
-        if (r >= HA_FIRST_DERIVATIVE && r < HA_FIRST_INPUT) {
-            result[i] = dv[r - HA_FIRST_DERIVATIVE];
-        } else if (r >= HA_FIRST_OUTPUT && r < HA_FIRST_INDICATOR) {
-            result[i] = dy[r - HA_FIRST_OUTPUT];
-        } else {
-            return ha_refuse(f, "directional derivatives are those of outputs and of derivatives of states");
+        if (!ha_of(f, unknowns[i], dv, dy, &result[i])) {
+            return 0;
         }
     }
     return 1;

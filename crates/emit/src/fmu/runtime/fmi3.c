@@ -291,6 +291,45 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return ha_tried(f, ha_direction(f, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
 }
 
+/* By one state or input after the other, each along its direction. */
+static int ha_adjoint(ha_fmu *f, const unsigned *unknowns, size_t rows, const unsigned *knowns, size_t columns, const double *seed, double *result)
+{
+    const double one = 1.0;
+    double dv[HA_NX > 0 ? HA_NX : 1];
+    double dy[HA_NY > 0 ? HA_NY : 1];
+    size_t i;
+    size_t j;
+    if (!ha_started(f)) {
+        return 0;
+    }
+    for (j = 0; j < columns; ++j) {
+        double sum = 0.0;
+        memset(dv, 0, sizeof dv);
+        memset(dy, 0, sizeof dy);
+        if (!ha_along(f, &knowns[j], 1, &one, dv, dy)) {
+            return 0;
+        }
+        for (i = 0; i < rows; ++i) {
+            double slope = 0.0;
+            if (!ha_of(f, unknowns[i], dv, dy, &slope)) {
+                return 0;
+            }
+            sum += seed[i] * slope;
+        }
+        result[j] = sum;
+    }
+    return 1;
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    HA_CHECK(HA_IN(HA_INITIALISING) | HA_RUNNING | HA_IN(HA_TERMINATED), "fmi3GetAdjointDerivative")
+    if (nSeed != nUnknowns || nSensitivity != nKnowns) {
+        return ha_status(ha_refuse(f, "all variables are scalars"));
+    }
+    return ha_tried(f, ha_adjoint(f, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
+}
+
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
 {
     return ha_not_there(instance, "fmi3EnterConfigurationMode");
@@ -490,19 +529,6 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
     (void)dependencyKinds;
     (void)nDependencies;
     return ha_not_there(instance, "fmi3GetVariableDependencies");
-}
-
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
-{
-    (void)unknowns;
-    (void)nUnknowns;
-    (void)knowns;
-    (void)nKnowns;
-    (void)seed;
-    (void)nSeed;
-    (void)sensitivity;
-    (void)nSensitivity;
-    return ha_not_there(instance, "fmi3GetAdjointDerivative");
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])

@@ -203,7 +203,8 @@ impl<'m> Back<'m> {
                                 }
                             }
                         }
-                        let found = found.and_then(|()| self.along((t, tape.points[to].t), (method, rtol), &mut states));
+                        let found =
+                            found.and_then(|()| self.along((t, tape.points[to].t), (method, rtol), &mut states));
                         k = to + 1;
                         found
                     }
@@ -294,7 +295,12 @@ impl<'m> Back<'m> {
     }
 
     /// Along the path of a method of variable step.
-    fn along(&mut self, (from, to): (f64, f64), (method, rtol): (Method, f64), states: &mut [f64]) -> Result<(), Failure> {
+    fn along(
+        &mut self,
+        (from, to): (f64, f64),
+        (method, rtol): (Method, f64),
+        states: &mut [f64],
+    ) -> Result<(), Failure> {
         if from <= to {
             return Ok(());
         }
@@ -318,7 +324,13 @@ impl<'m> Back<'m> {
     fn place_on_path(&mut self, t: f64) -> Result<(), Failure> {
         let k = self.step_at(t);
         let mut x = std::mem::take(&mut self.x);
-        let found = if self.stiff { Ok(self.between_neighbours(k, t, &mut x)) } else { self.between_ends(k, t, &mut x) };
+        let found = match self.stiff {
+            true => {
+                self.between_neighbours(k, t, &mut x);
+                Ok(())
+            }
+            false => self.between_ends(k, t, &mut x),
+        };
         self.remember(k - 1);
         self.model.place(t, &x);
         self.x = x;
