@@ -138,6 +138,9 @@ fn of_events(list: &mut List, plan: &Plan) {
     list.one(Kind::Int, &["begun"], "whether the run has begun");
     list.one(Kind::Int, &["cross_due"], "whether a parameter or an input has jumped");
     list.one(Kind::Wide, &["crossed"], "when the last jump was crossed");
+    if plan.export.derivatives {
+        list.one(Kind::Int, &["stops"], "whether steps end where a jump was crossed");
+    }
     list.arrays(Kind::Real, &["u_crossed"], p.inputs.len(), "inputs then");
     list.arrays(Kind::Real, &["u_default"], p.inputs.len(), "inputs that nobody sets");
     list.one(Kind::Wide, &["tick_from", "tick_next", "tick_index", "tick_rate"], "times of steps");

@@ -79,7 +79,7 @@ fn interfaces(export: &Export, version: Version, name: &str) -> String {
             format!(
                 "  <ModelExchange modelIdentifier=\"{name}\" needsCompletedIntegratorStep=\"{follows}\" {common}/>\n\
                  \x20 <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
-                 fixedInternalStepSize=\"{:?}\" {common}/>\n",
+                 fixedInternalStepSize=\"{:?}\" hasEventMode=\"true\" mightReturnEarlyFromDoStep=\"true\" {common}/>\n",
                 export.step
             )
         }

@@ -99,7 +99,7 @@ def trajectory(model, *arguments):
 class Fmu:
     """An instance of either version, with what was logged."""
 
-    def __init__(self, file, exchange=False, guid=None):
+    def __init__(self, file, exchange=False, guid=None, events=False):
         self.description = fmpy.read_model_description(str(file))
         self.version = 2 if self.description.fmiVersion == "2.0" else 3
         self.folder = fmpy.extract(str(file))
@@ -122,7 +122,8 @@ class Fmu:
             self.callbacks = callbacks
             self.api.instantiate(callbacks=callbacks)
         else:
-            self.api.instantiate(logMessage=lambda e, s, c, message: self.logged.append(message.decode()))
+            more = {"eventModeUsed": True, "earlyReturnAllowed": True} if events else {}
+            self.api.instantiate(logMessage=lambda e, s, c, message: self.logged.append(message.decode()), **more)
         self.variables = {v.name: v for v in self.description.modelVariables}
 
     def begin(self, values={}):
@@ -209,6 +210,61 @@ def co_simulation(where, file, reference, values={}):
             k = differ[0]
             fault(where, f"{name} is {rows[k][i]!r} at {k / 100} s, but {wanted[k]!r}")
     fmu.close()
+
+
+def event_mode(where, file, reference, happens):
+    """Co-simulation of FMI 3 that returns where something happens has the values of the one that does not."""
+    fmu = Fmu(file, events=True)
+    fmu.begin()
+    fmu.api.updateDiscreteStates()
+    fmu.api.enterStepMode()
+    names = recorded(fmu, reference)
+    rows, events = [fmu.get(names)], 0
+    for point in range(POINTS):
+        t, end = point / 100, (point + 1) / 100
+        while t < end - 1e-12:
+            needed, _, early, reached = fmu.api.doStep(currentCommunicationPoint=t, communicationStepSize=end - t)
+            if early and not needed:
+                fault(where, f"a step returns at {reached} s without an event")
+            if needed:
+                events += 1
+                fmu.api.enterEventMode()
+                fmu.api.updateDiscreteStates()
+                fmu.api.enterStepMode()
+            t = reached
+        rows.append(fmu.get(names))
+    if happens and not events:
+        fault(where, "no event was told")
+    for i, name in enumerate(names):
+        differ = [k for k in range(POINTS + 1) if abs(rows[k][i] - reference[name][k]) > 1e-9 * abs(reference[name][k]) + 1e-12]
+        if differ:
+            k = differ[0]
+            fault(where, f"{name} is {rows[k][i]!r} at {k / 100} s, but {reference[name][k]!r}")
+    fmu.close()
+    # An input that jumps between two steps, and in event mode.
+    inputs = [v.name for v in fmu.description.modelVariables if v.causality == "input"]
+    ends = []
+    for events in (False, True) if inputs else ():
+        fmu = Fmu(file, events=events)
+        fmu.begin()
+        if events:
+            fmu.api.updateDiscreteStates()
+            fmu.api.enterStepMode()
+        for point in range(10):
+            if point == 5:
+                if events:
+                    fmu.api.enterEventMode()
+                fmu.set(inputs[0], fmu.get(inputs[:1])[0] + 0.1)
+                if events:
+                    fmu.api.updateDiscreteStates()
+                    fmu.api.enterStepMode()
+            t, end = point / 100, (point + 1) / 100
+            while t < end - 1e-12:
+                t = fmu.api.doStep(currentCommunicationPoint=t, communicationStepSize=end - t)[3]
+        ends.append(fmu.get(names))
+        fmu.close()
+    if ends and any(abs(a - b) > 1e-12 * abs(a) + 1e-15 for a, b in zip(*ends)):
+        fault(where, f"an input that jumps in event mode leads to {ends[1]}, between two steps to {ends[0]}")
 
 
 def ball(t):
@@ -543,6 +599,9 @@ def main():
             for problem in validate_fmu(str(file)):
                 fault(where, problem)
             co_simulation(where + " co-simulation", file, reference)
+            if version == 3:
+                happens = name in ("when_bouncing_ball", "when_rimless_wheel", "controlled")
+                event_mode(where + " co-simulation with event mode", file, reference, happens)
             if name != "rectifier":  # its diodes turn over within one step
                 variable_steps(where, file)
             model_exchange(where + " model exchange", file, tight, tolerance)

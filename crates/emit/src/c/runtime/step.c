@@ -273,6 +273,11 @@ int $model_step_until($model *m, double end)
         const double jump = $model_next_jump(m, m->t);
         const int jumps = jump <= end + slack;
         status = $ha_step_to(m, jumps ? jump : end, jumps);
+//if derivatives
+        if (status == $MODEL_OK && m->stops && m->crossed == m->t) {
+            return $model_observe(m, m->t, m->x, m->y);
+        }
+//end
     }
     if (status == $MODEL_OK && m->t + slack < end) {
         status = $ha_fail(m, $MODEL_TOO_MANY_JUMPS, 0, m->t);

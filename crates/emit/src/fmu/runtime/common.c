@@ -54,6 +54,10 @@ typedef struct ha_fmu {
     ha_state s;
     int exchange;
     int logging;
+    /* Co-simulation: whether it has an event mode; whether steps return where something jumps, and whether the last one has. */
+    int event_mode;
+    int stops;
+    int stopped;
     /* Whether what failed last is but a trial of the importer: the model has no value there, and goes on from elsewhere. */
     int discarded;
     /* Whether what is said last is a warning. */
@@ -317,7 +321,7 @@ static int ha_initialised(ha_fmu *f)
     if (!ha_started(f)) {
         return 0;
     }
-    f->s.mode = f->exchange ? HA_EVENT : HA_STEPPING;
+    f->s.mode = f->exchange || f->event_mode ? HA_EVENT : HA_STEPPING;
     return 1;
 }
 
@@ -331,8 +335,10 @@ static int ha_event(ha_fmu *f, double *next)
 //end
     if (!f->s.fresh) {
 //if leaps
-        /* Inputs move on their own between events. */
-        memcpy(f->s.m.u_crossed, f->s.m.u, sizeof f->s.m.u_crossed);
+        /* Inputs move on their own between events, and jump between steps. */
+        if (f->exchange) {
+            memcpy(f->s.m.u_crossed, f->s.m.u, sizeof f->s.m.u_crossed);
+        }
 //end
         if ($model_cross(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_failed(f);
@@ -401,7 +407,9 @@ static int ha_advance_to(ha_fmu *f, double from, double length)
         return ha_refuse(f, text);
     }
     ha_changed(f);
-    while (m->t + slack < end) {
+    f->stopped = 0;
+    m->stops = f->stops;
+    while (m->t + slack < end && !f->stopped) {
         int status;
         if (end - m->t < m->step - slack) {
             status = $model_step_until(m, end);
@@ -412,6 +420,7 @@ static int ha_advance_to(ha_fmu *f, double from, double length)
         if (status != $MODEL_OK) {
             return ha_failed(f);
         }
+        f->stopped = f->stops && m->crossed == m->t;
     }
     return 1;
 }

@@ -100,17 +100,22 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[], size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     (void)resourcePath;
+    ha_fmu *f;
     (void)visible;
-    (void)earlyReturnAllowed;
     (void)requiredIntermediateVariables;
     (void)intermediateUpdate;
-    if (eventModeUsed || nRequiredIntermediateVariables > 0) {
+    if (nRequiredIntermediateVariables > 0) {
         if (logMessage != NULL) {
-            logMessage(instanceEnvironment, fmi3Error, "logStatusError", "co-simulation has no event mode and no intermediate variables");
+            logMessage(instanceEnvironment, fmi3Error, "logStatusError", "co-simulation has no intermediate variables");
         }
         return NULL;
     }
-    return ha_instantiate(instanceName, instantiationToken, 0, loggingOn, instanceEnvironment, logMessage);
+    f = (ha_fmu *)ha_instantiate(instanceName, instantiationToken, 0, loggingOn, instanceEnvironment, logMessage);
+    if (f != NULL) {
+        f->event_mode = eventModeUsed ? 1 : 0;
+        f->stops = eventModeUsed && earlyReturnAllowed;
+    }
+    return f;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate, fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption)
@@ -159,7 +164,16 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
-    HA_CHECK(HA_IN(HA_CONTINUOUS) | HA_IN(HA_EVENT), "fmi3EnterEventMode")
+    HA_CHECK(HA_IN(HA_CONTINUOUS) | HA_IN(HA_EVENT) | HA_IN(HA_STEPPING), "fmi3EnterEventMode")
+    if (!f->exchange && !f->event_mode) {
+        return ha_status(ha_refuse(f, "the model was instantiated without event mode"));
+    }
+    if (f->s.mode == HA_STEPPING) {
+        /* What happens by itself at this time has happened in the step. */
+        f->s.mode = HA_EVENT;
+        f->s.fresh = f->s.m.crossed == f->s.m.t;
+        return fmi3OK;
+    }
     f->s.mode = HA_EVENT;
     f->s.fresh = 0;
     return fmi3OK;
@@ -368,6 +382,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
     HA_CHECK(HA_IN(HA_EVENT), "fmi3EnterContinuousTimeMode")
+    if (!f->exchange) {
+        return ha_status(ha_refuse(f, "fmi3EnterContinuousTimeMode is a function of model exchange"));
+    }
     f->s.mode = HA_CONTINUOUS;
     return fmi3OK;
 }
@@ -459,7 +476,12 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
-    return ha_not_there(instance, "fmi3EnterStepMode");
+    HA_CHECK(HA_IN(HA_EVENT), "fmi3EnterStepMode")
+    if (f->exchange) {
+        return ha_status(ha_refuse(f, "fmi3EnterStepMode is a function of co-simulation"));
+    }
+    f->s.mode = HA_STEPPING;
+    return fmi3OK;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize, fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
@@ -468,9 +490,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     HA_CHECK(HA_IN(HA_STEPPING), "fmi3DoStep")
     (void)noSetFMUStatePriorToCurrentPoint;
     good = ha_advance_to(f, currentCommunicationPoint, communicationStepSize);
-    *eventHandlingNeeded = fmi3False;
+    *eventHandlingNeeded = f->stopped ? fmi3True : fmi3False;
     *terminateSimulation = fmi3False;
-    *earlyReturn = fmi3False;
+    *earlyReturn = f->stopped && f->s.m.t + 1e-9 * f->s.m.step < currentCommunicationPoint + communicationStepSize ? fmi3True : fmi3False;
     *lastSuccessfulTime = f->s.m.t;
     return ha_status(good);
 }
