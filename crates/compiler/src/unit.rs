@@ -12,9 +12,7 @@ pub use dimension::{Dimension, Domain, WHOLE};
 use crate::algebra::math;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
-use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::{One, ToPrimitive, Zero};
+use dashu_ratio::RBig;
 use std::sync::Arc;
 
 /// A unit: its dimension and the way from numbers in it to numbers in SI base units.
@@ -41,11 +39,11 @@ pub struct Scale {
     /// Exponent of the radian, in sixtieths: 60 for `rad/s` and `rpm`, -60 for `N.m/rad`, 0 for `1/s`.
     pub angle: i32,
     /// The rational part of the factor to SI.
-    pub rational: BigRational,
+    pub rational: RBig,
     /// The power of pi in the factor to SI: 1 for `deg`, `rev` and `rpm`.
     pub pi: i32,
     /// What is added in SI units, for temperatures: 273.15 for `degC`.
-    pub offset: BigRational,
+    pub offset: RBig,
     text: String,
 }
 
@@ -102,9 +100,8 @@ impl Unit {
 
     /// The SI unit of a dimension, under its usual name.
     pub fn si(dimension: Dimension) -> Unit {
-        let one = BigRational::one();
-        let (offset, text) = (BigRational::zero(), dimension.to_string());
-        Scale { dimension, angle: 0, rational: one, pi: 0, offset, text }.into()
+        let text = dimension.to_string();
+        Scale { dimension, angle: 0, rational: RBig::ONE, pi: 0, offset: RBig::ZERO, text }.into()
     }
 
     /// The SI unit with the dimension and the angle of this one: `rad/s` for `rpm`, `m` for `mm`.
@@ -119,23 +116,23 @@ impl Unit {
     }
 
     /// The exact SI value of a number in this unit, as a rational to be multiplied by `pi^self.pi`.
-    pub fn to_si(&self, value: &BigRational) -> BigRational {
+    pub fn to_si(&self, value: &RBig) -> RBig {
         value * &self.rational + &self.offset
     }
 
     /// The SI value of a number in this unit, to rounding.
     pub fn to_si_f64(&self, value: f64) -> f64 {
-        match BigRational::from_float(value) {
-            Some(exact) => float(&self.to_si(&exact)) * math::whole_power(std::f64::consts::PI, self.pi.into()),
-            None => value,
+        match RBig::try_from(value) {
+            Ok(exact) => float(&self.to_si(&exact)) * math::whole_power(std::f64::consts::PI, self.pi.into()),
+            Err(_) => value,
         }
     }
 
     /// The number in this unit of an SI value, to rounding.
     pub fn from_si_f64(&self, si: f64) -> f64 {
-        match BigRational::from_float(si / math::whole_power(std::f64::consts::PI, self.pi.into())) {
-            Some(exact) => float(&((exact - &self.offset) / &self.rational)),
-            None => si,
+        match RBig::try_from(si / math::whole_power(std::f64::consts::PI, self.pi.into())) {
+            Ok(exact) => float(&((exact - &self.offset) / &self.rational)),
+            Err(_) => si,
         }
     }
 
@@ -145,8 +142,8 @@ impl Unit {
     }
 }
 
-fn float(value: &BigRational) -> f64 {
-    value.to_f64().unwrap_or(f64::NAN)
+fn float(value: &RBig) -> f64 {
+    value.to_f64().value()
 }
 
 impl std::ops::Deref for Unit {
@@ -208,8 +205,14 @@ impl UnitError {
 }
 
 /// The integer as an exact rational.
-fn whole(n: i64) -> BigRational {
-    BigRational::from(BigInt::from(n))
+fn whole(n: i64) -> RBig {
+    RBig::from(n)
+}
+
+/// A whole power, of a base other than 0 where it is below 0.
+fn whole_power(base: &RBig, exponent: i32) -> RBig {
+    let power = base.pow(exponent.unsigned_abs() as usize);
+    if exponent < 0 { RBig::ONE / power } else { power }
 }
 
 #[cfg(test)]

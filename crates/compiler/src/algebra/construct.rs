@@ -3,8 +3,8 @@
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::node::{Expr, Function, Node, Parts};
 use super::rational::Rational;
-use num_integer::Integer;
-use num_rational::BigRational;
+use dashu_base::{Gcd, UnsignedAbs};
+use dashu_int::{IBig, UBig};
 use smallvec::{SmallVec, smallvec};
 
 /// Expressions that are written no longer than this are not taken as wholes.
@@ -310,10 +310,13 @@ impl Exprs {
 
     /// `(base^(1/d))^k`: roots whose exponents add up to an integer stay roots, since the base must not be negative.
     fn power_of_root(&mut self, base: Expr, exponents: &[Rational], sum: &Rational) -> Expr {
-        let d = exponents.iter().fold(num_bigint::BigInt::from(1), |d, n| d.lcm(&n.denominator()));
-        let part = Rational::from_big(BigRational::new(1.into(), d.clone()));
-        let root = self.pow_number(base, &part);
-        let k = self.number(sum * &Rational::from_big(d.into()));
+        let lcm = |d: IBig, n: &Rational| {
+            let common = (&d).gcd(&n.denominator());
+            d / IBig::from(common) * n.denominator()
+        };
+        let d = Rational::from_big(exponents.iter().fold(IBig::ONE, lcm).into());
+        let root = self.pow_number(base, &d.recip().expect("a multiple of denominators"));
+        let k = self.number(sum * &d);
         self.intern(Node::Pow(root, k))
     }
 
@@ -471,7 +474,7 @@ struct Product {
 }
 
 fn is_even(n: &Rational) -> bool {
-    n.is_integer() && !n.numerator().bit(0)
+    n.is_integer() && n.is_even()
 }
 
 /// The number that `primitive` takes out.
@@ -485,6 +488,8 @@ fn content(terms: &[(Rational, Expr)]) -> Rational {
     if !terms.iter().all(|t| t.0.is_integer()) {
         return sign;
     }
-    let gcd = terms.iter().fold(num_bigint::BigInt::from(0), |g, t| g.gcd(&t.0.numerator()));
+    let mut numerators = terms.iter().map(|t| t.0.numerator().unsigned_abs());
+    let first = numerators.next().unwrap_or(UBig::ONE);
+    let gcd = numerators.fold(first, |g, n| if n.is_zero() { g } else { g.gcd(n) });
     &sign * &Rational::from_big(gcd.into())
 }

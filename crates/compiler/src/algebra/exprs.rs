@@ -267,7 +267,7 @@ fn hash_number(value: &Rational) -> u64 {
         Some((n, d)) => mix(mix(0x0c0, n as u64), d as u64),
         None => {
             let parts = [value.numerator(), value.denominator()];
-            parts.iter().flat_map(|p| p.to_signed_bytes_le()).fold(0xb16, |h, b| mix(h, u64::from(b)))
+            parts.iter().flat_map(|p| p.to_le_bytes().into_vec()).fold(0xb16, |h, b| mix(h, u64::from(b)))
         }
     }
 }

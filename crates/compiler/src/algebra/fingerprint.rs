@@ -228,7 +228,7 @@ impl Exprs {
 
     /// Whether a term of an angle or exponent is independent of all others.
     fn is_free(&self, number: &Rational, term: Expr, given: bool) -> bool {
-        let exact = number.denominator() <= 8.into();
+        let exact = number.denominator() <= dashu_int::IBig::from(8);
         match self.node(term) {
             Node::Symbol(s) => exact && !(given && self.facts(*s).given.is_some()),
             Node::Pi => point_of_turns(number).is_some(),
@@ -244,10 +244,10 @@ fn residue(value: &Rational) -> Option<u64> {
         Some((n, 1)) => return Some(fit(n)),
         Some((n, d)) => (fit(n), fit(d)),
         None => {
-            let modulus = num_bigint::BigInt::from(P);
-            let fit = |n: num_bigint::BigInt| {
-                let rest: num_bigint::BigInt = ((n % &modulus) + &modulus) % &modulus;
-                rest.iter_u64_digits().next().unwrap_or(0)
+            let fit = |n: dashu_int::IBig| {
+                let (sign, size) = n.into_parts();
+                let rest = size % P;
+                if sign == dashu_base::Sign::Negative { field::neg(rest) } else { rest }
             };
             (fit(value.numerator()), fit(value.denominator()))
         }

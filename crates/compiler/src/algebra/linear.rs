@@ -386,7 +386,7 @@ impl Exprs {
             self.pow_number(half, &n)
         } else if self.nonnegative(base) {
             self.pow_number(y, &inverse)
-        } else if n.numerator().bit(0) {
+        } else if !n.is_even() {
             let root = self.signed_root(y, &n.abs())?;
             if n.signum() < 0 { self.recip(root) } else { root }
         } else {

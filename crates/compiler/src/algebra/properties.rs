@@ -226,7 +226,7 @@ impl Exprs {
             return if base.within(Signs::PLUS) { Signs::PLUS } else { Signs::ANY };
         };
         let possible = if n.signum() < 0 { base.and(Signs::NOT_ZERO) } else { base };
-        let even = !n.numerator().bit(0);
+        let even = n.is_even();
         match n.is_integer() {
             true if even => Signs(possible.and(Signs::ZERO).0 | if possible.within(Signs::ZERO) { 0 } else { 4 }),
             true => possible,

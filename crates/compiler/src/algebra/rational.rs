@@ -1,9 +1,9 @@
 //! Exact numbers: machine integers where they suffice, big ones behind them.
 
-use num_bigint::BigInt;
+use dashu_base::{BitTest, Signed, UnsignedAbs};
+use dashu_int::{IBig, UBig};
+use dashu_ratio::RBig;
 use num_integer::Integer;
-use num_rational::BigRational;
-use num_traits::{One, Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -24,16 +24,15 @@ pub struct Rational(Repr);
 #[derive(Clone, PartialEq, Eq)]
 enum Repr {
     Small(i64, i64),
-    Big(Box<BigRational>),
+    Big(Box<RBig>),
 }
 
-/// Of parts in lowest terms; that of `BigRational` divides them all the way down, so that fractions not in lowest terms
-/// have the same.
+/// Of parts in lowest terms.
 impl Hash for Repr {
     fn hash<H: Hasher>(&self, state: &mut H) {
         match self {
             Repr::Small(n, d) => (n, d).hash(state),
-            Repr::Big(big) => (big.numer(), big.denom()).hash(state),
+            Repr::Big(big) => (big.numerator(), big.denominator()).hash(state),
         }
     }
 }
@@ -47,17 +46,17 @@ impl Rational {
     }
 
     /// The number of a big rational.
-    pub fn from_big(value: BigRational) -> Self {
-        match (value.numer().to_i64(), value.denom().to_i64()) {
-            (Some(n), Some(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
+    pub fn from_big(value: RBig) -> Self {
+        match (i64::try_from(value.numerator()), i64::try_from(value.denominator())) {
+            (Ok(n), Ok(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
             _ => Rational(Repr::Big(Box::new(value))),
         }
     }
 
     /// The same number as a big rational.
-    pub fn to_big(&self) -> BigRational {
+    pub fn to_big(&self) -> RBig {
         match &self.0 {
-            Repr::Small(n, d) => BigRational::new_raw(BigInt::from(*n), BigInt::from(*d)),
+            Repr::Small(n, d) => RBig::from_parts(IBig::from(*n), UBig::from(d.unsigned_abs())),
             Repr::Big(big) => (**big).clone(),
         }
     }
@@ -77,16 +76,16 @@ impl Rational {
         if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > 5000 {
             return None;
         }
-        let value = BigInt::parse_bytes(digits.as_bytes(), 10)? * sign;
+        let value = IBig::from_str_radix(&digits, 10).ok()? * IBig::from(sign);
         let shift = exponent - i32::try_from(part.len()).ok()?;
-        let power = num_traits::pow(BigInt::from(10), shift.unsigned_abs() as usize);
-        let exact = if shift < 0 { BigRational::new(value, power) } else { BigRational::from(value * power) };
+        let power = UBig::from(10u8).pow(shift.unsigned_abs() as usize);
+        let exact = if shift < 0 { RBig::from_parts(value, power) } else { RBig::from(value * power) };
         Some(Self::from_big(exact))
     }
 
     /// The exact value of a float; `None` if it is not finite.
     pub fn from_f64(value: f64) -> Option<Self> {
-        BigRational::from_float(value).map(Self::from_big)
+        RBig::try_from(value).ok().map(Self::from_big)
     }
 
     /// The nearest float (infinite beyond their range).
@@ -94,7 +93,7 @@ impl Rational {
         const EXACT: u64 = 1 << 53;
         match &self.0 {
             Repr::Small(n, d) if n.unsigned_abs() <= EXACT && d.unsigned_abs() <= EXACT => *n as f64 / *d as f64,
-            _ => self.to_big().to_f64().unwrap_or(f64::NAN),
+            _ => self.to_big().to_f64().value(),
         }
     }
 
@@ -120,25 +119,39 @@ impl Rational {
             Repr::Small(n, d) => {
                 u64::from(u64::BITS * 2 - n.unsigned_abs().leading_zeros() - d.unsigned_abs().leading_zeros())
             }
-            Repr::Big(big) => big.numer().bits() + big.denom().bits(),
+            Repr::Big(big) => (big.numerator().bit_len() + big.denominator().bit_len()) as u64,
         }
     }
 
     /// The numerator.
-    pub fn numerator(&self) -> BigInt {
-        self.to_big().numer().clone()
+    pub fn numerator(&self) -> IBig {
+        match &self.0 {
+            Repr::Small(n, _) => IBig::from(*n),
+            Repr::Big(big) => big.numerator().clone(),
+        }
     }
 
     /// The denominator, positive.
-    pub fn denominator(&self) -> BigInt {
-        self.to_big().denom().clone()
+    pub fn denominator(&self) -> IBig {
+        match &self.0 {
+            Repr::Small(_, d) => IBig::from(*d),
+            Repr::Big(big) => IBig::from(big.denominator().clone()),
+        }
     }
 
     /// Whether it is an integer, of whatever size.
     pub fn is_integer(&self) -> bool {
         match &self.0 {
             Repr::Small(_, d) => *d == 1,
-            Repr::Big(big) => big.is_integer(),
+            Repr::Big(big) => big.is_int(),
+        }
+    }
+
+    /// Whether its numerator is even.
+    pub fn is_even(&self) -> bool {
+        match &self.0 {
+            Repr::Small(n, _) => n % 2 == 0,
+            Repr::Big(big) => !big.numerator().bit(0),
         }
     }
 
@@ -176,7 +189,10 @@ impl Rational {
         match &self.0 {
             Repr::Small(0, _) => None,
             Repr::Small(n, d) => Some(Rational(Repr::Small(d * n.signum(), n.abs()))),
-            Repr::Big(big) => Some(Self::from_big(big.recip())),
+            Repr::Big(big) => {
+                let (n, d) = (**big).clone().into_parts();
+                Some(Self::from_big(RBig::from_parts(IBig::from_parts(n.sign(), d), n.unsigned_abs())))
+            }
         }
     }
 
@@ -193,11 +209,11 @@ impl Rational {
         if exponent < 0 {
             return self.recip()?.powi(exponent.checked_neg()?);
         }
-        let bits = self.numerator().bits().max(self.denominator().bits());
-        if bits.checked_mul(exponent as u64)? > 13_000 {
+        let bits = self.numerator().bit_len().max(self.denominator().bit_len());
+        if (bits as u64).checked_mul(exponent as u64)? > 13_000 {
             return None;
         }
-        Some(Self::from_big(num_traits::pow(self.to_big(), exponent as usize)))
+        Some(Self::from_big(self.to_big().pow(exponent as usize)))
     }
 
     /// The exact root of this order, 2 or more, if it is rational. Of a negative number there is none.
@@ -205,16 +221,17 @@ impl Rational {
         if self.signum() < 0 {
             return None;
         }
-        let exact = |n: &BigInt| Some(n.nth_root(order)).filter(|r| &num_traits::pow(r.clone(), order as usize) == n);
-        let (n, d) = (exact(&self.numerator())?, exact(&self.denominator())?);
-        Some(Self::from_big(BigRational::new(n, d)))
+        let order = order as usize;
+        let exact = |n: UBig| Some(n.nth_root(order)).filter(|r| r.pow(order) == n);
+        let (n, d) = (exact(self.numerator().unsigned_abs())?, exact(self.denominator().unsigned_abs())?);
+        Some(Self::from_big(RBig::from_parts(n.into(), d)))
     }
 
     /// The greatest integer not above it.
     pub fn floor(&self) -> Self {
         match &self.0 {
             Repr::Small(n, d) => Self::from(n.div_floor(d)),
-            Repr::Big(big) => Self::from_big(big.floor()),
+            Repr::Big(big) => Self::from_big(big.floor().into()),
         }
     }
 
@@ -223,7 +240,7 @@ impl Rational {
         let (n, d) = if g == 1 { (n, d) } else { (n / g, d / g) };
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) if n != i64::MIN => Rational(Repr::Small(n, d)),
-            _ => Rational(Repr::Big(Box::new(BigRational::new_raw(BigInt::from(n), BigInt::from(d))))),
+            _ => Rational(Repr::Big(Box::new(RBig::from_parts(IBig::from(n), UBig::from(d.unsigned_abs()))))),
         }
     }
 }
@@ -307,21 +324,6 @@ impl fmt::Display for Rational {
 impl fmt::Debug for Rational {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
-    }
-}
-
-impl Zero for Rational {
-    fn zero() -> Self {
-        Self::from(0)
-    }
-    fn is_zero(&self) -> bool {
-        Rational::is_zero(self)
-    }
-}
-
-impl One for Rational {
-    fn one() -> Self {
-        Self::from(1)
     }
 }
 

@@ -1,6 +1,5 @@
 //! Numbers that are known when the model is compiled, calculated exactly.
 
-use num_traits::Zero;
 
 use super::repeat::{Key, Known, Repeats, Unknown, too_long};
 use super::scope::{DeclId, DeclKind, Here, Names, Node, ScopeId, Valued};
@@ -162,7 +161,7 @@ impl<'a> Repeats<'a> {
         item: &[i64],
     ) -> Result<Rational, Unknown> {
         let (from, to) = (self.range_end(names, here, &sum.from)?, self.range_end(names, here, &sum.to)?);
-        let mut total = Rational::zero();
+        let mut total = Rational::from(0);
         let turns = self.turns.len();
         for value in self.terms_of(from, to).ok_or_else(|| too_many(sum.to.span))? {
             let turn = self.turn(&sum.variable, value, here);

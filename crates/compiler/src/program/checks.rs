@@ -12,9 +12,12 @@ const SHORT: usize = 60;
 
 /// An expression as text if it is short, else which symbols of this kind it reads.
 pub(super) fn described(exprs: &Exprs, e: Expr, named: &dyn Fn(&Symbol) -> bool) -> String {
-    let text = ascii(exprs, e, &PlainNames(exprs));
-    if text.len() <= SHORT {
-        return text;
+    // What has more parts than that has a longer text.
+    if exprs.written_length(e) <= SHORT as u64 {
+        let text = ascii(exprs, e, &PlainNames(exprs));
+        if text.len() <= SHORT {
+            return text;
+        }
     }
     let read: Vec<&str> = exprs.symbols_of(e).into_iter().filter(named).map(|s| exprs.name(s)).collect();
     format!("an expression in {}", first_of(&read.join(", ")))

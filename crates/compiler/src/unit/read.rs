@@ -2,7 +2,8 @@
 
 use super::table::{PREFIXES, SYMBOLS, Symbol, sixtieths};
 use super::*;
-use num_traits::Signed;
+use dashu_base::BitTest;
+use dashu_int::IBig;
 use std::ops::Range;
 
 /// Exponents beyond this are absurd.
@@ -12,7 +13,7 @@ const MAX_EXPONENT: i32 = 100;
 struct Factor {
     dimension: Dimension,
     angle: i32,
-    rational: BigRational,
+    rational: RBig,
     pi: i32,
 }
 
@@ -24,7 +25,7 @@ pub(super) fn unit(text: &str) -> Result<Unit, UnitError> {
     }
     let offset = match SYMBOLS.iter().find(|s| s.name == text) {
         Some(symbol) => number(symbol.offset),
-        None => BigRational::zero(),
+        None => RBig::ZERO,
     };
     let Factor { dimension, angle, rational, pi } = product;
     Ok(Scale { dimension, angle, rational, pi, offset, text: text.to_owned() }.into())
@@ -179,16 +180,16 @@ fn to_sixtieths(text: &str) -> Option<i32> {
     let plain = size.len() <= 12 && size.bytes().all(|b| b.is_ascii_digit() || b == b'.' || b == b'/');
     let value = if plain { checked_number(size)? } else { return None };
     let sixtieths = value * whole(i64::from(WHOLE));
-    if !sixtieths.is_integer() || sixtieths > whole(i64::from(MAX_EXPONENT * WHOLE)) {
+    if !sixtieths.is_int() || sixtieths > whole(i64::from(MAX_EXPONENT * WHOLE)) {
         return None;
     }
-    let n = sixtieths.to_integer().to_i32()?;
+    let n = i32::try_from(sixtieths.numerator()).ok()?;
     Some(if negative { -n } else { n })
 }
 
 impl Factor {
     fn one() -> Factor {
-        Factor { dimension: Dimension::NONE, angle: 0, rational: BigRational::one(), pi: 0 }
+        Factor { dimension: Dimension::NONE, angle: 0, rational: RBig::ONE, pi: 0 }
     }
 
     /// The power with an exponent in sixtieths; `Err(true)` if a root is not exact, `Err(false)` if it is absurd.
@@ -200,7 +201,7 @@ impl Factor {
         let angle = Dimension([self.angle, 0, 0, 0, 0, 0, 0]).power(sixtieths).ok_or(false)?.0[0];
         let plain = self.rational.is_one() && self.pi == 0;
         let (rational, pi) = match sixtieths % WHOLE {
-            0 => (self.rational.pow(sixtieths / WHOLE), self.pi * (sixtieths / WHOLE)),
+            0 => (whole_power(&self.rational, sixtieths / WHOLE), self.pi * (sixtieths / WHOLE)),
             _ if plain => (self.rational, 0),
             _ => return Err(true),
         };
@@ -215,7 +216,7 @@ impl Factor {
         self.rational *= factor.rational;
         self.pi = self.pi.checked_add(factor.pi)?;
         let exponents = self.dimension.0.iter().all(|e| e.abs() <= MAX_EXPONENT * WHOLE);
-        let size = self.rational.numer().abs().bits() + self.rational.denom().bits();
+        let size = self.rational.numerator().bit_len() + self.rational.denominator().bit_len();
         (exponents && size < 4000).then_some(())
     }
 }
@@ -234,17 +235,17 @@ fn symbol(text: &str) -> Option<Factor> {
 
 fn scaled(symbol: &Symbol, power: i32) -> Factor {
     let (exponents, angle) = sixtieths(symbol);
-    let rational = number(symbol.factor) * whole(10).pow(power);
+    let rational = number(symbol.factor) * whole_power(&whole(10), power);
     Factor { dimension: Dimension(exponents), angle, rational, pi: symbol.pi }
 }
 
 /// A number of the table.
-fn number(text: &str) -> BigRational {
+fn number(text: &str) -> RBig {
     checked_number(text).expect("the numbers of the table can be read")
 }
 
 /// A decimal, or two with a `/` between them.
-fn checked_number(text: &str) -> Option<BigRational> {
+fn checked_number(text: &str) -> Option<RBig> {
     match text.split_once('/') {
         Some((over, under)) => {
             let under = decimal(under)?;
@@ -254,12 +255,12 @@ fn checked_number(text: &str) -> Option<BigRational> {
     }
 }
 
-fn decimal(text: &str) -> Option<BigRational> {
+fn decimal(text: &str) -> Option<RBig> {
     let (mantissa, exponent) = text.split_once('e').unwrap_or((text, "0"));
     let (before, after) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-    let digits: BigInt = format!("{before}{after}").parse().ok()?;
+    let digits = IBig::from_str_radix(&format!("{before}{after}"), 10).ok()?;
     let exponent = exponent.parse::<i32>().ok()? - i32::try_from(after.len()).ok()?;
-    Some(BigRational::from(digits) * whole(10).pow(exponent))
+    Some(RBig::from(digits) * whole_power(&whole(10), exponent))
 }
 
 /// What may be meant by a symbol that is not known: two known ones without their dot, other case, or a misspelling.

@@ -5,8 +5,8 @@ fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap_or_else(|e| panic!("{text}: {e:?}"))
 }
 
-fn exact(n: i64, d: i64) -> BigRational {
-    BigRational::new(BigInt::from(n), BigInt::from(d))
+fn exact(n: i64, d: i64) -> RBig {
+    RBig::from_parts(n.into(), u64::try_from(d).expect("above zero").into())
 }
 
 /// `a` has the dimension of `b` and is `n/d` of it.
@@ -117,7 +117,7 @@ fn what_is_printed_reads_the_same() {
 fn the_table_is_sound() {
     for symbol in super::table::SYMBOLS {
         let one = unit(symbol.name);
-        assert!(one.rational > BigRational::zero(), "{}", symbol.name);
+        assert!(one.rational > RBig::ZERO, "{}", symbol.name);
         for prefix in symbol.prefixes.chars() {
             let text = format!("{prefix}{}", symbol.name);
             let known = super::table::SYMBOLS.iter().any(|s| s.name == text);
@@ -195,7 +195,7 @@ proptest! {
                 Ok(unit) => {
                     let again = Unit::parse(&unit.to_si_unit().to_string()).expect("what is printed can be read");
                     prop_assert_eq!((again.dimension, again.angle), (unit.dimension, unit.angle));
-                    prop_assert!(unit.rational > BigRational::zero());
+                    prop_assert!(unit.rational > RBig::ZERO);
                 }
                 Err(fault) => {
                     let span = Span { start: 0, end: text.len() as u32, ..Span::default() };

@@ -1,7 +1,8 @@
 //! Numbers as people write them.
 
 use super::super::rational::Rational;
-use num_bigint::BigInt;
+use dashu_base::UnsignedAbs;
+use dashu_int::{IBig, UBig};
 
 /// Digits of a decimal that stands for a number exactly: more than a float has.
 const MOST: usize = 17;
@@ -29,28 +30,17 @@ fn digits(n: i64) -> usize {
 }
 
 fn exact_decimal(value: &Rational) -> Option<(String, i32)> {
-    let mut below = value.denominator();
-    let mut power = 0u32;
-    let ten = BigInt::from(10);
-    let mut above = value.numerator();
-    while below != BigInt::from(1) {
-        if power > 340 {
-            return None;
-        }
-        above *= &ten;
-        power += 1;
-        let common = num_integer::Integer::gcd(&above, &below);
-        if common == BigInt::from(1) {
-            return None;
-        }
-        above /= &common;
-        below /= &common;
-        // A factor other than 2 and 5 never goes away.
-        let bits = below.bits();
-        if bits > 64 * 18 {
-            return None;
-        }
+    // A denominator 2^a 5^b is that of a decimal with max(a, b) digits behind the point, and no other is one.
+    let below = value.denominator().unsigned_abs();
+    let twos = below.trailing_zeros()?;
+    let mut rest = below >> twos;
+    let fives = rest.remove(&UBig::from(5u8)).unwrap_or(0);
+    let power = twos.max(fives);
+    if rest != UBig::ONE || power > 340 {
+        return None;
     }
+    let missing = UBig::from(2u8).pow(power - twos) * UBig::from(5u8).pow(power - fives);
+    let above = value.numerator() * IBig::from(missing);
     let digits = above.to_string();
     let kept = digits.trim_end_matches('0');
     let zeros = digits.len() - kept.len();

@@ -95,7 +95,7 @@ impl Shaper<'_> {
         let shape = if super::numbers::decimal(&size, false).is_some() {
             Shape::Number(size)
         } else {
-            let part = |n: num_bigint::BigInt| Shape::Number(Rational::from_big(n.into()));
+            let part = |n: dashu_int::IBig| Shape::Number(Rational::from_big(n.into()));
             Shape::Product(vec![part(size.numerator())], vec![part(size.denominator())])
         };
         (value.signum() < 0, shape)
@@ -322,7 +322,7 @@ struct TermPlace {
 
 /// A coefficient as what it puts above and below the bar: 1/2 goes below, 1.5 above.
 fn number_parts(value: &Rational) -> (Vec<Shape>, Vec<Shape>) {
-    let part = |n: num_bigint::BigInt| {
+    let part = |n: dashu_int::IBig| {
         let n = Rational::from_big(n.into());
         if n.is_one() { Vec::new() } else { vec![Shape::Number(n)] }
     };
