@@ -11,6 +11,7 @@ use super::rewrite::ShortForms;
 use super::symbol_sets::{SetId, SymbolSets};
 use super::symbols::{SymbolEntry, SymbolKind, Texts};
 use super::table::{Table1d, TableId};
+use super::zero::Told;
 use hashbrown::HashTable;
 use rustc_hash::FxHashMap;
 use std::fmt;
@@ -46,6 +47,7 @@ pub struct Exprs {
     pub(super) slope_tables: FxHashMap<TableId, TableId>,
     pub(super) short_forms: ShortForms,
     pub(super) assumptions: Assumptions,
+    pub(super) told: Told,
 }
 
 /// An expression with what is known of it from birth.
@@ -79,6 +81,7 @@ impl Default for Exprs {
             slope_tables: FxHashMap::default(),
             short_forms: ShortForms::default(),
             assumptions: Assumptions::default(),
+            told: Told::default(),
         };
         for n in [0, 1, -1] {
             pool.int(n);

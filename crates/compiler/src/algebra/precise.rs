@@ -6,9 +6,10 @@ use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::rational::Rational;
 use astro_float_num::{BigFloat, Consts, Radix, RoundingMode, Sign};
 use rustc_hash::FxHashMap;
+use std::sync::MutexGuard;
 
 /// Real numbers of some precision.
-pub(super) trait Real: Clone {
+pub(super) trait Real: Clone + Sized {
     /// Bits that a single operation gets right.
     const BITS: f64;
     fn rational(value: &Rational, constants: &mut Consts) -> Self;
@@ -18,6 +19,11 @@ pub(super) trait Real: Clone {
     fn recip(&self) -> Self;
     fn pow(&self, n: &Self, constants: &mut Consts) -> Self;
     fn call(&self, f: Function, constants: &mut Consts) -> Self;
+    /// Functions whose values are kept, if they cost so much.
+    fn calls(pool: &Exprs) -> Option<MutexGuard<'_, Kept<Self>>> {
+        let _ = pool;
+        None
+    }
     /// The logarithm to base 2 of its size: minus infinity for 0, NaN if it is no finite number.
     fn size(&self) -> f64;
     fn negative(&self) -> bool;
@@ -108,6 +114,9 @@ impl Real for BigFloat {
             Atan2 | Sign | Min | Max | Floor | Mod => BigFloat::nan(None),
         }
     }
+    fn calls(pool: &Exprs) -> Option<MutexGuard<'_, Calls>> {
+        Some(pool.told.calls())
+    }
     fn size(&self) -> f64 {
         if self.is_nan() || self.is_inf() {
             f64::NAN
@@ -122,9 +131,14 @@ impl Real for BigFloat {
     }
 }
 
+/// Values of functions and of powers that are no whole ones, by point and expression.
+pub(super) type Kept<R> = FxHashMap<(u64, bool, Expr), Option<Approximate<R>>>;
+/// Those of many digits.
+pub(super) type Calls = Kept<BigFloat>;
+
 /// A value and the logarithm to base 2 of a bound on its error.
-#[derive(Clone)]
-struct Approximate<R> {
+#[derive(Debug, Clone)]
+pub(super) struct Approximate<R> {
     value: R,
     error: f64,
 }
@@ -174,12 +188,26 @@ impl Point<'_> {
     ) -> Option<Approximate<R>> {
         let known = &*values;
         for part in self.pool.below(&[e], &|e| !known.contains_key(&e)) {
+            let place = (self.number, self.given, part);
+            let keeps = match self.pool.node(part) {
+                Node::Call(..) => true,
+                Node::Pow(_, n) => self.pool.is_number(*n).is_none_or(|n| !n.is_integer()),
+                _ => false,
+            };
+            if keeps && let Some(kept) = R::calls(self.pool).and_then(|calls| calls.get(&place).cloned()) {
+                values.insert(part, kept);
+                continue;
+            }
             let value = match self.pool.node(part) {
                 Node::Symbol(s) => self.symbol(*s, values, constants),
                 node => self.node(node, values, constants),
             };
             let sound = |v: &Approximate<R>| !v.value.size().is_nan() && !v.error.is_nan() && v.error < 900.0;
-            values.insert(part, value.filter(sound));
+            let value = value.filter(sound);
+            if keeps && let Some(mut calls) = R::calls(self.pool) {
+                calls.insert(place, value.clone());
+            }
+            values.insert(part, value);
         }
         values[&e].clone()
     }

@@ -5,13 +5,41 @@ use super::exprs::Exprs;
 use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::{Expr, Node};
-use super::precise::{Point, Verdict};
+use super::precise::{Calls, Point, Verdict};
 use astro_float_num::{BigFloat, Consts};
+use rustc_hash::FxHashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Points that have to agree before an expression counts as zero by its values.
 const POINTS: usize = 12;
 /// Points that are tried for that: at some of them the expression may be undefined.
 const TRIED: u64 = 48;
+
+/// What values at random points have told: it stays true, since a pool never changes what it has.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    /// Whether an expression vanishes, in general or at the given parameters.
+    vanishes: Mutex<FxHashMap<(Expr, bool), bool>>,
+    /// Functions of many digits at the points: most of what a value costs.
+    calls: Mutex<Calls>,
+}
+
+impl Clone for Told {
+    /// A copy of a pool goes another way.
+    fn clone(&self) -> Told {
+        Told::default()
+    }
+}
+
+impl Told {
+    pub(super) fn calls(&self) -> MutexGuard<'_, Calls> {
+        self.calls.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn vanishes(&self) -> MutexGuard<'_, FxHashMap<(Expr, bool), bool>> {
+        self.vanishes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl Exprs {
     /// Whether the expression is zero for all values of its symbols for which it is defined (up to a probability of
@@ -69,7 +97,12 @@ impl Exprs {
         if !zero && properties.piecewise {
             return false;
         }
-        self.is_zero_by_values(e, given)
+        if let Some(&told) = self.told.vanishes().get(&(e, given)) {
+            return told;
+        }
+        let vanishes = self.is_zero_by_values(e, given);
+        self.told.vanishes().insert((e, given), vanishes);
+        vanishes
     }
 
     /// Roots and magnitudes vanish in sums by the signs of what stands in them.
