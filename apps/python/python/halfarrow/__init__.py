@@ -92,7 +92,7 @@ from .picture import Picture
 from .result import Audit, Result
 from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
-from .sweeps import SweepResult
+from .sweeps import SweepFiles, SweepResult, read_sweep
 
 __all__ = [
     "Audit",
@@ -122,6 +122,7 @@ __all__ = [
     "Sensitivities",
     "Snapshot",
     "Stepper",
+    "SweepFiles",
     "SweepResult",
     "UnknownNameError",
     "UsageError",
@@ -131,4 +132,5 @@ __all__ = [
     "library",
     "load",
     "model",
+    "read_sweep",
 ]

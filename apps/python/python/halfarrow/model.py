@@ -8,7 +8,7 @@ import html
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -595,8 +595,12 @@ class Model:
         sample: float | None = None,
         parameters: Mapping[str, Value | Sequence[Value]] | None = None,
         inputs: Mapping[str, InputLike] | None = None,
-        executor: Executor | None = None,
+        executor: Executor | Callable[[], Executor] | None = None,
         chunk: int | None = None,
+        journal: str | os.PathLike[str] | None = None,
+        into: str | os.PathLike[str] | None = None,
+        whole: bool = False,
+        restart: bool = False,
         progress: Any = None,
         **values: Any,
     ) -> sweeps.SweepResult:
@@ -616,8 +620,17 @@ class Model:
             parameters: Values of parameters by name: one for all sets, or several that vary.
             executor: Any ``concurrent.futures.Executor``, of threads, processes, joblib's loky, Dask
                 (``client.get_executor()``), Ray or MPI. Each worker is sent the text once, and compiles it once; sets go as
-                arrays. Nothing: all cores of this computer. Results have the same bits.
+                arrays. Nothing: all cores of this computer. Results have the same bits. Or what makes an executor, such as
+                ``ProcessPoolExecutor`` or ``get_reusable_executor``: if a worker is killed, another one is made.
             chunk: Sets in a task of an executor.
+            journal: A file to which every part is written when it is done. The same call goes on from it after the program was
+                killed, with any executor; a complete one gives the result at once.
+            into: A folder into which the workers write the rows, as Parquet files, in the place of the memory of this program;
+                it goes on as with ``journal``. The folder has to be there for all workers (``pip install
+                halfarrow[parquet]``). The result reads columns when they are asked for.
+            whole: Whether ``into`` gets whole trajectories: a row for each sample, with the number of its set, its parameters,
+                ``t`` and what is recorded. Every run is audited.
+            restart: Whether to begin anew, whatever ``journal`` or ``into`` have.
             progress: As in ``simulate``.
             values: Parameters and inputs whose names are words: ``ks=np.linspace(10e3, 30e3, 50)``, ``b=600``.
 
@@ -626,7 +639,8 @@ class Model:
 
         Raises:
             UnknownNameError, UsageError: as in ``simulate``.
-            RunError: all sets failed.
+            RunError: all sets failed, or a worker was killed and took its executor along; ``result`` has the sets that are
+                done.
             Interrupted: Ctrl-C; ``result`` has the sets that are done.
 
         Warns:
@@ -648,6 +662,7 @@ class Model:
             vary={name: numbers(value) for name, value in several.items() if np.ndim(value)},
             samples=table,
             reduce=sweeps.reductions(reduce),
+            whole=whole,
         )
         for name, values_of in plan.vary.items():
             if not len(values_of):
@@ -656,7 +671,21 @@ class Model:
             raise UsageError(
                 "nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`"
             )
-        return sweeps.run(self, plan, executor, chunk, progress)
+        if whole and (into is None or plan.reduce):
+            raise UsageError("whole trajectories go `into` a folder, and nothing of them is reduced")
+        if journal is not None and into is not None:
+            raise UsageError(
+                "a sweep is kept in a `journal` or goes `into` a folder, not both: the folder is a journal too"
+            )
+        way = sweeps.Way(
+            executor=executor,
+            chunk=chunk,
+            journal=None if journal is None else Path(journal),
+            into=None if into is None else Path(into),
+            restart=restart,
+            progress=progress,
+        )
+        return sweeps.run(self, plan, way)
 
     def stepper(
         self,
