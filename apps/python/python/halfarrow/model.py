@@ -123,6 +123,8 @@ def load(
     Warns:
         ModelWarning: something is odd in the model.
     """
+    if "\n" in os.fspath(path):
+        raise UsageError("this is no path but a text of several lines: give the text of a model to `halfarrow.model`")
     core = _halfarrow.Model.load(os.fspath(path), [os.fspath(folder) for folder in allow], _overrides(parameters or {}))
     return _told(Model(core))
 
@@ -161,6 +163,8 @@ def model(
       |
       = hint: declare it: `param m = …`
     """
+    if "\n" not in text and text.strip().endswith(".bond"):
+        raise UsageError(f"`{text}` is the name of a file, not the text of a model: `halfarrow.load` reads files")
     return _told(Model(_halfarrow.Model.from_text(name, text, dict(files or {}), _overrides(parameters or {}))))
 
 
@@ -321,7 +325,16 @@ class Model:
             ModelError: the form does not apply to the model.
         """
         names = [only] if isinstance(only, str) else list(only)
-        return Equations._of(self._core.equations(choice("form", form, _FORMS), names), self)
+        choice("form", form, _FORMS)
+        try:
+            return Equations._of(self._core.equations(form, names), self)
+        except UnknownNameError:
+            for name in names:
+                if name not in self.variables:
+                    raise unknown("variable", name, self.variables) from None
+            raise UsageError(
+                f"there is no equation of one of {', '.join(names)}: ask for variables of elements, which those of junctions are"
+            ) from None
 
     def draw(self, *, paths: Iterable[int] | None = None, laws: bool = True, first_cells: bool = False) -> Picture:
         """The bond graph with causal strokes, numbered bonds and causal paths.
