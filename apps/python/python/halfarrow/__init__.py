@@ -85,6 +85,7 @@ from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
+from .identifiability import Identifiability
 from .linear import Linearization
 from .loops import Loops
 from .model import Input, Model, Parameter, Variable, load, model
@@ -106,6 +107,7 @@ __all__ = [
     "Experiment",
     "FileError",
     "Fit",
+    "Identifiability",
     "Input",
     "Interrupted",
     "Library",

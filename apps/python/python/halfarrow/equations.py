@@ -12,6 +12,7 @@ from ._tables import record
 if TYPE_CHECKING:
     import sympy
 
+    from ._casadi import Casadi
     from .model import Model
 
 
@@ -151,6 +152,19 @@ class Equations:
         from . import _sympy
 
         return _sympy.mathml(written)
+
+    def casadi(self) -> Casadi:
+        """The equations for CasADi: ``dae`` is what ``casadi.integrator`` takes, and optimal control begins with.
+
+        Raises:
+            UsageError: CasADi or SymPy is not there, the model has events, or an equation holds something that CasADi has no
+                word for.
+        """
+        try:
+            from . import _casadi
+        except ImportError:
+            raise needed("casadi", "casadi", "casadi") from None
+        return _casadi.casadi_of(self)
 
     def __str__(self) -> str:
         return self.text

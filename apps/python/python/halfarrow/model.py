@@ -36,6 +36,7 @@ from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
 from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
+from .identifiability import Identifiability, identifiability
 from .linear import Linearization
 from .loops import Loops
 from .picture import Picture
@@ -332,8 +333,9 @@ class Model:
             for name in names:
                 if name not in self.variables:
                     raise unknown("variable", name, self.variables) from None
+            told = ", ".join(f"`{name}`" for name in names)
             raise UsageError(
-                f"there is no equation of one of {', '.join(names)}: ask for variables of elements, which those of junctions are"
+                f"one of {told} has no equation, as outputs and junctions: ask for variables of elements"
             ) from None
 
     def draw(self, *, paths: Iterable[int] | None = None, laws: bool = True, first_cells: bool = False) -> Picture:
@@ -552,6 +554,40 @@ class Model:
         return fit(
             self, shared, params, outputs or {}, sigma or {}, to, start, loss, f_scale, tolerance, most, seed, options
         )
+
+    def identifiability(
+        self,
+        by: str | Sequence[str],
+        outputs: str | Sequence[str],
+        *,
+        to: float,
+        excite: Mapping[str, float] | None = None,
+        points: int = 3,
+        seed: int = 0,
+        parameters: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        **values: Any,
+    ) -> Identifiability:
+        """Which parameters measurements without noise would tell, whatever their values: the rank of the exact derivatives of
+        outputs, by the values of the model and at some others near them. What is found here no better data will tell.
+
+        Args:
+            by: Parameters, and start values such as ``spring.q(0)``.
+            outputs: Variables that are measured.
+            to: End of the run in s.
+            excite: Amplitudes of inputs that move in all ways, each as a sum of five sines; others as they are given.
+            points: Other values of the parameters, up to a fifth away.
+            seed: Of these values and inputs.
+            parameters, inputs, values: As in ``simulate``.
+
+        Raises:
+            UsageError, UnknownNameError, RunError: as in ``sensitivities``.
+        """
+        set_values, given = self._split(values, parameters, inputs)
+        self._names.check_inputs(excite or {})
+        named = [[name] if isinstance(name, str) else list(name) for name in (by, outputs)]
+        options = {"parameters": dict(set_values), "inputs": given}
+        return identifiability(self, named[0], named[1], to, excite or {}, points, seed, options)
 
     def linearize(
         self,
