@@ -32,11 +32,13 @@ def test_runs_are_the_same(name: str) -> None:
     c = model.equations().casadi()
     conserved = {"K1": r["spring.q"][0] - r["gap.me.q"][0]} if name == "electrostatic" else {}
     values = [conserved[name] if value is None else value for name, value in zip(c.parameters, c.values)]
-    options = {"abstol": 1e-20 if name == "electrostatic" else 1e-12, "reltol": 1e-10, "max_num_steps": 1_000_000}
+    # IDAS, which the blocks that are solved together need, stops at tolerances as small as those of CVODES.
+    small, exact = 1e-20 if name == "electrostatic" else 1e-14, 1e-10 if c.algebraic else 1e-12
+    options = {"abstol": 1e-12 if c.algebraic else small, "reltol": exact, "max_num_steps": 1_000_000}
     run = casadi.integrator("run", "idas" if c.algebraic else "cvodes", c.dae, 0, to, options)
     end = run(x0=c.start, z0=[r[name][0] for name in c.algebraic], p=values, u=[0.0] * len(c.inputs))
     for i, state in enumerate(c.states):
-        assert abs(float(end["xf"][i]) - r[state][-1]) <= 1e-6 * np.abs(r[state]).max(), state
+        assert abs(float(end["xf"][i]) - r[state][-1]) <= 1e-7 * np.abs(r[state]).max(), state
 
 
 def test_conditions() -> None:

@@ -142,7 +142,7 @@ class Equations:
         """The equations, then the definitions, in presentation MathML, for pages without LaTeX; by SymPy.
 
         >>> import halfarrow as ha
-        >>> ha.model("model Cart\nparam m = 2 kg\nSe:push(3 N) -> I:cart(m)\n").equations().mathml.count("<mtr>")
+        >>> ha.model("model Cart\\nparam m = 2 kg\\nSe:push(3 N) -> I:cart(m)\\n").equations().mathml.count("<mtr>")
         1
 
         Raises:

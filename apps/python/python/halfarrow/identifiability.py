@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from ._errors import RunError, UsageError
 from ._tables import as_html, as_text
-from .fitting import _combination
 
 if TYPE_CHECKING:
     from .model import Model
@@ -107,8 +106,16 @@ def identifiability(
     rank = max(ranks)
     ways = found[ranks.index(rank)][2][rank:]
     told = {name: bool(np.all(np.abs(ways[:, i]) <= _SHARE)) for i, name in enumerate(by)}
-    lost = [{name: round(share, 3) for name, share in _combination(by, way).items()} for way in here[2][ranks[0] :]]
+    lost = [_shares(by, way) for way in here[2][ranks[0] :]]
     return Identifiability(list(by), rank, ranks[0], told, lost, here[1] / (here[1].max(initial=0.0) or 1.0))
+
+
+def _shares(names: Sequence[str], way: Array) -> dict[str, float]:
+    """The parameters that take part, the greatest share first and above 0; of equal ones as they were named."""
+    shares = [round(float(share), 3) for share in way]
+    order = sorted((i for i in range(len(names)) if abs(way[i]) > _SHARE), key=lambda i: -abs(shares[i]))
+    sign = -1.0 if shares[order[0]] < 0 else 1.0
+    return {names[i]: sign * shares[i] for i in order}
 
 
 def _rich(excite: Mapping[str, float], to: float, rng: np.random.Generator) -> dict[str, Any]:
