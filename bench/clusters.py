@@ -30,7 +30,7 @@ import halfarrow as ha
 ROOT = Path(__file__).resolve().parents[1]
 CAR = ROOT / "models" / "quarter_car" / "model.bond"
 WORKERS = 2
-TURNS = 3
+TURNS = 5
 STIFF = 100
 
 

@@ -263,14 +263,20 @@ def test_files_that_are_missing_are_made_again(car: ha.Model, tmp_path: Path) ->
     pytest.importorskip("pyarrow")
     here = ask(car, into=tmp_path / "a", chunk=10)
     here.files[3].unlink()
-    told = json.loads((tmp_path / "a" / "_sweep.json").read_text())
-    (tmp_path / "a" / "_sweep.json").write_text(json.dumps({"identity": told["identity"]}))
+    about = tmp_path / "a" / "_sweep.json"
+    told = json.loads(about.read_text())
+    # As it stands while a sweep runs.
+    about.write_text(json.dumps({**{k: told[k] for k in ("identity", "model", "grid")}, "complete": False}))
     (tmp_path / "a" / ".part-x.partial").write_text("half of a file")
     stopped = ha.read_sweep(tmp_path / "a")
     assert not stopped.complete and stopped.done == 65 and len(stopped["peak"]) == 65
     there = ask(car, into=tmp_path / "a", chunk=3)
     assert there.resumed == 65 and content(there) == content(ask(car)) and there.audit == ask(car).audit
     assert not list((tmp_path / "a").glob(".*"))
+    about.unlink()
+    with pytest.raises(ha.UsageError, match="something else"):
+        ask(car, into=tmp_path / "a")
+    assert ask(car, into=tmp_path / "a", restart=True).resumed == 0
 
 
 def test_whole_trajectories(car: ha.Model, tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def _refused(path: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> U
     runs = [
         f"its `{name}` is {there['run'].get(name)!r}, not {value!r}"
         for name, value in here["run"].items()
-        if there.get("run", {}).get(name) != value
+        if there.get("run") and there["run"].get(name) != value
     ]
     others = [text.format(there=there.get(k), here=here[k]) for k, text in _WORDS.items() if there.get(k) != here[k]]
     if "it has" in " ".join(others):
@@ -115,7 +115,7 @@ class Journal:
         except OSError as why:
             raise FileError(f"{path} cannot be written: {why}") from None
         try:
-            lock(self._file, path)
+            lock(self._file.fileno(), path)
             if restart:
                 self._file.truncate(0)
             self._parts = self._read(about)
@@ -182,14 +182,14 @@ def _entry(file: IO[bytes]) -> Done | None:
     return Done(told["first"], told["sets"], columns, told["report"])
 
 
-def lock(file: IO[Any], path: Path) -> None:
+def lock(file: int, path: Path) -> None:
     """Keeps other sweeps away as long as the file is open; where the system knows no locks there are none."""
     try:
         import fcntl
     except ImportError:
         return
     try:
-        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise UsageError(
             f"another sweep is writing {path} just now: wait until it is done, or give another path"
@@ -201,44 +201,42 @@ def lock(file: IO[Any], path: Path) -> None:
 class Folder:
     """A folder of Parquet files, each written whole by the worker that has computed it."""
 
-    def __init__(self, path: Path, about: Mapping[str, Any], restart: bool) -> None:
-        self.path, self._about = path, path / ABOUT
+    def __init__(self, path: Path, about: Mapping[str, Any], restart: bool, told: Mapping[str, Any]) -> None:
+        self.path, self._told = path, {"identity": about, **told}
         arrow()
         try:
             path.mkdir(parents=True, exist_ok=True)
-            self._about.touch()
-            self._file = self._about.open("r+", encoding="utf-8")
+            self._own = os.open(path, os.O_RDONLY) if os.name == "posix" else None
         except OSError as why:
             raise FileError(f"{path} cannot be written: {why}") from None
         try:
-            lock(self._file, path)
+            if self._own is not None:
+                lock(self._own, path)
+            there = about_of(path)
             if restart:
+                there = None
                 for old in files(path):
                     old.unlink()
-                self._file.truncate(0)
             for left in path.glob(".*.partial"):
                 with contextlib.suppress(OSError):
                     left.unlink()
-            text = self._file.read()
-            try:
-                there = json.loads(text)["identity"]
-            except (ValueError, KeyError, TypeError):
-                there = None
             if there is None and files(path):
                 raise UsageError(f"{path} has Parquet files of something else: give another folder")
-            if there is not None and there != about:
-                raise _refused(path, there, about)
-            self.tell({"identity": about})
+            if there is not None and there.get("identity") != about:
+                raise _refused(path, there.get("identity") or {}, about)
+            self.tell({"complete": False})
         except BaseException:
-            self._file.close()
+            self.close()
             raise
 
     def tell(self, told: Mapping[str, Any]) -> None:
         """Says what the folder holds."""
-        self._file.seek(0)
-        self._file.truncate()
-        json.dump(told, self._file)
-        self._file.flush()
+        beside = self.path / f".{ABOUT}.{uuid.uuid4().hex}.partial"
+        try:
+            beside.write_text(json.dumps({**self._told, **told}), encoding="utf-8")
+            os.replace(beside, self.path / ABOUT)
+        except OSError as why:
+            raise FileError(f"{self.path} cannot be written: {why}") from None
 
     def parts(self) -> list[Done]:
         """What is there. A worker that nobody waited for any more may have written what another has, in other parts."""
@@ -255,7 +253,18 @@ class Folder:
         """Its worker has written it."""
 
     def close(self) -> None:
-        self._file.close()
+        if self._own is not None:
+            os.close(self._own)
+            self._own = None
+
+
+def about_of(folder: Path) -> dict[str, Any] | None:
+    """What a folder says about its sweep, if it is one."""
+    try:
+        told = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return told if isinstance(told, dict) and "identity" in told else None
 
 
 def files(folder: Path) -> list[Path]:

@@ -36,7 +36,7 @@ from ._errors import (
     unknown,
 )
 from ._inputs import Given, as_sent, numbers, on_its_own
-from ._kept import ABOUT, Columns, Done, Folder, Journal, Kept, arrow, files, gaps, identity, part_of, write_part
+from ._kept import Columns, Done, Folder, Journal, Kept, about_of, arrow, files, gaps, identity, part_of, write_part
 from ._progress import Bar
 from ._tables import as_html, as_text
 
@@ -276,16 +276,15 @@ def read_sweep(folder: str | os.PathLike[str]) -> SweepFiles:
         FileError: there is none.
     """
     path = Path(folder)
-    try:
-        told = json.loads((path / ABOUT).read_text(encoding="utf-8"))
-        if "report" not in told:
-            # It was killed: the parts tell.
-            parts = [part_of(own) for own in files(path)]
-            report = _merged([part.report for part in parts], told["identity"]["sets"])
-            told = {**told, "report": report, "grid": {}, "complete": not gaps(parts, told["identity"]["sets"])}
-            told.setdefault("model", "")
-    except (OSError, ValueError, KeyError) as why:
-        raise FileError(f"{path} holds no sweep: {why}") from None
+    told = about_of(path)
+    if told is None:
+        raise FileError(f"{path} holds no sweep")
+    if not told["complete"]:
+        # It was stopped: the parts tell.
+        parts = [part_of(own) for own in files(path)]
+        sets = told["identity"]["sets"]
+        report = _merged([part.report for part in parts], sets)
+        told = {**told, "report": report, "complete": not gaps(parts, sets)}
     return SweepFiles(path, told)
 
 
@@ -547,8 +546,11 @@ def _in_parts(model: Model, plan: Plan, way: Way) -> _Ended:
     if way.journal is not None or way.into is not None:
         about = identity(job.parts, bare.arguments(), given, names, rows)
         about["columns"] = [list(plan.reduce), list(plan.fixed), plan.whole]
-        kind, path = (Journal, way.journal) if way.into is None else (Folder, way.into)
-        kept = kind(path, about, way.restart)  # type: ignore[arg-type]
+        if way.into is not None:
+            grid = {} if plan.samples or plan.whole else {name: values.tolist() for name, values in plan.vary.items()}
+            kept = Folder(way.into, about, way.restart, {"model": model.name, "grid": grid})
+        elif way.journal is not None:
+            kept = Journal(way.journal, about, way.restart)
     try:
         done = [] if kept is None else kept.parts()
         resumed = sum(part.sets for part in done)
@@ -580,9 +582,7 @@ def _in_parts(model: Model, plan: Plan, way: Way) -> _Ended:
                 for i, (name, unit, _) in enumerate(done[0].columns)
             ]
         if isinstance(kept, Folder):
-            grid = {} if plan.samples or plan.whole else {name: values.tolist() for name, values in plan.vary.items()}
-            told = {"model": model.name, "grid": grid, "complete": complete, "report": report}
-            kept.tell({"identity": about, **told})
+            kept.tell({"complete": complete, "report": report})
         return _Ended(columns, report, complete, raised)
     finally:
         if kept is not None:
@@ -598,13 +598,15 @@ class _Parts:
         self.model, self.job, self.names, self.rows = model, job, names, rows
         self.kept, self.done, self.bar = kept, done, bar
         self.of = len(rows)
+        self.sets = sum(part.sets for part in done)
         self.key = hashlib.sha256(pickle.dumps(job)).hexdigest()
 
     def add(self, part: Done) -> None:
         if self.kept is not None:
             self.kept.add(part)
         self.done.append(part)
-        self.bar.reach(sum(part.sets for part in self.done))
+        self.sets += part.sets
+        self.bar.reach(self.sets)
 
     def here(self, chunk: int | None) -> BaseException | None:
         """On all cores of this computer, in parts of about a second: so much is lost if the program is killed."""
@@ -613,7 +615,7 @@ class _Parts:
         for first, end in gaps(self.done, self.of):
             while first < end:
                 rows = self.rows[first : min(first + size, end)]
-                before = sum(part.sets for part in self.done)
+                before = self.sets
                 told = (lambda done, _, before=before: self.bar.reach(before + done)) if self.bar else None
                 begun = time.perf_counter()
                 part = (first, self.of)
