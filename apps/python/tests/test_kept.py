@@ -301,6 +301,24 @@ def test_whole_trajectories(car: ha.Model, tmp_path: Path) -> None:
         car.sweep(to=1, whole=True, ks=[1e4])
 
 
+def test_control_c_leaves_whole_trajectories(long: ha.Model, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    options: dict[str, Any] = {"to": 10, "step": 1e-3, "every": 0.1, "w": np.linspace(1, 2, 20_000), "whole": True}
+
+    def interrupt() -> None:
+        while len(list(tmp_path.glob("a/part-*"))) < 2:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(ha.Interrupted, match="of 20000 sets are done.*goes on from") as caught:
+        long.sweep(**options, chunk=400, into=tmp_path / "a")
+    begun = time.monotonic()
+    s = caught.value.result
+    assert 400 <= s.done < 20_000 and not s.complete and set(s.sets) >= {1, 400}
+    assert time.monotonic() - begun < 5
+
+
 def test_runs_that_fail_are_in_the_files(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     growing = ha.model("model M\nparam a = 1\nstate x' = a*x^2 from 1\nSe:s(x) -> R:r(1)\n")

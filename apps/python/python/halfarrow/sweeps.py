@@ -434,6 +434,8 @@ class _Job:
 _models: OrderedDict[Any, _halfarrow.Model] = OrderedDict()
 _jobs: OrderedDict[str, _Job] = OrderedDict()
 _lock = threading.Lock()
+# Jobs that Ctrl-C has stopped: threads of this process leave them.
+_stopped: set[str] = set()
 
 
 def _keep(kept: OrderedDict[Any, Any], key: Any, value: Any) -> Any:
@@ -461,20 +463,27 @@ def _work(key: str, job: _Job | None, names: list[str], rows: Array, first: int,
             model = _halfarrow.Model.from_text(*job.parts)
         _keep(_models, made_of, model)
     # The executor has the other cores.
-    done, raised = _part(model, job, names, numbers(rows), (first, of), None, True)
+    done, raised = _part(model, job, names, numbers(rows), (first, of), None, True, key)
     if raised is not None:
         raise raised
     return done
 
 
 def _part(
-    model: _halfarrow.Model, job: _Job, names: list[str], rows: Array, part: tuple[int, int], told: Any, alone: bool
+    model: _halfarrow.Model,
+    job: _Job,
+    names: list[str],
+    rows: Array,
+    part: tuple[int, int],
+    told: Any,
+    alone: bool,
+    key: str,
 ) -> tuple[Done, BaseException | None]:
     """Some sets, so many of all, and what has stopped them."""
     plan = job.plan
     given = [(name, as_sent(value)) for name, value in plan.given]
     if plan.whole:
-        columns, report = _trajectories(model, plan, names, rows, part[0], given)
+        columns, report = _trajectories(model, plan, names, rows, part[0], given, key)
         raised = None
     else:
         arguments = {**plan.arguments(), "vary": [], "samples": (names, rows), "part": part}
@@ -488,12 +497,20 @@ def _part(
 
 
 def _trajectories(
-    model: _halfarrow.Model, plan: Plan, names: list[str], rows: Array, first: int, given: list[tuple[str, Given]]
+    model: _halfarrow.Model,
+    plan: Plan,
+    names: list[str],
+    rows: Array,
+    first: int,
+    given: list[tuple[str, Given]],
+    key: str,
 ) -> tuple[Columns, dict[str, Any]]:
     """Every sample of every run, each audited; of a run that came to no end those before."""
     runs: list[tuple[int, Array, Columns]] = []
     failures, audits = [], []
     for number, row in enumerate(rows, first + 1):
+        if key in _stopped:
+            raise InterruptedError("the sweep was stopped")
         try:
             ended = model.simulate(plan.options, given, list(zip(names, row.tolist())), None)
         except (ModelError, RunError) as why:
@@ -619,7 +636,7 @@ class _Parts:
                 told = (lambda done, _, before=before: self.bar.reach(before + done)) if self.bar else None
                 begun = time.perf_counter()
                 part = (first, self.of)
-                done, raised = _part(self.model._core, self.job, self.names, rows, part, told, False)
+                done, raised = _part(self.model._core, self.job, self.names, rows, part, told, False, self.key)
                 if raised is not None:
                     if self.job.into is None and len(done.columns[0][2]):
                         # They are not whole: they come into the result, and are computed again by another sweep.
@@ -654,6 +671,7 @@ class _Parts:
         )
         # Workers that are threads of this process, or its forks, have the model already.
         with _lock:
+            _stopped.discard(self.key)
             _keep(_models, _made_of(self.job.parts), self.model._core)
         ready: SimpleQueue[Future[Done | None]] = SimpleQueue()
         waiting: dict[Future[Done | None], tuple[int, int]] = {}
@@ -695,6 +713,7 @@ class _Parts:
                     except BrokenExecutor as why:
                         raised = why
         except BaseException as why:
+            _stopped.add(self.key)
             for future in waiting:
                 future.cancel()
             return why
