@@ -91,15 +91,16 @@ from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
+from .gradients import Gradient, Recorded
+from .identifiability import Identifiability
 from .linear import Linearization
 from .loops import Loops
-from .gradients import Gradient, Recorded
 from .model import Input, Model, Parameter, Variable, load, model
 from .picture import Picture
 from .result import Audit, Result
 from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
-from .sweeps import SweepResult
+from .sweeps import SweepFiles, SweepResult, read_sweep
 
 __all__ = [
     "Audit",
@@ -114,6 +115,7 @@ __all__ = [
     "FileError",
     "Fit",
     "Gradient",
+    "Identifiability",
     "Input",
     "Interrupted",
     "Library",
@@ -131,6 +133,7 @@ __all__ = [
     "Sensitivities",
     "Snapshot",
     "Stepper",
+    "SweepFiles",
     "SweepResult",
     "UnknownNameError",
     "UsageError",
@@ -140,4 +143,5 @@ __all__ = [
     "library",
     "load",
     "model",
+    "read_sweep",
 ]
