@@ -128,6 +128,7 @@ Examples:
   halfarrow export c car.bond --out car --real float   in single precision, for a microcontroller
   halfarrow export fmu3 car.bond --out car.fmu         with a binary by the C compiler cc, or what CC names
   halfarrow export fmu2 car.bond --out car.fmu --source-only
+  halfarrow export casadi car.bond --out car.py        for optimal control
   halfarrow export latex car.bond --out car.tex        the equations as a document")]
     Export(Export),
 }
@@ -771,6 +772,8 @@ pub enum Target {
     Fmu2,
     /// A Functional Mock-up Unit 3.0: model exchange and co-simulation
     Fmu3,
+    /// Rates and outputs as functions of CasADi, a file of Python
+    Casadi,
     /// The equations as a LaTeX document
     Latex,
 }

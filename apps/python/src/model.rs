@@ -337,7 +337,7 @@ impl Model {
         real: &str,
         binary: bool,
     ) -> PyResult<Files<'py>> {
-        let targets = [Target::C, Target::Fmu2, Target::Fmu3, Target::Latex];
+        let targets = [Target::C, Target::Fmu2, Target::Fmu3, Target::Casadi, Target::Latex];
         let target = targets.into_iter().find(|known| known.name() == target).ok_or_else(|| none("target", target))?;
         let real = [Real::Double, Real::Float]
             .into_iter()

@@ -1,10 +1,11 @@
 //! Programs as files for elsewhere, in memory: [`c`] writes C99, [`fmu`] Functional Mock-up
-//! Units around it, [`latex`] a document of the equations.
+//! Units around it, [`casadi`] functions of CasADi, [`latex`] a document of the equations.
 //!
 //! What is written computes what the interpreter computes, to the last bit: the same operations in the same order.
 #![forbid(unsafe_code)]
 
 pub mod c;
+pub mod casadi;
 pub mod fmu;
 pub mod latex;
 mod names;
@@ -161,6 +162,8 @@ pub enum EmitError {
     Step(f64),
     /// A value does not fit real numbers of single precision: what it is, and the value.
     Range(String, f64),
+    /// What happens at events, or is held from earlier times: names.
+    Events(Vec<String>),
     /// A delay would keep too many points with this step: its name, and how many.
     Delay(String, f64),
 }
@@ -186,6 +189,12 @@ impl fmt::Display for EmitError {
                 "{what} is {value:?} in SI units, which does not fit `float`: its numbers are from {:?} to {:?} in size; export with `--real double`, or change the value",
                 f32::MIN_POSITIVE,
                 f32::MAX
+            ),
+            EmitError::Events(names) => write!(
+                f,
+                "{} would have to happen while an integrator runs, and functions of CasADi have no memory: leave that out of what \
+                 is exported, or export c, fmu2 or fmu3",
+                names.iter().take(5).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
             ),
             EmitError::Delay(name, points) => write!(
                 f,

@@ -30,6 +30,8 @@ pub enum Target {
     Fmu2,
     /// A Functional Mock-up Unit 3.0, for both too.
     Fmu3,
+    /// Rates and outputs as functions of CasADi: a file of Python.
+    Casadi,
     /// The equations as a LaTeX document.
     Latex,
 }
@@ -41,6 +43,7 @@ impl Target {
             Target::C => "c",
             Target::Fmu2 => "fmu2",
             Target::Fmu3 => "fmu3",
+            Target::Casadi => "casadi",
             Target::Latex => "latex",
         }
     }
@@ -91,7 +94,7 @@ pub struct Exported {
 pub struct ExportReport {
     /// Name of the model.
     pub model: String,
-    /// `c`, `fmu2`, `fmu3` or `latex`.
+    /// `c`, `fmu2`, `fmu3`, `casadi` or `latex`.
     pub target: &'static str,
     /// The name before all functions in C; empty without code.
     pub name: String,
@@ -156,6 +159,7 @@ impl Model {
             Target::C => self.export_c(export),
             Target::Fmu2 => self.export_fmu(export, Version::V2),
             Target::Fmu3 => self.export_fmu(export, Version::V3),
+            Target::Casadi => self.export_casadi(export),
             Target::Latex => self.export_latex(export),
         }
     }
@@ -184,6 +188,30 @@ impl Model {
             files: vec![name],
         };
         Ok(Exported { files, report })
+    }
+
+    fn export_casadi(&self, export: &Export) -> Result<Exported, Error> {
+        let code = ExportedProgram::new(self, export)?;
+        let solutions = code.system.solutions();
+        let text = emit::casadi::write(&code.program, &code.start, (&code.recorded, &solutions)).map_err(refused)?;
+        let name = format!("{}.py", self.name());
+        let p = &code.program;
+        let report = ExportReport {
+            model: self.name().to_string(),
+            target: export.target.name(),
+            name: String::new(),
+            method: None,
+            step: None,
+            real: None,
+            states: p.states.iter().map(|s| s.name.clone()).collect(),
+            inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
+            parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
+            outputs: code.recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
+            cost: None,
+            cost_text: Vec::new(),
+            files: vec![name.clone()],
+        };
+        Ok(Exported { files: vec![File::text(&name, text)], report })
     }
 
     fn export_c(&self, export: &Export) -> Result<Exported, Error> {
@@ -357,6 +385,7 @@ fn method(method: FixedMethod) -> emit::Method {
 /// Why something else than C is not written with numbers of single precision.
 fn not_single(target: Target) -> Error {
     let why = match target {
+        Target::Casadi => "functions of CasADi have no numbers of single precision",
         Target::Latex => "equations as a document have no numbers of single precision",
         _ => "the variables of FMUs are double",
     };

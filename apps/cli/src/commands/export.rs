@@ -18,7 +18,7 @@ pub fn export(arguments: &arguments::Export) -> u8 {
         let asked = asked(arguments);
         let exported = model.export(&asked)?;
         let notes = match asked.target {
-            Target::Latex => Vec::new(),
+            Target::Casadi | Target::Latex => Vec::new(),
             _ => warn_of_step(model, asked.form, (asked.method, asked.step), Start::Given),
         };
         let written = write_files(arguments, &exported.files)?;
@@ -41,6 +41,7 @@ fn asked(arguments: &arguments::Export) -> Export {
             arguments::Target::C => Target::C,
             arguments::Target::Fmu2 => Target::Fmu2,
             arguments::Target::Fmu3 => Target::Fmu3,
+            arguments::Target::Casadi => Target::Casadi,
             arguments::Target::Latex => Target::Latex,
         },
         form: form(arguments.form),
@@ -66,6 +67,7 @@ fn ending(target: arguments::Target) -> Option<&'static str> {
     match target {
         arguments::Target::C => None,
         arguments::Target::Fmu2 | arguments::Target::Fmu3 => Some("fmu"),
+        arguments::Target::Casadi => Some("py"),
         arguments::Target::Latex => Some("tex"),
     }
 }

@@ -54,7 +54,7 @@ Method: TypeAlias = Literal[
     "auto", "explicit", "bdf", "radau",
     "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock",
 ]  # fmt: skip
-Target: TypeAlias = Literal["c", "fmu2", "fmu3", "latex"]
+Target: TypeAlias = Literal["c", "fmu2", "fmu3", "casadi", "latex"]
 Stage: TypeAlias = Literal["ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program"]
 
 Value: TypeAlias = float | str
@@ -63,7 +63,7 @@ Value: TypeAlias = float | str
 _FORMS = ("minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff")
 _FIXED = ("euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock")
 _METHODS = ("auto", "explicit", "bdf", "radau", *_FIXED)
-_TARGETS = {"c": "", "fmu2": ".fmu", "fmu3": ".fmu", "latex": ".tex"}
+_TARGETS = {"c": "", "fmu2": ".fmu", "fmu3": ".fmu", "casadi": ".py", "latex": ".tex"}
 _STAGES = ("ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program")
 
 # Points at which a function of time is called where nothing says how far apart.

@@ -81,6 +81,13 @@ pub(crate) struct Solver {
     pub newton: Newton,
 }
 
+impl Solver {
+    /// The unknowns as they were found last.
+    pub fn found(&self) -> &[f64] {
+        if self.newton.x.is_empty() { &self.x } else { &self.newton.x }
+    }
+}
+
 impl Frame {
     pub fn new(program: &Program, layout: &Layout, registers: u32) -> Frame {
         let solver = |block: &Block| {

@@ -240,6 +240,11 @@ impl Model {
         &self.run.positions
     }
 
+    /// The unknowns of solve blocks as they were found last, block by block.
+    pub fn solutions(&self) -> Vec<Vec<f64>> {
+        self.frame.solvers.iter().map(|solver| solver.found().to_vec()).collect()
+    }
+
     /// What a value of parameters alone comes to: a delay, the default of an input.
     pub fn constant(&self, value: Value) -> Option<f64> {
         let register = *self.code.layout.registers.get(&value)?;
