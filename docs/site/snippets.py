@@ -4,8 +4,8 @@
 In a page, in this order, within one empty folder of the page:
 
 - a block with `title="name"` is a file of that name;
-- a block `console` has commands behind `$ `, each with what it prints; a line `...` stands for any lines; a command may
-  fail only where the page shows an error;
+- a block `console` has commands behind `$ `, each with what it prints; a line `...` stands for any lines, `...` at
+  the end of one for its rest; a command may fail only where the page shows an error;
 - a block `python` is run, all of a page in one name space; a block `text` right behind it is what it prints.
 
 `snippets.py` checks all pages, `snippets.py PAGE ...` some; with `UPDATE=1` it writes what is printed into them.
@@ -23,6 +23,7 @@ import subprocess
 import sys
 import time
 import traceback
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,8 +83,15 @@ def made(page: Path) -> Path:
 
 
 def agree(shown: str, printed: str) -> bool:
-    parts = re.split(r"^\.\.\.\n", shown, flags=re.M)
-    pattern = r"(?:.*\n)*?".join(re.escape(part) for part in parts)
+    lines = []
+    for line in shown.splitlines(keepends=True):
+        if line == "...\n":
+            lines.append(r"(?:.*\n)*?")
+        elif line.endswith("...\n"):
+            lines.append(re.escape(line.removesuffix("...\n")) + r".*\n")
+        else:
+            lines.append(re.escape(line))
+    pattern = "".join(lines)
     return re.fullmatch(pattern, printed) is not None
 
 
@@ -116,19 +124,23 @@ def run_console(block: Block, folder: Path, update: bool) -> str:
             text=True,
             timeout=300,
         )
+        # Of long runs, how far they are.
+        printed = re.sub(r"^ *\d+ %, after .*\n", "", run.stdout, flags=re.M)
         if run.returncode and "error" not in shown:
             raise Mismatch(f"$ {command}{run.stdout}exit status {run.returncode}")
-        if not agree(shown, run.stdout):
+        if not agree(shown, printed):
             if not update:
-                raise Mismatch(f"$ {command}--- shown\n{shown}--- printed\n{run.stdout}")
-            shown = run.stdout
+                raise Mismatch(f"$ {command}--- shown\n{shown}--- printed\n{printed}")
+            shown = printed
         text += f"$ {command}{shown}"
     return text
 
 
 def run_python(block: Block, names: dict[str, object], line: int, page: Path) -> str:
     printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
+    with contextlib.redirect_stdout(printed), warnings.catch_warnings():
+        # What is odd is no example.
+        warnings.filterwarnings("error", module="halfarrow|.*\\.md")
         # Lines of errors are those of the page.
         exec(compile("\n" * line + block.body, str(page), "exec"), names)
     return printed.getvalue()
