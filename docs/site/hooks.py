@@ -48,9 +48,9 @@ def on_files(files: Files, config: Any) -> Files:
             picture(f"models/{shown.name}/{path.name}", path)
     for example in EXAMPLES:
         folder = ROOT / "examples" / example
-        page(f"examples/{example}.md", (folder / "README.md").read_text())
+        page(f"examples/{example}/index.md", (folder / "README.md").read_text())
         for path in sorted([*folder.glob("*.svg"), *folder.glob("*.png")]):
-            picture(f"examples/{path.name}", path)
+            picture(f"examples/{example}/{path.name}", path)
     for source in snippets.pages():
         folder = snippets.made(source)
         where = source.relative_to(snippets.DOCS).with_suffix("")
@@ -61,6 +61,8 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """Links to files of the repository that are no pages become their paths."""
+    if page.file.src_uri == "python.md":
+        markdown += not_listed(markdown)
 
     def target(match: re.Match[str]) -> str:
         text, link = match[1], match[2]
@@ -70,7 +72,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         example = re.search(r"examples/(\w+)/README\.md$", path)
         if example:
             up = "../" * page.file.src_uri.count("/")
-            return f"[{text}]({up}examples/{example[1]}.md)"
+            return f"[{text}]({up}examples/{example[1]}/index.md)"
         here = Path(page.file.src_uri).parent / path
         if "README.md" in page.file.src_uri or files.get_file_from_path(_normal(str(here))):
             return match[0]
@@ -81,6 +83,14 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     for i in range(0, len(parts), 2):
         parts[i] = re.sub(r"(?<!!)\[([^\]\n]+)\]\(([^)\s]+)\)", target, parts[i])
     return "".join(parts)
+
+
+def not_listed(markdown: str) -> str:
+    """Names of the Python package that the page has in none of its sections."""
+    text = (ROOT / "apps/python/python/halfarrow/__init__.py").read_text()
+    names = re.findall(r'^    "([A-Za-z]\w*)",$', text, re.M)
+    left = [name for name in names if f"::: halfarrow.{name}\n" not in markdown + "\n"]
+    return "\n## More\n\n" + "".join(f"::: halfarrow.{name}\n\n" for name in left) if left else ""
 
 
 def _normal(path: str) -> str:
@@ -95,7 +105,7 @@ def _normal(path: str) -> str:
 
 def _in_repository(page: Any, path: str) -> str:
     uri = page.file.src_uri
-    example = re.match(r"examples/(\w+)\.md", uri)
+    example = re.match(r"examples/(\w+)/index\.md", uri)
     model = re.match(r"models/(\w+)\.md", uri)
     base = f"examples/{example[1]}" if example else f"models/{model[1]}" if model else f"docs/{Path(uri).parent}"
     return _normal(f"{base}/{path}")

@@ -52,7 +52,7 @@ class Block:
 
 
 def pages() -> list[Path]:
-    return [DOCS / "index.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]
+    return [DOCS / "index.md", DOCS / "domains.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("how-to/*.md"))]
 
 
 def blocks(text: str) -> list[Block]:
@@ -127,7 +127,7 @@ def run_console(block: Block, folder: Path, update: bool) -> str:
         # Of long runs, how far they are.
         printed = re.sub(r"^ *\d+ %, after .*\n", "", run.stdout, flags=re.M)
         if run.returncode and "error" not in shown:
-            raise Mismatch(f"$ {command}{run.stdout}exit status {run.returncode}")
+            raise Mismatch(f"$ {command}{printed}exit status {run.returncode}")
         if not agree(shown, printed):
             if not update:
                 raise Mismatch(f"$ {command}--- shown\n{shown}--- printed\n{printed}")
