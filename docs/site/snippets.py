@@ -156,6 +156,9 @@ def run_page(page: Path, update: bool) -> None:
         (folder / there).symlink_to(ROOT / there)
     names: dict[str, object] = {"__name__": "__main__"}
     changes: list[tuple[Block, str]] = []
+    if "matplotlib.pyplot" in sys.modules:
+        # Each page has figures of its own.
+        sys.modules["matplotlib.pyplot"].close("all")
     before = Path.cwd()
     os.chdir(folder)
     os.environ.setdefault("MPLBACKEND", "Agg")

@@ -137,7 +137,11 @@ def test_several_runs_weights_and_starts(car: ha.Model, tmp_path: Path) -> None:
     assert len(f.predicted()) == 2 and f.plot().axes
     # The same with a column as the input.
     second_alone = ha.Experiment(second, inputs={"road": "road"}, parameters={"m": 350.0})
-    assert car.fit([second_alone], {"k": None}, outputs={"travel": "z_meas"}, b=1200).success
+    alone = car.fit([second_alone], {"k": None}, outputs={"travel": "z_meas"}, b=1200)
+    assert alone.success
+    # Standard deviations that are estimated: what is left over is drawn in them.
+    left = alone.plot().axes[1].lines[0].get_ydata()
+    np.testing.assert_allclose(np.sum(np.square(left)), alone.freedom)
 
 
 def test_outliers(car: ha.Model) -> None:

@@ -432,7 +432,8 @@ class Fit:
             top.plot(run.t, predicted[run.name][name], label="fitted")
             top.set_title(f"{name}, {run.name}" if len(self.problem.runs) > 1 else name)
             top.legend()
-            left = (predicted[run.name][name] - run.measured[:, k]) / run.sigma[:, k]
+            # Where standard deviations are estimated, `run.sigma` is what outputs are weighed by.
+            left = (predicted[run.name][name] - run.measured[:, k]) / (run.sigma[:, k] * np.sqrt(self.variance))
             bottom.plot(run.t[valid], left[valid], ".", markersize=3)
             bottom.axhline(0.0, color="black", linewidth=0.5)
             bottom.set_xlabel("t / s")
