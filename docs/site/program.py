@@ -21,7 +21,7 @@ def program() -> Path:
     return Path(found).resolve()
 
 
-def halfarrow(*arguments: str | Path, folder: Path = ROOT, columns: int = 100) -> str:
+def halfarrow(*arguments: str | Path, folder: Path = ROOT, columns: int = 92) -> str:
     """Standard output of a run that went well."""
     run = subprocess.run(
         [program(), *map(str, arguments)],
