@@ -91,6 +91,7 @@ from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
+from .functions import Function
 from .linear import Linearization
 from .loops import Loops
 from .gradients import Gradient, Recorded
@@ -113,6 +114,7 @@ __all__ = [
     "Experiment",
     "FileError",
     "Fit",
+    "Function",
     "Gradient",
     "Input",
     "Interrupted",

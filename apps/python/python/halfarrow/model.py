@@ -36,6 +36,7 @@ from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
 from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
+from .functions import Function
 from .gradients import Gradient, Objective, asked, variables
 from .linear import Linearization
 from .loops import Loops
@@ -533,6 +534,59 @@ class Model:
         result = Result(self, ended, to)
         _conclude(ended, result)
         return Gradient(value, slopes, without, result)
+
+    def function(
+        self,
+        parameters: str | Sequence[str],
+        outputs: str | Sequence[str],
+        to: float,
+        *,
+        every: float | None = None,
+        at: npt.ArrayLike | None = None,
+        method: Method = "auto",
+        step: float | None = None,
+        rtol: float = 1e-8,
+        atol: float | None = None,
+        start: Literal["given", "equilibrium"] = "given",
+        execution: Literal["auto", "bytecode", "machine"] = "auto",
+        threads: int | None = None,
+        fixed: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        **values: Any,
+    ) -> Function:
+        """The model as a differentiable function, from an array ``(parameters,)`` to an array ``(samples, outputs)``: of NumPy
+        with ``jvp``, ``vjp`` and ``jacobian``, of JAX (``.jax()``) and of PyTorch (``.torch()``).
+
+        Args:
+            parameters: What it is a function of: parameters, start values such as ``spring.q(0)``, inputs, which are then
+                constant.
+            outputs: Variables that it gives.
+            to: End of the runs in s.
+            every, at: As in ``simulate``; one of them, that every run has as many samples. The end is the last sample.
+            method, step, rtol, atol, start, execution: As in ``simulate``; derivatives have no linearly implicit method.
+            threads: Runs at the same time, where there are several sets; nothing: as many as there are processors.
+            fixed: Values of other parameters by name.
+            inputs: Other inputs over time, as in ``simulate``; a function of time is called once.
+            values: Other parameters and inputs whose names are words.
+
+        Raises:
+            UnknownNameError: there is no parameter, input, start value or variable of a name.
+            UsageError: something is asked that cannot be.
+
+        >>> import halfarrow as ha
+        >>> rc = ha.model("model RC\\nparam r = 2, u = 3\\nSe:s(u) -> 1:j -> R:wire(r)\\nj -> C:store(0.5)\\n")
+        >>> f = rc.function(["r", "store.q(0)"], "store.q", to=2, at=[1, 2])
+        >>> f.vjp(f.values, [[0], [1]]).round(4)
+        array([-0.203 ,  0.1353])
+        """
+        set_values, given = self._split(values, fixed, inputs)
+        options = dict(
+            method=choice("method", method, _METHODS), step=step, rtol=rtol, atol=atol, start=_start(start),
+            execution=choice("execution", execution, ("auto", "bytecode", "machine")),
+        )  # fmt: skip
+        asked = [parameters] if isinstance(parameters, str) else parameters
+        named = [outputs] if isinstance(outputs, str) else outputs
+        return Function(self, asked, named, to, every, at, dict(set_values), given, options, threads)
 
     def fit(
         self,
