@@ -92,6 +92,7 @@ from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
 from .functions import Function
+from .global_sensitivity import GlobalSensitivity, MorrisEffects, SobolIndices
 from .linear import Linearization
 from .loops import Loops
 from .gradients import Gradient, Recorded
@@ -115,6 +116,7 @@ __all__ = [
     "FileError",
     "Fit",
     "Function",
+    "GlobalSensitivity",
     "Gradient",
     "Input",
     "Interrupted",
@@ -124,6 +126,7 @@ __all__ = [
     "Model",
     "ModelError",
     "ModelWarning",
+    "MorrisEffects",
     "Parameter",
     "Picture",
     "Profile",
@@ -132,6 +135,7 @@ __all__ = [
     "RunError",
     "Sensitivities",
     "Snapshot",
+    "SobolIndices",
     "Stepper",
     "SweepResult",
     "UnknownNameError",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from . import _halfarrow, sweeps
+from . import _halfarrow, global_sensitivity, sweeps
 from ._errors import (
     AuditWarning,
     Diagnostic,
@@ -777,6 +777,83 @@ class Model:
                 "nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`"
             )
         return sweeps.run(self, plan, executor, chunk, progress)
+
+    def sobol(
+        self,
+        ranges: Mapping[str, tuple[Value, Value]],
+        to: float,
+        *,
+        n: int = 1024,
+        second_order: bool = True,
+        resamples: int = 100,
+        confidence: float = 0.95,
+        seed: int = 0,
+        **run: Any,
+    ) -> global_sensitivity.GlobalSensitivity[global_sensitivity.SobolIndices]:
+        """Sobol' indices: which parts of the variance of an output come of which parameters, alone and together, where all of
+        them vary over their ranges at once. Sampled and estimated by SALib, run by ``sweep``.
+
+        Args:
+            ranges: ``(least, greatest)`` by the names of parameters and start values such as ``spring.q(0)``, in SI units or
+                as text with a unit; all values between are equally likely, and parameters independent of each other.
+            to: End of each run in s.
+            n: Size of the design, a power of two: ``n (2 p + 2)`` runs for ``p`` parameters, without pairs ``n (p + 2)``.
+            second_order: Whether pairs are asked for.
+            resamples, confidence: Of the bootstrap that gives the confidence intervals: how often, and at which level.
+            seed: Of the design and the bootstrap: the same gives the same.
+            run: All else that ``sweep`` takes but ``samples``: ``reduce={"peak": ("travel", "max")}``, ``step``,
+                ``executor``, values of other parameters. Start values cannot vary in an executor.
+
+        Returns:
+            ``SobolIndices`` by the columns of ``reduce``; nothing: by the last values of what is recorded.
+
+        Raises:
+            RunError: a set failed, since the estimates need all of them; ``result`` has the sweep.
+            UsageError: something is asked that cannot be; an output is the same in all sets.
+            UnknownNameError, Interrupted: as in ``sweep``.
+
+        >>> import halfarrow as ha
+        >>> wire = ha.model("model W\\nparam a = 1, b = 1\\nSe:s(a) -> 1:j\\nSe:z(b) -> j\\nj -> R:r(2)\\nj -> I:l(1)\\n")
+        >>> s = wire.sobol({"a": (0, 2), "b": (0, 1)}, to=10, n=256, step=0.01, reduce={"current": ("l.f", "final")})
+        >>> s["current"].total.round(1)
+        array([0.8, 0.2])
+        """
+        return global_sensitivity.sobol(self, ranges, to, n, second_order, resamples, confidence, seed, run)
+
+    def morris(
+        self,
+        ranges: Mapping[str, tuple[Value, Value]],
+        to: float,
+        *,
+        n: int = 20,
+        levels: int = 4,
+        resamples: int = 100,
+        confidence: float = 0.95,
+        seed: int = 0,
+        **run: Any,
+    ) -> global_sensitivity.GlobalSensitivity[global_sensitivity.MorrisEffects]:
+        """Elementary effects (Morris): which of many parameters matter at all, for few runs. Sampled and estimated by SALib, run
+        by ``sweep``.
+
+        Args:
+            ranges, to, resamples, confidence, seed, run: As in ``sobol``.
+            n: Trajectories through the ranges, on each of which every parameter takes one step: ``n (p + 1)`` runs for ``p``
+                parameters.
+            levels: Values that each parameter may have, an even number; a step goes over half of them.
+
+        Returns:
+            ``MorrisEffects`` by the columns of ``reduce``; nothing: by the last values of what is recorded.
+
+        Raises:
+            UsageError, RunError, UnknownNameError, Interrupted: as in ``sobol``, but for outputs that do not vary.
+
+        >>> import halfarrow as ha
+        >>> drop = ha.model("model Drop\\nparam m = 1 kg, F = 1 N\\nSe:weight(F) -> I:mass(m)\\n")
+        >>> s = drop.morris({"m": (1, 2), "F": ("0 N", "4 N")}, to=1, step=0.1, reduce=["final(mass.f)"])
+        >>> bool(s["final(mass.f)"].mean_abs[1] > s["final(mass.f)"].mean_abs[0])
+        True
+        """
+        return global_sensitivity.morris(self, ranges, to, n, levels, resamples, confidence, seed, run)
 
     def stepper(
         self,
