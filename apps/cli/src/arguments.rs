@@ -348,6 +348,21 @@ pub enum Exec {
     Machine,
 }
 
+/// What large residuals count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Loss {
+    /// Their squares
+    Linear,
+    /// 2 (sqrt(1 + z) - 1) of the square z: like magnitudes
+    SoftL1,
+    /// Their squares up to the scale, then like magnitudes
+    Huber,
+    /// ln(1 + z)
+    Cauchy,
+    /// arctan z: not more than a bound
+    Arctan,
+}
+
 /// How to find the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Start {
@@ -562,18 +577,34 @@ pub struct Report {
 pub struct Fit {
     #[command(flatten)]
     pub model: ModelArguments,
-    /// What was measured: a CSV file
-    #[arg(long, value_name = "FILE")]
-    pub data: PathBuf,
+    /// What was measured: a CSV file; may be repeated: runs that are fitted at once
+    #[arg(long, value_name = "FILE", required = true)]
+    pub data: Vec<PathBuf>,
     /// Variables with the columns that are measurements of them, as in `travel=z_meas,body.f=v_meas`; may be repeated
     #[arg(long, value_name = "VARIABLE=COLUMN", required = true)]
     pub outputs: Vec<String>,
     /// Parameters to fit, with bounds where there are some, as in `ks=5e3:50e3,b`; may be repeated
     #[arg(long, value_name = "NAMES", required = true)]
     pub params: Vec<String>,
-    /// Standard deviations of the measurements, as in `travel=1e-3`, for all outputs [default: estimated]
+    /// Standard deviations of the measurements, as in `travel=1e-3`, or `travel=@s` for the column s of the data, for all outputs
+    /// [default: estimated]
     #[arg(long, value_name = "VARIABLE=NUMBER")]
     pub sigma: Vec<String>,
+    /// How many searches are made: from the first guesses, then from points between the bounds
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub starts: usize,
+    /// What large residuals count
+    #[arg(long, default_value = "linear")]
+    pub loss: Loss,
+    /// From how many standard deviations on a residual is large
+    #[arg(long, value_name = "NUMBER", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub loss_scale: f64,
+    /// Parameters whose profile is wanted: the best fit for other values of each
+    #[arg(long, value_name = "NAMES")]
+    pub profile: Vec<String>,
+    /// Where to draw measurements, the fitted model and what is left over: a .svg or .png file; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub plot: Vec<PathBuf>,
     /// End of each run, in s [default: the last time of the data]
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: Option<f64>,
@@ -589,7 +620,8 @@ pub struct Fit {
     /// Relative change of the sum of squares and of the parameters at which the search ends
     #[arg(long, default_value_t = 1e-10, allow_negative_numbers = true)]
     pub tolerance: f64,
-    /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
+    /// Give an input by a CSV file with a column `t` and one named as the input, or as in `road=@z` by the column z of each file of
+    /// data; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,
     /// Where each run starts

@@ -45,6 +45,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for name, package in OPTIONAL.items():
             if item.name.startswith(name) and importlib.util.find_spec(package) is None:
                 item.add_marker(pytest.mark.skip(reason=f"{package} is not installed"))
+    # JAX has threads, which processes that are forked do not survive: what needs it comes last.
+    items.sort(key=lambda item: "jax" in item.nodeid.lower())
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,7 +43,9 @@ def measured(car: ha.Model, seed: int, noise: float = NOISE, **values: object) -
 
 def test_as_scipy_with_differences(car: ha.Model) -> None:
     data = measured(car, 1)
-    f = car.fit(data, {"k": ("5 kN/m", "50 kN/m"), "b": None}, outputs={"travel": "z_meas"}, sigma={"travel": NOISE}, road=ROAD)
+    f = car.fit(
+        data, {"k": ("5 kN/m", "50 kN/m"), "b": None}, outputs={"travel": "z_meas"}, sigma={"travel": NOISE}, road=ROAD
+    )
     assert f.success and f.rank == 2 and not f.unidentified
 
     runs = 0
@@ -59,7 +62,9 @@ def test_as_scipy_with_differences(car: ha.Model) -> None:
     np.testing.assert_allclose(f.x, other.x, rtol=1e-5)
     covariance = np.linalg.inv(other.jac.T @ other.jac)
     np.testing.assert_allclose([e.error for e in f.estimates.values()], np.sqrt(np.diag(covariance)), rtol=1e-3)
-    np.testing.assert_allclose(f.correlation[0, 1], covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]), atol=1e-3)
+    np.testing.assert_allclose(
+        f.correlation[0, 1], covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]), atol=1e-3
+    )
     assert f.evaluations < runs
     low, high = f.interval("k")
     assert low < 20e3 < high and f["k"] == f.x[0] == f.model.parameters["k"].value
@@ -151,7 +156,9 @@ def test_starts_as_parameters(car: ha.Model) -> None:
     f = car.fit(data, {"q0": (0.0, 0.2), "k": None}, outputs={"travel": "z_meas"}, road=ROAD, b=1200)
     assert abs(f["q0"] - 0.08) < 4 * f.estimates["q0"].error
     # The same by the name of the start value, and one of which the model says nothing.
-    g = car.fit(data, {"spring.q(0)": None, "k": None, "body.f(0)": (-1, 1)}, outputs={"travel": "z_meas"}, road=ROAD, b=1200)
+    g = car.fit(
+        data, {"spring.q(0)": None, "k": None, "body.f(0)": (-1, 1)}, outputs={"travel": "z_meas"}, road=ROAD, b=1200
+    )
     assert abs(g["spring.q(0)"] - 0.08) < 4 * g.estimates["spring.q(0)"].error
     assert abs(g["body.f(0)"]) < 4 * g.estimates["body.f(0)"].error and g.estimates["body.f(0)"].unit == "m/s"
 
@@ -170,3 +177,24 @@ def test_what_is_refused(car: ha.Model) -> None:
         car.fit(data, {"k": (5, 1)}, outputs={"travel": "z_meas"})
     with pytest.raises(ha.UsageError, match="column `t`"):
         car.fit({"z": [1.0]}, {"k": None}, outputs={"travel": "z"})
+
+
+def test_deviations_are_given_for_all_outputs_or_for_none(cart: ha.Model) -> None:
+    t = np.linspace(0, 4, 41)
+    r = cart.simulate(to=4, at=t, push=3, record="all")
+    data = {"t": t, "v": r["speed"], "p": r["cart.p"]}
+    ask: dict[str, Any] = {"outputs": {"speed": "v", "cart.p": "p"}, "push": 3}
+    with pytest.raises(ha.UsageError, match="no standard deviation of `cart.p`: give them for all"):
+        cart.fit(data, {"m": None}, sigma={"speed": 0.1}, **ask)
+    with pytest.raises(ha.UnknownNameError, match="output `sped`; did you mean `speed`"):
+        cart.fit(data, {"m": None}, sigma={"sped": 0.1}, **ask)
+    with pytest.raises(ha.UnknownNameError, match="column `sd`"):
+        cart.fit(data, {"m": None}, sigma={"speed": "sd", "cart.p": 1}, **ask)
+    # Of several experiments each has its own outputs.
+    halves = [ha.Experiment(data, outputs={own: ask["outputs"][own]}) for own in ask["outputs"]]
+    f = cart.fit(halves, {"m": None}, sigma={"speed": 0.1, "cart.p": 0.1}, push=3)
+    assert f.variance == 1.0 and abs(f["m"] - 2) < 1e-6
+    f = cart.fit(data, {"m": (1, 5), "b": None}, sigma={"speed": 0.1, "cart.p": 0.1}, **ask)
+    profile = f.profile("m")
+    axes = profile.plot()
+    assert axes.get_xlabel() == "m" and profile.bound > f.cost

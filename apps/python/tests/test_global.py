@@ -127,3 +127,7 @@ def test_what_is_wrong_is_told() -> None:
         m.sobol({"r": (1, 2)}, to=1, n=4, step=0.01, reduce=["final(s1.e)"])
     with pytest.raises(ha.UsageError, match="has to be even"):
         m.morris({"r": (1, 2)}, to=1, levels=3)
+    with pytest.raises(ha.UsageError, match="leave out `whole`"):
+        m.morris({"r": (1, 2)}, to=1, whole=True)
+    with pytest.raises(ha.UsageError, match="seed is -1"):
+        m.morris({"r": (1, 2)}, to=1, seed=-1)

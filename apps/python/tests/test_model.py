@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import xml.dom.minidom
 from pathlib import Path
 
 import pytest
@@ -219,3 +220,25 @@ def test_everything_public_is_documented() -> None:
             for own, value in vars(thing).items() if isinstance(thing, type) else []:
                 if not own.startswith("_") and (callable(value) or isinstance(value, property)):
                     assert value.__doc__, f"{name}.{own}"
+
+
+def test_mathml(car: ha.Model) -> None:
+    table = xml.dom.minidom.parseString(car.equations().mathml)
+    assert len(table.getElementsByTagName("mtr")) == len(car.equations().equations)
+    assert "<mover><mi>f</mi><mo>˙</mo></mover>" in car.equations().mathml
+    assert repr(car.equations()).startswith("<Equations of QuarterCar, form minimal>\n")
+
+
+def test_equations_that_are_not_there(car: ha.Model) -> None:
+    with pytest.raises(ha.UnknownNameError, match="did you mean `spring.q`"):
+        car.equations(only="sprng.q")
+    with pytest.raises(ha.UsageError, match="ask for variables of elements"):
+        car.equations(only="chassis.f")
+    assert not car.equations(only="damper.f").text.startswith("\n")
+
+
+def test_texts_and_paths_are_told_apart() -> None:
+    with pytest.raises(ha.UsageError, match="`halfarrow.load` reads files"):
+        ha.model("car.bond")
+    with pytest.raises(ha.UsageError, match="to `halfarrow.model`"):
+        ha.load("model Drop\nSe:weight(9.81 N) -> I:mass(1 kg)\n")

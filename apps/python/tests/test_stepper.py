@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,3 +88,9 @@ def test_control_c(cart: ha.Model) -> None:
             run.step(10**12)
         assert run.t > 0
         run.step()
+
+
+@pytest.mark.parametrize("steps", [-1, 1.5, "1"])
+def test_what_is_no_number_of_steps(cart: ha.Model, steps: Any) -> None:
+    with cart.stepper(step=1e-3) as run, pytest.raises(ha.UsageError, match="give a whole number of them"):
+        run.step(steps)

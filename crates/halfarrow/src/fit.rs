@@ -1,19 +1,28 @@
 //! Parameters from measurements: least squares by the method of Levenberg and Marquardt, with exact derivatives.
 
+mod loss;
+mod measured;
+mod profile;
+mod range;
+mod search;
+
+pub use loss::Loss;
+pub use profile::Profile;
+
 use std::path::PathBuf;
 
 use faer::Mat;
 use halfarrow_compiler::equations::Form;
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra_of_lm::storage::Owned;
-use nalgebra_of_lm::{DMatrix, DVector, Dyn};
+use halfarrow_trace::{Column, Trace};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF as _, Normal, StudentsT};
 
-use crate::compiled::Compiled;
 use crate::error::{Error, Problem};
 use crate::model::Model;
 use crate::run::{Record, Run};
-use crate::table_file::ReadTable;
+use measured::Measured;
+use range::Range;
+use search::Task;
 
 /// Directions in which residuals change by less than this part of the greatest change are told by the errors of runs alone.
 const RANK: f64 = 1e-6;
@@ -21,24 +30,59 @@ const RANK: f64 = 1e-6;
 const SHARE: f64 = 1e-3;
 /// A parameter below this part of its first guess, or of the distance of its bounds, counts as that.
 const NEAR_ZERO: f64 = 1e-2;
-/// A residual where the model does not run: no step goes there.
-const NOWHERE: f64 = 1e100;
+/// Intervals hold the true value this often.
+const LEVEL: f64 = 0.95;
 
 /// What to fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// The run; its end is the last time of the data unless it is sooner. In the form `minimal`.
     pub run: Run,
-    /// A CSV file with a column `t` and those that are compared.
-    pub data: PathBuf,
+    /// CSV files with a column `t` and those that are compared: a run for each, all with the same parameters.
+    pub data: Vec<PathBuf>,
+    /// Inputs that are columns of these files.
+    pub columns: Vec<(String, String)>,
     /// Variables with the columns that are measurements of them.
     pub outputs: Vec<(String, String)>,
-    /// Standard deviations of the measurements of variables, in their units; those of the others are estimated.
-    pub sigma: Vec<(String, f64)>,
+    /// Standard deviations of the measurements of variables, in their units: of all or of none, then they are estimated.
+    pub sigma: Vec<(String, Sigma)>,
     /// What is fitted.
     pub parameters: Vec<FitParameter>,
     /// Relative change of parameters and sum of squares at which the search ends.
     pub tolerance: f64,
+    /// How many searches are made, from different values.
+    pub starts: usize,
+    /// What large residuals count, and from how many standard deviations on.
+    pub loss: (Loss, f64),
+    /// Parameters whose profile is wanted.
+    pub profiles: Vec<String>,
+}
+
+impl Default for Fit {
+    /// Of nothing, to 1e-10, by one search for the least sum of squares.
+    fn default() -> Fit {
+        Fit {
+            run: Run { to: f64::INFINITY, rtol: 1e-8, ..Run::default() },
+            data: Vec::new(),
+            columns: Vec::new(),
+            outputs: Vec::new(),
+            sigma: Vec::new(),
+            parameters: Vec::new(),
+            tolerance: 1e-10,
+            starts: 1,
+            loss: (Loss::Linear, 1.0),
+            profiles: Vec::new(),
+        }
+    }
+}
+
+/// A standard deviation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sigma {
+    /// The same for all measurements.
+    Number(f64),
+    /// A column of the data.
+    Column(String),
 }
 
 /// A parameter to fit; the search begins at its value in the model, or between its bounds. The start value of a variable is
@@ -99,6 +143,35 @@ pub struct FitReport {
     pub success: bool,
     /// Why it ended.
     pub ended: String,
+    /// Of each search where it began, where it ended and what it came to there; `null` where the model does not run.
+    pub starts: Vec<Beginning>,
+    /// The profiles that were asked for.
+    pub profiles: Vec<Profile>,
+    /// Measurements, the fitted model and what is left over, of each run.
+    #[serde(skip)]
+    pub runs: Vec<FittedRun>,
+}
+
+/// A search.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Beginning {
+    /// Values of the parameters where it began, in SI units.
+    pub begin: Vec<f64>,
+    /// Where it ended.
+    pub end: Option<Vec<f64>>,
+    /// The sum there.
+    pub cost: Option<f64>,
+}
+
+/// A run that was measured, beside the fitted model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedRun {
+    /// The file.
+    pub name: String,
+    /// The measurements, and as `travel: residual` what is left over in standard deviations.
+    pub measured: Trace,
+    /// The fitted model.
+    pub fitted: Trace,
 }
 
 /// A parameter that was fitted.
@@ -110,129 +183,12 @@ pub struct Estimate {
     pub value: f64,
     /// Its standard error; `null` where the data do not tell it.
     pub error: Option<f64>,
+    /// A confidence interval of 95 % by it; `null` with it.
+    pub interval: Option<(f64, f64)>,
     /// SI unit, where known.
     pub unit: Option<String>,
     /// Whether it lies at a bound.
     pub at_bound: bool,
-}
-
-/// A parameter as the search has it: without bounds by `value = scale · u`, between bounds by the sine of `u`. Source: [MINUIT].
-#[derive(Debug, Clone, Copy)]
-enum Range {
-    Free { scale: f64 },
-    Between { low: f64, high: f64 },
-}
-
-impl Range {
-    fn value(self, u: f64) -> f64 {
-        match self {
-            Range::Free { scale } => scale * u,
-            Range::Between { low, high } => low + 0.5 * (high - low) * (1.0 + libm::sin(u)),
-        }
-    }
-
-    fn slope(self, u: f64) -> f64 {
-        match self {
-            Range::Free { scale } => scale,
-            Range::Between { low, high } => 0.5 * (high - low) * libm::cos(u),
-        }
-    }
-
-    fn place(self, value: f64) -> f64 {
-        match self {
-            Range::Free { scale } => value / scale,
-            Range::Between { low, high } => libm::asin((2.0 * (value - low) / (high - low) - 1.0).clamp(-1.0, 1.0)),
-        }
-    }
-}
-
-/// The problem as the method asks for it.
-struct Search<'a> {
-    compiled: &'a Compiled,
-    run: Run,
-    names: Vec<String>,
-    ranges: Vec<Range>,
-    /// Measurements, output by output, and their standard deviations; NaN where there is none.
-    measured: Vec<Vec<f64>>,
-    sigma: Vec<f64>,
-    u: DVector<f64>,
-    evaluations: std::cell::Cell<usize>,
-    jacobians: std::cell::Cell<usize>,
-    progress: std::cell::RefCell<&'a mut dyn FnMut(usize) -> bool>,
-}
-
-impl Search<'_> {
-    fn values(&self) -> Vec<f64> {
-        self.ranges.iter().zip(&self.u).map(|(range, u)| range.value(*u)).collect()
-    }
-
-    /// The columns of a run with the present values: outputs, then their derivatives by each parameter.
-    fn columns(&self, differentiated: bool) -> Result<Vec<Vec<f64>>, Error> {
-        self.evaluations.set(self.evaluations.get() + 1);
-        let mut compiled = self.compiled.clone();
-        let values = self.values();
-        compiled.set_all(self.names.iter().map(String::as_str).zip(values))?;
-        let mut run = self.run.clone();
-        if differentiated {
-            self.jacobians.set(self.jacobians.get() + 1);
-            run.sensitivities.clone_from(&self.names);
-        }
-        if !(self.progress.borrow_mut())(self.evaluations.get()) {
-            let reason = "the fit was stopped".to_string();
-            return Err(Problem::BadOption { reason }.into());
-        }
-        let done = compiled.simulate(&run, &mut |_| true)?;
-        Ok(done.trace.columns.into_iter().map(|column| column.values).collect())
-    }
-
-    /// For each measurement that there is, what `of` makes of the column of its output.
-    fn each<'s>(&'s self, of: impl Fn(usize, usize) -> f64 + 's) -> impl Iterator<Item = f64> + 's {
-        let places = self.measured.iter().enumerate();
-        let places = places.flat_map(|(k, values)| (0..values.len()).map(move |i| (k, i)));
-        places.filter(|&(k, i)| self.measured[k][i].is_finite()).map(move |(k, i)| of(k, i) / self.sigma[k])
-    }
-
-    fn residuals_of(&self, columns: &[Vec<f64>]) -> Vec<f64> {
-        self.each(|k, i| columns[k][i] - self.measured[k][i]).collect()
-    }
-
-    /// The derivatives of the residuals by the parameters themselves.
-    fn slopes_of(&self, columns: &[Vec<f64>]) -> DMatrix<f64> {
-        let outputs = self.measured.len();
-        let by = |j: usize| self.each(move |k, i| columns[(j + 1) * outputs + k][i]).collect::<Vec<f64>>();
-        let all: Vec<Vec<f64>> = (0..self.names.len()).map(by).collect();
-        DMatrix::from_fn(all.first().map_or(0, Vec::len), all.len(), |i, j| all[j][i])
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, u: &DVector<f64>) {
-        self.u.copy_from(u);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.u.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        Some(match self.columns(false) {
-            Ok(columns) => DVector::from_vec(self.residuals_of(&columns)),
-            Err(_) => DVector::from_iterator(self.each(|_, _| 1.0).count(), self.each(|_, _| 1.0).map(|_| NOWHERE)),
-        })
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let mut slopes = self.slopes_of(&self.columns(true).ok()?);
-        for (j, range) in self.ranges.iter().enumerate() {
-            let slope = range.slope(self.u[j]);
-            slopes.column_mut(j).iter_mut().for_each(|entry| *entry *= slope);
-        }
-        Some(slopes)
-    }
 }
 
 impl Model {
@@ -262,77 +218,88 @@ impl Model {
         }
         let starts: Vec<&str> = fit.parameters.iter().filter_map(|p| p.name.strip_suffix("(0)")).collect();
         let compiled = self.with_starts(&starts)?.compile(Form::Minimal)?;
-        let (times, measured) = measurements(fit, &compiled)?;
-        let spread = |values: &[f64]| {
-            let known: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-            let mean = known.iter().sum::<f64>() / known.len() as f64;
-            let square = known.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / known.len() as f64;
-            if square > 0.0 { square.sqrt() } else { 1.0 }
-        };
-        let given = |name: &String| fit.sigma.iter().find(|s| s.0 == *name).map(|s| s.1);
-        let known = fit.outputs.iter().all(|(name, _)| given(name).is_some());
-        if !known && !fit.sigma.is_empty() {
-            return Err(bad(
-                "standard deviations are given for some outputs only: give them for all, or for none".into()
-            ));
+        if !(fit.loss.1.is_finite() && fit.loss.1 > 0.0) {
+            return Err(bad(format!("the scale of the loss is {}: it has to be a finite number above 0", fit.loss.1)));
         }
-        let outputs = fit.outputs.iter().zip(&measured);
-        let sigma: Vec<f64> =
-            outputs.map(|((name, _), values)| given(name).unwrap_or_else(|| spread(values))).collect();
-        if sigma.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-            return Err(bad("standard deviations have to be finite and above 0".into()));
+        if fit.data.is_empty() || fit.starts == 0 {
+            return Err(bad("there is nothing to compare with, or no search".into()));
         }
-        let run = Run {
-            to: *times.last().expect("there are measurements"),
-            at: times,
-            record: Record::Names(fit.outputs.iter().map(|(name, _)| name.clone()).collect()),
-            ..fit.run.clone()
+        let (measured, known) = measured::all(fit, &compiled)?;
+        let (ranges, guesses) = range::ranges(fit, &compiled)?;
+        let record = Record::Names(fit.outputs.iter().map(|(name, _)| name.clone()).collect());
+        let run = |measured: Measured| {
+            let to = *measured.times.last().expect("there are measurements");
+            let inputs = fit.run.inputs.iter().cloned().chain(measured.inputs.clone()).collect();
+            (Run { to, at: measured.times.clone(), record: record.clone(), inputs, ..fit.run.clone() }, measured)
         };
-        let (ranges, u) = ranges(fit, &compiled)?;
-        let names = fit.parameters.iter().map(|p| p.name.clone()).collect();
-        let counter = || std::cell::Cell::new(0);
-        let progress = std::cell::RefCell::new(progress);
-        let search = Search {
+        let task = Task {
             compiled: &compiled,
-            run,
-            names,
+            runs: measured.into_iter().map(run).collect(),
+            names: fit.parameters.iter().map(|p| p.name.clone()).collect(),
             ranges,
-            measured,
-            sigma,
-            u: DVector::from_vec(u),
-            evaluations: counter(),
-            jacobians: counter(),
-            progress,
+            loss: fit.loss,
+            tolerance: fit.tolerance,
+            evaluations: std::cell::Cell::new(0),
+            jacobians: std::cell::Cell::new(0),
+            progress: std::cell::RefCell::new(progress),
         };
-        // Where the search begins the model has to run, and why it does not is told.
-        search.columns(true)?;
-        let method =
-            LevenbergMarquardt::new().with_ftol(fit.tolerance).with_xtol(fit.tolerance).with_gtol(fit.tolerance);
-        let (found, ended) = method.minimize(search);
-        let columns = found.columns(true)?;
-        let success = ended.termination.was_successful();
-        self.judge(&found, &columns, known, (success, format!("{:?}", ended.termination)))
+        let profiled = |name: &String| task.names.iter().position(|own| own == name);
+        if let Some(name) = fit.profiles.iter().find(|name| profiled(name).is_none()) {
+            return Err(bad(format!("a profile of `{name}` is asked for, which is not fitted")));
+        }
+        let all: Vec<usize> = (0..task.names.len()).collect();
+        let (mut best, mut starts, mut why) = (None::<(f64, Ended)>, Vec::new(), None);
+        for begin in range::beginnings(&task.ranges, &guesses, fit.starts) {
+            // Where a search begins the model has to run; of the first one that does not, why is told.
+            if let Err(error) = task.columns(&begin, &all) {
+                why = why.or(Some(error));
+                starts.push(Beginning { begin, end: None, cost: None });
+                continue;
+            }
+            let found = task.search(&begin, &all);
+            let cost = task.cost(&task.residuals(&task.columns(&found.0, &[])?));
+            starts.push(Beginning { begin, end: Some(found.0.clone()), cost: Some(cost) });
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, found));
+            }
+        }
+        let (cost, found) = match (best, why) {
+            (Some(best), _) => best,
+            (None, Some(why)) => return Err(why),
+            (None, None) => unreachable!("there is a first search"),
+        };
+        let mut report = self.judge(&task, (cost, &found), known)?;
+        report.starts = starts;
+        for name in &fit.profiles {
+            let at = profiled(name).expect("looked for above");
+            report.profiles.push(profile::profile(&task, &report, at, (known, LEVEL))?);
+        }
+        (report.evaluations, report.jacobians) = (task.evaluations.get(), task.jacobians.get());
+        Ok(report)
     }
 
     /// What the data tell at the end of a search.
     fn judge(
         &self,
-        found: &Search<'_>,
-        columns: &[Vec<f64>],
+        task: &Task<'_>,
+        (cost, (values, success, ended)): (f64, &Ended),
         known: bool,
-        (success, ended): (bool, String),
     ) -> Result<FitReport, Error> {
-        let (residuals, slopes, values) = (found.residuals_of(columns), found.slopes_of(columns), found.values());
+        let all: Vec<usize> = (0..values.len()).collect();
+        let columns = task.columns(values, &all)?;
+        let (residuals, mut slopes) = (task.residuals(&columns), task.slopes(&columns, values.len()));
         let n = values.len();
+        let weights: Vec<f64> = residuals.iter().map(|&r| task.loss.0.weight(r, task.loss.1)).collect();
+        slopes.iter_mut().for_each(|column| column.iter_mut().zip(&weights).for_each(|(slope, w)| *slope *= w));
         // What is near zero counts as a part of where it was sought.
         let size = |j: usize| {
-            let sought = match found.ranges[j] {
+            let sought = match task.ranges[j] {
                 Range::Free { scale } => scale,
                 Range::Between { low, high } => high - low,
             };
             values[j].abs().max(NEAR_ZERO * sought)
         };
-        let weighed = Mat::from_fn(residuals.len(), n, |i, j| slopes[(i, j)] * size(j));
+        let weighed = Mat::from_fn(residuals.len(), n, |i, j| slopes[j][i] * size(j));
         let bad = || Problem::BadOption { reason: "the derivatives at the end of the search are not finite".into() };
         let svd = weighed.thin_svd().map_err(|_| bad())?;
         let (sizes, ways) = (svd.S().column_vector(), svd.V());
@@ -340,9 +307,8 @@ impl Model {
         let (told, untold): (Vec<usize>, Vec<usize>) =
             (0..n.min(residuals.len())).partition(|&k| sizes[k] > RANK * most);
         let (rank, measurements) = (told.len(), residuals.len());
-        let cost = residuals.iter().map(|r| r * r).sum::<f64>();
         let freedom = measurements - rank;
-        let variance = if known { 1.0 } else { cost / freedom.max(1) as f64 };
+        let variance = if known { 1.0 } else { residuals.iter().map(|r| r * r).sum::<f64>() / freedom.max(1) as f64 };
         let lost = |i: usize| untold.iter().any(|&k| ways[(i, k)].abs() > SHARE);
         let covariance = |i: usize, j: usize| {
             variance * told.iter().map(|&k| ways[(i, k)] * ways[(j, k)] / (sizes[k] * sizes[k])).sum::<f64>()
@@ -351,27 +317,30 @@ impl Model {
             let value = covariance(i, j) / (covariance(i, i) * covariance(j, j)).sqrt();
             (!lost(i) && !lost(j)).then_some(value)
         };
-        let at_bound = |i: usize| match found.ranges[i] {
+        let at_bound = |i: usize| match task.ranges[i] {
             Range::Free { .. } => false,
             Range::Between { low, high } => (values[i] - low).min(high - values[i]) <= 1e-6 * (high - low),
         };
-        let interface = found.compiled.interface();
+        let interface = task.compiled.interface();
         let unit = |name: &str| interface.parameters.iter().find(|p| p.name == name).and_then(|p| p.unit.clone());
         let combination = |k: usize| {
-            let mut shares: Vec<(String, f64)> = (0..n).map(|i| (found.names[i].clone(), ways[(i, k)])).collect();
+            let mut shares: Vec<(String, f64)> = (0..n).map(|i| (task.names[i].clone(), ways[(i, k)])).collect();
             shares.retain(|(_, share)| share.abs() > SHARE);
             shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
             let sign = shares.first().map_or(1.0, |s| s.1.signum());
             shares.into_iter().map(|(name, share)| (name, sign * share)).collect()
         };
+        let reach = reach(known, freedom, LEVEL);
+        let error = |i: usize| (!lost(i)).then(|| covariance(i, i).sqrt() * size(i));
         Ok(FitReport {
             model: self.name().to_string(),
             parameters: (0..n)
                 .map(|i| Estimate {
-                    name: found.names[i].clone(),
+                    name: task.names[i].clone(),
                     value: values[i],
-                    error: (!lost(i)).then(|| covariance(i, i).sqrt() * size(i)),
-                    unit: unit(&found.names[i]),
+                    error: error(i),
+                    interval: error(i).map(|error| (values[i] - reach * error, values[i] + reach * error)),
+                    unit: unit(&task.names[i]),
                     at_bound: at_bound(i),
                 })
                 .collect(),
@@ -382,72 +351,54 @@ impl Model {
             variance,
             rank,
             unidentified: untold.iter().map(|&k| combination(k)).collect(),
-            evaluations: found.evaluations.get(),
-            jacobians: found.jacobians.get(),
-            success,
-            ended,
+            evaluations: task.evaluations.get(),
+            jacobians: task.jacobians.get(),
+            success: *success,
+            ended: ended.clone(),
+            starts: Vec::new(),
+            profiles: Vec::new(),
+            runs: fitted_runs(task, &columns, &residuals),
         })
     }
 }
 
-/// Times and, output by output, measurements in the units of results.
-fn measurements(fit: &Fit, compiled: &Compiled) -> Result<(Vec<f64>, Vec<Vec<f64>>), Error> {
-    let table = ReadTable::open(&fit.data)?;
-    let fault = |fault: String| Error::from(Problem::BadInput { path: fit.data.clone(), faults: vec![fault] });
-    let mut last = f64::NEG_INFINITY;
-    if table.times.iter().any(|&t| std::mem::replace(&mut last, t) >= t || t < 0.0) {
-        return Err(fault("times have to ascend from 0 on, each of them once".into()));
+/// Where a search has ended: the values, whether by itself, and why.
+type Ended = (Vec<f64>, bool, String);
+
+/// How many standard errors an interval reaches to each side: by the normal distribution where the variance is known, else by
+/// Student's.
+fn reach(known: bool, freedom: usize, level: f64) -> f64 {
+    let part = 0.5 + 0.5 * level;
+    match known {
+        true => Normal::standard().inverse_cdf(part),
+        false => {
+            let law = StudentsT::new(0.0, 1.0, freedom.max(1) as f64).expect("degrees of freedom above 0");
+            law.inverse_cdf(part)
+        }
     }
-    let count = table.times.iter().take_while(|t| **t <= fit.run.to).count();
-    if count == 0 {
-        return Err(fault("nothing was measured before the end of the run".into()));
-    }
-    let observed = &compiled.minimal().program().observed;
-    let mut all = Vec::new();
-    for (name, column) in &fit.outputs {
-        let Some(found) = table.columns.get(column) else {
-            let known: Vec<&str> = table.columns.keys().map(String::as_str).collect();
-            return Err(fault(format!("there is no column `{column}`; there are {}", known.join(", "))));
-        };
-        let unit = observed.iter().find(|o| o.name == *name).and_then(|o| o.unit.as_ref());
-        let values = match (&found.unit, unit) {
-            (Some(_), Some(unit)) => {
-                let si = found.in_si(column, Some(unit)).map_err(fault)?;
-                si.into_iter().map(|value| if unit.is_si() { value } else { unit.from_si_f64(value) }).collect()
-            }
-            _ => found.values.clone(),
-        };
-        all.push(values[..count].to_vec());
-    }
-    Ok((table.times[..count].to_vec(), all))
 }
 
-/// Ranges of the parameters, and where the search begins.
-fn ranges(fit: &Fit, compiled: &Compiled) -> Result<(Vec<Range>, Vec<f64>), Error> {
-    let (mut ranges, mut begin) = (Vec::new(), Vec::new());
-    for parameter in &fit.parameters {
-        let own = compiled.parameter(&parameter.name);
-        let range = match &parameter.bounds {
-            None => Range::Free { scale: own.filter(|v| *v != 0.0).map_or(1.0, f64::abs) },
-            Some((low, high)) => {
-                let (low, high) = (compiled.quantity(&parameter.name, low)?, compiled.quantity(&parameter.name, high)?);
-                if low >= high || !(low.is_finite() && high.is_finite()) {
-                    let reason = format!("`{}` is given the bounds {low} and {high}", parameter.name);
-                    return Err(Problem::BadOption { reason }.into());
-                }
-                Range::Between { low, high }
-            }
-        };
-        let value = match range {
-            Range::Between { low, high } => match own.filter(|own| low < *own && *own < high) {
-                Some(own) => own,
-                None if low > 0.0 => (low * high).sqrt(),
-                None => 0.5 * (low + high),
-            },
-            Range::Free { .. } => own.unwrap_or(0.0),
-        };
-        begin.push(range.place(value));
-        ranges.push(range);
-    }
-    Ok((ranges, begin))
+fn fitted_runs(task: &Task<'_>, columns: &search::Columns, residuals: &[f64]) -> Vec<FittedRun> {
+    let observed = &task.compiled.minimal().program().observed;
+    let unit = |name: &str| {
+        let unit = observed.iter().find(|o| o.name == name).and_then(|o| o.unit.as_ref());
+        unit.map(ToString::to_string).unwrap_or_default()
+    };
+    let mut left = residuals.iter().copied();
+    let one = |((run, measured), own): (&(Run, Measured), &Vec<Vec<f64>>)| {
+        let Record::Names(names) = &run.record else { unreachable!("outputs are recorded by name") };
+        let column = |name: String, unit: String, values: &[f64]| Column { name, unit, values: values.to_vec() };
+        let (mut data, mut fitted, mut rest) = (Vec::new(), Vec::new(), Vec::new());
+        for ((name, values), own) in names.iter().zip(&measured.values).zip(own) {
+            data.push(column(name.clone(), unit(name), values));
+            fitted.push(column(name.clone(), unit(name), own));
+            let next = |v: &f64| if v.is_finite() { left.next().unwrap_or(f64::NAN) } else { f64::NAN };
+            let values: Vec<f64> = values.iter().map(next).collect();
+            rest.push(column(format!("{name}: residual"), "1".into(), &values));
+        }
+        data.extend(rest);
+        let trace = |columns| Trace { times: measured.times.clone(), columns };
+        FittedRun { name: measured.name.clone(), measured: trace(data), fitted: trace(fitted) }
+    };
+    task.runs.iter().zip(columns).map(one).collect()
 }

@@ -78,7 +78,7 @@ pub use error::{Error, Problem};
 pub use execution::RoutineReport;
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
 pub use families::Family;
-pub use fit::{Estimate, Fit, FitParameter, FitReport};
+pub use fit::{Beginning, Estimate, Fit, FitParameter, FitReport, FittedRun, Loss, Profile, Sigma};
 pub use gradient::{Gradient, Objective, Slope};
 pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};

@@ -93,15 +93,16 @@ from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
 from .functions import Function
 from .global_sensitivity import GlobalSensitivity, MorrisEffects, SobolIndices
+from .gradients import Gradient, Recorded
+from .identifiability import Identifiability
 from .linear import Linearization
 from .loops import Loops
-from .gradients import Gradient, Recorded
 from .model import Input, Model, Parameter, Variable, load, model
 from .picture import Picture
 from .result import Audit, Result
 from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
-from .sweeps import SweepResult
+from .sweeps import SweepFiles, SweepResult, read_sweep
 
 __all__ = [
     "Audit",
@@ -118,6 +119,7 @@ __all__ = [
     "Function",
     "GlobalSensitivity",
     "Gradient",
+    "Identifiability",
     "Input",
     "Interrupted",
     "Library",
@@ -137,6 +139,7 @@ __all__ = [
     "Snapshot",
     "SobolIndices",
     "Stepper",
+    "SweepFiles",
     "SweepResult",
     "UnknownNameError",
     "UsageError",
@@ -146,4 +149,5 @@ __all__ = [
     "library",
     "load",
     "model",
+    "read_sweep",
 ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import sympy
+from sympy.printing.mathml import MathMLPresentationPrinter
 
 from ._errors import UsageError
 
@@ -39,6 +41,46 @@ _T = sympy.Symbol("t")
 def equations(lines: Sequence[str], constants: Collection[str]) -> list[sympy.Eq]:
     """Lines ``left = right``. What is no constant is a function of time."""
     return [_Reader(line, constants).equation() for line in lines]
+
+
+def mathml(written: Sequence[sympy.Eq]) -> str:
+    """Equations as a table of presentation MathML: variables as `f` with the name of their element below, rates with dots."""
+    printer = MathMLPresentationPrinter()
+    rows = []
+    for equation in written:
+        marks: dict[str, tuple[str, int]] = {}
+
+        def mark(text: str, order: int, marks: dict[str, tuple[str, int]] = marks) -> sympy.Symbol:
+            key = f"mark{len(marks)}end"
+            marks[key] = (text, order)
+            return sympy.Symbol(key)
+
+        # Rates before what they are rates of.
+        rates = sorted(equation.atoms(sympy.Derivative), key=str)
+        left = {rate: mark(rate.expr.func.__name__, int(rate.derivative_count)) for rate in rates}
+        plain = equation.xreplace(left)
+        functions = sorted(plain.atoms(sympy.core.function.AppliedUndef), key=str)
+        names = sorted((s for s in plain.free_symbols if s not in left.values() and s != _T), key=str)
+        plain = plain.xreplace(
+            {**{f: mark(f.func.__name__, 0) for f in functions}, **{s: mark(s.name, 0) for s in names}}
+        )
+        row = "".join(
+            f"<mtd>{printer.doprint(side)}</mtd>" + "<mtd><mo>=</mo></mtd>" * (side is plain.lhs) for side in plain.args
+        )
+        for key, (text, order) in marks.items():
+            row = row.replace(f"<mi>{key}</mi>", _identifier(text, order))
+        # Entities that HTML knows, and XML does not.
+        rows.append(f"<mtr>{html.unescape(row.replace('&lt;', '&amp;lt;').replace('&gt;', '&amp;gt;'))}</mtr>")
+    return f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"><mtable>{"".join(rows)}</mtable></math>'
+
+
+def _identifier(text: str, order: int) -> str:
+    """A name: what stands behind its last point, with what stands before it below; a dot above for each rate."""
+    element, _, own = text.rpartition(".")
+    found = f"<mi>{own}</mi>"
+    if order:
+        found = f"<mover>{found}<mo>{'˙¨'[order - 1] if order < 3 else '(' + str(order) + ')'}</mo></mover>"
+    return f'<msub>{found}<mi mathvariant="normal">{element}</mi></msub>' if element else found
 
 
 class _Reader:

@@ -12,6 +12,7 @@ from ._tables import record
 if TYPE_CHECKING:
     import sympy
 
+    from ._casadi import Casadi
     from .model import Model
 
 
@@ -104,12 +105,8 @@ class Equations:
     @property
     def text(self) -> str:
         """All of it in Unicode, for people."""
-        text = "\n".join(self.lines)
-        if self.legend:
-            text += "\n\nwhere\n" + "\n".join(f"    {line}" for line in self.legend)
-        if self.events_text:
-            text += "\n\n" + "\n".join(self.events_text)
-        return text
+        legend = ["where", *(f"    {line}" for line in self.legend)] if self.legend else []
+        return "\n\n".join("\n".join(part) for part in (self.lines, legend, self.events_text) if part)
 
     @property
     def latex(self) -> str:
@@ -140,8 +137,40 @@ class Equations:
         constants = {*self.of.parameters, *(line.split(" = ", 1)[0] for line in self.conserved)}
         return _sympy.equations([*self.equations, *self.definitions], constants)
 
+    @property
+    def mathml(self) -> str:
+        """The equations, then the definitions, in presentation MathML, for pages without LaTeX; by SymPy.
+
+        >>> import halfarrow as ha
+        >>> ha.model("model Cart\\nparam m = 2 kg\\nSe:push(3 N) -> I:cart(m)\\n").equations().mathml.count("<mtr>")
+        1
+
+        Raises:
+            UsageError: as of ``sympy``.
+        """
+        written = self.sympy()
+        from . import _sympy
+
+        return _sympy.mathml(written)
+
+    def casadi(self) -> Casadi:
+        """The equations for CasADi: ``dae`` is what ``casadi.integrator`` takes, and optimal control begins with.
+
+        Raises:
+            UsageError: CasADi or SymPy is not there, the model has events, or an equation holds something that CasADi has no
+                word for.
+        """
+        try:
+            from . import _casadi
+        except ImportError:
+            raise needed("casadi", "casadi", "casadi") from None
+        return _casadi.casadi_of(self)
+
     def __str__(self) -> str:
         return self.text
+
+    def __repr__(self) -> str:
+        return f"<Equations of {self.model}, form {self.form}>\n{self.text}"
 
     def _repr_latex_(self) -> str:
         rows = " \\\\\n".join(_at_equal(line) for line in [*self.latex_lines, *self.latex_legend])

@@ -17,6 +17,7 @@ from ._inputs import InputLike
 from ._tables import as_html, as_text
 
 if TYPE_CHECKING:
+    import matplotlib.axes
     import matplotlib.figure
     import pandas
 
@@ -75,7 +76,8 @@ class _Measured:
         self.name = given.name or f"run {number + 1}"
         columns = _columns(given.data)
         outputs = given.outputs or outputs
-        sigma = {**sigma, **(given.sigma or {})}
+        shared = {name: value for name, value in sigma.items() if name in outputs}
+        sigma = {**shared, **(given.sigma or {})}
         if not outputs:
             raise UsageError("nothing is compared: give `outputs`, as in {'travel': 'z_meas'}")
         for column in outputs.values():
@@ -95,11 +97,20 @@ class _Measured:
         if not self.valid.any():
             raise UsageError(f"{self.name} has no measurement at all")
         self.sigma: Array = np.ones_like(self.measured)
-        self.known = False
+        sigma = {name: value for name, value in sigma.items() if value is not None}
+        for name, value in sigma.items():
+            if name not in self.outputs:
+                raise unknown("output", name, self.outputs)
+            if isinstance(value, str) and value not in columns:
+                raise unknown("column", value, columns)
+        self.known = bool(sigma)
         for k, name in enumerate(self.outputs):
-            value = sigma.get(name)
-            if value is not None:
-                self.known = True
+            if self.known and name not in sigma:
+                raise UsageError(
+                    f"`sigma` has no standard deviation of `{name}`: give them for all outputs, or for none"
+                )
+            if self.known:
+                value = sigma[name]
                 self.sigma[:, k] = columns[value][used] if isinstance(value, str) else value
         if np.any(self.sigma[self.valid] <= 0) or not np.all(np.isfinite(self.sigma[self.valid])):
             raise UsageError(f"standard deviations of {self.name} have to be finite and above 0")
@@ -154,6 +165,25 @@ class Profile:
     interval: tuple[float, float]
     """Where the sum stays below the bound of the level; a bound that was not met is infinite."""
     level: float
+    bound: float = np.nan
+    """The sum at the ends of the interval."""
+
+    def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
+        """The sums over the values, with the bound and the interval."""
+        try:
+            import matplotlib.pyplot as plt
+        except ImportError:
+            raise needed("matplotlib", "plot", "plot") from None
+        ax = plt.gca() if ax is None else ax
+        ax.plot(self.values, self.sums, ".-")
+        ax.axhline(self.bound, color="black", linewidth=0.5)
+        for end in self.interval:
+            if np.isfinite(end):
+                ax.axvline(end, color="black", linewidth=0.5, linestyle="--")
+        ax.set_xlabel(self.name)
+        ax.set_ylabel("least sum of squares")
+        ax.set_title(f"{100 * self.level:g} %: {self.interval[0]:.6g} to {self.interval[1]:.6g}")
+        return ax
 
 
 class Problem:
@@ -362,6 +392,7 @@ class Fit:
             np.array([*down[::-1], self.cost, *up]),
             (low, high),
             level,
+            bound,
         )
 
     def predicted(self) -> list[dict[str, Array]]:
@@ -447,7 +478,9 @@ def _range(model: Model, name: str, known: Bounds) -> tuple[float, float, float]
         return -np.inf, si(known), np.inf
     least, greatest = si(known[0]), si(known[-1])
     if not least < greatest:
-        raise UsageError(f"`{name}` is given the bounds {least:g} and {greatest:g}: the first has to be below the second")
+        raise UsageError(
+            f"`{name}` is given the bounds {least:g} and {greatest:g}: the first has to be below the second"
+        )
     if len(known) == 3:
         guess = si(known[1])
     elif least < own < greatest:
@@ -498,6 +531,10 @@ def fit(
         raise UsageError("nothing is fitted: give `params`, as in {'ks': (5e3, 50e3), 'b': None}")
     begun = time.perf_counter()
     runs = [_Measured(given, outputs, sigma, to, i) for i, given in enumerate(experiments)]
+    compared = {name for run in runs for name in run.outputs}
+    for name in sigma:
+        if name not in compared:
+            raise unknown("output", name, sorted(compared))
     if any(run.known for run in runs) and not all(run.known for run in runs):
         raise UsageError("standard deviations are given for some experiments only: give them for all, or for none")
     if not runs[0].known:

@@ -132,7 +132,7 @@ def sobol(
     if n < 2 or n & (n - 1):
         near = 2 ** max(1, round(np.log2(max(n, 2))))
         raise UsageError(f"n is {n}: the sequence is balanced over a power of two; give {near}")
-    _within(confidence, resamples)
+    _within(confidence, resamples, seed)
     started, problem = _problem(model, ranges, run, "sobol")
     rows = sample.sample(problem, n, calc_second_order=second_order, seed=seed)
     swept = _runs(started, problem, rows, to, run)
@@ -140,8 +140,9 @@ def sobol(
     for name, y in _outputs(swept, problem).items():
         if np.ptp(y) == 0:
             raise UsageError(f"`{name}` is {y[0]:g} in all sets: it has no variance of which there could be parts")
+        # The bootstrap of SALib takes 0 for no seed.
         told = analyze.analyze(
-            problem, y, calc_second_order=second_order, num_resamples=resamples, conf_level=confidence, seed=seed
+            problem, y, calc_second_order=second_order, num_resamples=resamples, conf_level=confidence, seed=seed + 1
         )
         pairs = [_symmetric(told[key]) if second_order else None for key in ("S2", "S2_conf")]
         arrays = [np.asarray(told[key], dtype=np.float64) for key in ("S1", "S1_conf", "ST", "ST_conf")]
@@ -159,14 +160,14 @@ def morris(
         raise UsageError(f"n is {n}: a spread takes at least 2 trajectories")
     if levels < 2 or levels % 2:
         raise UsageError(f"levels is {levels}: it has to be even")
-    _within(confidence, resamples)
+    _within(confidence, resamples, seed)
     started, problem = _problem(model, ranges, run, "morris")
     rows = sample.sample(problem, n, num_levels=levels, seed=seed)
     swept = _runs(started, problem, rows, to, run)
     found = {}
     for name, y in _outputs(swept, problem).items():
         told = analyze.analyze(
-            problem, rows, y, num_levels=levels, num_resamples=resamples, conf_level=confidence, seed=seed
+            problem, rows, y, num_levels=levels, num_resamples=resamples, conf_level=confidence, seed=seed + 1
         )
         arrays = [np.asarray(told[key], dtype=np.float64) for key in ("mu", "mu_star", "mu_star_conf", "sigma")]
         found[name] = MorrisEffects(tuple(problem["names"]), *arrays)
@@ -182,7 +183,9 @@ def _salib(method: str) -> tuple[Any, Any]:
         raise needed("SALib", "salib", method) from None
 
 
-def _within(confidence: float, resamples: int) -> None:
+def _within(confidence: float, resamples: int, seed: int) -> None:
+    if seed < 0:
+        raise UsageError(f"seed is {seed}: it has to be at least 0")
     if not 0 < confidence < 1:
         raise UsageError(f"confidence is {confidence}: it has to be between 0 and 1, such as 0.95")
     if resamples < 2:
@@ -200,6 +203,8 @@ def _problem(model: Model, ranges: Mapping[str, Any], run: Mapping[str, Any], of
             raise UnknownNameError(f"`{name}` is no parameter or input of {model.name}, and no argument of {of}{hint(name, options)}")
         if name in ranges:
             raise UsageError(f"`{name}` varies and is given a value: leave out one of them")
+    if run.get("whole"):
+        raise UsageError("indices are of numbers: leave out `whole`, and say by `reduce` what is kept of each run")
     starts = [name[: -len("(0)")] for name in ranges if name.endswith("(0)")]
     for name in starts:
         if name not in names.variables:

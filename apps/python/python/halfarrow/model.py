@@ -8,7 +8,7 @@ import html
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -38,6 +38,7 @@ from .equations import Equations
 from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
 from .functions import Function
 from .gradients import Gradient, Objective, asked, variables
+from .identifiability import Identifiability, identifiability
 from .linear import Linearization
 from .loops import Loops
 from .picture import Picture
@@ -125,6 +126,8 @@ def load(
     Warns:
         ModelWarning: something is odd in the model.
     """
+    if "\n" in os.fspath(path):
+        raise UsageError("this is no path but a text of several lines: give the text of a model to `halfarrow.model`")
     core = _halfarrow.Model.load(os.fspath(path), [os.fspath(folder) for folder in allow], _overrides(parameters or {}))
     return _told(Model(core))
 
@@ -163,6 +166,8 @@ def model(
       |
       = hint: declare it: `param m = …`
     """
+    if "\n" not in text and text.strip().endswith(".bond"):
+        raise UsageError(f"`{text}` is the name of a file, not the text of a model: `halfarrow.load` reads files")
     return _told(Model(_halfarrow.Model.from_text(name, text, dict(files or {}), _overrides(parameters or {}))))
 
 
@@ -323,7 +328,17 @@ class Model:
             ModelError: the form does not apply to the model.
         """
         names = [only] if isinstance(only, str) else list(only)
-        return Equations._of(self._core.equations(choice("form", form, _FORMS), names), self)
+        choice("form", form, _FORMS)
+        try:
+            return Equations._of(self._core.equations(form, names), self)
+        except UnknownNameError:
+            for name in names:
+                if name not in self.variables:
+                    raise unknown("variable", name, self.variables) from None
+            told = ", ".join(f"`{name}`" for name in names)
+            raise UsageError(
+                f"one of {told} has no equation, as outputs and junctions: ask for variables of elements"
+            ) from None
 
     def draw(self, *, paths: Iterable[int] | None = None, laws: bool = True, first_cells: bool = False) -> Picture:
         """The bond graph with causal strokes, numbered bonds and causal paths.
@@ -660,6 +675,40 @@ class Model:
             self, shared, params, outputs or {}, sigma or {}, to, start, loss, f_scale, tolerance, most, seed, options
         )
 
+    def identifiability(
+        self,
+        by: str | Sequence[str],
+        outputs: str | Sequence[str],
+        *,
+        to: float,
+        excite: Mapping[str, float] | None = None,
+        points: int = 3,
+        seed: int = 0,
+        parameters: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        **values: Any,
+    ) -> Identifiability:
+        """Which parameters measurements without noise would tell, whatever their values: the rank of the exact derivatives of
+        outputs, by the values of the model and at some others near them. What is found here no better data will tell.
+
+        Args:
+            by: Parameters, and start values such as ``spring.q(0)``.
+            outputs: Variables that are measured.
+            to: End of the run in s.
+            excite: Amplitudes of inputs that move in all ways, each as a sum of five sines; others as they are given.
+            points: Other values of the parameters, up to a fifth away.
+            seed: Of these values and inputs.
+            parameters, inputs, values: As in ``simulate``.
+
+        Raises:
+            UsageError, UnknownNameError, RunError: as in ``sensitivities``.
+        """
+        set_values, given = self._split(values, parameters, inputs)
+        self._names.check_inputs(excite or {})
+        named = [[name] if isinstance(name, str) else list(name) for name in (by, outputs)]
+        options = {"parameters": dict(set_values), "inputs": given}
+        return identifiability(self, named[0], named[1], to, excite or {}, points, seed, options)
+
     def linearize(
         self,
         at: Literal["start", "equilibrium"] | float = "start",
@@ -715,8 +764,12 @@ class Model:
         sample: float | None = None,
         parameters: Mapping[str, Value | Sequence[Value]] | None = None,
         inputs: Mapping[str, InputLike] | None = None,
-        executor: Executor | None = None,
+        executor: Executor | Callable[[], Executor] | None = None,
         chunk: int | None = None,
+        journal: str | os.PathLike[str] | None = None,
+        into: str | os.PathLike[str] | None = None,
+        whole: bool = False,
+        restart: bool = False,
         progress: Any = None,
         **values: Any,
     ) -> sweeps.SweepResult:
@@ -736,8 +789,17 @@ class Model:
             parameters: Values of parameters by name: one for all sets, or several that vary.
             executor: Any ``concurrent.futures.Executor``, of threads, processes, joblib's loky, Dask
                 (``client.get_executor()``), Ray or MPI. Each worker is sent the text once, and compiles it once; sets go as
-                arrays. Nothing: all cores of this computer. Results have the same bits.
+                arrays. Nothing: all cores of this computer. Results have the same bits. Or what makes an executor, such as
+                ``ProcessPoolExecutor`` or ``get_reusable_executor``: if a worker is killed, another one is made.
             chunk: Sets in a task of an executor.
+            journal: A file to which every part is written when it is done. The same call goes on from it after the program was
+                killed, with any executor; a complete one gives the result at once.
+            into: A folder into which the workers write the rows, as Parquet files, in the place of the memory of this program;
+                it goes on as with ``journal``. The folder has to be there for all workers (``pip install
+                halfarrow[parquet]``). The result reads columns when they are asked for.
+            whole: Whether ``into`` gets whole trajectories: a row for each sample, with the number of its set, its parameters,
+                ``t`` and what is recorded. Every run is audited.
+            restart: Whether to begin anew, whatever ``journal`` or ``into`` have.
             progress: As in ``simulate``.
             values: Parameters and inputs whose names are words: ``ks=np.linspace(10e3, 30e3, 50)``, ``b=600``.
 
@@ -746,7 +808,8 @@ class Model:
 
         Raises:
             UnknownNameError, UsageError: as in ``simulate``.
-            RunError: all sets failed.
+            RunError: all sets failed, or a worker was killed and took its executor along; ``result`` has the sets that are
+                done.
             Interrupted: Ctrl-C; ``result`` has the sets that are done.
 
         Warns:
@@ -768,6 +831,7 @@ class Model:
             vary={name: numbers(value) for name, value in several.items() if np.ndim(value)},
             samples=table,
             reduce=sweeps.reductions(reduce),
+            whole=whole,
         )
         for name, values_of in plan.vary.items():
             if not len(values_of):
@@ -776,7 +840,21 @@ class Model:
             raise UsageError(
                 "nothing varies: give several values for a parameter, as in `ks=[10e3, 20e3]`, or `samples`"
             )
-        return sweeps.run(self, plan, executor, chunk, progress)
+        if whole and (into is None or plan.reduce):
+            raise UsageError("whole trajectories go `into` a folder, and nothing of them is reduced")
+        if journal is not None and into is not None:
+            raise UsageError(
+                "a sweep is kept in a `journal` or goes `into` a folder, not both: the folder is a journal too"
+            )
+        way = sweeps.Way(
+            executor=executor,
+            chunk=chunk,
+            journal=None if journal is None else Path(journal),
+            into=None if into is None else Path(into),
+            restart=restart,
+            progress=progress,
+        )
+        return sweeps.run(self, plan, way)
 
     def sobol(
         self,

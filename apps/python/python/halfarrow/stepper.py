@@ -60,9 +60,13 @@ class Stepper:
 
         Raises:
             RunError: the run stops; it stands at the last state that it reached.
+            UsageError: that is no number of steps.
         """
         core = self._core
-        (core or self._run()).advance(steps)
+        try:
+            (core or self._run()).advance(steps)
+        except (OverflowError, TypeError):
+            raise UsageError(f"steps is {steps!r}: give a whole number of them, from 0 on") from None
 
     def __getitem__(self, name: str) -> float:
         """The present value of a variable in its declared unit, or of a parameter in SI units.

@@ -73,8 +73,7 @@ impl Real for BigFloat {
             Some((n, 1)) => BigFloat::from_i64(n, P),
             Some((n, d)) => BigFloat::from_i64(n, P).div(&BigFloat::from_i64(d, P), P, RM),
             None => {
-                let part =
-                    |n: dashu_int::IBig, c: &mut Consts| BigFloat::parse(&n.to_string(), Radix::Dec, P, RM, c);
+                let part = |n: dashu_int::IBig, c: &mut Consts| BigFloat::parse(&n.to_string(), Radix::Dec, P, RM, c);
                 part(value.numerator(), constants).div(&part(value.denominator(), constants), P, RM)
             }
         }

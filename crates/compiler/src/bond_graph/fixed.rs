@@ -1,6 +1,5 @@
 //! Numbers that are known when the model is compiled, calculated exactly.
 
-
 use super::repeat::{Key, Known, Repeats, Unknown, too_long};
 use super::scope::{DeclId, DeclKind, Here, Names, Node, ScopeId, Valued};
 use crate::algebra::Rational;
