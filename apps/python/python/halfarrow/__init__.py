@@ -74,6 +74,8 @@ audit finds missed by ``AuditWarning``.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ._errors import (
     AuditWarning,
     Diagnostic,
@@ -104,12 +106,17 @@ from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
 from .sweeps import SweepFiles, SweepResult, read_sweep
 
+if TYPE_CHECKING:
+    from .gyms import Environment, Environments, gym, gym_vector
+
 __all__ = [
     "Audit",
     "AuditWarning",
     "Comparison",
     "Component",
     "Diagnostic",
+    "Environment",
+    "Environments",
     "Equations",
     "Error",
     "Estimate",
@@ -146,8 +153,19 @@ __all__ = [
     "Variable",
     "__version__",
     "format",
+    "gym",
+    "gym_vector",
     "library",
     "load",
     "model",
     "read_sweep",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Gymnasium is loaded when it is asked for.
+    if name in ("Environment", "Environments", "gym", "gym_vector"):
+        from . import gyms
+
+        return getattr(gyms, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
