@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import threading
 import time
 from typing import Any
@@ -123,6 +124,30 @@ def test_inputs_over_time_and_other_parameters() -> None:
     assert len(calls) == called
 
 
+def test_what_follows_from_what_is_varied() -> None:
+    m = ha.model(
+        "model M\nparam k = 2, m = 1, q0 = k/4, b = 3*k\ninput push : N = 0.3*k\nSe:hand(push) -> 1:v -> I:mass(m)\n"
+        "v -> C:spring(k = k, q0 = q0)\nv -> R:drag(b)\n"
+    )
+    run: dict[str, Any] = dict(to=1, every=0.5, method="rk4", step=1e-2)
+    by_name = m.function(["k", "b", "q0", "push"], "spring.q", **run)
+    assert by_name.values.tolist() == [2.0, 6.0, 0.5, 0.6]
+    assert m.function(["b", "push", "q0"], "spring.q", **run, k=4.0).values.tolist() == [12.0, 1.2, 1.0]
+    for f in (by_name, m.function("k", "spring.q", **run), m.function(["k", "spring.q(0)", "push"], "spring.q", **run)):
+        x, slopes = f.values, f.jacobian(f.values)
+        for i, h in enumerate(1e-5 * np.eye(len(x))):
+            np.testing.assert_allclose(slopes[..., i], (f(x + h) - f(x - h)) / 2e-5, atol=1e-8)
+        w = np.ones((3, 1))
+        np.testing.assert_allclose(f.vjp(x, w), slopes.sum(axis=(0, 1)), rtol=1e-9, atol=1e-12)
+
+
+def test_it_is_pickled() -> None:
+    f = cart(inputs=None)
+    again = pickle.loads(pickle.dumps(f))
+    np.testing.assert_array_equal(again(AT), f(AT))
+    assert repr(again) == repr(f) and "cart.f(0)" in f._repr_html_()
+
+
 def test_through_an_event() -> None:
     f = ha.load(MODELS / "when_bouncing_ball" / "model.bond").function(["e", "h(0)"], "h", to=1, at=[1.0], rtol=1e-11)
     g, e, h = 9.81, 0.8, 1.0
@@ -152,6 +177,10 @@ def test_what_is_wrong_is_told() -> None:
         f([1.0, 2.0])
     with pytest.raises(ha.UsageError, match="samples and outputs"):
         f.vjp([1.0], [1.0])
+    with pytest.raises(ha.UsageError, match="complex"):
+        f([1j])
+    with pytest.raises(ha.UsageError, match="cannot be taken"):
+        f(["one"])
     with pytest.raises(ha.UsageError, match="NaN"):
         f([np.nan])
     with pytest.raises(ha.UsageError, match="shapes the model"):
@@ -251,6 +280,8 @@ class TestJax:
                 np.asarray(how(np.array([2.0])))
         with pytest.raises(ha.UsageError, match="last axis is a"):
             f.jax()(np.ones(2))
+        with pytest.raises(ha.UsageError, match="complex"):
+            f.jax()(np.array([1j]))
         with pytest.raises(ha.UsageError, match="did you mean `forward`"):
             f.jax("foward")  # type: ignore[arg-type]
         with pytest.raises(Exception, match="custom_vjp|JVP"):
@@ -312,5 +343,7 @@ class TestTorch:
         growing = ha.model(GROWING).function("a", "x", to=1, every=0.5).torch()
         with pytest.raises(ha.RunError):
             growing(torch.tensor([2.0]))
+        with pytest.raises(ha.UsageError, match="complex"):
+            growing(torch.tensor([1j]))
         with pytest.raises(ha.UsageError, match="second derivatives"):
             torch.autograd.functional.hessian(lambda x: growing(x)[-1, 0], torch.tensor([0.5]))

@@ -48,9 +48,9 @@ def function(of: Function, mode: str) -> Callable[[Any], Any]:
 
     def wrapped(values: Any) -> Any:
         x = jnp.asarray(values)
+        of._given(np.empty(x.shape, np.complex64 if jnp.iscomplexobj(x) else np.float64))
         if not jnp.issubdtype(x.dtype, jnp.floating):
             x = x.astype(jnp.result_type(float))
-        of._given(np.empty(x.shape))
         return run(x) if x.ndim == 1 else jax.vmap(wrapped)(x)
 
     return wrapped

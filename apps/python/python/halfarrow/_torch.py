@@ -100,9 +100,9 @@ def function(of: Function) -> Callable[[Any], Any]:
 
     def wrapped(values: Any) -> Any:
         x = torch.as_tensor(values)
+        of._given(np.empty(x.shape, np.complex64 if x.is_complex() else np.float64))
         if not torch.is_floating_point(x):
             x = x.to(torch.get_default_dtype())
-        of._given(np.empty(x.shape))
         return Run.apply(x)
 
     return wrapped

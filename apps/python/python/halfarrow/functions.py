@@ -75,6 +75,7 @@ class Function:
         self._fixed = dict(fixed)
         # A function of time is called once, not in every run.
         self._inputs = {n: given(n, v, to, sample) if callable(v) else v for n, v in inputs.items()}
+        self._made = (to, every, at, dict(options), threads)
         self._options = {"to": float(to), "every": every, "at": None if every else self.t, **options}
         # Derivatives by inputs come by SI units.
         self._scale = np.array([_per_unit(model, n) if i else 1.0 for n, i in zip(self.parameters, self._is_input)])
@@ -96,9 +97,10 @@ class Function:
     def values(self) -> Array:
         """The values that the model has, of the shape ``(parameters,)``."""
         known = self._started.parameters
-        if not any(self._is_input):
+        if not any(self._is_input) and not self._fixed:
             return np.array([known[name].value for name in self.parameters])
-        with self._started.stepper(step=self._options["to"], method="euler") as begun:
+        # What follows from other parameters is known when a run begins.
+        with self._started.stepper(step=self._options["to"], method="euler", parameters=self._fixed) as begun:
             return np.array([begun[name] for name in self.parameters])
 
     def __call__(self, values: npt.ArrayLike) -> Array:
@@ -167,7 +169,7 @@ class Function:
         Raises:
             UsageError, RunError: as in ``jacobian``.
         """
-        x, w = self._given(values), np.asarray(weights, dtype=np.float64)
+        x, w = self._given(values), _real(weights, "weights")
         shape = (len(self.t), len(self.outputs))
         if w.shape[-2:] != shape:
             raise UsageError(f"weights has the shape {w.shape}: its last axes are samples and outputs, {shape}")
@@ -176,8 +178,8 @@ class Function:
         flat, heavy = x.reshape(-1, len(self.parameters)), w.reshape(-1, *shape)
         points, which, times = np.unique(flat, axis=0, return_inverse=True, return_counts=True)
         which = which.reshape(-1)
-        # An adjoint is worth about four runs, sensitivities one and one for each parameter.
-        often = (times > 1) & (4 * times > len(self.parameters) + 1)
+        # An adjoint takes about two runs, sensitivities one and a quarter of one for each parameter: `bench/learning.py`.
+        often = (times > 1) & (8 * times > len(self.parameters) + 4)
         found = np.empty(flat.shape)
         if often.any():
             slopes = self._each(self._jacobian, [points[often]], (*shape, len(self.parameters)))
@@ -244,10 +246,7 @@ class Function:
         return function(self)
 
     def _given(self, values: npt.ArrayLike, what: str = "values") -> Array:
-        try:
-            x = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError) as why:
-            raise UsageError(f"{what} are no numbers: {why}") from None
+        x = _real(values, what)
         if x.shape[-1:] != (len(self.parameters),):
             raise UsageError(
                 f"{what} has the shape {x.shape}: its last axis is {', '.join(self.parameters)}, {len(self.parameters)} numbers"
@@ -325,6 +324,12 @@ class Function:
         slopes: Array = np.array([found[name] for name in self.parameters]) * self._scale
         return slopes
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        to, every, at, options, threads = self._made
+        return Function, (
+            self.model, self.parameters, self.outputs, to, every, at, self._fixed, self._inputs, options, threads,
+        )  # fmt: skip
+
     def _rows(self) -> list[tuple[Any, ...]]:
         units = self.parameter_units
         return [(name, units[name], float(value)) for name, value in zip(self.parameters, self.values)]
@@ -335,6 +340,15 @@ class Function:
 
     def _repr_html_(self) -> str:
         return as_html(("by", "unit", "value"), self._rows())
+
+
+def _real(values: npt.ArrayLike, what: str) -> Array:
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError("they are complex, and a run is not")
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as why:
+        raise UsageError(f"{what} cannot be taken: {why}") from None
 
 
 class _Stop:
