@@ -74,6 +74,8 @@ audit finds missed by ``AuditWarning``.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ._errors import (
     AuditWarning,
     Diagnostic,
@@ -91,6 +93,8 @@ from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
+from .functions import Function
+from .global_sensitivity import GlobalSensitivity, MorrisEffects, SobolIndices
 from .gradients import Gradient, Recorded
 from .identifiability import Identifiability
 from .linear import Linearization
@@ -102,18 +106,25 @@ from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
 from .sweeps import SweepFiles, SweepResult, read_sweep
 
+if TYPE_CHECKING:
+    from .gyms import Environment, Environments, gym, gym_vector
+
 __all__ = [
     "Audit",
     "AuditWarning",
     "Comparison",
     "Component",
     "Diagnostic",
+    "Environment",
+    "Environments",
     "Equations",
     "Error",
     "Estimate",
     "Experiment",
     "FileError",
     "Fit",
+    "Function",
+    "GlobalSensitivity",
     "Gradient",
     "Identifiability",
     "Input",
@@ -124,6 +135,7 @@ __all__ = [
     "Model",
     "ModelError",
     "ModelWarning",
+    "MorrisEffects",
     "Parameter",
     "Picture",
     "Profile",
@@ -132,6 +144,7 @@ __all__ = [
     "RunError",
     "Sensitivities",
     "Snapshot",
+    "SobolIndices",
     "Stepper",
     "SweepFiles",
     "SweepResult",
@@ -140,8 +153,19 @@ __all__ = [
     "Variable",
     "__version__",
     "format",
+    "gym",
+    "gym_vector",
     "library",
     "load",
     "model",
     "read_sweep",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Gymnasium is loaded when it is asked for.
+    if name in ("Environment", "Environments", "gym", "gym_vector"):
+        from . import gyms
+
+        return getattr(gyms, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
