@@ -291,12 +291,11 @@ class TestJax:
         import jax
         import jax.numpy as jnp
 
-        f = ha.model(CART).function(["m", "b"], "speed", to=2, every=1e-4, push=1.0)
+        f = ha.model(CART).function(["m", "b"], "speed", to=2, every=2e-4, push=1.0)
         g = f.jax()
         step = jax.jit(lambda x: x - 1e-9 * jax.grad(lambda x: jnp.mean(g(x) ** 2))(x))
         x = jnp.array([2.0, 3.0])
-        for _ in range(2):
-            x = step(x)
+        x = step(x)
         assert np.isfinite(x).all() and not (x == jnp.array([2.0, 3.0])).any()
 
 
