@@ -168,6 +168,8 @@ def test_what_is_wrong_is_told() -> None:
         m.function("m", "speed", to=1, evry=1)
     with pytest.raises(ha.UsageError, match="either `every` or `at`"):
         m.function("m", "speed", to=1)
+    with pytest.raises(ha.UsageError, match="at has no times"):
+        m.function("m", "speed", to=1, at=[])
     with pytest.raises(ha.UsageError, match="`m` is varied and given a value"):
         m.function("m", "speed", to=1, every=1, m=3)
     with pytest.raises(ha.UsageError, match="`m` stands twice"):
