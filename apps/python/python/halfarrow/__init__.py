@@ -48,6 +48,20 @@ Differentiate it, fit it
 >>> list(g), g.units["ks"]
 (['ms', 'ks', 'b'], 'N/m')
 
+    ``function`` makes a function of NumPy of it, with derivatives, ``.jax()`` and ``.torch()`` one of these libraries:
+
+    >>> f = car.function(["ks", "b", "spring.q(0)"], ["travel"], to=4, every=1, road=0.1)
+    >>> f(f.values).shape, f.jacobian(f.values).shape, f.vjp(f.values, [[0], [0], [0], [0], [1]]).shape
+    ((5, 1), (5, 1, 3), (3,))
+
+Ask what matters over whole ranges
+    ``sobol`` gives parts of the variance of an output, ``morris`` tells which of many parameters matter at all, both with
+    confidence intervals (SALib).
+
+Let something learn to act in it
+    ``gym`` and ``gym_vector`` are environments of Gymnasium: what is observed, what is acted on, what is rewarded, what
+    begins at random.
+
 Look at it near a point
     ``linearize`` gives matrices, poles, zeros, ``bode()``, ``to_control()``:
 

@@ -415,6 +415,8 @@ def _samples(to: float, every: float | None, at: npt.ArrayLike | None) -> Array:
         raise UsageError("as many samples in every run: give either `every` or `at`")
     if at is not None:
         given_times = numbers(np.atleast_1d(np.asarray(at, dtype=np.float64)))
+        if not len(given_times):
+            raise UsageError("at has no times")
         return given_times if given_times[-1] >= to else np.append(given_times, to)
     assert every is not None
     if not (every > 0 and to > 0):

@@ -89,7 +89,8 @@ def gym(
         UnknownNameError: there is nothing of a name.
         UsageError: Gymnasium is not installed, or something is asked that cannot be.
 
-    Its ``step`` raises ``RunError`` where the run stops, and ``UsageError`` for an action that is not in the space.
+    Its ``step`` raises ``RunError`` where the run stops, and ``UsageError`` for an action that is not in the space. Runs by
+    steps are not audited, as those of ``simulate`` are: look at one of these with the same step first.
 
     >>> import halfarrow as ha
     >>> cart = ha.model("model Cart\\ninput push : N = 0\\nSe:hand(push) -> 1:v -> I:cart(2 kg)\\noutput speed = cart.f : m/s\\n")
