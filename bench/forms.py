@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the forms cost: the tables of README.md and docs/TESTING.md, by `halfarrow compare`, one line a model.
+"""What the forms cost: the tables of docs/forms.md and docs/TESTING.md, by `halfarrow compare`, one line a model.
 
     python3 bench/forms.py [MODEL ...]
 

@@ -1,0 +1,37 @@
+"""Formulas as MathML, made when the site is built: no script, no fonts from elsewhere."""
+
+from __future__ import annotations
+
+import html
+import re
+
+from latex2mathml.converter import convert
+
+
+def block(source: str, *_: object, **__: object) -> str:
+    """A fenced block `math`: one formula a line."""
+    lines = [line for line in source.strip().splitlines() if line.strip()]
+    return f'<div class="math">{"".join(_one(line, "block") for line in lines)}</div>'
+
+
+def inline(source: str, *_: object, **__: object) -> str:
+    """`#!math x` in the text."""
+    return _one(source, "inline")
+
+
+def aligned(latex: str) -> str:
+    """What `equations --format latex` prints; text between the environments stays."""
+    parts = re.split(r"\\begin\{align\*?\}\n(.*?)\\end\{align\*?\}\n?", latex, flags=re.S)
+    shown = ""
+    for i, part in enumerate(parts):
+        if i % 2:
+            shown += block(part.replace("&", "").replace("\\\\\n", "\n"))
+        elif part.strip():
+            shown += f"<p>{html.escape(part.strip())}</p>"
+    return shown
+
+
+def _one(latex: str, display: str) -> str:
+    latex = latex.strip().removesuffix("\\\\")
+    # Dots in names are no decimal points.
+    return convert(latex, display=display).replace("\n", "")
