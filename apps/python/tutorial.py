@@ -101,7 +101,7 @@ lin = damped.linearize(at="equilibrium", ks=20e3)
 lin.bode()
 plt.show()
 assert lin.stable
-lin.modes
+lin
 
 # %% [markdown]
 # ## Many runs
