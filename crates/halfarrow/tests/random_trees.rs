@@ -113,3 +113,23 @@ fn axes_with_decimals_keep_speeds_outside_of_loops() {
         assert!((a - b).abs() < 1e-9 * a.abs().max(1.0), "{ends:?}");
     }
 }
+
+/// Positions that are guessed and fit stay: a guess of an unknown itself goes before what others have it follow from.
+#[test]
+fn guesses_that_fit_are_left() {
+    let planar =
+        (include_str!("multibody/moved.bond"), [("j2.q", 0.12251020742408691), ("j3t.q", -1.0217660320656292)]);
+    let ball = (
+        include_str!("multibody/moved_ball.bond"),
+        [("j0.pitch.q", -0.43398542040230526), ("j0.yaw.q", 1.3581832991817564)],
+    );
+    for (text, guessed) in [planar, ball] {
+        let model = Model::from_text("moved.bond", text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let record = Record::Names(guessed.iter().map(|g| g.0.to_string()).collect());
+        let run = Run { to: 1e-4, every: Some(1e-4), record, ..Run::default() };
+        let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
+        for (column, (name, guess)) in trace.columns.iter().zip(guessed) {
+            assert!((column.values[0] - guess).abs() < 1e-13, "{name} is {} for {guess}", column.values[0]);
+        }
+    }
+}
