@@ -21,7 +21,7 @@ def reference() -> str:
     return "\n".join(pages)
 
 
-def wrapped(text: str, width: int = 100) -> str:
+def wrapped(text: str, width: int = 96) -> str:
     """Long lines go on below where their description begins."""
     lines: list[str] = []
     for line in text.splitlines():

@@ -9,6 +9,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import bond_lexer  # noqa: E402, F401 (Pygments looks for it by its name)
 import commands  # noqa: E402
 import mathml  # noqa: E402
 import models  # noqa: E402
@@ -48,7 +49,7 @@ def on_files(files: Files, config: Any) -> Files:
             picture(f"models/{shown.name}/{path.name}", path)
     for example in EXAMPLES:
         folder = ROOT / "examples" / example
-        page(f"examples/{example}/index.md", (folder / "README.md").read_text())
+        page(f"examples/{example}/{example}.md", (folder / "README.md").read_text())
         for path in sorted([*folder.glob("*.svg"), *folder.glob("*.png")]):
             picture(f"examples/{example}/{path.name}", path)
     for source in snippets.pages():
@@ -72,7 +73,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         example = re.search(r"examples/(\w+)/README\.md$", path)
         if example:
             up = "../" * page.file.src_uri.count("/")
-            return f"[{text}]({up}examples/{example[1]}/index.md)"
+            return f"[{text}]({up}examples/{example[1]}/{example[1]}.md)"
         here = Path(page.file.src_uri).parent / path
         if "README.md" in page.file.src_uri or files.get_file_from_path(_normal(str(here))):
             return match[0]
@@ -89,7 +90,7 @@ def not_listed(markdown: str) -> str:
     """Names of the Python package that the page has in none of its sections."""
     text = (ROOT / "apps/python/python/halfarrow/__init__.py").read_text()
     names = re.findall(r'^    "([A-Za-z]\w*)",$', text, re.M)
-    left = [name for name in names if f"::: halfarrow.{name}\n" not in markdown + "\n"]
+    left = [name for name in names if not re.search(rf"^::: halfarrow\.(model\.)?{name}$", markdown, re.M)]
     return "\n## More\n\n" + "".join(f"::: halfarrow.{name}\n\n" for name in left) if left else ""
 
 
@@ -105,7 +106,7 @@ def _normal(path: str) -> str:
 
 def _in_repository(page: Any, path: str) -> str:
     uri = page.file.src_uri
-    example = re.match(r"examples/(\w+)/index\.md", uri)
+    example = re.match(r"examples/(\w+)/\w+\.md", uri)
     model = re.match(r"models/(\w+)\.md", uri)
     base = f"examples/{example[1]}" if example else f"models/{model[1]}" if model else f"docs/{Path(uri).parent}"
     return _normal(f"{base}/{path}")

@@ -33,5 +33,8 @@ def aligned(latex: str) -> str:
 
 def _one(latex: str, display: str) -> str:
     latex = latex.strip().removesuffix("\\\\")
-    # Dots in names are no decimal points.
+    # TeX spaces names of functions by itself.
+    names = "sin|cos|tan|arcsin|arccos|arctan|sinh|cosh|tanh|exp|log|ln|max|min"
+    latex = re.sub(rf"(?<=\S)\s*\\({names})\b", r"\,\\\1 ", latex)
+    latex = re.sub(rf"\\({names})\b\s*(?!\s|\(|\^|_|\\left)", r"\\\1\,", latex)
     return convert(latex, display=display).replace("\n", "")

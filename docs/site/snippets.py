@@ -149,6 +149,7 @@ def run_python(block: Block, names: dict[str, object], line: int, page: Path) ->
 def run_page(page: Path, update: bool) -> None:
     text = page.read_text()
     folder = folder_of(page)
+    folder.with_suffix(".stamp").unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for there in ("models", "examples"):
