@@ -585,3 +585,90 @@ fn long_equations_are_told_in_brief() {
     let report = json(&halfarrow(&here, &["equations", "ladder.bond", "--json"]));
     assert_eq!(report["equations"].as_array().map(Vec::len), Some(1200));
 }
+
+#[test]
+fn a_number_is_differentiated_by_all_parameters() {
+    let folder = folder("gradient");
+    let car = model("quarter_car");
+    let run = ["simulate", &car, "--to", "1", "--every", "0.01", "--gradient"];
+    let told = stdout(&halfarrow(&folder, &[&run[..], &["rms(body.f)", "--width", "100"]].concat()));
+    let table = told.split("rms(body.f) = ").nth(1).expect("the number");
+    let header = table.lines().find(|line| line.contains("derivative")).expect("a table");
+    assert!(["by", "unit", "of 1 %"].iter().all(|word| header.contains(word)), "{told}");
+    assert!(["ms", "mu", "ks", "kt", "b", "g"].iter().all(|name| table.contains(&format!("│ {name} "))), "{told}");
+    let object =
+        json(&halfarrow(&folder, &[&run[..], &["max(travel)", "--sensitivity", "ks,road", "--json"]].concat()));
+    let slopes = object["gradient"]["slopes"].as_array().expect("derivatives");
+    assert_eq!(slopes.iter().map(|s| s["name"].as_str().expect("a name")).collect::<Vec<_>>(), ["ks", "road"]);
+    assert!(slopes[0]["slope"].is_f64() && slopes[0]["at"] == 18000.0 && slopes[0]["unit"] == "N/m");
+    let wrong = halfarrow(&folder, &[&run[..], &["time_of_max(travel)"]].concat());
+    assert!(status(&wrong) == 2 && stderr(&wrong).contains("time_of_max has no derivative"), "{}", stderr(&wrong));
+}
+
+#[test]
+fn several_measured_runs_are_fitted_at_once() {
+    let folder = folder("fit");
+    let car = write(
+        &folder,
+        "car.bond",
+        "model Car\nparam k = 18e3, b = 900\ninput push = 0\nSe:p(push) -> 1:c -> I:body(300)\nc -> C:spring(k = k)\nc -> R:d(b)\n",
+    );
+    for (name, push) in [("a", 100.0), ("b", 250.0)] {
+        let rows: String = (0..60).map(|i| format!("{},{push}\n", 0.02 * f64::from(i))).collect();
+        let input = write(&folder, &format!("{name}_in.csv"), &format!("t,push\n{rows}"));
+        let given = format!("push={input}");
+        let run = [
+            "simulate", &car, "--set", "k=25e3", "--set", "b=1500", "--to", "1.18", "--every", "0.02", "--rtol",
+            "1e-11",
+        ];
+        let run = halfarrow(&folder, &[&run[..], &["--input", &given, "--record", "spring.q", "--out", "-"]].concat());
+        let lines: Vec<String> = stdout(&run).lines().skip(1).map(|line| format!("{line},{push}")).collect();
+        write(&folder, &format!("{name}.csv"), &format!("t,z,f\n{}\n", lines.join("\n")));
+    }
+    let fit = [
+        "fit",
+        &car,
+        "--data",
+        "a.csv",
+        "--data",
+        "b.csv",
+        "--input",
+        "push=@f",
+        "--outputs",
+        "spring.q=z",
+        "--params",
+    ];
+    let fit = [&fit[..], &["k=5e3:80e3,b", "--starts", "3", "--profile", "b", "--sigma", "spring.q=1e-4"]].concat();
+    let object = json(&halfarrow(&folder, &[&fit[..], &["--json", "--plot", "fit.svg"]].concat()));
+    for (i, exact) in [25e3, 1500.0].into_iter().enumerate() {
+        let value = object["parameters"][i]["value"].as_f64().expect("a value");
+        assert!((value - exact).abs() < 1e-5 * exact, "{value} for {exact}");
+    }
+    assert_eq!((object["starts"].as_array().map(Vec::len), object["measurements"].as_u64()), (Some(3), Some(120)));
+    assert!(object["profiles"][0]["interval"][1].as_f64() > Some(1500.0));
+    assert!(fs::read_to_string(folder.join("fit.svg")).expect("a picture").contains("residual"));
+    let told = stdout(&halfarrow(&folder, &fit));
+    assert!(
+        told.contains("3 searches, 3 from where the model runs") && told.contains("95 % interval of b by its profile"),
+        "{told}"
+    );
+    let wrong = halfarrow(
+        &folder,
+        &["fit", &car, "--data", "a.csv", "--input", "push=@g", "--outputs", "spring.q=z", "--params", "k"],
+    );
+    assert!(status(&wrong) == 2 && stderr(&wrong).contains("no column `g`; there are f, z"), "{}", stderr(&wrong));
+}
+
+#[test]
+fn a_model_is_exported_for_casadi() {
+    let folder = folder("casadi");
+    let told = stdout(&halfarrow(&folder, &["export", "casadi", &model("rc_bridge_cubic"), "--out", "bridge.py"]));
+    assert!(told.contains("bridge.py"), "{told}");
+    let text = fs::read_to_string(folder.join("bridge.py")).expect("a file");
+    assert!(
+        text.contains("import casadi as ca") && text.contains("def dae():") && text.contains("UNKNOWNS = [\""),
+        "{text}"
+    );
+    let wrong = halfarrow(&folder, &["export", "casadi", &model("when_bouncing_ball"), "--out", "ball.py"]);
+    assert!(status(&wrong) == 2 && stderr(&wrong).contains("have no memory"), "{}", stderr(&wrong));
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import matplotlib
@@ -27,6 +28,25 @@ param w = 1
 1:v -> I:mass(1 kg, f0 = 1 m/s)
 v -> C:spring(k = w^2*100 N/m)
 """
+
+# Examples that need a library which need not be there.
+OPTIONAL = {
+    "halfarrow.functions.Function.jax": "jax",
+    "halfarrow.functions.Function.torch": "torch",
+    "halfarrow.gyms": "gymnasium",
+    "halfarrow.global_sensitivity": "SALib",
+    "halfarrow.model.Model.sobol": "SALib",
+    "halfarrow.model.Model.morris": "SALib",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        for name, package in OPTIONAL.items():
+            if item.name.startswith(name) and importlib.util.find_spec(package) is None:
+                item.add_marker(pytest.mark.skip(reason=f"{package} is not installed"))
+    # JAX has threads, which processes that are forked do not survive: what needs it comes last.
+    items.sort(key=lambda item: "jax" in item.nodeid.lower())
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use halfarrow::{Error, FixedMethod, Form, Input, Method, Model, Record, Run, Simulated, Start};
+use halfarrow::{Error, FixedMethod, Form, Input, Method, Model, Record, Run, Simulated, Start, Verdict};
 
 fn fault(name: &str) -> Model {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(format!("{name}.bond"));
@@ -321,5 +321,35 @@ fn no_run_goes_on_behind_a_pole() {
             let time = stopped.report.reached;
             assert!((time - pole).abs() < 0.011, "{name} {method:?} at {time}: {}", stopped.failure);
         }
+    }
+}
+
+/// The last values of positions, after other speeds have become independent.
+fn after_exchanges(model: &Model, rtol: f64, names: &[&str]) -> Vec<f64> {
+    let record = Record::Names(names.iter().map(|n| (*n).into()).collect());
+    let done = run(model, Run { to: 0.3, every: Some(0.3), rtol, record, ..Run::default() });
+    assert!(done.report.exchanges > 0, "{:?}", done.report);
+    assert_eq!(done.report.audit.verdict, Verdict::Holds, "{:?}", done.report.audit);
+    let last =
+        |name: &&str| *done.trace.columns.iter().find(|c| c.name == **name).expect(name).values.last().expect(name);
+    names.iter().map(last).collect()
+}
+
+/// Divisors of rows are products of pivots, which are themselves divided by those before them. The values are those of Newton
+/// and Euler in maximal coordinates (`multibody/random_trees.py`).
+#[test]
+fn a_four_bar_goes_on_where_its_independent_speed_turns_back() {
+    let found = after_exchanges(&fault("turns_back"), 1e-12, &["j0.q", "j1.q", "j2.q"]);
+    for (found, wanted) in found.iter().zip([-0.938181, -0.319575, -1.277230]) {
+        assert!((found - wanted).abs() < 6e-7, "{found} is not {wanted}");
+    }
+}
+
+#[test]
+fn a_tighter_tolerance_misses_less_at_a_limit() {
+    let model = fault("exchange_at_limit");
+    let [rough, fine] = [1e-9, 1e-12].map(|rtol| after_exchanges(&model, rtol, &["j0.q", "j1.q"]));
+    for (rough, fine) in rough.iter().zip(&fine) {
+        assert!((rough - fine).abs() < 1e-9, "{rough} and {fine}");
     }
 }

@@ -48,6 +48,20 @@ Differentiate it, fit it
 >>> list(g), g.units["ks"]
 (['ms', 'ks', 'b'], 'N/m')
 
+    ``function`` makes a function of NumPy of it, with derivatives, ``.jax()`` and ``.torch()`` one of these libraries:
+
+    >>> f = car.function(["ks", "b", "spring.q(0)"], ["travel"], to=4, every=1, road=0.1)
+    >>> f(f.values).shape, f.jacobian(f.values).shape, f.vjp(f.values, [[0], [0], [0], [0], [1]]).shape
+    ((5, 1), (5, 1, 3), (3,))
+
+Ask what matters over whole ranges
+    ``sobol`` gives parts of the variance of an output, ``morris`` tells which of many parameters matter at all, both with
+    confidence intervals (SALib).
+
+Let something learn to act in it
+    ``gym`` and ``gym_vector`` are environments of Gymnasium: what is observed, what is acted on, what is rewarded, what
+    begins at random.
+
 Look at it near a point
     ``linearize`` gives matrices, poles, zeros, ``bode()``, ``to_control()``:
 
@@ -74,6 +88,8 @@ audit finds missed by ``AuditWarning``.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ._errors import (
     AuditWarning,
     Diagnostic,
@@ -91,6 +107,8 @@ from .comparison import Comparison
 from .components import Component, Library, format, library
 from .equations import Equations
 from .fitting import Estimate, Experiment, Fit, Profile
+from .functions import Function
+from .global_sensitivity import GlobalSensitivity, MorrisEffects, SobolIndices
 from .gradients import Gradient, Recorded
 from .identifiability import Identifiability
 from .linear import Linearization
@@ -102,18 +120,25 @@ from .sensitivities import Sensitivities
 from .stepper import Snapshot, Stepper
 from .sweeps import SweepFiles, SweepResult, read_sweep
 
+if TYPE_CHECKING:
+    from .gyms import Environment, Environments, gym, gym_vector
+
 __all__ = [
     "Audit",
     "AuditWarning",
     "Comparison",
     "Component",
     "Diagnostic",
+    "Environment",
+    "Environments",
     "Equations",
     "Error",
     "Estimate",
     "Experiment",
     "FileError",
     "Fit",
+    "Function",
+    "GlobalSensitivity",
     "Gradient",
     "Identifiability",
     "Input",
@@ -124,6 +149,7 @@ __all__ = [
     "Model",
     "ModelError",
     "ModelWarning",
+    "MorrisEffects",
     "Parameter",
     "Picture",
     "Profile",
@@ -132,6 +158,7 @@ __all__ = [
     "RunError",
     "Sensitivities",
     "Snapshot",
+    "SobolIndices",
     "Stepper",
     "SweepFiles",
     "SweepResult",
@@ -140,8 +167,19 @@ __all__ = [
     "Variable",
     "__version__",
     "format",
+    "gym",
+    "gym_vector",
     "library",
     "load",
     "model",
     "read_sweep",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Gymnasium is loaded when it is asked for.
+    if name in ("Environment", "Environments", "gym", "gym_vector"):
+        from . import gyms
+
+        return getattr(gyms, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from . import _halfarrow, sweeps
+from . import _halfarrow, global_sensitivity, sweeps
 from ._errors import (
     AuditWarning,
     Diagnostic,
@@ -36,6 +36,7 @@ from ._words import hint, in_python
 from .comparison import Comparison
 from .equations import Equations
 from .fitting import Bounds, Data, Experiment, Fit, Loss, fit
+from .functions import Function
 from .gradients import Gradient, Objective, asked, variables
 from .identifiability import Identifiability, identifiability
 from .linear import Linearization
@@ -549,6 +550,59 @@ class Model:
         _conclude(ended, result)
         return Gradient(value, slopes, without, result)
 
+    def function(
+        self,
+        parameters: str | Sequence[str],
+        outputs: str | Sequence[str],
+        to: float,
+        *,
+        every: float | None = None,
+        at: npt.ArrayLike | None = None,
+        method: Method = "auto",
+        step: float | None = None,
+        rtol: float = 1e-8,
+        atol: float | None = None,
+        start: Literal["given", "equilibrium"] = "given",
+        execution: Literal["auto", "bytecode", "machine"] = "auto",
+        threads: int | None = None,
+        fixed: Mapping[str, Value] | None = None,
+        inputs: Mapping[str, InputLike] | None = None,
+        **values: Any,
+    ) -> Function:
+        """The model as a differentiable function, from an array ``(parameters,)`` to an array ``(samples, outputs)``: of NumPy
+        with ``jvp``, ``vjp`` and ``jacobian``, of JAX (``.jax()``) and of PyTorch (``.torch()``).
+
+        Args:
+            parameters: What it is a function of: parameters, start values such as ``spring.q(0)``, inputs, which are then
+                constant.
+            outputs: Variables that it gives.
+            to: End of the runs in s.
+            every, at: As in ``simulate``; one of them, that every run has as many samples. The end is the last sample.
+            method, step, rtol, atol, start, execution: As in ``simulate``; derivatives have no linearly implicit method.
+            threads: Runs at the same time, where there are several sets; nothing: as many as there are processors.
+            fixed: Values of other parameters by name.
+            inputs: Other inputs over time, as in ``simulate``; a function of time is called once.
+            values: Other parameters and inputs whose names are words.
+
+        Raises:
+            UnknownNameError: there is no parameter, input, start value or variable of a name.
+            UsageError: something is asked that cannot be.
+
+        >>> import halfarrow as ha
+        >>> rc = ha.model("model RC\\nparam r = 2, u = 3\\nSe:s(u) -> 1:j -> R:wire(r)\\nj -> C:store(0.5)\\n")
+        >>> f = rc.function(["r", "store.q(0)"], "store.q", to=2, at=[1, 2])
+        >>> f.vjp(f.values, [[0], [1]]).round(4)
+        array([-0.203 ,  0.1353])
+        """
+        set_values, given = self._split(values, fixed, inputs)
+        options = dict(
+            method=choice("method", method, _METHODS), step=step, rtol=rtol, atol=atol, start=_start(start),
+            execution=choice("execution", execution, ("auto", "bytecode", "machine")),
+        )  # fmt: skip
+        asked = [parameters] if isinstance(parameters, str) else parameters
+        named = [outputs] if isinstance(outputs, str) else outputs
+        return Function(self, asked, named, to, every, at, dict(set_values), given, options, threads)
+
     def fit(
         self,
         data: Data | Sequence[Experiment],
@@ -801,6 +855,83 @@ class Model:
             progress=progress,
         )
         return sweeps.run(self, plan, way)
+
+    def sobol(
+        self,
+        ranges: Mapping[str, tuple[Value, Value]],
+        to: float,
+        *,
+        n: int = 1024,
+        second_order: bool = True,
+        resamples: int = 100,
+        confidence: float = 0.95,
+        seed: int = 0,
+        **run: Any,
+    ) -> global_sensitivity.GlobalSensitivity[global_sensitivity.SobolIndices]:
+        """Sobol' indices: which parts of the variance of an output come of which parameters, alone and together, where all of
+        them vary over their ranges at once. Sampled and estimated by SALib, run by ``sweep``.
+
+        Args:
+            ranges: ``(least, greatest)`` by the names of parameters and start values such as ``spring.q(0)``, in SI units or
+                as text with a unit; all values between are equally likely, and parameters independent of each other.
+            to: End of each run in s.
+            n: Size of the design, a power of two: ``n (2 p + 2)`` runs for ``p`` parameters, without pairs ``n (p + 2)``.
+            second_order: Whether pairs are asked for.
+            resamples, confidence: Of the bootstrap that gives the confidence intervals: how often, and at which level.
+            seed: Of the design and the bootstrap: the same gives the same.
+            run: All else that ``sweep`` takes but ``samples``: ``reduce={"peak": ("travel", "max")}``, ``step``,
+                ``executor``, values of other parameters. Start values cannot vary in an executor.
+
+        Returns:
+            ``SobolIndices`` by the columns of ``reduce``; nothing: by the last values of what is recorded.
+
+        Raises:
+            RunError: a set failed, since the estimates need all of them; ``result`` has the sweep.
+            UsageError: something is asked that cannot be; an output is the same in all sets.
+            UnknownNameError, Interrupted: as in ``sweep``.
+
+        >>> import halfarrow as ha
+        >>> wire = ha.model("model W\\nparam a = 1, b = 1\\nSe:s(a) -> 1:j\\nSe:z(b) -> j\\nj -> R:r(2)\\nj -> I:l(1)\\n")
+        >>> s = wire.sobol({"a": (0, 2), "b": (0, 1)}, to=10, n=256, step=0.01, reduce={"current": ("l.f", "final")})
+        >>> s["current"].total.round(1)
+        array([0.8, 0.2])
+        """
+        return global_sensitivity.sobol(self, ranges, to, n, second_order, resamples, confidence, seed, run)
+
+    def morris(
+        self,
+        ranges: Mapping[str, tuple[Value, Value]],
+        to: float,
+        *,
+        n: int = 20,
+        levels: int = 4,
+        resamples: int = 100,
+        confidence: float = 0.95,
+        seed: int = 0,
+        **run: Any,
+    ) -> global_sensitivity.GlobalSensitivity[global_sensitivity.MorrisEffects]:
+        """Elementary effects (Morris): which of many parameters matter at all, for few runs. Sampled and estimated by SALib, run
+        by ``sweep``.
+
+        Args:
+            ranges, to, resamples, confidence, seed, run: As in ``sobol``.
+            n: Trajectories through the ranges, on each of which every parameter takes one step: ``n (p + 1)`` runs for ``p``
+                parameters.
+            levels: Values that each parameter may have, an even number; a step goes over half of them.
+
+        Returns:
+            ``MorrisEffects`` by the columns of ``reduce``; nothing: by the last values of what is recorded.
+
+        Raises:
+            UsageError, RunError, UnknownNameError, Interrupted: as in ``sobol``, but for outputs that do not vary.
+
+        >>> import halfarrow as ha
+        >>> drop = ha.model("model Drop\\nparam m = 1 kg, F = 1 N\\nSe:weight(F) -> I:mass(m)\\n")
+        >>> s = drop.morris({"m": (1, 2), "F": ("0 N", "4 N")}, to=1, step=0.1, reduce=["final(mass.f)"])
+        >>> bool(s["final(mass.f)"].mean_abs[1] > s["final(mass.f)"].mean_abs[0])
+        True
+        """
+        return global_sensitivity.morris(self, ranges, to, n, levels, resamples, confidence, seed, run)
 
     def stepper(
         self,

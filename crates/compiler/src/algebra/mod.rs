@@ -33,6 +33,7 @@ mod symbol_sets;
 mod symbols;
 mod table;
 mod text;
+mod unit_vector;
 mod zero;
 
 pub use assumptions::{Assumption, Assumptions, Holds};
@@ -56,6 +57,7 @@ pub use text::{
     Names, Place, PlainNames, Sort, ascii, ascii_within, latex, latex_name, latex_owner, mathml, mathml_name,
     mathml_owner, mathml_within, unicode, unicode_name, unicode_within,
 };
+pub use unit_vector::unit_vector;
 
 #[cfg(test)]
 mod tests;

@@ -40,6 +40,14 @@ impl Exprs {
     pub fn residue(&self, e: Expr) -> Option<Residue> {
         Some(self.fingerprint(e)[GENERIC.start]).filter(|&v| v != POISON).map(Residue)
     }
+
+    /// The quotient of the values of an expression at two random points of the prime field: what is a number times the
+    /// expression has the same, and products have the products. `None` where it has none, and of numbers.
+    pub fn proportion(&self, e: Expr) -> Option<Residue> {
+        let [first, second] = [0, 1].map(|lane| self.fingerprint(e)[GENERIC.start + lane]);
+        let known = ![0, POISON].iter().any(|v| [first, second].contains(v)) && first != second;
+        known.then(|| field::inverse(second).map(|inverse| Residue(field::mul(first, inverse))))?
+    }
 }
 
 /// The values of an expression in a prime field: with all symbols random, and with parameters as they are given.

@@ -8,15 +8,15 @@ use super::repeat::too_long;
 use super::scope::{DeclId, DeclKind, Here, Node, Valued};
 use super::uses::Used;
 use super::value::{Reading, known_of};
-use crate::algebra::Function;
+use crate::algebra::{Function, MINUS_ONE, Rational, unit_vector};
 use crate::ast::{self, BinaryOp, ExprKind, UnaryOp};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 use crate::unit::WHOLE;
 
 /// Functions of vectors and matrices, with the numbers of their arguments.
-pub(super) const VECTOR_FUNCTIONS: [(&str, usize); 7] =
-    [("dot", 2), ("cross", 2), ("transpose", 1), ("skew", 1), ("norm", 1), ("diag", 1), ("identity", 1)];
+pub(super) const VECTOR_FUNCTIONS: [(&str, usize); 8] =
+    [("dot", 2), ("cross", 2), ("transpose", 1), ("skew", 1), ("norm", 1), ("unit", 1), ("diag", 1), ("identity", 1)];
 
 /// A number, a vector or a matrix: its extents, and its entries row by row.
 #[derive(Debug, Clone)]
@@ -499,13 +499,14 @@ impl<'a> Builder<'a, '_> {
             ("norm", [a]) if a.shape.len() == 1 => {
                 let pairs: Vec<(&Value, &Value)> = a.items.iter().zip(&a.items).collect();
                 let square = self.inner_product(&pairs, span);
-                let expr = match self.exprs.is_number(square.expr).map(crate::algebra::Rational::to_f64) {
+                let expr = match self.exprs.is_number(square.expr).map(Rational::to_f64) {
                     // Roots that are kept exactly would stand in everything that is turned about an axis.
                     Some(square) => self.exprs.float(square.sqrt()),
                     None => self.exprs.call(Function::Sqrt, &[square.expr]),
                 };
                 Some(Shaped::scalar(Value::number(expr, square.quantity.power(WHOLE / 2))))
             }
+            ("unit", [a]) if a.shape.len() == 1 => self.direction(a, span),
             ("cross", [a, b]) if a.shape == [3] && b.shape == [3] => {
                 let mut items = Vec::with_capacity(3);
                 for k in 0..3 {
@@ -544,6 +545,29 @@ impl<'a> Builder<'a, '_> {
                 None
             }
         }
+    }
+
+    /// The direction of a vector. Of numbers, the squares of its entries add up to 1 exactly: where they did so to rounding
+    /// alone, loops would depend by rounding on joints outside of them.
+    fn direction(&mut self, a: &Shaped, span: Span) -> Option<Shaped> {
+        let pairs: Vec<(&Value, &Value)> = a.items.iter().zip(&a.items).collect();
+        let square = self.inner_product(&pairs, span);
+        let length = square.quantity.power(WHOLE / 2);
+        let numbers: Option<Vec<Rational>> = a.items.iter().map(|v| self.exprs.is_number(v.expr).cloned()).collect();
+        let exact = numbers.and_then(|numbers| unit_vector(&numbers));
+        let less_one = self.exprs.add(&[square.expr, MINUS_ONE]);
+        let items = match exact {
+            Some(exact) => exact.into_iter().map(|n| self.exprs.number(n)).collect(),
+            None if self.exprs.is_zero(less_one) => a.items.iter().map(|v| v.expr).collect(),
+            None => {
+                let length = Value::number(self.exprs.call(Function::Sqrt, &[square.expr]), length.clone());
+                let parts = a.items.iter().map(|v| self.quotient(v, &length, span).map(|v| v.expr));
+                parts.collect::<Option<Vec<_>>>()?
+            }
+        };
+        let quantities = a.items.iter().map(|v| v.quantity.over(&length));
+        let items = items.into_iter().zip(quantities).map(|(expr, quantity)| Value::number(expr, quantity)).collect();
+        Some(Shaped { shape: a.shape.clone(), items })
     }
 
     /// A function of numbers, of every entry of a vector or matrix.

@@ -13,6 +13,9 @@ use crate::causal_graph::{CausalGraph, PortState, Role, magnitude_of_slope};
 
 /// Larger tables of ratios are not looked at.
 const MOST: usize = 20_000;
+/// Of so many divisors all products are looked at; of more those of some that follow each other.
+const ALL_PRODUCTS: usize = 10;
+const IN_A_ROW: usize = 40;
 /// What moves so many times as fast at the start is near a position in which others had better be independent.
 const NEAR_SINGULAR: f64 = 100.0;
 
@@ -55,6 +58,9 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
         return Exchanges::default();
     }
     let d = &mut assembled.d;
+    if std::env::var("XD").is_ok() {
+        eprintln!("exchanges");
+    }
     let ports = &causal.ports;
     let mut rows = rows_of(d, causal);
     let storages = ports.ports.iter().filter(|p| p.role == Role::Independent);
@@ -74,7 +80,7 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     });
     let storages = ports.ports.iter().filter(|p| p.role == Role::Dependent).map(|p| p.output);
     let dependent: BTreeSet<Symbol> = storages.chain(rates).filter(|s| !independent.contains(s)).collect();
-    let divisors = residues_of(&mut d.x, &ports.watched);
+    let divisors = proportions_of(&mut d.x, &ports.watched);
     let mut found = Exchanges::default();
     let mut read: BTreeSet<Symbol> = BTreeSet::new();
     let mut seen: BTreeSet<Symbol> = BTreeSet::new();
@@ -100,6 +106,13 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
         let counts = |x: &Exprs, t: &(Symbol, Expr)| stored.contains_key(&t.0) || divides(x, t.1, &divisors);
         let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0)).collect();
         let none = !ratios.iter().any(|t| !d.is_constant(t.1) && counts(&d.x, t));
+        if std::env::var("XD").is_ok() {
+            eprintln!(
+                "dep {} none {none} ratios {:?}",
+                d.x.name(symbol),
+                ratios.iter().map(|t| (d.x.name(t.0), d.is_constant(t.1), counts(&d.x, t))).collect::<Vec<_>>()
+            );
+        }
         if none || !seen.insert(d.x.untwinned(symbol)) {
             continue;
         }
@@ -117,9 +130,11 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     found
 }
 
-/// The values of divisors, of their factors, and of these without numbers.
-fn residues_of(x: &mut Exprs, divisors: &[Expr]) -> BTreeSet<Residue> {
+/// What divisors, their factors and their products are, but for numbers: a pivot is itself divided by those before it, which
+/// their product no longer is, and rows are written with either.
+fn proportions_of(x: &mut Exprs, divisors: &[Expr]) -> BTreeSet<Residue> {
     let mut found = BTreeSet::new();
+    let mut whole: Vec<Residue> = Vec::new();
     for &divisor in divisors {
         let factors = match x.node(divisor) {
             Node::Mul(factors) => factors.to_vec(),
@@ -130,19 +145,35 @@ fn residues_of(x: &mut Exprs, divisors: &[Expr]) -> BTreeSet<Residue> {
                 Node::Pow(base, _) => base,
                 _ => e,
             };
-            let own = x.primitive(base).1;
-            let (minus, minus_own) = (x.neg(base), x.neg(own));
-            found.extend([base, own, minus, minus_own].into_iter().filter_map(|e| x.residue(e)));
+            found.extend(x.proportion(base));
+        }
+        whole.extend(x.proportion(divisor));
+    }
+    if whole.len() <= ALL_PRODUCTS {
+        let mut products: Vec<Residue> = Vec::new();
+        for &one in &whole {
+            let more: Vec<Residue> = products.iter().map(|&product| product * one).chain([one]).collect();
+            products.extend(more);
+        }
+        found.extend(products);
+    } else {
+        for from in 0..whole.len() {
+            let next = |product: &mut Residue, &one: &Residue| {
+                *product = *product * one;
+                Some(*product)
+            };
+            let in_a_row = whole[from + 1..].iter().take(IN_A_ROW).scan(whole[from], next);
+            found.extend(in_a_row);
         }
     }
     found
 }
 
-/// Whether a part of the expression is divided by one of these values.
+/// Whether a part of the expression is divided by one of these.
 fn divides(x: &Exprs, e: Expr, divisors: &BTreeSet<Residue>) -> bool {
     x.below(&[e], &|_| true).into_iter().any(|part| match *x.node(part) {
         Node::Pow(base, n) if x.is_number(n).is_some_and(|n| n.signum() < 0) => {
-            x.residue(base).is_some_and(|residue| divisors.contains(&residue))
+            x.proportion(base).is_some_and(|proportion| divisors.contains(&proportion))
         }
         _ => false,
     })

@@ -3,7 +3,9 @@
 //!
 //! Definitions stay triangular, as elimination leaves them, so that what is evaluated grows with the graph. Written out
 //! are only those in which terms cancel once the variables that they read are put in: added up while running such terms
-//! leave rounding; and those that have no more terms then.
+//! leave rounding; and those that have no more terms then. Of the variables through which such terms come those are put in
+//! that hold them, if the row has fewer terms so than over what elements give: what a spring between two bodies gives
+//! cancels in what carries both, whatever else hangs on them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -124,6 +126,25 @@ impl<'a> Rows<'a> {
         self.short.get(&symbol)?.clone()
     }
 
+    /// A variable with the rows of others put in, each of which comes after those that it reads; `along`: what is put into
+    /// rows already.
+    fn put_through(
+        &self,
+        x: &mut Exprs,
+        symbol: Symbol,
+        through: &[Symbol],
+        along: &Map<Symbol, Combination>,
+    ) -> Option<Combination> {
+        let ports = self.ports?;
+        let mut put: Map<Symbol, Combination> = self.zero.iter().map(|&s| (s, Combination::default())).collect();
+        for &next in through.iter().chain([&symbol]) {
+            let own = along.get(&next).or_else(|| ports.definitions.get(&next))?;
+            let row = own.substitute(x, |s| put.get(&s), &ports.undetermined);
+            put.insert(next, row);
+        }
+        put.remove(&symbol)
+    }
+
     /// What elements give of which a variable of the junction structure is made; nothing of other variables.
     pub fn inputs_of(&mut self, x: &mut Exprs, symbol: Symbol) -> Vec<Symbol> {
         let Some(ports) = self.ports else { return Vec::new() };
@@ -175,11 +196,20 @@ impl<'a> Rows<'a> {
     pub fn definitions(&mut self, x: &mut Exprs) -> Vec<(Symbol, Combination)> {
         let Some(ports) = self.ports else { return Vec::new() };
         let WrittenOut { needed, as_short } = written_out(x, ports);
+        let mut along: Map<Symbol, Combination> = Map::new();
+        for (symbol, through) in needed.iter().filter_map(|(s, through)| Some((*s, through.as_ref()?))) {
+            let row = self.put_through(x, symbol, through, &along).expect("it is defined");
+            along.insert(symbol, row);
+        }
+        let needed: BTreeSet<Symbol> = needed.into_iter().map(|n| n.0).collect();
         let mut all: Map<Symbol, Combination> = Map::new();
         for (&symbol, row) in &ports.definitions {
             let own = Combination(row.0.iter().filter(|t| !self.zero.contains(&t.0)).copied().collect());
             let row = match (needed.contains(&symbol), as_short.contains(&symbol)) {
-                (true, _) => self.of(x, symbol).expect("it is defined").clone(),
+                (true, _) => match along.remove(&symbol) {
+                    Some(row) => row,
+                    None => self.of(x, symbol).expect("it is defined").clone(),
+                },
                 (_, true) => self.shortly(x, symbol).filter(|row| row.0.len() <= own.0.len()).unwrap_or(own),
                 _ => own,
             };
@@ -241,12 +271,12 @@ pub fn without_own<C: Ord>(rows: &[Vec<C>]) -> Vec<bool> {
 /// A row with its coefficients in a prime field; `None` where one has no value there.
 type Row = Vec<(Symbol, Option<Residue>)>;
 
-/// Definitions that are written out over what elements give.
+/// Definitions that are written out.
 #[derive(Default)]
 struct WrittenOut {
     /// Terms cancel in them once all that they read is put in, or they read what nothing determines: their share in it may
-    /// vanish.
-    needed: BTreeSet<Symbol>,
+    /// vanish. With each what has to be put in for that, in order; none where all is. In the order of what they read.
+    needed: Vec<(Symbol, Option<Vec<Symbol>>)>,
     /// They have no more terms then. None where coefficients vanish at the given parameters only: which of them do is told
     /// by elimination alone.
     as_short: BTreeSet<Symbol>,
@@ -261,20 +291,31 @@ fn is_short(x: &mut Exprs, row: &Combination) -> bool {
 fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
     let mut found = WrittenOut::default();
     let mut known: Map<Symbol, Row> = Map::new();
+    let mut along: Map<Symbol, Row> = Map::new();
     let mut work = 0;
     for &first in ports.definitions.keys() {
         let mut open = vec![first];
         while let Some((top, definition)) = ports.next_to_resolve(&mut open, |s| known.contains_key(s)) {
             let mut row = put_in(x, definition, &known);
             let undetermined = row.iter().any(|t| ports.undetermined.contains(&t.0));
-            if undetermined || row.iter().any(|t| t.1.is_some_and(Residue::vanishes)) {
-                found.needed.insert(top);
+            let gone = |t: &(Symbol, Option<Residue>)| t.1.is_some_and(Residue::vanishes);
+            let cancelled: BTreeSet<Symbol> = row.iter().filter(|t| gone(t)).map(|t| t.0).collect();
+            row.retain(|t| !gone(t));
+            work += row.len();
+            if undetermined {
+                found.needed.push((top, None));
+            } else if !cancelled.is_empty() {
+                let (through, short) = through(x, ports, top, &cancelled, (&known, &along));
+                work += through.len();
+                let through = (short.len() < row.len()).then(|| {
+                    along.insert(top, short);
+                    through
+                });
+                found.needed.push((top, through));
             }
-            row.retain(|t| !t.1.is_some_and(Residue::vanishes));
             if row.len() <= definition.0.len() && ports.degenerate.is_empty() {
                 found.as_short.insert(top);
             }
-            work += row.len();
             if work > WORK && ports.undetermined.is_empty() {
                 return found;
             }
@@ -284,10 +325,50 @@ fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
     found
 }
 
+/// The variables that have to be put into a row so that the shares of others cancel in it, in order, and its terms then.
+/// `known`: rows with everything put in, `along`: with what had to be.
+fn through(
+    x: &Exprs,
+    ports: &Ports,
+    top: Symbol,
+    cancelled: &BTreeSet<Symbol>,
+    (known, along): (&Map<Symbol, Row>, &Map<Symbol, Row>),
+) -> (Vec<Symbol>, Row) {
+    let own = |s: Symbol| -> Row {
+        let defined = |d: &Combination| d.0.iter().map(|&(s, c)| (s, x.residue(c))).collect();
+        along.get(&s).cloned().or_else(|| ports.definitions.get(&s).map(defined)).unwrap_or_default()
+    };
+    let holds = |s: &Symbol| known.get(s).is_some_and(|row| row.iter().any(|t| cancelled.contains(&t.0)));
+    let mut put: Map<Symbol, Row> = Map::new();
+    let mut order = Vec::new();
+    let mut open = vec![top];
+    while let Some(&next) = open.last() {
+        let row = own(next);
+        let before = open.len();
+        open.extend(row.iter().map(|t| t.0).filter(|s| holds(s) && !put.contains_key(s)));
+        if open.len() > before {
+            continue;
+        }
+        open.pop();
+        if !put.contains_key(&next) {
+            let mut row = with(row, &put);
+            row.retain(|t| !t.1.is_some_and(Residue::vanishes));
+            put.insert(next, row);
+            order.push(next);
+        }
+    }
+    order.pop();
+    (order, put.remove(&top).unwrap_or_default())
+}
+
 fn put_in(x: &Exprs, definition: &Combination, known: &Map<Symbol, Row>) -> Row {
+    with(definition.0.iter().map(|&(symbol, coefficient)| (symbol, x.residue(coefficient))).collect(), known)
+}
+
+/// A row with others put in.
+fn with(row: Row, known: &Map<Symbol, Row>) -> Row {
     let mut terms: Row = Vec::new();
-    for &(symbol, coefficient) in &definition.0 {
-        let factor = x.residue(coefficient);
+    for (symbol, factor) in row {
         match known.get(&symbol) {
             Some(row) => terms.extend(row.iter().map(|&(s, c)| (s, factor.zip(c).map(|(a, b)| a * b)))),
             None => terms.push((symbol, factor)),

@@ -44,8 +44,9 @@ impl Program {
 }
 
 /// Where guesses go that read these unknowns, in the order in which they are placed: the number of the guess and its
-/// unknown. A guess places the only unknown that it reads which is not placed yet; where there is no such guess, the
-/// first guess places the first such. Guesses for which no unknown is left are left out.
+/// unknown. A guess places the only unknown that it reads which is not placed yet, first those that read fewest: what is
+/// guessed of an unknown itself goes before what others have it follow from. Where there is no such guess, the first guess
+/// places the first such. Guesses for which no unknown is left are left out.
 pub(super) fn place_guesses(reads: &[&[u32]]) -> Vec<(usize, u32)> {
     let mut left: Vec<usize> = (0..reads.len()).collect();
     let mut placed: BTreeSet<u32> = BTreeSet::new();
@@ -56,7 +57,8 @@ pub(super) fn place_guesses(reads: &[&[u32]]) -> Vec<(usize, u32)> {
         if left.is_empty() {
             return places;
         }
-        let guess = left.remove(left.iter().position(|&g| open(g).count() == 1).unwrap_or(0));
+        let telling = (0..left.len()).filter(|&at| open(left[at]).count() == 1);
+        let guess = left.remove(telling.min_by_key(|&at| reads[left[at]].len()).unwrap_or(0));
         let unknown = open(guess).next().expect("one is open");
         placed.insert(unknown);
         places.push((guess, unknown));
@@ -81,5 +83,6 @@ mod tests {
         assert_eq!(place_guesses(&[&[0, 1], &[1], &[]]), [(1, 1), (0, 0)]);
         assert_eq!(place_guesses(&[&[0, 1], &[0, 1], &[0]]), [(2, 0), (0, 1)]);
         assert_eq!(place_guesses(&[&[2, 3], &[2, 3]]), [(0, 2), (1, 3)]);
+        assert_eq!(place_guesses(&[&[0], &[0, 1], &[1]]), [(0, 0), (2, 1)]);
     }
 }
