@@ -1,7 +1,7 @@
 //! A model as functions of CasADi, for optimal control and whatever else works on its expressions: one file of Python.
 //!
 //! What is solved by iteration, and large linear blocks, are algebraic unknowns `z` with their residuals: what integrators and
-//! collocation of CasADi take. Conditions follow their operands. Source: [CasADi].
+//! collocation of CasADi take. Conditions follow their operands. Source: \[CasADi\].
 
 use std::collections::HashMap;
 use std::fmt::Write;
