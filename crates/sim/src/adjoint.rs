@@ -5,18 +5,15 @@
 //! `(∂f/∂c)ᵀ λ`. A method of fixed step is followed step by step, by the transposed derivative of the very step; otherwise
 //! the weights are integrated along the path that the run has taken. Source: [CaoLiPetzoldSerban].
 
-use crate::fixed_step::{FixedMethod, StepBack};
+use crate::fixed_step::FixedMethod;
 use crate::{AbsoluteTolerance, Events, Failure, Method, Nobody, Options, Sparsity, Stopped, System, simulate};
 
 /// What a run went through, to be followed backwards.
 pub trait Backwards {
-    /// Number of states.
-    fn states(&self) -> usize;
-
     /// How messages name a state.
     fn state_name(&self, state: usize) -> String;
 
-    /// Typical magnitudes of the states on the way; 0 where they stayed 0.
+    /// Typical magnitudes of the states on the way, one for each state; 0 where they stayed 0.
     fn magnitudes(&self) -> &[f64];
 
     /// Those of the constants, 0 where they are 0.
@@ -86,22 +83,11 @@ fn turned(stopped: Stopped, from: f64) -> Failure {
     }
 }
 
-/// Takes the weights back over one step of a method of fixed step, from `(from, x)` to `end`.
-///
-/// # Errors
-/// What the system reports.
-pub fn step_back(
-    back: &mut StepBack,
-    system: &mut dyn Transposed,
-    (from, x): (f64, &[f64]),
-    (to, end): (f64, &[f64]),
-    (states, constants): (&mut [f64], &mut [f64]),
-) -> Result<(), Failure> {
-    back.step(system, (from, to - from), (x, end), states, constants)
-}
-
 /// A system whose derivatives can be had transposed.
-pub trait Transposed: System {
+pub trait Transposed {
+    /// The system itself.
+    fn system(&mut self) -> &mut dyn System;
+
     /// `(∂f/∂x)ᵀ w` at `(t, x)`, and adds `(∂f/∂c)ᵀ w` to what the constants weigh.
     ///
     /// # Errors
@@ -138,7 +124,7 @@ impl System for Weights<'_> {
     }
 
     fn state_name(&self, state: usize) -> String {
-        match state < self.path.states() {
+        match state < self.path.magnitudes().len() {
             true => format!("the weight of {}", self.path.state_name(state)),
             false => "the weight of a constant".into(),
         }
@@ -149,13 +135,13 @@ impl System for Weights<'_> {
     }
 
     fn rates(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<(), Failure> {
-        let n = self.path.states();
+        let n = self.path.magnitudes().len();
         let (states, constants) = dy.split_at_mut(n);
         self.path.products(-t, &y[..n], states, constants)
     }
 
     fn directional_derivative(&mut self, t: f64, _: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
-        let n = self.path.states();
+        let n = self.path.magnitudes().len();
         // What the constants gather is solved for after the states.
         jv[n..].fill(0.0);
         self.path.products(-t, &v[..n], &mut jv[..n], &mut self.rest)
@@ -212,9 +198,6 @@ mod tests {
     }
 
     impl Backwards for Decay {
-        fn states(&self) -> usize {
-            1
-        }
         fn state_name(&self, _: usize) -> String {
             "x".into()
         }

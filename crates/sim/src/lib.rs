@@ -24,7 +24,7 @@ mod system;
 mod variable_step;
 pub mod wide;
 
-pub use adjoint::{Backwards, Transposed, follow_back, step_back};
+pub use adjoint::{Backwards, Transposed, follow_back};
 pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary, tick};
 pub use events::Events;
 pub use failure::{Affected, Failure, Leap};

@@ -31,20 +31,25 @@ impl StepBack {
         }
     }
 
-    pub(crate) fn step(
+    /// Takes the weights of states and constants back over the step that went from `(from, x)` to `(to, end)`.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn step(
         &mut self,
         system: &mut dyn Transposed,
-        (t, h): (f64, f64),
+        (from, to): (f64, f64),
         (x, end): (&[f64], &[f64]),
         states: &mut [f64],
         constants: &mut [f64],
     ) -> Result<(), Failure> {
+        let (t, h) = (from, to - from);
         match (self.tableau, &mut self.middle) {
             (Some(tableau), _) => self.explicit(tableau, system, (t, h), x, states, constants),
             // `X = x + h/2 f(X)`, `end = 2 X - x`.
             (None, Some(matrix)) => {
                 (0..x.len()).for_each(|i| self.point[i] = 0.5 * (x[i] + end[i]));
-                matrix.factor(system, t + 0.5 * h, &self.point, 0.5 * h, |_, _, _| {})?;
+                matrix.factor(system.system(), t + 0.5 * h, &self.point, 0.5 * h, |_, _, _| {})?;
                 self.weight.copy_from_slice(states);
                 matrix.solve(&mut self.weight);
                 for (state, middle) in states.iter_mut().zip(&self.weight) {
@@ -72,7 +77,7 @@ impl StepBack {
         for stage in 0..count - 1 {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
             advance(x, h, tableau.stages[stage], earlier, &mut self.point);
-            system.rates(t + tableau.nodes[stage] * h, &self.point, &mut rest[..n])?;
+            system.system().rates(t + tableau.nodes[stage] * h, &self.point, &mut rest[..n])?;
         }
         for stage in (0..count).rev() {
             let (own, later) = self.weights[stage * n..].split_at_mut(n);

@@ -5,7 +5,7 @@ use crate::bytecode::{Hold, Routine, Weights};
 use crate::model::Model;
 use crate::model::compiled::Mode;
 use halfarrow_sim::fixed_step::StepBack;
-use halfarrow_sim::{Backwards, Failure, Method, Sparsity, System, Transposed, follow_back, step_back};
+use halfarrow_sim::{Backwards, Failure, Method, Sparsity, System, Transposed, follow_back};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -141,7 +141,7 @@ impl<'m> Back<'m> {
             rates,
             recorded,
             at: None,
-            smooth: 0..0,
+            smooth: tape.points.len()..tape.points.len(),
             ends: BTreeMap::new(),
             x: vec![0.0; n],
             mode,
@@ -151,6 +151,19 @@ impl<'m> Back<'m> {
     }
 
     fn follow(&mut self, (first, weights): (usize, &[f64]), method: Method, rtol: f64) -> Result<(), Failure> {
+        let mut states = std::mem::take(&mut self.weights_of_states);
+        let found = self.follow_to_start((first, weights), (method, rtol), &mut states);
+        self.weights_of_states = states;
+        found
+    }
+
+    /// From the end of the run to its start.
+    fn follow_to_start(
+        &mut self,
+        (first, weights): (usize, &[f64]),
+        (method, rtol): (Method, f64),
+        states: &mut [f64],
+    ) -> Result<(), Failure> {
         let tape = self.tape;
         let each = weights.len() / tape.samples.len().max(1);
         let mut samples = tape.samples.iter().zip(weights.chunks(each.max(1))).rev().peekable();
@@ -158,63 +171,40 @@ impl<'m> Back<'m> {
             Method::Fixed(method) => Some(StepBack::new(method, self.model.sparsity())),
             _ => None,
         };
-        let mut states = std::mem::take(&mut self.weights_of_states);
         let mut k = tape.points.len();
-        let end = |found: Result<(), Failure>, back: &mut Back<'_>, states: Vec<f64>| {
-            back.weights_of_states = states;
-            found
-        };
         while let Some(point) = k.checked_sub(1).map(|k| &tape.points[k]) {
             k -= 1;
-            if point.t == tape.points.last().map_or(0.0, |last| last.t) || self.smooth.start > k {
+            if self.smooth.start > k {
                 self.smooth = self.around(k);
             }
             // What is sampled where the run stands.
             while let Some((sample, weights)) = samples.next_if(|(s, _)| s.after == k && s.inside.is_none()) {
-                if let Err(failure) = self.weigh_sample(sample, (first, weights), &mut states) {
-                    return end(Err(failure), self, states);
-                }
+                self.weigh_sample(sample, (first, weights), states)?;
             }
-            let found = match &point.from {
-                From::Start => return end(Ok(()), self, states),
-                From::Switch => Ok(()),
-                From::Event(moves) => {
-                    self.back_through_event(moves, &mut states);
-                    Ok(())
-                }
-                From::Step => match &mut steps {
-                    Some(steps) => self.back_over_step(steps, k, &mut states),
-                    None => {
-                        // As far as nothing is sampled and nothing happens.
-                        let mut to = k - 1;
-                        let due = samples.peek().map_or(0, |(s, _)| s.after);
-                        while to > due && matches!(tape.points[to].from, From::Step) {
-                            to -= 1;
-                        }
-                        let mut found = Ok(());
-                        let mut t = point.t;
-                        if to + 1 == k {
-                            while let Some((sample, weights)) = samples.next_if(|(s, _)| s.after == k) {
-                                found = self.along((t, sample.t), (method, rtol), &mut states);
-                                found = found.and_then(|()| self.weigh_sample(sample, (first, weights), &mut states));
-                                t = sample.t;
-                                if found.is_err() {
-                                    break;
-                                }
-                            }
-                        }
-                        let found =
-                            found.and_then(|()| self.along((t, tape.points[to].t), (method, rtol), &mut states));
-                        k = to + 1;
-                        found
+            match (&point.from, &mut steps) {
+                (From::Start, _) => return Ok(()),
+                (From::Switch, _) => {}
+                (From::Event(moves), _) => self.back_through_event(moves, states),
+                (From::Step, Some(steps)) => self.back_over_step(steps, k, states)?,
+                (From::Step, None) => {
+                    // As far as nothing is sampled and nothing happens.
+                    let mut to = k - 1;
+                    let due = samples.peek().map_or(0, |(s, _)| s.after);
+                    while to > due && matches!(tape.points[to].from, From::Step) {
+                        to -= 1;
                     }
-                },
-            };
-            if let Err(failure) = found {
-                return end(Err(failure), self, states);
+                    let mut t = point.t;
+                    while let Some((sample, weights)) = samples.next_if(|(s, _)| s.after == k) {
+                        self.along((t, sample.t), (method, rtol), states)?;
+                        self.weigh_sample(sample, (first, weights), states)?;
+                        t = sample.t;
+                    }
+                    self.along((t, tape.points[to].t), (method, rtol), states)?;
+                    k = to + 1;
+                }
             }
         }
-        end(Ok(()), self, states)
+        Ok(())
     }
 
     /// The points around one between which no event lies.
@@ -281,7 +271,7 @@ impl<'m> Back<'m> {
         self.remember(k - 1);
         let (from, to) = (&self.tape.points[k - 1], &self.tape.points[k]);
         let mut gathered = vec![0.0; self.read.len()];
-        let found = step_back(steps, self, (from.t, &from.x), (to.t, &to.x), (states, &mut gathered));
+        let found = steps.step(self, (from.t, to.t), (&from.x, &to.x), states, &mut gathered);
         self.gather(&gathered, false);
         found.and_then(|()| finite(self.model, from.t, states))
     }
@@ -444,41 +434,11 @@ fn finite(model: &Model, t: f64, states: &[f64]) -> Result<(), Failure> {
     }
 }
 
-impl System for Back<'_> {
-    fn states(&self) -> usize {
-        self.model.states()
-    }
-
-    fn state_name(&self, state: usize) -> String {
-        self.model.state_name(state)
-    }
-
-    fn scales(&self) -> &[f64] {
-        self.model.scales()
-    }
-
-    fn rates(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Failure> {
-        self.model.rates(t, x, dx)
-    }
-
-    fn directional_derivative(&mut self, t: f64, x: &[f64], v: &[f64], jv: &mut [f64]) -> Result<(), Failure> {
-        self.model.directional_derivative(t, x, v, jv)
-    }
-
-    fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        self.model.time_derivative(t, x, out)
-    }
-
-    fn sparsity(&self) -> &Sparsity {
-        self.model.sparsity()
-    }
-
-    fn jacobian(&mut self, t: f64, x: &[f64], values: &mut [f64]) -> Result<bool, Failure> {
-        self.model.jacobian(t, x, values)
-    }
-}
-
 impl Transposed for Back<'_> {
+    fn system(&mut self) -> &mut dyn System {
+        self.model
+    }
+
     fn transposed(
         &mut self,
         t: f64,
@@ -493,10 +453,6 @@ impl Transposed for Back<'_> {
 }
 
 impl Backwards for Back<'_> {
-    fn states(&self) -> usize {
-        self.model.states()
-    }
-
     fn state_name(&self, state: usize) -> String {
         self.model.state_name(state)
     }

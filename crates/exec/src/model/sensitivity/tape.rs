@@ -118,8 +118,9 @@ impl<'m> Taped<'m> {
         Ok(())
     }
 
-    /// Whether an event leaves all that moves as it moved: nothing but the rates is other after it, and those do not jump.
-    fn changes_nothing(&mut self, t: f64, x: &[f64]) -> Result<bool, Failure> {
+    /// Handles an event that leaves all that moves as it moved: nothing but the rates is other after it, and those do not
+    /// jump. Whether it is one; any other is left to be handled.
+    fn pass_switch(&mut self, t: f64, x: &[f64]) -> Result<bool, Failure> {
         let code = self.model.code.clone();
         if !code.program.clauses.is_empty() || !code.program.conserved.is_empty() || !code.program.held.is_empty() {
             return Ok(false);
@@ -132,21 +133,20 @@ impl<'m> Taped<'m> {
             self.model.rates(t, &moved, &mut after)
         });
         self.model.variation = kept;
-        let same_mode = self.model.run.mode == memory.mode();
-        self.model.restore(&memory);
         found?;
         let is_same = |(a, b): (&f64, &f64)| (a - b).abs() <= super::instant::SMOOTH * a.abs().max(b.abs());
-        Ok(same_mode && moved == x && before.iter().zip(&after).all(is_same))
+        let same_mode = self.model.run.mode == memory.mode();
+        let is_switch = same_mode && moved == x && before.iter().zip(&after).all(is_same);
+        match is_switch {
+            true => self.note(t, x, From::Switch),
+            false => self.model.restore(&memory),
+        }
+        Ok(is_switch)
     }
 
     /// Handles an event along every direction, some at a time, each time from what the run remembered before it.
     fn pass_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        if self.changes_nothing(t, x)? {
-            let kept = self.model.variation.take();
-            let done = self.model.handle_event(t, x);
-            self.model.variation = kept;
-            done?;
-            self.note(t, x, From::Switch);
+        if self.pass_switch(t, x)? {
             return Ok(());
         }
         let (memory, before) = (self.model.memory(), x.to_vec());
