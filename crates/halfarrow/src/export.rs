@@ -120,6 +120,27 @@ pub struct ExportReport {
     pub files: Vec<String>,
 }
 
+impl ExportReport {
+    /// Nothing but the names of the model and of what is written.
+    fn without_code(model: &str, target: Target) -> ExportReport {
+        ExportReport {
+            model: model.to_string(),
+            target: target.name(),
+            name: String::new(),
+            method: None,
+            step: None,
+            real: None,
+            states: Vec::new(),
+            inputs: Vec::new(),
+            parameters: Vec::new(),
+            outputs: Vec::new(),
+            cost: None,
+            cost_text: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+}
+
 /// What a step costs at most: see [`halfarrow_emit::c::Cost`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[allow(missing_docs)]
@@ -172,21 +193,8 @@ impl Model {
         let start: Vec<f64> = start.into_iter().take(states.len()).collect();
         let name = format!("{}.tex", self.name());
         let files = vec![File::text(&name, latex::document(&shown, &start))];
-        let report = ExportReport {
-            model: self.name().to_string(),
-            target: export.target.name(),
-            name: String::new(),
-            method: None,
-            step: None,
-            real: None,
-            states,
-            inputs: Vec::new(),
-            parameters: Vec::new(),
-            outputs: Vec::new(),
-            cost: None,
-            cost_text: Vec::new(),
-            files: vec![name],
-        };
+        let report =
+            ExportReport { states, files: vec![name], ..ExportReport::without_code(self.name(), export.target) };
         Ok(Exported { files, report })
     }
 
@@ -195,22 +203,7 @@ impl Model {
         let solutions = code.system.solutions();
         let text = emit::casadi::write(&code.program, &code.start, (&code.recorded, &solutions)).map_err(refused)?;
         let name = format!("{}.py", self.name());
-        let p = &code.program;
-        let report = ExportReport {
-            model: self.name().to_string(),
-            target: export.target.name(),
-            name: String::new(),
-            method: None,
-            step: None,
-            real: None,
-            states: p.states.iter().map(|s| s.name.clone()).collect(),
-            inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
-            parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
-            outputs: code.recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
-            cost: None,
-            cost_text: Vec::new(),
-            files: vec![name.clone()],
-        };
+        let report = ExportReport { files: vec![name.clone()], ..code.names(&code.recorded) };
         Ok(Exported { files: vec![File::text(&name, text)], report })
     }
 
@@ -225,7 +218,7 @@ impl Model {
             File::text("CMakeLists.txt", &*w.cmake),
         ];
         let names: Vec<String> = files.iter().map(|f| f.path.clone()).collect();
-        Ok(Exported { report: code.report(&w.name, &w.cost, code.recorded.clone(), names), files })
+        Ok(Exported { report: code.report(&w.name, &w.cost, &code.recorded, names), files })
     }
 
     #[cfg(feature = "fmu")]
@@ -237,7 +230,7 @@ impl Model {
         let mut names: Vec<String> = written.files.iter().map(|f| f.path.clone()).collect();
         names.extend(binary.iter().map(|f| f.path.clone()));
         let file = File { path: format!("{}.fmu", written.name), bytes: fmu::package(&written, binary) };
-        let report = code.report(&written.name, &written.cost, written.recorded, names);
+        let report = code.report(&written.name, &written.cost, &written.recorded, names);
         Ok(Exported { files: vec![file], report })
     }
 
@@ -281,8 +274,19 @@ impl<'a> ExportedProgram<'a> {
         })
     }
 
-    fn report(&self, name: &str, c: &emit::c::Cost, recorded: Vec<usize>, files: Vec<String>) -> ExportReport {
+    /// What the variables are called that whatever is written has.
+    fn names(&self, recorded: &[usize]) -> ExportReport {
         let p = &self.program;
+        ExportReport {
+            states: p.states.iter().map(|s| s.name.clone()).collect(),
+            inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
+            parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
+            outputs: recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
+            ..ExportReport::without_code(&p.name, self.export.target)
+        }
+    }
+
+    fn report(&self, name: &str, c: &emit::c::Cost, recorded: &[usize], files: Vec<String>) -> ExportReport {
         let cost = CostReport {
             operations: c.operations,
             divisions: c.divisions,
@@ -298,19 +302,14 @@ impl<'a> ExportedProgram<'a> {
             memory: c.memory,
         };
         ExportReport {
-            model: p.name.clone(),
-            target: self.export.target.name(),
             name: name.to_string(),
             method: Some(method(self.export.method).name()),
             step: Some(self.export.step),
             real: Some(self.export.real.name()),
-            states: p.states.iter().map(|s| s.name.clone()).collect(),
-            inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
-            parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
-            outputs: recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
             cost: Some(cost),
             cost_text: c.lines(),
             files,
+            ..self.names(recorded)
         }
     }
 }

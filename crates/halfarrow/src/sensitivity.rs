@@ -3,7 +3,6 @@
 use halfarrow_compiler::diagnostic::nearest;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Quantity};
-use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::{AbsoluteTolerance, Method, Options};
 
 use crate::error::Problem;
@@ -30,7 +29,7 @@ pub(crate) fn quantities(system: &exec::Model, run: &Run) -> Result<Vec<By>, Pro
             "sensitivities do not go with project or minimum-norm, which are not differentiated: leave that out".into(),
         );
     }
-    if let Method::Fixed(FixedMethod::Rosenbrock | FixedMethod::LinearlyImplicitEuler) = run.method {
+    if matches!(run.method, Method::Fixed(method) if !method.goes_back()) {
         return bad(
             "sensitivities do not go with linearly implicit methods, which would need second derivatives of the model: take \
              implicit-midpoint or radau"

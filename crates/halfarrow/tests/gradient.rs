@@ -1,21 +1,8 @@
 //! Gradients from runs followed backwards: against the same run differentiated forwards, of every model, by every method,
 //! through every kind of event; against closed forms; what has no derivative is refused.
 
-use halfarrow::{Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Source, Start, Trace};
-
-fn model(text: &str) -> Model {
-    Model::from_text("model.bond", text, &[]).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn run(by: &[&str], to: f64) -> Run {
-    Run {
-        to,
-        every: Some(to / 8.0),
-        rtol: 1e-10,
-        sensitivities: by.iter().map(|name| (*name).to_string()).collect(),
-        ..Run::default()
-    }
-}
+use super::sensitivity::{BALL, BELT, CAR, SAMPLED, collection, model, run};
+use halfarrow::{Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Start, Trace};
 
 /// Numbers between -1 and 1.
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
@@ -95,16 +82,9 @@ fn by_all_methods(model: &Model, asked: &Run, step: f64) {
 /// Every model of the collection, by all parameters that are given as numbers and do not shape it.
 #[test]
 fn all_models_agree_with_the_way_forth() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-    let mut names: Vec<_> = std::fs::read_dir(&folder).expect("models").flatten().map(|e| e.path()).collect();
-    names.sort();
     let mut compared = 0;
-    for path in names.iter().map(|p| p.join("model.bond")).filter(|p| p.exists()) {
-        let model = Model::new(Source::open(&path).expect("a file"), &[]).expect("a model");
+    for (name, model, to) in collection() {
         let compiled = model.compile(Form::Minimal).expect("equations");
-        let short = [("electrostatic", 1e-4), ("rlc_ladder", 2e-3), ("rectifier", 0.03), ("wave_line", 0.01)];
-        let name = path.parent().and_then(|p| p.file_name()).and_then(|n| n.to_str()).unwrap_or_default();
-        let to = short.iter().find(|s| s.0 == name).map_or(0.25, |s| s.1);
         let parameters = compiled.interface().parameters;
         let by: Vec<&str> = parameters
             .iter()
@@ -132,18 +112,7 @@ fn all_models_agree_with_the_way_forth() {
 
 #[test]
 fn bounces_are_followed_back() {
-    let ball = model(
-        "model Ball
-param m = 1 kg, g = 9.81 m/s2, e = 0.8, h0 = 1 m
-Se:weight(-m*g) -> 1:v -> I:ball(m)
-state h' = v.f from h0
-discrete n = 0
-when h < 0 m {
-    reset ball.f = -e*ball.f
-    n = n + 1
-}
-",
-    );
+    let ball = model(BALL);
     let asked = run(&["e", "h(0)", "g", "h0", "m"], 2.2);
     let fixed = FIXED.into_iter().filter(|(method, _)| !matches!(method, Method::Fixed(FixedMethod::Euler)));
     for (method, step, most) in
@@ -168,17 +137,7 @@ when h < 0 m {
 
 #[test]
 fn starts_inputs_and_equilibria_are_followed_back() {
-    let car = model(
-        "model Car
-param m = 300 kg, k = 18 kN/m, b = 900 N.s/m, g = 9.81 m/s2, q0 = 0.1 m
-input lift : N = 0.1*m*g
-Se:weight(m*g) -> 1:c
-Se:up(lift) -> c
-c -> I:body(m, p0 = 0.2*m)
-c -> C:spring(e = k*q + 1e5*q^3, q0 = 2*q0)
-c -> R:damper(b)
-",
-    );
+    let car = model(CAR);
     by_all_methods(&car, &run(&["m", "k", "b", "g", "q0", "spring.q(0)"], 0.5), 1e-3);
     let given = Run { inputs: vec![("lift".into(), Input::Constant(50.0))], ..run(&["lift", "m"], 0.5) };
     by_all_methods(&car, &given, 1e-3);
@@ -191,33 +150,10 @@ c -> R:damper(b)
 
 #[test]
 fn samples_periods_and_jumps_are_followed_back() {
-    let circuit = model(
-        "model Sampled
-param tau = 0.13 s, gain = 3, r = 2 ohm, ind = 0.1, cap = 0.05, late = 0.31 s
-discrete level = gain
-Se:supply((if t < late then 1 else 4)*level - sample(store.e, tau)) -> 1:loop -> R:wire(r)
-loop -> I:coil(ind)
-loop -> C:store(cap)
-when every 2*tau {
-    level = 0.5*level + coil.f
-}
-",
-    );
+    let circuit = model(SAMPLED);
     let all = Run { record: Record::All, ..run(&["tau", "gain", "late", "cap", "r", "coil.f(0)"], 0.9) };
     by_all_methods(&circuit, &all, 1e-4);
-    let belt = model(
-        "model Belt
-param m = 2 kg, v = 3 m/s, late = 0.2 s, k = 50 N/m, n = 1.5
-Sf:belt(if t < late then 0 else v) -> 0:a
-a -> 1:j -> I:own(m)
-a -> C:spring(k = k)
-j -> TF:lever(n) -> 1:o -> I:other(2*m)
-o -> R:drag(0.3)
-when spring.q > 0.1 m {
-    reset own.f = -0.5*own.f
-}
-",
-    );
+    let belt = model(BELT);
     by_all_methods(&belt, &Run { record: Record::All, ..run(&["m", "v", "late", "k", "n"], 1.0) }, 1e-3);
 }
 

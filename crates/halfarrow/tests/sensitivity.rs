@@ -3,11 +3,11 @@
 
 use halfarrow::{Error, FixedMethod, Form, Input, Method, Model, Record, Run, Source, Start, Trace};
 
-fn model(text: &str) -> Model {
+pub(super) fn model(text: &str) -> Model {
     Model::from_text("model.bond", text, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn run(by: &[&str], to: f64) -> Run {
+pub(super) fn run(by: &[&str], to: f64) -> Run {
     Run {
         to,
         every: Some(to / 8.0),
@@ -60,7 +60,7 @@ fn miss(model: &Model, name: &str, value: f64, run: &Run) -> f64 {
     worst
 }
 
-const BALL: &str = "model Ball
+pub(super) const BALL: &str = "model Ball
 param m = 1 kg, g = 9.81 m/s2, e = 0.8, h0 = 1 m
 Se:weight(-m*g) -> 1:v -> I:ball(m)
 state h' = v.f from h0
@@ -68,6 +68,39 @@ discrete n = 0
 when h < 0 m {
     reset ball.f = -e*ball.f
     n = n + 1
+}
+";
+
+pub(super) const CAR: &str = "model Car
+param m = 300 kg, k = 18 kN/m, b = 900 N.s/m, g = 9.81 m/s2, q0 = 0.1 m
+input lift : N = 0.1*m*g
+Se:weight(m*g) -> 1:c
+Se:up(lift) -> c
+c -> I:body(m, p0 = 0.2*m)
+c -> C:spring(e = k*q + 1e5*q^3, q0 = 2*q0)
+c -> R:damper(b)
+";
+
+pub(super) const SAMPLED: &str = "model Sampled
+param tau = 0.13 s, gain = 3, r = 2 ohm, ind = 0.1, cap = 0.05, late = 0.31 s
+discrete level = gain
+Se:supply((if t < late then 1 else 4)*level - sample(store.e, tau)) -> 1:loop -> R:wire(r)
+loop -> I:coil(ind)
+loop -> C:store(cap)
+when every 2*tau {
+    level = 0.5*level + coil.f
+}
+";
+
+pub(super) const BELT: &str = "model Belt
+param m = 2 kg, v = 3 m/s, late = 0.2 s, k = 50 N/m, n = 1.5
+Sf:belt(if t < late then 0 else v) -> 0:a
+a -> 1:j -> I:own(m)
+a -> C:spring(k = k)
+j -> TF:lever(n) -> 1:o -> I:other(2*m)
+o -> R:drag(0.3)
+when spring.q > 0.1 m {
+    reset own.f = -0.5*own.f
 }
 ";
 
@@ -138,26 +171,33 @@ fn units_are_those_of_the_quotient() {
     assert_eq!(unit("d(h)/d(e)"), "m");
 }
 
+/// Every model of the collection with its name, and how long it is worth to be run: what is fast is at rest soon, or has met
+/// its end.
+pub(super) fn collection() -> impl Iterator<Item = (String, Model, f64)> {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let mut folders: Vec<_> = std::fs::read_dir(&folder).expect("models").flatten().map(|e| e.path()).collect();
+    folders.sort();
+    folders.into_iter().filter(|folder| folder.join("model.bond").exists()).map(|folder| {
+        let model = Model::new(Source::open(&folder.join("model.bond")).expect("a file"), &[]).expect("a model");
+        let short = [("electrostatic", 1e-4), ("rlc_ladder", 2e-3), ("rectifier", 0.03), ("wave_line", 0.01)];
+        let name = folder.file_name().and_then(|n| n.to_str()).unwrap_or_default().to_string();
+        let to = short.iter().find(|s| s.0 == name).map_or(0.25, |s| s.1);
+        (name, model, to)
+    })
+}
+
 /// Every model of the collection, by all parameters that are given as numbers and do not shape it.
 #[test]
 fn all_models_agree_with_differences() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-    let mut names: Vec<_> = std::fs::read_dir(&folder).expect("models").flatten().map(|e| e.path()).collect();
-    names.sort();
     let (mut compared, mut contradicting) = (0, 0);
-    for path in names.iter().map(|p| p.join("model.bond")).filter(|p| p.exists()) {
-        let model = Model::new(Source::open(&path).expect("a file"), &[]).expect("a model");
+    for (name, model, to) in collection() {
         let compiled = model.compile(Form::Minimal).expect("equations");
-        // What is fast is at rest soon, or has met its end.
-        let short = [("electrostatic", 1e-4), ("rlc_ladder", 2e-3), ("rectifier", 0.03), ("wave_line", 0.01)];
-        let name = path.parent().and_then(|p| p.file_name()).and_then(|n| n.to_str()).unwrap_or_default();
-        let to = short.iter().find(|s| s.0 == name).map_or(0.25, |s| s.1);
         let parameters = compiled.interface().parameters;
         for parameter in parameters.iter().filter(|p| !p.constant && !p.shapes && p.value != 0.0).take(2) {
             let asked = Run { every: Some(to / 8.0), ..run(&[&parameter.name], to) };
             if let Err(error) = model.simulate(&asked, &mut |_| true) {
                 // Start values that fit at one value only: with another one there is no run.
-                assert!(error.to_string().contains("contradict"), "{}: {error}", path.display());
+                assert!(error.to_string().contains("contradict"), "{name}: {error}");
                 let mut other = compiled.clone();
                 other.set(&parameter.name, 1.01 * parameter.value).expect("a value");
                 let run = Run { sensitivities: Vec::new(), ..asked };
@@ -166,7 +206,7 @@ fn all_models_agree_with_differences() {
                 continue;
             }
             let worst = miss(&model, &parameter.name, parameter.value, &asked);
-            assert!(worst < 2e-4, "{} by {}: {worst:e}", path.display(), parameter.name);
+            assert!(worst < 2e-4, "{name} by {}: {worst:e}", parameter.name);
             compared += 1;
         }
     }
@@ -175,16 +215,7 @@ fn all_models_agree_with_differences() {
 
 #[test]
 fn what_starts_and_rests_moves() {
-    let car = "model Car
-param m = 300 kg, k = 18 kN/m, b = 900 N.s/m, g = 9.81 m/s2, q0 = 0.1 m
-input lift : N = 0.1*m*g
-Se:weight(m*g) -> 1:c
-Se:up(lift) -> c
-c -> I:body(m, p0 = 0.2*m)
-c -> C:spring(e = k*q + 1e5*q^3, q0 = 2*q0)
-c -> R:damper(b)
-";
-    let car = model(car);
+    let car = model(CAR);
     for (name, value) in [("m", 300.0), ("k", 18e3), ("q0", 0.1), ("g", 9.81)] {
         for start in [Start::Given, Start::Equilibrium] {
             if start == Start::Equilibrium && name == "q0" {
@@ -212,17 +243,7 @@ c -> R:damper(b)
 
 #[test]
 fn samples_periods_and_sources_of_time_move() {
-    let text = "model Sampled
-param tau = 0.13 s, gain = 3, r = 2 ohm, ind = 0.1, cap = 0.05, late = 0.31 s
-discrete level = gain
-Se:supply((if t < late then 1 else 4)*level - sample(store.e, tau)) -> 1:loop -> R:wire(r)
-loop -> I:coil(ind)
-loop -> C:store(cap)
-when every 2*tau {
-    level = 0.5*level + coil.f
-}
-";
-    let circuit = model(text);
+    let circuit = model(SAMPLED);
     for (name, value) in [("tau", 0.13), ("gain", 3.0), ("late", 0.31), ("cap", 0.05)] {
         let worst = miss(&circuit, name, value, &Run { record: Record::All, ..run(&[name], 0.9) });
         assert!(worst < 1e-6, "{name}: {worst:e}");
@@ -232,18 +253,7 @@ when every 2*tau {
 /// A source of speed that jumps: momentum is conserved, and what is conserved moves with the masses and the jump.
 #[test]
 fn speeds_that_jump_with_a_source_move() {
-    let text = "model Belt
-param m = 2 kg, v = 3 m/s, late = 0.2 s, k = 50 N/m, n = 1.5
-Sf:belt(if t < late then 0 else v) -> 0:a
-a -> 1:j -> I:own(m)
-a -> C:spring(k = k)
-j -> TF:lever(n) -> 1:o -> I:other(2*m)
-o -> R:drag(0.3)
-when spring.q > 0.1 m {
-    reset own.f = -0.5*own.f
-}
-";
-    let belt = model(text);
+    let belt = model(BELT);
     for (name, value) in [("m", 2.0), ("v", 3.0), ("late", 0.2), ("k", 50.0), ("n", 1.5)] {
         let worst = miss(&belt, name, value, &Run { record: Record::All, ..run(&[name], 1.0) });
         assert!(worst < 1e-4, "{name}: {worst:e}");
