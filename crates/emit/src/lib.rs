@@ -164,6 +164,8 @@ pub enum EmitError {
     Range(String, f64),
     /// What happens at events, or is held from earlier times: names.
     Events(Vec<String>),
+    /// Set-valued laws, whose margins need double precision.
+    SingleModes,
     /// A delay would keep too many points with this step: its name, and how many.
     Delay(String, f64),
 }
@@ -195,6 +197,10 @@ impl fmt::Display for EmitError {
                 "{} would have to happen while an integrator runs, and functions of CasADi have no memory: leave that out of what \
                  is exported, or export c, fmu2 or fmu3",
                 names.iter().take(5).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+            ),
+            EmitError::SingleModes => f.write_str(
+                "the model has set-valued laws: where their branches end is told from rounding in double precision only; export \
+                 with `--real double`",
             ),
             EmitError::Delay(name, points) => write!(
                 f,

@@ -42,6 +42,7 @@ fn written(one: &Exported, version: Version) -> fmu::Written {
         recorded: &recorded,
         derivatives: true,
         real: halfarrow_emit::Real::Double,
+        modes: &[],
     };
     fmu::write(&export, version).expect("an explicit program")
 }

@@ -159,6 +159,9 @@ pub struct CostReport {
     pub memory: u64,
 }
 
+/// Combinations of branches of set-valued laws at most in exported code.
+const MOST_MODES: usize = 256;
+
 impl Model {
     /// Writes the model, in memory.
     ///
@@ -168,11 +171,11 @@ impl Model {
         if export.real == Real::Float && export.target != Target::C {
             return Err(not_single(export.target));
         }
-        if let (Some(law), true) = (self.graph.set_valued.first(), export.target != Target::Latex) {
+        if let (Some(law), Target::Casadi) = (self.graph.set_valued.first(), export.target) {
             let name = &self.graph.elements[law.element].name;
             let reason = format!(
-                "`{name}` has a set-valued law, whose branch changes while the model runs: code and FMUs do not follow that \
-                 yet; give it a law with a finite slope, such as a steep resistance"
+                "`{name}` has a set-valued law, whose branch changes while the model runs: functions of CasADi have no memory \
+                 of it; give it a law with a finite slope, such as a steep resistance, or export c, fmu2 or fmu3"
             );
             return Err(Problem::BadOption { reason }.into());
         }
@@ -247,6 +250,8 @@ struct ExportedProgram<'a> {
     program: Program,
     start: emit::Start,
     recorded: Vec<usize>,
+    /// The other modes of set-valued laws.
+    modes: Vec<emit::c::Mode>,
 }
 
 impl<'a> ExportedProgram<'a> {
@@ -259,7 +264,8 @@ impl<'a> ExportedProgram<'a> {
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
         let recorded = system.recorded().to_vec();
-        Ok(ExportedProgram { export, program: system.program().clone(), system, start, recorded })
+        let modes = modes(model, &system)?;
+        Ok(ExportedProgram { export, program: system.program().clone(), system, start, recorded, modes })
     }
 
     fn asked(&self, derivatives: bool) -> Result<emit::c::Export<'_>, Problem> {
@@ -271,6 +277,7 @@ impl<'a> ExportedProgram<'a> {
             recorded: &self.recorded,
             derivatives,
             real: self.export.real,
+            modes: &self.modes,
         })
     }
 
@@ -312,6 +319,22 @@ impl<'a> ExportedProgram<'a> {
             ..self.names(recorded)
         }
     }
+}
+
+/// The modes that runs may come to from the first one.
+fn modes(model: &Model, system: &exec::Model) -> Result<Vec<emit::c::Mode>, Error> {
+    if model.graph.set_valued.is_empty() {
+        return Ok(Vec::new());
+    }
+    let all = system.programs_of_modes(MOST_MODES).ok_or_else(|| {
+        let laws = model.graph.set_valued.len();
+        let reason = format!(
+            "{laws} set-valued laws have more than {MOST_MODES} combinations of branches: exported code knows each of them as \
+             equations of its own; export a part of the model, or give some of the laws a finite slope"
+        );
+        Error::from(Problem::BadOption { reason })
+    })?;
+    Ok(all.into_iter().skip(1).map(|(program, recorded)| emit::c::Mode { program, recorded }).collect())
 }
 
 /// Everything at the start of a run.

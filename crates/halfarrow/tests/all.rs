@@ -58,6 +58,8 @@ mod machines_satellite;
 mod machines_stewart;
 #[path = "mechanisms.rs"]
 mod mechanisms;
+#[path = "modes_in_c.rs"]
+mod modes_in_c;
 #[path = "multibonds.rs"]
 mod multibonds;
 #[path = "names.rs"]

@@ -31,7 +31,7 @@ impl Random {
 }
 
 /// Nodes with a leakage each, joined by branches of all kinds.
-fn circuit(seed: u64) -> (String, Vec<String>) {
+pub(super) fn circuit(seed: u64) -> (String, Vec<String>) {
     let mut random = Random(seed);
     let r = &mut random;
     let nodes = 2 + r.below(3);
@@ -70,7 +70,7 @@ fn circuit(seed: u64) -> (String, Vec<String>) {
 }
 
 /// Bodies in a row between two walls, with friction, springs and forces.
-fn row(seed: u64, bouncing: bool) -> (String, Vec<String>) {
+pub(super) fn row(seed: u64, bouncing: bool) -> (String, Vec<String>) {
     let mut random = Random(seed);
     let r = &mut random;
     let n = 2 + r.below(3);

@@ -22,6 +22,7 @@ mod dataflow;
 mod dependence;
 mod derive;
 pub mod elimination;
+mod bounds;
 mod events;
 mod idle;
 mod jacobian;
@@ -37,6 +38,7 @@ mod triggers;
 mod values;
 mod verify;
 
+pub use bounds::{Bounds, Margin};
 pub use events::{Action, Bound, Clause, Impulse, Jumps, Measure, SetValued, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};

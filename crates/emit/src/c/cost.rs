@@ -162,6 +162,8 @@ pub struct Cost {
     pub delay_points: u64,
     /// Size of the work arrays of the model, in numbers.
     pub memory: u64,
+    /// Modes of set-valued laws, each with equations of its own; 0 without such laws.
+    pub modes: u64,
 }
 
 /// Jumps within one step at most.
@@ -196,6 +198,29 @@ impl Cost {
             most_jumps: if jumps || !plan.export.program.inputs.is_empty() { most_jumps(plan) } else { 0 },
             delay_points: plan.delays.iter().map(|d| d.1 as u64).sum(),
             memory: (s.memory + s.work + s.crossing + s.factors + s.derived) as u64,
+            modes: 0,
+        }
+    }
+
+    /// What the mode that costs most does; where a mode is sought each of them may be tried.
+    pub(super) fn of_modes(plans: &[Plan]) -> Cost {
+        let all: Vec<Cost> = plans.iter().map(Plan::cost).collect();
+        let most = |of: fn(&Cost) -> u64| all.iter().map(of).max().unwrap_or(0);
+        let tried = plans[0].bounds.as_ref().map_or(0, |tables| tables.modes.counts().0 as u64);
+        Cost {
+            operations: most(|c| c.operations),
+            divisions: most(|c| c.divisions),
+            calls: most(|c| c.calls),
+            linear_solves: most(|c| c.linear_solves),
+            newton_solves: most(|c| c.newton_solves),
+            newton_evaluations: most(|c| c.newton_evaluations),
+            method_iterations: most(|c| c.method_iterations),
+            total: most(|c| c.total),
+            jump_total: most(|c| c.jump_total) * (1 + tried),
+            most_jumps: most(|c| c.most_jumps),
+            delay_points: most(|c| c.delay_points),
+            memory: most(|c| c.memory),
+            modes: tried,
         }
     }
 
@@ -222,6 +247,12 @@ impl Cost {
             lines.push(format!(
                 "at most {} jumps in a step, each as much again and {} operations more",
                 self.most_jumps, self.jump_total
+            ));
+        }
+        if self.modes > 0 {
+            lines.push(format!(
+                "{} modes of set-valued laws in a table, of which each may be tried where a branch ends",
+                self.modes
             ));
         }
         lines

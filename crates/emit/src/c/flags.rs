@@ -9,6 +9,11 @@ macro_rules! flags {
         }
 
         impl Flags {
+            /// What one or the other has.
+            pub fn or(self, other: Flags) -> Flags {
+                Flags { $($name: self.$name || other.$name,)* }
+            }
+
             /// Whether a condition holds.
             ///
             /// # Panics
@@ -41,6 +46,8 @@ flags! {
     shown_motion
     tables
     conditions
+    /// Conditions, or modes that may have some.
+    holds
     sign_conditions
     floor_conditions
     piece_conditions
@@ -102,4 +109,12 @@ flags! {
     solves_start
     guesses
     start_groups
+    /// Set-valued laws.
+    bounds
+    /// Gaps among their bounds; such whose sides meet with an impulse, in this mode and in any.
+    gaps
+    meets
+    contacts
+    /// Impulses balanced where ratios leap or modes change.
+    leaps_balanced
 }

@@ -14,6 +14,20 @@ pub(crate) enum Kind {
     Section,
     /// A function, table or macro, which stands where something needs it.
     Item(FragmentName),
+    /// Such an item by which a mode of the model is entered: where modes differ in it, it calls that of the present one.
+    Entry(FragmentName),
+    /// A function of the header, which always stands and is an entry as well.
+    Public(FragmentName),
+}
+
+impl Kind {
+    /// The name of an item.
+    pub fn item(&self) -> Option<&FragmentName> {
+        match self {
+            Kind::Item(name) | Kind::Entry(name) => Some(name),
+            Kind::Always | Kind::Section | Kind::Public(_) => None,
+        }
+    }
 }
 
 /// A piece of a file.
@@ -23,7 +37,7 @@ pub(crate) struct Fragment {
     /// Whether a line before it is empty.
     gap: bool,
     /// Its lines.
-    text: String,
+    pub text: String,
     /// Whether one behind it is.
     gap_behind: bool,
     /// The items that it needs.
@@ -72,9 +86,9 @@ impl From<Function> for Fragment {
 pub(crate) fn assembled(fragments: &[Fragment]) -> String {
     let needed = needed(fragments);
     let stands = |f: &Fragment| match &f.kind {
-        Kind::Always => !f.text.is_empty(),
+        Kind::Always | Kind::Public(_) => !f.text.is_empty(),
         Kind::Section => false,
-        Kind::Item(name) => needed.contains(name),
+        Kind::Item(name) | Kind::Entry(name) => needed.contains(name),
     };
     let mut text = String::new();
     let mut gap = false;
@@ -95,12 +109,13 @@ pub(crate) fn assembled(fragments: &[Fragment]) -> String {
 fn needed(fragments: &[Fragment]) -> BTreeSet<&FragmentName> {
     let mut items: BTreeMap<&FragmentName, Vec<&Fragment>> = BTreeMap::new();
     for fragment in fragments {
-        if let Kind::Item(name) = &fragment.kind {
+        if let Some(name) = fragment.kind.item() {
             items.entry(name).or_default().push(fragment);
         }
     }
     let mut needed = BTreeSet::new();
-    let mut open: Vec<&Fragment> = fragments.iter().filter(|f| f.kind == Kind::Always).collect();
+    let mut open: Vec<&Fragment> =
+        fragments.iter().filter(|f| matches!(f.kind, Kind::Always | Kind::Public(_))).collect();
     while let Some(fragment) = open.pop() {
         for name in &fragment.needs {
             if needed.insert(name) {

@@ -5,23 +5,34 @@ use std::fmt::Write;
 use halfarrow_compiler::unit::Unit;
 
 use super::cost::{Cost, most_jumps};
+use super::flags::Flags;
 use super::plan::Plan;
 use super::template::{Filling, Words};
 use super::written::Written;
 use super::{Names, members, messages};
 
-/// The header file.
-pub(super) fn header(plan: &Plan, names: &Names, cost: &Cost) -> String {
+/// The header file of a model of these modes.
+pub(super) fn header(plans: &[Plan], names: &Names, cost: &Cost) -> String {
+    let plan = &plans[0];
     let (export, p) = (plan.export, plan.program);
     let capitals = plan.name.to_ascii_uppercase();
     let lines = cost.lines().into_iter().map(|line| format!(" *     {line}\n")).collect::<String>();
-    let s = &plan.sizes;
+    let indicators = plans.iter().map(|plan| plan.sizes.indicators).max().unwrap_or(0);
     let mut codes = String::new();
-    for (i, (code, meaning)) in messages::codes(plan).iter().enumerate() {
+    let mut all: Vec<(&str, &str)> = Vec::new();
+    for code in plans.iter().flat_map(messages::codes) {
+        if !all.contains(&code) {
+            all.push(code);
+        }
+    }
+    for (i, (code, meaning)) in all.iter().enumerate() {
         let _ = writeln!(codes, "    /* {meaning} */\n    {capitals}_{code} = {},", i + 1);
     }
     let codes = codes.trim_end().trim_end_matches(',').to_string();
-    let states = p.states.iter().map(|s| (s.name.clone(), s.unit.as_ref()));
+    let states = p.states.iter().map(|s| match plans.len() {
+        1 => (s.name.clone(), s.unit.as_ref()),
+        _ => ("of the present mode".to_string(), None),
+    });
     let inputs = p.inputs.iter().map(|s| (s.name.clone(), s.unit.as_ref()));
     let parameters = p.parameters.iter().zip(&export.start.parameters).map(|(s, value)| {
         let kind = if s.constant { ", constant" } else { "" };
@@ -37,18 +48,19 @@ pub(super) fn header(plan: &Plan, names: &Names, cost: &Cost) -> String {
         ("NUMBER_INPUTS", p.inputs.len().to_string()),
         ("NUMBER_PARAMETERS", p.parameters.len().to_string()),
         ("NUMBER_OUTPUTS", export.recorded.len().to_string()),
-        ("NUMBER_INDICATORS", s.indicators.to_string()),
+        ("NUMBER_INDICATORS", indicators.to_string()),
         ("NUMBER_JUMPS", most_jumps(plan).to_string()),
         ("STATE_LINES", enumerators((&capitals, "X"), &names.states, states)),
         ("INPUT_LINES", enumerators((&capitals, "U"), &names.inputs, inputs)),
         ("PARAMETER_LINES", enumerators((&capitals, "P"), &names.parameters, parameters)),
         ("OUTPUT_LINES", enumerators((&capitals, "Y"), &names.outputs, outputs)),
         ("CODES", codes),
-        ("PUBLIC_PARTS", members::lines(&members::public(plan), plan)),
-        ("PRIVATE_PARTS", members::lines(&members::private(plan), plan)),
+        ("PUBLIC_PARTS", members::lines(&members::public(plans), plan)),
+        ("PRIVATE_PARTS", members::lines(&members::private(plans), plan)),
     ];
     let words: Words = words.into_iter().map(|(word, text)| (word, Written::of(text))).collect();
-    let filling = Filling { flags: plan.flags(), words, model: &plan.name, real: export.real };
+    let flags = plans.iter().map(Plan::flags).fold(Flags::default(), Flags::or);
+    let filling = Filling { flags, words, model: &plan.name, real: export.real };
     filling.text(include_str!("runtime/header.h"))
 }
 

@@ -86,8 +86,12 @@ impl List {
     }
 }
 
-/// What users read and set.
-pub(super) fn public(plan: &Plan) -> Vec<Members> {
+/// What users read and set, in a model of these modes.
+pub(super) fn public(plans: &[Plan]) -> Vec<Members> {
+    of_all(plans.iter().map(public_of).collect())
+}
+
+fn public_of(plan: &Plan) -> Vec<Members> {
     let (p, mut list) = (plan.program, List::default());
     list.one(Kind::Wide, &["t"], "time, in s");
     list.one(Kind::Wide, &["step"], "length of a step, in s; may be changed before the start");
@@ -102,10 +106,15 @@ pub(super) fn public(plan: &Plan) -> Vec<Members> {
 }
 
 /// What is nobody's affair.
-pub(super) fn private(plan: &Plan) -> Vec<Members> {
+pub(super) fn private(plans: &[Plan]) -> Vec<Members> {
+    of_all(plans.iter().map(private_of).collect())
+}
+
+fn private_of(plan: &Plan) -> Vec<Members> {
     let mut list = List::default();
     of_parameters(&mut list, plan);
     of_events(&mut list, plan);
+    of_modes(&mut list, plan);
     of_blocks(&mut list, plan);
     of_steps(&mut list, plan);
     list.0
@@ -153,7 +162,7 @@ fn of_events(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Wide, &["clock_operand", "clock_rate"], clocks, "");
     }
     let switches = plan.switches.len();
-    if switches > 0 {
+    if switches > 0 || plan.bounds.is_some() {
         list.one(Kind::Int, &["state_hold"], "what is done with those of the state");
         list.one(Kind::Wide, &["signs_taken"], "when their sides were taken last");
         list.arrays(Kind::Int, &["sides"], s.indicators, "sides of the indicators");
@@ -178,7 +187,8 @@ fn of_clauses(list: &mut List, plan: &Plan) {
     }
     if plan.locates() {
         list.one(Kind::Int, &["handled"], "whether an event has been handled at the present time");
-        list.arrays(Kind::Real, &["seen"], 3 * plan.sizes.indicators, "the last values of indicators in a step");
+        let places = if plan.bounds.is_some() { 20 } else { 3 };
+        list.arrays(Kind::Real, &["seen"], places * plan.sizes.indicators, "the last values of indicators in a step");
     }
     if let Some(jumps) = &p.jumps {
         let (rows, columns, moved) = (events.equations(), events.columns(), events.moved.len());
@@ -199,6 +209,65 @@ fn of_clauses(list: &mut List, plan: &Plan) {
         let names = ["misses", "misses_after", "position_out", "position_rates"];
         list.arrays(Kind::Real, &names, events.positions.len(), "how far constraints are missed");
     }
+}
+
+fn of_modes(list: &mut List, plan: &Plan) {
+    let Some(tables) = &plan.bounds else { return };
+    let (p, modes) = (plan.program, tables.modes);
+    let (margins, values, laws, symbols) =
+        (tables.bounds.margins.len(), tables.margin_values(), modes.laws(), modes.symbols());
+    let (clauses, storages) = (p.clauses.len(), p.jumps.as_ref().map_or(0, |jumps| jumps.stored.len()));
+    list.one(Kind::Int, &["mode"], "the mode: which branch each set-valued law has");
+    if plan.export.derivatives {
+        list.one(Kind::Int, &["outside"], "whether an importer integrates, and locates where a branch ends");
+    }
+    list.one(Kind::Int, &["switched"], "whether it has changed since the last step");
+    let about = "of margins, of their rates and of the rates of these, how great they have been";
+    list.arrays(Kind::Real, &["most_margins", "most_kept"], 3 * modes.keys(), about);
+    let about = "variables of the machine, how great they and their rates have been, and what storages keep";
+    list.arrays(Kind::Real, &["most_values", "most_rates", "most_stored"], symbols, about);
+    list.arrays(Kind::Real, &["most_groups"], modes.groups(), "efforts and flows in groups of one unit");
+    list.arrays(Kind::Real, &["most_beyond"], plan.sizes.indicators, "indicators");
+    list.arrays(Kind::Real, &["left_values", "left_stored"], symbols, "what the mode that was left had");
+    list.arrays(Kind::Real, &["carried"], modes.values(p).len(), "");
+    list.arrays(Kind::Real, &["compared"], tables.bounds.compared.concat().len(), "with what margins are compared");
+    list.arrays(Kind::Real, &["entered"], storages, "what storages kept where the mode was entered");
+    list.one(Kind::Wide, &["gaps_at"], "when it was found what is zero of gaps");
+    list.arrays(Kind::Real, &["gap_zero"], laws, "");
+    list.arrays(Kind::Int, &["gap_known", "apart", "released", "short_flight", "fired_ends"], laws, "of each law");
+    let names = ["margin_values", "margin_rates", "margin_changes", "margin_sizes", "margin_present"];
+    list.arrays(Kind::Real, &names, values, "margins");
+    list.arrays(Kind::Real, &["margin_way"], p.states.len(), "");
+    let names = ["margin_value", "margin_rate", "margin_zero", "margin_still", "margin_rounding"];
+    list.arrays(Kind::Real, &names, margins, "how they stand");
+    list.arrays(Kind::Int, &["margin_ended"], margins, "whether their branches have ended");
+    list.arrays(Kind::Real, &["floors"], p.conditions.len(), "from where on conditions are watched");
+    list.one(Kind::Wide, &["last_step"], "length of the last step, 0 after an event");
+    list.arrays(Kind::Real, &["jump_been"], plan.events.columns(), "");
+    list.arrays(Kind::Real, &["jump_greatest"], plan.events.moved.len(), "");
+    let actions = p.clauses.iter().map(|c| c.actions.len() + 1).max().unwrap_or(1);
+    list.arrays(Kind::Real, &["clause_values"], actions, "");
+    list.arrays(Kind::Int, &["contact", "at_rest", "contact_held", "fired_before"], clauses, "of each clause");
+    list.arrays(Kind::Real, &["shared", "wanted"], clauses, "impulses of contacts");
+    list.arrays(Kind::Real, &["shared_from"], p.states.len() + p.conserved.len(), "");
+    let (_, combinations) = modes.counts();
+    list.arrays(Kind::Byte, &["tried_modes", "seen_modes"], combinations, "while a mode is sought");
+    list.arrays(Kind::Int, &["waiting_modes"], combinations, "");
+}
+
+/// Those of all modes: of arrays as many places as the mode with most of them has.
+fn of_all(lists: Vec<Vec<Members>>) -> Vec<Members> {
+    let mut all: Vec<Members> = Vec::new();
+    for members in lists.into_iter().flatten() {
+        match all.iter_mut().find(|known| known.names.iter().map(|n| n.0).eq(members.names.iter().map(|n| n.0))) {
+            Some(known) => {
+                let sizes = known.names.iter_mut().zip(members.names);
+                sizes.for_each(|(own, other)| own.1 = own.1.max(other.1));
+            }
+            None => all.push(members),
+        }
+    }
+    all
 }
 
 fn of_blocks(list: &mut List, plan: &Plan) {
@@ -281,10 +350,10 @@ pub(super) fn lines(members: &[Members], plan: &Plan) -> String {
 }
 
 /// Bytes of the model: its members, each in whole words.
-pub(super) fn bytes(plan: &Plan) -> usize {
-    let all = public(plan).into_iter().chain(private(plan));
+pub(super) fn bytes(plans: &[Plan]) -> usize {
+    let all = public(plans).into_iter().chain(private(plans));
     let of = |m: Members| {
-        let bytes = m.kind.bytes(plan.export.real);
+        let bytes = m.kind.bytes(plans[0].export.real);
         m.names.iter().map(|(_, size)| (bytes * size.unwrap_or(1)).next_multiple_of(8)).sum::<usize>()
     };
     all.map(of).sum()

@@ -42,6 +42,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         all.push(text("what storages keep"));
         all
     };
+    let laws = |text: &dyn Fn(&str) -> String| p.set_valued.iter().map(|l| text(&l.name)).collect::<Vec<_>>();
     let kept = match p.exchanges.independent.is_empty() {
         true => "",
         false => {
@@ -136,6 +137,9 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
                 .map(|c| format!("what events change does not fit the constraint {}: reset all positions that it reads, so that they fit each other", c.name))
                 .collect(),
         ),
+        ("NO_MODE", laws(&|name| format!("no branch of the set-valued laws fits after that of {name} has ended: look whether they contradict each other there, or whether a source asks for what no branch allows"))),
+        ("STUCK", vec!["an impulse acts where what is stuck or in contact cannot be let go".into()]),
+        ("OVERLAP", laws(&|name| format!("the sides of {name} overlap where the run begins: begin with a gap that is not negative"))),
         ("STRUCTURE", p.assumptions.iter().map(structure).collect()),
     ]
 }
@@ -209,6 +213,9 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "ACCUMULATION" => "events come ever faster",
         "RESET_DEPENDENT" => "resets of what moves together",
         "RESET_UNMET" => "no impulse leads to what a reset asks for",
+        "NO_MODE" => "no branch of the set-valued laws fits",
+        "STUCK" => "an impulse acts on what cannot be let go",
+        "OVERLAP" => "the sides of a contact overlap at the start",
         "CONSTRAINT_BROKEN" => "what events change does not fit a constraint",
         _ => "a step before the start",
     };
@@ -221,6 +228,7 @@ fn can_happen(code: &str, plan: &Plan) -> bool {
         "OUT_OF_RANGE" => plan.export.real == Real::Float,
         "EVENT_NOT_FINITE" | "CONFLICT" | "ENDLESS_EVENTS" | "ACCUMULATION" => !plan.program.clauses.is_empty(),
         "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
+        "NO_MODE" | "STUCK" | "OVERLAP" => plan.bounds.is_some(),
         "CONSTRAINT_BROKEN" => !plan.events.positions.is_empty(),
         _ => true,
     }
@@ -246,7 +254,8 @@ pub(super) fn messages(plan: &Plan) -> Vec<Fragment> {
     let message = format!(
         "\nconst char *{model}_message(const {model} *m)\n{{\n    switch (m->failure.code) {{\n{cases}    default:\n        return \"\";\n    }}\n}}"
     );
-    let mut all = Fragment::new(Kind::Always);
+    // Tables of each mode have names of their own, which the function alone knows.
+    let mut all = Fragment::new(Kind::Public(format!("{model}_message").into()));
     all.line(&Written::of(tables + &message));
     vec![Fragment::section("what failures mean"), all]
 }

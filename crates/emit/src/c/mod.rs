@@ -4,6 +4,7 @@
 //! wherever C computes in double precision without contraction.
 
 mod blocks;
+mod compose;
 mod cost;
 mod derivatives;
 pub(crate) mod flags;
@@ -30,6 +31,8 @@ pub use cost::Cost;
 
 use halfarrow_compiler::program::Program;
 
+use plan::Plan;
+
 use crate::{EmitError, Method, Real, Start, names};
 
 /// Unknowns at most that a balance of impulses at events may have: there is room for a full matrix.
@@ -52,6 +55,17 @@ pub struct Export<'a> {
     pub derivatives: bool,
     /// Its real numbers.
     pub real: Real,
+    /// The other modes of a model with set-valued laws: those that have equations.
+    pub modes: &'a [Mode],
+}
+
+/// A mode of a model with set-valued laws, besides that in which runs begin.
+#[derive(Debug, Clone)]
+pub struct Mode {
+    /// Its program.
+    pub program: Program,
+    /// What is computed after each step, the same variables as in the first mode.
+    pub recorded: Vec<usize>,
 }
 
 /// What was written.
@@ -107,19 +121,47 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     }
     range::check(export)?;
     let program = export.program;
+    if export.real == Real::Float && !program.set_valued.is_empty() {
+        return Err(EmitError::SingleModes);
+    }
+    let in_modes = !program.set_valued.is_empty();
     let name = names::of_model(&program.name);
     let list = |names: &mut dyn Iterator<Item = &str>| names::unique(names.collect::<Vec<_>>().into_iter());
     let names = Names {
-        states: list(&mut program.states.iter().map(|s| s.name.as_str())),
+        states: match in_modes {
+            // What they are depends on the mode.
+            true => (1..=program.states.len()).map(|i| format!("state_{i}")).collect(),
+            false => list(&mut program.states.iter().map(|s| s.name.as_str())),
+        },
         inputs: list(&mut program.inputs.iter().map(|i| i.name.as_str())),
         parameters: list(&mut program.parameters.iter().map(|p| p.name.as_str())),
         outputs: list(&mut export.recorded.iter().map(|&i| program.observed[i].name.as_str())),
     };
-    let plan = plan::Plan::new(export, &name)?;
-    let cost = plan.cost();
-    let header = header::header(&plan, &names, &cost);
-    let source = plan.source(obligations::lines(&plan));
+    let others = export.modes.iter().map(|mode| Export { program: &mode.program, recorded: &mode.recorded, ..*export });
+    let exports: Vec<Export> = std::iter::once(*export).chain(others).collect();
+    let programs: Vec<&Program> = exports.iter().map(|export| export.program).collect();
+    let modes = plan::Modes::of(&programs);
+    let plans: Vec<Plan> = exports
+        .iter()
+        .enumerate()
+        .map(|(i, export)| Plan::new(export, &name, modes.as_ref(), i == 0))
+        .collect::<Result<_, _>>()?;
+    let cost = Cost::of_modes(&plans);
+    let header = header::header(&plans, &names, &cost);
+    let obligations = obligations::lines(&plans);
+    let source = match in_modes {
+        true => source_of_modes(&plans, &obligations),
+        false => plans[0].source(obligations),
+    };
     let main = project::main(export, &name);
     let cmake = project::cmake(&name);
     Ok(Written { header, source, main, cmake, cost, names, name })
+}
+
+/// The source of a model that has several modes.
+fn source_of_modes(plans: &[Plan], obligations: &str) -> String {
+    let modes: Vec<_> = plans.iter().map(|plan| plan.fragments(obligations)).collect();
+    let mut common = plans[0].changes_of_mode();
+    common.extend(plans[0].beginning(obligations));
+    compose::Composition::new(&modes, &common).text()
 }

@@ -11,8 +11,9 @@ use crate::{Method, Real};
 const OWN_STACK: usize = 6 * 1024 + 96;
 
 /// The lines, as they stand in the comment at the head of the source.
-pub(super) fn lines(plan: &Plan) -> String {
-    let tables = !plan.newton.is_empty() || plan.solves_start();
+pub(super) fn lines(plans: &[Plan]) -> String {
+    let plan = &plans[0];
+    let tables = plans.iter().any(|plan| !plan.newton.is_empty()) || plan.solves_start();
     let implicit = plan.export.method.is_implicit();
     let indirect = match (tables, implicit) {
         (true, true) => {
@@ -37,13 +38,13 @@ pub(super) fn lines(plan: &Plan) -> String {
             "of <math.h> and <string.h> alone; no input or output (21.6), signal (21.5), setjmp (21.4)".into(),
         ),
         ("indirect calls", indirect.into()),
-        ("loops", format!("bounded: {}", bounds(plan))),
+        ("loops", format!("bounded: {}", bounds(plans))),
         (
             "control flow",
             "no goto (15.1), no union (19.2), no stdarg (17.1); functions have several returns (against 15.5)".into(),
         ),
-        ("stack", format!("at most {} bytes (gcc, 64 bits, -O2)", stack(plan))),
-        ("state", format!("at most {} bytes, all in one {}", members::bytes(plan), plan.name)),
+        ("stack", format!("at most {} bytes (gcc, 64 bits, -O2)", plans.iter().map(stack).max().unwrap_or(0))),
+        ("state", format!("at most {} bytes, all in one {}", members::bytes(plans), plan.name)),
         ("conversions", format!("no warning by gcc -std=c99 -Wall -Wextra -Wconversion -pedantic{flags}")),
     ];
     all.iter()
@@ -54,22 +55,28 @@ pub(super) fn lines(plan: &Plan) -> String {
 }
 
 /// What bounds the loops.
-fn bounds(plan: &Plan) -> String {
+fn bounds(plans: &[Plan]) -> String {
+    let plan = &plans[0];
     let mut bounds = vec![
         "sizes in the header".to_string(),
         format!("{}_MOST_JUMPS parts of a step", plan.name.to_ascii_uppercase()),
     ];
-    if !plan.newton.is_empty() {
+    if plans.iter().any(|plan| !plan.newton.is_empty()) {
         bounds.push("evaluations of Newton blocks by most_evaluations (20000 at the start and at jumps)".into());
     }
-    if plan.locates() {
-        bounds.push(format!("{} steps to locate a crossing", most_looks(plan)));
+    let looks = plans.iter().map(most_looks).max().unwrap_or(0);
+    if looks > 0 {
+        bounds.push(format!("{looks} steps to locate a crossing"));
     }
     if !plan.program.clauses.is_empty() {
         bounds.push("200 rounds of events at one instant".into());
     }
     if plan.program.jumps.is_some() {
         bounds.push("50 iterations of the balance of impulses".into());
+    }
+    if let Some(tables) = &plan.bounds {
+        let (modes, combinations) = tables.modes.counts();
+        bounds.push(format!("{modes} modes tried at an instant, of {combinations} combinations of branches, 200 times"));
     }
     if plan.export.method == Method::ImplicitMidpoint {
         bounds.push("20 iterations of the method".into());

@@ -4,6 +4,8 @@
 //!
 //! - `//if flag`, `//else`, `//end`: only under a condition;
 //! - `//item name: others`: a function, table or macro that is put in only where it is needed, and needs others;
+//! - `//entry name`: an item by which a mode of the model is entered;
+//! - `//public name`: a function of the header, put in whether anybody needs it or not;
 //! - `//always`: what is put in whether anybody needs it or not;
 //! - `//section`: a heading, put in where something stands under it.
 //!
@@ -59,6 +61,10 @@ impl Filling<'_> {
                 fragments.push(Fragment::new(Kind::Section));
             } else if let Some(item) = line.strip_prefix("//item ") {
                 fragments.push(self.item(item));
+            } else if let Some(entry) = line.strip_prefix("//entry ") {
+                fragments.push(Fragment::new(Kind::Entry(Cow::Borrowed(entry))));
+            } else if let Some(public) = line.strip_prefix("//public ") {
+                fragments.push(Fragment::new(Kind::Public(self.line(public).text.into())));
             } else {
                 let line = self.line(line);
                 fragments.last_mut().expect("one at least").line(&line);

@@ -60,6 +60,8 @@ fn interfaces(export: &Export, version: Version, name: &str) -> String {
     // Solutions and delays go on from step to step.
     let follows =
         p.blocks.values().any(|b| matches!(b, Block::Newton { .. })) || p.held.iter().any(|h| !h.kind.is_discrete());
+    // Margins of set-valued laws are compared with what they have been.
+    let follows = follows || !p.set_valued.is_empty();
     match version {
         Version::V2 => {
             let common =
@@ -172,10 +174,17 @@ fn structure(export: &Export, variables: &Variables, version: Version) -> String
                 }
                 next += 1;
             }
-            Role::Indicator => indicators.extend(operands.next().map(|value| running(v, value))),
+            Role::Indicator => {
+                indicators.push(operands.next().map_or((v.reference, Vec::new()), |value| running(v, value)));
+            }
             Role::Time | Role::Input | Role::Parameter(_) => {}
         }
     }
+    // In another mode of set-valued laws they may depend on anything.
+    let dependencies = |on: String| match export.modes.is_empty() {
+        true => format!(" dependencies=\"{on}\""),
+        false => String::new(),
+    };
     let mut text = "  <ModelStructure>\n".to_string();
     match version {
         Version::V2 => {
@@ -190,9 +199,9 @@ fn structure(export: &Export, variables: &Variables, version: Version) -> String
                     let place = |r: usize| variables.place(r).map_or(0, |p| p + 1);
                     let _ = writeln!(
                         text,
-                        "      <Unknown index=\"{}\" dependencies=\"{}\"/>",
+                        "      <Unknown index=\"{}\"{}/>",
                         place(reference),
-                        list(&mut on.into_iter().map(place))
+                        dependencies(list(&mut on.into_iter().map(place)))
                     );
                 }
                 let _ = writeln!(text, "    </{element}>");
@@ -207,8 +216,8 @@ fn structure(export: &Export, variables: &Variables, version: Version) -> String
             ];
             for (element, unknowns) in all {
                 for (reference, on) in unknowns {
-                    let on = list(&mut on.into_iter());
-                    let _ = writeln!(text, "    <{element} valueReference=\"{reference}\" dependencies=\"{on}\"/>");
+                    let on = dependencies(list(&mut on.into_iter()));
+                    let _ = writeln!(text, "    <{element} valueReference=\"{reference}\"{on}/>");
                 }
             }
         }

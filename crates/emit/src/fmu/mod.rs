@@ -16,7 +16,7 @@ use crate::c::template::{Filling, Words};
 use crate::c::written::Written as Text;
 use crate::c::{self, Cost};
 use crate::{EmitError, File, Real};
-use halfarrow_compiler::program::EventTrigger;
+use halfarrow_compiler::program::{EventTrigger, Program};
 use variables::Variables;
 
 /// Versions of the interface.
@@ -50,6 +50,9 @@ pub struct Written {
 /// # Errors
 /// As [`c::write`].
 pub fn write(export: &c::Export, version: Version) -> Result<Written, EmitError> {
+    // What states are depends on the mode: variables of the machine are outputs.
+    let program = without_names_of_states(export);
+    let export = &c::Export { program: program.as_ref().unwrap_or(export.program), ..*export };
     // States are there anyway: outputs are what else is recorded.
     let is_state = |&&i: &&usize| export.program.states.iter().any(|s| s.name == export.program.observed[i].name);
     let at: Vec<usize> = (0..export.recorded.len()).filter(|&k| !is_state(&&export.recorded[k])).collect();
@@ -135,9 +138,23 @@ pub fn binary_path(version: Version, name: &str, os: &str, architecture: &str) -
     Some(format!("binaries/{folder}/{name}.{ending}"))
 }
 
+/// A program whose states have numbers for names, where they are others in each mode of set-valued laws.
+fn without_names_of_states(export: &c::Export) -> Option<Program> {
+    if export.program.set_valued.is_empty() {
+        return None;
+    }
+    let mut program = export.program.clone();
+    for (i, state) in program.states.iter_mut().enumerate() {
+        (state.name, state.unit) = (format!("state {}", i + 1), None);
+    }
+    Some(program)
+}
+
 /// The functions of the interface around a model.
 fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model: &str, token: &str) -> String {
-    let switches = export.program.conditions.values().any(|c| c.trigger == EventTrigger::State);
+    let bounds = !export.program.set_valued.is_empty();
+    let of_state = |p: &Program| p.conditions.values().any(|c| c.trigger == EventTrigger::State);
+    let switches = of_state(export.program) || export.modes.iter().any(|mode| of_state(&mode.program));
     let clauses = !export.program.clauses.is_empty();
     let list = |values: Vec<String>| match values.is_empty() {
         true => "    0".to_string(),
@@ -151,7 +168,7 @@ fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model:
     ];
     let words = words.map(|(word, text)| (word, Text::of(text)));
     let mut filling = Filling {
-        flags: Flags { switches, clauses, ..Flags::default() },
+        flags: Flags { switches, clauses, bounds, ..Flags::default() },
         words: Words::from(words),
         model,
         real: Real::Double,

@@ -90,7 +90,7 @@ impl Variables {
         }
         let first = first + export.recorded.len();
         all.extend(
-            (0..indicators(p).len())
+            (0..most_indicators(export))
                 .map(|i| variable(&format!("indicator_{}", i + 1), first + i, Role::Indicator, None)),
         );
         make_unique(&mut all);
@@ -149,6 +149,12 @@ const SMALL: f64 = 1e-6;
 pub(super) fn indicators(p: &Program) -> Vec<Value> {
     let of_state = p.conditions.values().filter(|c| c.trigger == EventTrigger::State);
     of_state.flat_map(|c| vec![c.operand; c.kind.switches()]).collect()
+}
+
+/// How many event indicators the mode with most of them has.
+fn most_indicators(export: &Export) -> usize {
+    let modes = export.modes.iter().map(|mode| &mode.program);
+    std::iter::once(export.program).chain(modes).map(|p| indicators(p).len()).max().unwrap_or(0)
 }
 
 /// Whether a value is that of a discrete variable.

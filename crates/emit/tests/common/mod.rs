@@ -128,7 +128,8 @@ pub fn export_as(
         observed: vec![f64::NAN; model.observed()],
     };
     let recorded = model.recorded().to_vec();
-    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real };
+    let modes = &[];
+    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real, modes };
     let written = write(&export)?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());

@@ -42,6 +42,8 @@ impl Clock {
     /// Takes all of them as they are just after `t`, and finds the next time event: when the first of them changes, in s.
     pub fn handle_time_event(&self, frame: &mut Frame, t: f64, next: &mut Option<f64>) {
         if self.conditions.is_empty() {
+            // One that another mode has waited for is none of this one.
+            *next = None;
             return;
         }
         frame.conditions.clock = Hold::Take;

@@ -6,9 +6,9 @@
 use super::Model;
 use super::modes::Extents;
 use crate::bytecode::{Hold, Layout, Routine};
-use halfarrow_compiler::equations::ObservedKind;
-use halfarrow_compiler::program::{Bound, ConditionId, EventTrigger, Measure, Op, Program, Target, Value};
+use halfarrow_compiler::program::{Bound, ConditionId, Margin, Program};
 use halfarrow_sim::Failure;
+use std::ops::Range;
 
 /// A margin that is zero, as part of what it is compared with.
 const ZERO: f64 = 1e-12;
@@ -27,7 +27,7 @@ const SHORT: f64 = 32.0;
 /// By what sides of a contact may overlap where a run begins, as part of what their displacements are.
 const OVERLAP: f64 = 1e-9;
 
-/// The bounds of the branches of a mode.
+/// The bounds of the branches of a mode, as code.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
     pub margins: Vec<Margin>,
@@ -39,25 +39,7 @@ pub(super) struct Bounds {
     pub branches: Vec<u32>,
     /// Efforts and flows that are compared: computes them, and the places of each group among them.
     compared: Routine,
-    groups: Vec<Vec<usize>>,
-}
-
-/// A bound that is a margin.
-#[derive(Debug, Clone)]
-pub(super) struct Margin {
-    /// Its clause.
-    pub clause: usize,
-    pub bound: Bound,
-    /// Its place among what is computed.
-    place: usize,
-    /// The condition that it is below zero.
-    condition: Option<ConditionId>,
-    /// Law, branch and number of the bound.
-    key: (u32, u32, u32),
-    /// The group with which it is compared; of a gap its rate.
-    group: usize,
-    /// Whether impulses act where its sides meet.
-    pub meets: bool,
+    groups: Vec<Range<usize>>,
 }
 
 /// How a margin stands.
@@ -79,67 +61,15 @@ pub(super) struct Standing {
 
 impl Bounds {
     pub fn of(program: &Program, layout: &Layout) -> Option<Bounds> {
-        if program.set_valued.is_empty() {
-            return None;
-        }
-        let branches: Vec<u32> = program.set_valued.iter().map(|law| law.present).collect();
-        let condition = |clause: usize| match program.values.op(program.clauses[clause].trigger.value()) {
-            Op::Sign(condition, _) => Some(condition).filter(|c| program.conditions[*c].trigger == EventTrigger::State),
-            _ => None,
-        };
-        // Of each law one group of efforts and one of flows, those of one unit being one: the same in all modes.
-        let observed = |name: &str| program.observed.iter().find(|o| o.name == name);
-        let mut kinds = Vec::new();
-        let mut group = |law: u32, measure: Measure| {
-            let name = &program.set_valued[law as usize].name;
-            let (port, kind) = match measure {
-                Measure::Effort => ("e", ObservedKind::Effort),
-                Measure::Flow | Measure::Gap => ("f", ObservedKind::Flow),
-            };
-            let unit = observed(&format!("{name}.{port}")).and_then(|o| o.unit.clone());
-            let known = kinds.iter().position(|known| *known == (kind, unit.clone()));
-            known.unwrap_or_else(|| {
-                kinds.push((kind, unit));
-                kinds.len() - 1
-            })
-        };
-        let places: Vec<[usize; 2]> = (0..branches.len() as u32)
-            .map(|law| [Measure::Effort, Measure::Flow].map(|measure| group(law, measure)))
-            .collect();
-        let mut values: Vec<Value> = Vec::new();
-        let (mut margins, mut commands) = (Vec::new(), Vec::new());
-        let mut numbers = vec![0; branches.len()];
-        for (clause, c) in program.clauses.iter().enumerate() {
-            let Some(bound) = c.bound else { continue };
-            let law = bound.law as usize;
-            let number = numbers[law];
-            numbers[law] += 1;
-            let Some(margin) = bound.margin else {
-                commands.push((clause, bound));
-                continue;
-            };
-            let place = values.len();
-            values.push(margin);
-            values.extend(bound.gap.map(|(rate, _)| rate));
-            margins.push(Margin {
-                clause,
-                bound,
-                place,
-                condition: condition(clause),
-                key: (bound.law, branches[law], number),
-                group: places[law][usize::from(bound.measure != Measure::Effort)],
-                meets: bound.gap.is_some() && c.actions.iter().any(|a| matches!(a.target, Target::Moved { .. })),
-            });
-        }
-        let mut compared: Vec<Value> = Vec::new();
-        let mut groups = Vec::new();
-        for (kind, unit) in &kinds {
-            let alike = program.observed.iter().filter(|o| o.kind == *kind && o.unit == *unit);
-            let from = compared.len();
-            compared.extend(alike.filter_map(|o| o.value.clone().ok()));
-            groups.push((from..compared.len()).collect());
-        }
-        let (routine, compared) = (layout.routine(program, &values), layout.routine(program, &compared));
+        let bounds = program.bounds()?;
+        let routine = layout.routine(program, &bounds.values());
+        let ends = bounds.compared.iter().scan(0, |end, group| {
+            *end += group.len();
+            Some(*end - group.len()..*end)
+        });
+        let groups = ends.collect();
+        let compared = layout.routine(program, &bounds.compared.concat());
+        let halfarrow_compiler::program::Bounds { margins, commands, branches, .. } = bounds;
         Some(Bounds { margins, commands, routine, branches, compared, groups })
     }
 
@@ -196,7 +126,7 @@ impl Model {
         let Model { run, frame, dx, .. } = self;
         run.extents.groups.resize(bounds.groups.len(), 0.0);
         for (most, group) in run.extents.groups.iter_mut().zip(&bounds.groups).filter(|_| known) {
-            let values = group.iter().map(|&place| frame.r[bounds.compared.outputs[place] as usize].abs());
+            let values = bounds.compared.outputs[group.clone()].iter().map(|&r| frame.r[r as usize].abs());
             *most = values.filter(|value| value.is_finite()).fold(*most, f64::max);
         }
         for (&symbol, rate) in code.program.tracked.iter().zip(dx.iter()).filter(|_| moves) {

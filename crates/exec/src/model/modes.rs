@@ -9,7 +9,7 @@ use super::compiled::ModeId;
 use super::margins::Bounds;
 use crate::bytecode::Hold;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Clause, Target};
+use halfarrow_compiler::program::{Clause, Program, Target};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -121,6 +121,29 @@ impl Model {
     /// Makes all modes that set-valued laws can have, so that none is made while a run goes on, if they are no more than `most`:
     /// how many there are and how many of them have equations.
     pub fn prepare_modes(&self, most: usize) -> Option<(usize, usize)> {
+        let all = self.combinations(most)?;
+        Some((all.len(), all.iter().filter(|branches| self.compiled.in_mode(branches).is_some()).count()))
+    }
+
+    /// The programs of all modes that set-valued laws can have, if these are no more than `most`: of each mode that has
+    /// equations, and a value for all that is recorded, its program and what is recorded. The first is the present one.
+    pub fn programs_of_modes(&self, most: usize) -> Option<Vec<(Program, Vec<usize>)>> {
+        let all = self.combinations(most)?;
+        let observed = &self.code.program.observed;
+        let names: Vec<&str> = self.recorded.chosen.iter().map(|&i| observed[i].name.as_str()).collect();
+        let mode = |branches: &Vec<u32>| {
+            let code = self.compiled.mode(self.compiled.in_mode(branches)?);
+            let place = |name: &&str| code.program.observed.iter().position(|o| o.name == *name && o.value.is_ok());
+            let recorded: Option<Vec<usize>> = names.iter().map(place).collect();
+            Some((code.program.clone(), recorded?))
+        };
+        let present: Vec<u32> = self.code.program.set_valued.iter().map(|law| law.present).collect();
+        let others = all.iter().filter(|branches| **branches != present);
+        Some(std::iter::once(&present).chain(others).filter_map(mode).collect())
+    }
+
+    /// All combinations of branches, if they are no more than `most`.
+    fn combinations(&self, most: usize) -> Option<Vec<Vec<u32>>> {
         let laws = &self.code.program.set_valued;
         let counts: Vec<usize> = laws.iter().map(|law| law.branches.len()).collect();
         let all = counts.iter().try_fold(1usize, |all, count| all.checked_mul(*count)).filter(|all| *all <= most)?;
@@ -133,7 +156,7 @@ impl Model {
             };
             counts.iter().map(branch).collect::<Vec<u32>>()
         };
-        Some((all, (0..all).filter(|&number| self.compiled.in_mode(&mode(number)).is_some()).count()))
+        Some((0..all).map(mode).collect())
     }
 
     /// Opens contacts and lets go what sticks, before impulses are shared out among all that move: what they take of it is

@@ -2,6 +2,7 @@
 
 mod checks;
 mod events;
+mod modes;
 mod routines;
 mod shapes;
 mod source;
@@ -23,6 +24,7 @@ use super::start::{self, Group, Pass};
 use super::write::{Moving, Shape, TimeRate, Writer};
 use crate::EmitError;
 pub(super) use events::EventTables;
+pub(super) use modes::{ModeTables, Modes};
 use routines::{Routines, newton_of};
 use shapes::{ALONG, CLOCK, PLAIN, PREAMBLE, block_functions, of_parameters};
 pub(super) use step_order::StepOrder;
@@ -49,6 +51,10 @@ pub(super) struct Plan<'a> {
     pub discretes: Vec<usize>,
     /// What happens at events.
     pub events: EventTables,
+    /// Where the branches of set-valued laws end, if the model has such laws.
+    pub bounds: Option<ModeTables<'a>>,
+    /// Whether runs begin in this mode.
+    first: bool,
     /// Newton blocks in use.
     pub newton: Vec<BlockId>,
     /// Where the matrices of solve blocks have entries.
@@ -103,8 +109,15 @@ struct Works {
 }
 
 impl<'a> Plan<'a> {
-    pub fn new(export: &'a Export<'a>, name: &str) -> Result<Plan<'a>, EmitError> {
+    /// The plan of a program; of a mode of set-valued laws with what all modes have in common. Runs begin in the first one.
+    pub fn new(
+        export: &'a Export<'a>,
+        name: &str,
+        modes: Option<&'a Modes>,
+        first: bool,
+    ) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
+        let bounds = modes.zip(program.bounds()).map(|(modes, bounds)| ModeTables { modes, bounds });
         let of = |wanted: fn(EventTrigger) -> bool| -> Vec<ConditionId> {
             program.conditions.iter().filter(|(_, c)| wanted(c.trigger)).map(|(id, _)| id).collect()
         };
@@ -119,6 +132,8 @@ impl<'a> Plan<'a> {
             samples: held(program, |kind| kind == HeldKind::Sample),
             discretes: held(program, HeldKind::is_discrete),
             events: EventTables::of(program),
+            bounds,
+            first,
             newton: Vec::new(),
             patterns: Rc::new(Patterns::of(program)),
             reads: Vec::new(),
@@ -132,7 +147,9 @@ impl<'a> Plan<'a> {
             step_order: None,
             works: Works::default(),
         };
-        (plan.passes, plan.groups) = start::plan(program);
+        if first {
+            (plan.passes, plan.groups) = start::plan(program);
+        }
         if export.method.is_implicit() {
             plan.step_order = StepOrder::of(&plan.columns());
         }
@@ -178,6 +195,10 @@ impl<'a> Plan<'a> {
             functions.extend(plain(&mut writer, &events::code_of(i), clause));
         }
         functions.extend(plain(&mut writer, "ha_stored_code", &routines.stored));
+        if self.bounds.is_some() {
+            functions.extend(plain(&mut writer, "ha_compared_code", &routines.compared));
+            functions.extend(plain(&mut writer, "ha_values_code", &routines.carried));
+        }
         functions.extend(self.domain_checks(&writer));
         functions.extend(self.assumption_checks(&writer));
 
@@ -191,6 +212,9 @@ impl<'a> Plan<'a> {
         let run =
             Moving { time: Some(TimeRate::OfDirection), inputs: true, held: true, states: true, ..Moving::default() };
         functions.extend(along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run));
+        if self.bounds.is_some() {
+            functions.extend(along(&mut writer, "ha_margins_along", ALONG, &routines.margins, run));
+        }
         let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
         functions.extend(along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional));
         if self.export.method.is_linearly_implicit() {
@@ -281,7 +305,7 @@ impl<'a> Plan<'a> {
 
     /// Whether a start may differ from the exported one.
     pub fn solves_start(&self) -> bool {
-        !(self.program.start.is_empty() && self.program.guesses.is_empty())
+        self.first && !(self.program.start.is_empty() && self.program.guesses.is_empty())
     }
 
     /// Whether the rates have a function for their derivatives.

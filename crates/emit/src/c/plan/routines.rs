@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use halfarrow_compiler::program::{Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, Routine, Solve, Value};
 
-use super::Plan;
+use super::{ModeTables, Plan};
 
 /// What the functions compute.
 pub(super) struct Routines {
@@ -25,6 +25,10 @@ pub(super) struct Routines {
     pub stored: Routine,
     pub impulses: Routine,
     pub positions: Routine,
+    /// Margins of set-valued laws, with what they are compared, and what is carried from one mode to the next.
+    pub margins: Routine,
+    pub compared: Routine,
+    pub carried: Routine,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -39,13 +43,16 @@ impl Routines {
         let passes = plan.passes.iter().enumerate().map(|(i, p)| ("pass", i, residuals(&p.conditions)));
         let groups = plan.groups.iter().enumerate().filter(|(_, g)| g.together);
         let groups = groups.map(|(i, g)| ("group", i, residuals(&g.conditions)));
-        let guesses = p.guesses.iter().enumerate().map(|(i, g)| ("guess", i, vec![g.residual]));
+        let guesses = p.guesses.iter().enumerate().filter(|_| plan.first);
+        let guesses = guesses.map(|(i, g)| ("guess", i, vec![g.residual]));
         let start = |(kind, number, wanted): (&str, usize, Vec<Value>)| {
             (format!("ha_start_{kind}_{number}"), p.start_routine(&wanted))
         };
         let events = &plan.events;
         let stored = p.jumps.as_ref().map_or(&[][..], |jumps| &jumps.stored);
-        let values = |c: &Clause| p.routine(&c.actions.iter().map(|a| a.value).collect::<Vec<_>>());
+        // Behind the new values of a contact stands that with which it is at rest.
+        let still = |c: &Clause| c.bound.and_then(|b| b.gap).map(|gap| gap.1).filter(|_| !c.actions.is_empty());
+        let values = |c: &Clause| p.routine(&c.actions.iter().map(|a| a.value).chain(still(c)).collect::<Vec<_>>());
         let becomes: Vec<Value> = events.conditional.iter().map(|&c| p.clauses[c].trigger.value()).collect();
         let balanced = p.jumps.iter().flat_map(Jumps::values).chain(events.moved.iter().copied());
         let guarded = p.guarded_routine(&rates);
@@ -53,13 +60,20 @@ impl Routines {
         let read: Vec<BlockId> = newton_of(&guarded.code).map(|solve| solve.block).collect();
         let shown_blocks = newton_of(&observe.code).map(|solve| solve.block);
         let shown_alone: Vec<BlockId> = shown_blocks.filter(|block| !read.contains(block)).collect();
+        let bounds = plan.bounds.as_ref();
+        let carried = bounds.map_or_else(Vec::new, |b| b.modes.values(p));
+        let wanted: Vec<Value> = carried.iter().map(|v| v.1).collect();
+        let of_bounds = |values: &dyn Fn(&ModeTables) -> Vec<Value>| p.routine(&bounds.map_or_else(Vec::new, values));
         Routines {
+            margins: of_bounds(&|b| b.bounds.values()),
+            compared: of_bounds(&|b| b.bounds.compared.concat()),
+            carried: p.routine(&wanted),
             becomes: p.routine(&becomes),
             clauses: p.clauses.iter().map(values).collect(),
             stored: p.routine(stored),
             impulses: p.routine(&balanced.collect::<Vec<_>>()),
             positions: p.routine(&events.constraints(p).map(|c| c.residual).collect::<Vec<_>>()),
-            preamble: p.preamble(&p.determined(&[])),
+            preamble: p.preamble(&p.determined(&wanted)),
             motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&read))),
             shown_motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&shown_alone))),
             rates: guarded,
@@ -74,7 +88,7 @@ impl Routines {
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
         let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
-        let Routines { becomes, clauses, stored, impulses, positions, starts, .. } = self;
+        let Routines { becomes, clauses, stored, impulses, positions, starts, margins, compared, carried, .. } = self;
         let all = [
             preamble,
             rates,
@@ -89,6 +103,9 @@ impl Routines {
             stored,
             impulses,
             positions,
+            margins,
+            compared,
+            carried,
         ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }

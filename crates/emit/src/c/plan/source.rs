@@ -3,8 +3,8 @@
 use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::program::{ConditionKind, EventTrigger, LawDomain, Reads};
 
-use super::Plan;
 use super::step_order::StepOrder;
+use super::{ModeTables, Plan};
 use crate::c::flags::Flags;
 use crate::c::fragment::{Fragment, assembled};
 use crate::c::header::comment;
@@ -35,7 +35,31 @@ impl Plan<'_> {
 
     /// The source file; at its head stands what it keeps to.
     pub(in crate::c) fn source(&self, obligations: String) -> String {
-        let [filling, wide] = self.fillings(obligations);
+        let mut all = self.fragments(&obligations);
+        all.extend(self.beginning(&obligations));
+        assembled(&all)
+    }
+
+    /// How runs begin.
+    pub(in crate::c) fn beginning(&self, obligations: &str) -> Vec<Fragment> {
+        let [filling, _] = self.fillings(obligations.to_string());
+        let mut all = filling.fragments(include_str!("../runtime/start.c"));
+        if self.solves_start() {
+            all.extend(filling.fragments(include_str!("../runtime/start_solve.c")));
+        }
+        all.extend(filling.fragments(include_str!("../runtime/begin.c")));
+        all
+    }
+
+    /// How runs go from one mode to the next.
+    pub(in crate::c) fn changes_of_mode(&self) -> Vec<Fragment> {
+        let [filling, _] = self.fillings(String::new());
+        filling.fragments(include_str!("../runtime/modes.c"))
+    }
+
+    /// What steps are made of.
+    pub(in crate::c) fn fragments(&self, obligations: &str) -> Vec<Fragment> {
+        let [filling, wide] = self.fillings(obligations.to_string());
         let mut all = filling.fragments(include_str!("../runtime/top.c"));
         let mut put = |fragments: Vec<Fragment>| all.extend(fragments);
         put(wide.fragments(math::C_SOURCE));
@@ -61,9 +85,11 @@ impl Plan<'_> {
         }
         put(filling.fragments(include_str!("../runtime/held.c")));
         put(filling.fragments(include_str!("../runtime/system.c")));
+        put(filling.fragments(include_str!("../runtime/margins.c")));
         if !self.program.clauses.is_empty() || self.program.jumps.is_some() {
             put(filling.fragments(include_str!("../runtime/events.c")));
         }
+        put(filling.fragments(include_str!("../runtime/enter.c")));
         put(filling.fragments(include_str!("../runtime/cross.c")));
         if self.export.method.is_implicit() {
             put(filling.fragments(include_str!("../runtime/matrix.c")));
@@ -75,13 +101,9 @@ impl Plan<'_> {
             _ => include_str!("../runtime/explicit.c"),
         }));
         put(filling.fragments(include_str!("../runtime/step.c")));
-        put(filling.fragments(include_str!("../runtime/start.c")));
-        if self.solves_start() {
-            put(filling.fragments(include_str!("../runtime/start_solve.c")));
-        }
-        put(filling.fragments(include_str!("../runtime/begin.c")));
+        put(filling.fragments(include_str!("../runtime/parameters.c")));
         put(messages::messages(self));
-        assembled(&all)
+        all
     }
 
     pub(super) fn kinds(&self) -> impl Iterator<Item = ConditionKind> + '_ {
@@ -91,6 +113,7 @@ impl Plan<'_> {
     /// What the model has.
     pub(in crate::c) fn flags(&self) -> Flags {
         let Plan { export, program: p, .. } = *self;
+        let bounds = self.bounds.as_ref();
         let held = !(self.delays.is_empty() && self.samples.is_empty());
         let time_derivative = export.method.is_linearly_implicit();
         let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
@@ -108,6 +131,7 @@ impl Plan<'_> {
             shown_motion: self.motion_blocks.len() > self.motion_of_rates,
             tables: !p.tables.is_empty(),
             conditions: !p.conditions.is_empty(),
+            holds: !p.conditions.is_empty() || bounds.is_some(),
             sign_conditions: self.kinds().any(|k| k == ConditionKind::Sign),
             floor_conditions: self.kinds().any(|k| k == ConditionKind::Floor),
             piece_conditions: self.kinds().any(|k| matches!(k, ConditionKind::Piece(_))),
@@ -139,7 +163,12 @@ impl Plan<'_> {
             directional_derivative: self.has_directional_derivative(),
             derivatives: export.derivatives,
             time_derivative,
-            time_passes: time_derivative || held,
+            time_passes: time_derivative || held || bounds.is_some(),
+            bounds: bounds.is_some(),
+            gaps: bounds.is_some_and(ModeTables::has_gaps),
+            meets: bounds.is_some_and(ModeTables::meets),
+            contacts: bounds.is_some_and(|b| b.modes.has_contacts()),
+            leaps_balanced: bounds.is_some() || p.jumps.as_ref().is_some_and(|jumps| jumps.leaps),
             linear_constant: self.sizes.factored > 0,
             step_order: self.step_order.is_some(),
             step_full: self.step_order.as_ref().is_some_and(StepOrder::has_full),

@@ -130,6 +130,11 @@ impl Plan<'_> {
             let places = ("STEP_PLACES", order.places(&columns));
             order.tables().into_iter().chain([places]).map(|(word, values)| (word, ints(values)))
         });
+        let places: BTreeMap<BlockId, usize> = self.newton.iter().copied().zip(self.memory_places()).collect();
+        let bounds = self.bounds.iter().flat_map(|bounds| {
+            let own = bounds.words(program, &self.events.conditional, &places, &lines, &join);
+            own.into_iter().chain(bounds.modes.words()).chain(super::modes::tolerances(real))
+        });
         let more = linearly_implicit(self.export.method, real);
         let tables = [
             ("TABLES", Written::of(self.tables())),
@@ -141,6 +146,7 @@ impl Plan<'_> {
             .into_iter()
             .chain(events)
             .chain(order)
+            .chain(bounds)
             .chain(more)
             .chain(tolerances(real))
             .map(|(word, text)| (word, Written::of(text)))

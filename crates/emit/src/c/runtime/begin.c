@@ -27,10 +27,30 @@ static int ha_start_values(ha_model *m, double t)
 //end
 }
 
-//always
+//if bounds
+//item ha_return
+/* A run begins in the first mode. */
+static int ha_return(ha_model *m)
+{
+    if (m->mode == 0) {
+        return $MODEL_OK;
+    }
+    m->mode = 0;
+    m->begun = 0;
+    return $ha_parameters(m);
+}
+
+//end
+//public $model_start_from
 int $model_start_from($model *m, double t, const $real *x)
 {
     int status;
+//if bounds
+    status = $ha_return(m);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
     $ha_restart(m);
     m->failure.code = $MODEL_OK;
     m->t = t;
@@ -48,10 +68,17 @@ int $model_start_from($model *m, double t, const $real *x)
     return status == $MODEL_OK ? $model_observe(m, t, m->x, m->y) : status;
 }
 
+//public $model_start
 int $model_start($model *m, double t)
 {
     int status;
     m->failure.code = $MODEL_OK;
+//if bounds
+    status = $ha_return(m);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
     $ha_restart(m);
 //if assumptions
     if (m->broken) {

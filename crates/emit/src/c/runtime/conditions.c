@@ -1,10 +1,13 @@
-//if conditions
+//if holds
 
 //section
 /* ---- conditions: followed, held, or taken anew ---- */
 
 //always
 enum { HA_FOLLOW, HA_KEEP, HA_TAKE };
+
+//end
+//if conditions
 
 //if sign_conditions
 //item ha_side

@@ -1,6 +1,7 @@
-
-//always
-int $model_cross($model *m, double t, $real *x)
+//entry ha_cross_begin
+/* The run stands at a jump, at a switch, or at its beginning: conditions are taken anew, samples taken, and it is found out what
+ * happens. */
+static int ha_cross_begin(ha_model *m, double t, $real *x)
 {
     int status = $MODEL_OK;
 //if clauses
@@ -28,16 +29,8 @@ int $model_cross($model *m, double t, $real *x)
     m->state_hold = HA_FOLLOW;
 //end
 //if newton
-    {
-        /* A solution may leap where something jumps. */
-        int i;
-        for (i = 0; i < $BLOCKS; ++i) {
-            m->following[i] = 0;
-//if sought_positions
-            m->motion_known[i] = 0;
-//end
-        }
-    }
+    /* A solution may leap where something jumps. */
+    $ha_leave_solutions(m);
 //end
 //if clocks
     $ha_clock_cross(m, t);
@@ -68,6 +61,14 @@ int $model_cross($model *m, double t, $real *x)
 //end
     m->begun = 1;
     m->cross_due = 0;
+//if bounds
+    if (first) {
+        status = $ha_note_compared(m, t, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+    }
+//end
 //if switches
     status = $ha_take_sides(m, t, x);
     if (status != $MODEL_OK) {
@@ -83,28 +84,58 @@ int $model_cross($model *m, double t, $real *x)
     }
 //end
 //end
-//if clauses
-    status = first ? $ha_begin_clauses(m, t, x) : $ha_find_fired(m, t, x);
-    if (status == $MODEL_OK) {
-        status = $ha_run_clauses(m, t, x);
-    }
+//if gaps
+    status = first ? $ha_begin_contacts(m, t, x) : $MODEL_OK;
     if (status != $MODEL_OK) {
         return status;
     }
 //end
+//if clauses
+    status = first ? $ha_begin_clauses(m, t, x) : $ha_find_fired(m, t, x);
+//end
+    (void)x;
+    return status;
+}
+
+//entry ha_hold_sides
+/* The sides of indicators that the run is on from here. */
+static int ha_hold_sides(ha_model *m, double t, const $real *x)
+{
+//if switches
+    const int status = $model_indicators(m, t, x, m->beyond);
+    int i;
+    for (i = 0; i < HA_NG && status == $MODEL_OK; ++i) {
+        m->sides[i] = m->beyond[i] > $0.0;
+    }
+//if bounds
+    $ha_copy(m->seen + HA_START * HA_NG, m->beyond, HA_NG);
+    m->last_step = 0.0;
+//end
+    return status;
+//else
+    (void)m;
+    (void)t;
+    (void)x;
+    return $MODEL_OK;
+//end
+}
+
+//entry ha_cross_end
+/* What has happened is over: delays, solutions and indicators go on from here. */
+static int ha_cross_end(ha_model *m, double t, const $real *x)
+{
+    int status = $MODEL_OK;
 //if delays
-    {
-        static const int places[] = {$DELAY_PLACES};
-        int d;
-        status = $ha_sources(m, t, x);
-        if (status != $MODEL_OK) {
-            return status;
-        }
-        for (d = 0; d < $DELAYS; ++d) {
-            $ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
-            if (m->delays[d].full) {
-                return $ha_fail(m, $MODEL_NO_ROOM, d, t);
-            }
+    static const int places[] = {$DELAY_PLACES};
+    int d;
+    status = $ha_sources(m, t, x);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+    for (d = 0; d < $DELAYS; ++d) {
+        $ha_delay_jump(m, d, t, m->source[places[d]], m->source_rate[places[d]]);
+        if (m->delays[d].full) {
+            return $ha_fail(m, $MODEL_NO_ROOM, d, t);
         }
     }
 //end
@@ -118,15 +149,28 @@ int $model_cross($model *m, double t, $real *x)
     m->handled = 1;
 //end
 //if switches
-    status = $model_indicators(m, t, x, m->beyond);
+    status = $ha_hold_sides(m, t, x);
+//end
+    (void)m;
+    (void)t;
+    (void)x;
+    return status;
+}
+
+//public $model_cross
+int $model_cross($model *m, double t, $real *x)
+{
+    int status = $ha_cross_begin(m, t, x);
+//if bounds
     if (status == $MODEL_OK) {
-        int i;
-        for (i = 0; i < HA_NG; ++i) {
-            m->sides[i] = m->beyond[i] > $0.0;
-        }
+        status = $ha_settle_all(m, t, x);
     }
 //else
-    (void)x;
+//if clauses
+    if (status == $MODEL_OK) {
+        status = $ha_run_clauses(m, t, x);
+    }
 //end
-    return status;
+//end
+    return status == $MODEL_OK ? $ha_cross_end(m, t, x) : status;
 }

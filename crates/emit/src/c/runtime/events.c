@@ -41,7 +41,7 @@ $CLAUSE_CASES
     }
 }
 
-//item ha_find_fired
+//entry ha_find_fired
 /* Which clauses happen: those whose condition, as held, has become true, and those whose period is over. */
 static int ha_find_fired(ha_model *m, double t, const $real *x)
 {
@@ -66,6 +66,14 @@ static int ha_find_fired(ha_model *m, double t, const $real *x)
     }
 //else
     (void)x;
+//end
+//if meets
+    {
+        const int status = $ha_find_meeting(m, t, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+    }
 //end
 //if periodic_clauses
     {
@@ -92,7 +100,7 @@ static int ha_find_fired(ha_model *m, double t, const $real *x)
 /* A run begins: conditions that hold have not become true, multiples of periods count from time 0. */
 static int ha_begin_clauses(ha_model *m, double t, const $real *x)
 {
-    const int status = $ha_find_fired(m, t, x);
+    int status = $ha_find_fired(m, t, x);
     int i;
     for (i = 0; i < $CLAUSES; ++i) {
         m->clauses[i].fired = 0;
@@ -113,10 +121,15 @@ static int ha_begin_clauses(ha_model *m, double t, const $real *x)
         }
     }
 //end
+//if meets
+    if (status == $MODEL_OK) {
+        status = $ha_find_meeting(m, t, x);
+    }
+//end
     return status;
 }
 
-//item ha_first_fired
+//entry ha_first_fired
 /* The first clause that happens now, or -1. */
 static int ha_first_fired(const ha_model *m)
 {
@@ -165,9 +178,20 @@ static int ha_notice(ha_model *m, double t)
 {
     static const int conditional[] = {$CONDITIONAL};
     int i;
+//if meets
+    for (i = 0; i < $CLAUSES; ++i) {
+        m->at_rest[i] = 0;
+    }
+//end
     for (i = 0; i < $CONDITIONALS; ++i) {
         $model_clause *c = &m->clauses[conditional[i]];
         if (c->fired && $ha_accumulates(c, t, m->step)) {
+//if meets
+            if ($ha_is_gap(conditional[i])) {
+                m->at_rest[conditional[i]] = 1;
+                continue;
+            }
+//end
             return $ha_fail(m, $MODEL_ACCUMULATION, conditional[i], t);
         }
     }
@@ -186,10 +210,22 @@ static int ha_new_values(ha_model *m, double t, const $real *x)
     $ha_place(m, t);
 //end
     for (i = 0; i < $CLAUSES && status == $MODEL_OK; ++i) {
+//if meets
+        if (!(m->clauses[i].fired || m->contact[i])) {
+            continue;
+        }
+        status = $ha_clause_code(m, i, t, x, m->clause_values);
+        for (a = $ha_action_starts[i]; a < $ha_action_starts[i + 1]; ++a) {
+            /* Behind the new values of a contact stands that with which it is at rest. */
+            const int still = $ha_is_gap(i) && m->at_rest[i];
+            m->new_values[a] = m->clause_values[(still ? $ha_action_starts[i + 1] : a) - $ha_action_starts[i]];
+        }
+//else
         if (!m->clauses[i].fired) {
             continue;
         }
         status = $ha_clause_code(m, i, t, x, m->new_values + $ha_action_starts[i]);
+//end
         for (a = $ha_action_starts[i]; a < $ha_action_starts[i + 1] && status == $MODEL_OK; ++a) {
             if (!$ha_finite(m->new_values[a])) {
                 status = $ha_fail(m, $MODEL_EVENT_NOT_FINITE, a, t);
@@ -248,17 +284,6 @@ static int ha_reset_of_round(const ha_model *m)
 //end
     return $ACTIONS;
 }
-
-//always
-enum {
-    /* What storages keep; balances of impulses; states and constants by which storages tell what they keep; impulses. */
-    HA_STORED = $JUMP_STORED,
-    HA_BALANCES = $JUMP_BALANCES,
-    HA_UNKNOWNS = $JUMP_UNKNOWNS,
-    HA_IMPULSES = $JUMP_IMPULSES,
-    /* Where what resets change begins among what is computed. */
-    HA_FIRST_MOVED = $FIRST_MOVED
-};
 
 //item ha_balance_starts
 /* Where the terms of each balance begin, and of each what is kept, which has a factor there. */
@@ -352,6 +377,9 @@ static int ha_balanced(ha_model *m, double t, const $real *x)
     const int columns = HA_UNKNOWNS;
     const int rows = HA_BALANCES;
 //end
+//if bounds
+    static const int storages[] = {$STORAGE_SYMBOLS};
+//end
     int column;
     int row;
     int k;
@@ -383,7 +411,12 @@ static int ha_balanced(ha_model *m, double t, const $real *x)
                 const $real direct = factor * m->jump_rates[$ha_balance_terms[k]];
                 const $real turned = m->jump_rates[HA_STORED + k] * jump;
                 const $real both = direct + turned;
+//if bounds
+                const $real nothing = $HA_NOTHING * factor * m->most_stored[storages[$ha_balance_terms[k]]];
+                const $real magnitude = $fabs(factor * now) + $fabs(factor * before) + $fabs(nothing);
+//else
                 const $real magnitude = $fabs(factor * now) + $fabs(factor * before);
+//end
                 sum += part;
                 slope += both;
                 size += magnitude;
@@ -405,9 +438,30 @@ static int ha_balanced(ha_model *m, double t, const $real *x)
             if (column < HA_UNKNOWNS) {
                 m->jump_matrix[row * columns + column] = m->jump_rates[output];
             }
+//if bounds
+            /* What is reset may be a small difference of what storages keep. */
+            if (column < HA_UNKNOWNS) {
+                const int unknown = $ha_jump_unknowns[column];
+//if conserved
+                const $real value = unknown < HA_NX ? x[unknown] : m->k[unknown - HA_NX];
+//else
+                const $real value = x[unknown];
+//end
+                const $real part = $fabs(m->jump_rates[output] * value);
+                const $real been = $fabs($HA_NOTHING * m->jump_rates[output] * m->jump_been[column]);
+                m->jump_greatest[k] = $ha_max($ha_max(m->jump_greatest[k], part), been);
+            }
+//end
         }
 //end
     }
+//if bounds
+//if resets
+    for (k = 0; k < m->asked; ++k) {
+        m->jump_sizes[HA_BALANCES + k] = $ha_max(m->jump_sizes[HA_BALANCES + k], m->jump_greatest[k]);
+    }
+//end
+//end
     return $MODEL_OK;
 }
 
@@ -537,7 +591,15 @@ static $real ha_move_unknowns(ha_model *m, $real *x)
         $real *value = &x[unknown];
 //end
         const $real step = m->jump_step[i];
+//if bounds
+        const $real size = $ha_max($ha_max($fabs(*value), $fabs(step)), $DBL_MIN);
+        m->jump_been[i] = $ha_max(m->jump_been[i], $fabs(step));
+        if ($fabs(step) > $CLOSE_TO_ROUNDING * $HA_NOTHING * m->jump_been[i]) {
+            length = $ha_max(length, $fabs(step) / size);
+        }
+//else
         length = $ha_max(length, $fabs(step) / $ha_max($ha_max($fabs(*value), $fabs(step)), $DBL_MIN));
+//end
         *value += step;
 //if single
         if (unknown < HA_NX) {
@@ -553,10 +615,9 @@ static $real ha_move_unknowns(ha_model *m, $real *x)
     return length;
 }
 
-//item ha_balance_impulses
-/* What storages keep after the round: Newton on states, constants and impulses. The impulses of one instant add up, of which this may
- * be the first round. */
-static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
+//item ha_solve_impulses
+/* What storages keep after the round: Newton on states, constants and impulses. Whether what is asked for is independent. */
+static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
 {
 //if resets
     const int rows = HA_BALANCES + m->asked;
@@ -570,6 +631,23 @@ static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
     int iteration;
     int status;
     int i;
+    *independent = 1;
+//if bounds
+    for (i = 0; i < HA_UNKNOWNS; ++i) {
+        const int unknown = $ha_jump_unknowns[i];
+//if conserved
+        const $real value = unknown < HA_NX ? x[unknown] : m->k[unknown - HA_NX];
+//else
+        const $real value = x[unknown];
+//end
+        const $real been = unknown < HA_TRACKED ? m->most_values[$ha_tracked[unknown]] : $0.0;
+        m->jump_been[i] = $ha_max(been, $fabs(value));
+    }
+//if resets
+    $ha_fill(m->jump_greatest, $0.0, m->asked);
+    $ha_fill(m->impulses, $0.0, m->asked);
+//end
+//end
     for (iteration = 0; iteration < 50 && !met; ++iteration) {
         $real length;
         int rank;
@@ -589,7 +667,8 @@ static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
             break;
         }
         if (rank < columns) {
-            return $ha_fail(m, $MODEL_RESET_DEPENDENT, $ha_reset_of_round(m), t);
+            *independent = 0;
+            return $MODEL_OK;
         }
         length = $ha_move_unknowns(m, x);
         met = length <= $4.0 * $DBL_EPSILON || (length < $CLOSE_TO_ROUNDING && length >= $0.5 * last);
@@ -604,22 +683,241 @@ static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
             met = met && $fabs(m->jump_residual[i]) <= $CLOSE_TO_ROUNDING * m->jump_sizes[i];
         }
     }
-    if (!met) {
-        return $ha_fail(m, $MODEL_RESET_UNMET, $ha_reset_of_round(m), t);
+    return met ? $MODEL_OK : $ha_fail(m, $MODEL_RESET_UNMET, $ha_reset_of_round(m), t);
+}
+
+//if meets
+//item ha_impulse_of
+/* The impulse of a contact in what has been solved last. */
+static $real ha_impulse_of(const ha_model *m, int clause)
+{
+    int k;
+    for (k = 0; k < m->asked && m->clauses[clause].fired; ++k) {
+        if ($ha_action_impulses[m->asked_actions[k]] == $ha_action_impulses[$ha_action_starts[clause]]) {
+            return m->impulses[k];
+        }
     }
+    return $0.0;
+}
+
+//item ha_gives_way
+/* By how much a contact gives way after what has been solved last, beyond rounding. */
+static $real ha_gives_way(const ha_model *m, int clause)
+{
+    const int action = $ha_action_starts[clause];
+    const $real flow = m->jump_out[HA_FIRST_MOVED + $ha_action_places[action]];
+    const $real rounding = $HA_CLOSE * $ha_greatest_rate(m, clause);
+    return $ha_max(m->new_values[action] - flow - rounding, $0.0);
+}
+
+//item ha_noise_of_impulses
+/* An impulse that is rounding. */
+static $real ha_noise_of_impulses(const ha_model *m)
+{
+    $real most = $0.0;
+    $real kept = $0.0;
+    int i;
+    for (i = 0; i < m->asked; ++i) {
+        most = $ha_max(most, $fabs(m->impulses[i]));
+    }
+    for (i = 0; i < HA_BALANCES; ++i) {
+        kept = $ha_max(kept, m->jump_sizes[i]);
+    }
+    most *= $CLOSE_TO_ROUNDING;
+    kept *= $HA_CLOSE;
+    return most + kept;
+}
+
+//item ha_begin_again
+/* What storages kept before anything was shared out. */
+static void ha_begin_again(ha_model *m, $real *x)
+{
+    $ha_copy(x, m->shared_from, HA_NX);
+//if conserved
+    $ha_copy(m->k, m->shared_from + HA_NX, HA_NK);
+//end
+}
+
+//item ha_worst_contact
+/* The contact that gives way most, or -1. */
+static int ha_worst_contact(const ha_model *m)
+{
+    $real most = $0.0;
+    int worst = -1;
+    int i;
+    for (i = 0; i < $CLAUSES; ++i) {
+        if (m->contact[i] && !m->clauses[i].fired && !m->contact_held[i]) {
+            const $real by = $ha_gives_way(m, i);
+            if (by > most) {
+                most = by;
+                worst = i;
+            }
+        }
+    }
+    return worst;
+}
+
+//item ha_let_go
+/* Goes from what is shared out to what is wanted as far as no contact pulls; whether one does, which is let go. */
+static int ha_let_go(ha_model *m)
+{
+    const $real noise = $ha_noise_of_impulses(m);
+    $real part = $0.0;
+    int first = -1;
+    int i;
+    for (i = 0; i < $CLAUSES; ++i) {
+        m->wanted[i] = m->contact[i] ? $ha_impulse_of(m, i) : $0.0;
+        if (m->contact[i] && m->clauses[i].fired && m->wanted[i] < -noise) {
+            const $real way = m->shared[i] / (m->shared[i] - m->wanted[i]);
+            if (first < 0 || way < part) {
+                part = way;
+                first = i;
+            }
+        }
+    }
+    if (first < 0) {
+        return 0;
+    }
+    for (i = 0; i < $CLAUSES; ++i) {
+        if (m->contact[i]) {
+            const $real way = part * (m->wanted[i] - m->shared[i]);
+            m->shared[i] += way;
+            if (m->clauses[i].fired && (i == first || m->shared[i] <= $0.0)) {
+                m->shared[i] = $0.0;
+                m->clauses[i].fired = 0;
+            }
+        }
+    }
+    return 1;
+}
+
+//item ha_let_act
+/* Lets a contact act beside the others, and lets go those that would pull. */
+static int ha_let_act(ha_model *m, double t, $real *x, int added)
+{
+    int turn;
+    int i;
+    m->clauses[added].fired = 1;
+    for (turn = 0; turn < 2 * $CLAUSES + 2; ++turn) {
+        int independent;
+        int status;
+        $ha_begin_again(m, x);
+        $ha_take_asked(m);
+        status = $ha_solve_impulses(m, t, x, &independent);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+        if (!independent && (m->contact_held[added] || !m->clauses[added].fired)) {
+            return $ha_fail(m, $MODEL_RESET_DEPENDENT, $ha_reset_of_round(m), t);
+        }
+        if (!independent) {
+            /* The others hold it to rounding. */
+            m->contact_held[added] = 1;
+            m->clauses[added].fired = 0;
+            continue;
+        }
+        if (m->clauses[added].fired && m->shared[added] == $0.0 && $ha_impulse_of(m, added) <= $0.0) {
+            /* What it gives way by is rounding. */
+            m->contact_held[added] = 1;
+            m->clauses[added].fired = 0;
+            continue;
+        }
+        if ($ha_let_go(m)) {
+            continue;
+        }
+        for (i = 0; i < $CLAUSES; ++i) {
+            m->shared[i] = m->wanted[i];
+            m->contact_held[i] = m->contact_held[i] && !m->clauses[added].fired;
+        }
+        return $MODEL_OK;
+    }
+    return $ha_fail(m, $MODEL_RESET_UNMET, $ha_reset_of_round(m), t);
+}
+
+//end
+//item ha_share_out
+/* Shares out the impulses of resets and of contacts: of each contact none pulls, and where one acts it gives way no more. That is the
+ * least kinetic energy of what the impulses change, found by letting act the contact that gives way most. */
+static int ha_share_out(ha_model *m, double t, $real *x)
+{
+    int independent;
+    int status;
+//if meets
+    int turn;
+    int i;
+    for (i = 0; i < $CLAUSES; ++i) {
+        m->clauses[i].fired = m->clauses[i].fired && !m->contact[i];
+        m->contact_held[i] = 0;
+        m->shared[i] = $0.0;
+    }
+    $ha_copy(m->shared_from, x, HA_NX);
+//if conserved
+    $ha_copy(m->shared_from + HA_NX, m->k, HA_NK);
+//end
+    $ha_take_asked(m);
+//end
+    status = $ha_solve_impulses(m, t, x, &independent);
+    if (status == $MODEL_OK && !independent) {
+        status = $ha_fail(m, $MODEL_RESET_DEPENDENT, $ha_reset_of_round(m), t);
+    }
+//if meets
+    for (turn = 0; turn < 8 * ($CLAUSES + 1) && status == $MODEL_OK; ++turn) {
+        const int worst = $ha_worst_contact(m);
+        if (worst < 0) {
+            return $MODEL_OK;
+        }
+        status = $ha_let_act(m, t, x, worst);
+    }
+    if (status == $MODEL_OK && $ha_worst_contact(m) >= 0) {
+        status = $ha_fail(m, $MODEL_RESET_UNMET, $ha_reset_of_round(m), t);
+    }
+//end
+    return status;
+}
+
+//item ha_balance_impulses
+/* What storages keep after the round. The impulses of one instant add up, of which this may be the first round. */
+static int ha_balance_impulses(ha_model *m, double t, $real *x, int first)
+{
+    const int status = $ha_share_out(m, t, x);
 //if resets
-    for (i = 0; i < m->asked && first; ++i) {
+    int i;
+    for (i = 0; i < m->asked && first && status == $MODEL_OK; ++i) {
         m->z[$ha_impulse_held[$ha_action_impulses[m->asked_actions[i]]]] = $0.0;
     }
-    for (i = 0; i < m->asked; ++i) {
+    for (i = 0; i < m->asked && status == $MODEL_OK; ++i) {
         m->z[$ha_impulse_held[$ha_action_impulses[m->asked_actions[i]]]] += m->impulses[i];
     }
 //else
     (void)first;
 //end
-    return $MODEL_OK;
+    return status;
 }
 
+//if leaps_balanced
+//item ha_balance_leaps
+/* What storages keep after ratios have leapt. */
+static int ha_balance_leaps(ha_model *m, double t, $real *x)
+{
+    int independent;
+    int status;
+//if clauses
+    int i;
+    for (i = 0; i < $CLAUSES; ++i) {
+        m->clauses[i].fired = 0;
+    }
+//end
+//if resets
+    m->asked = 0;
+//end
+    status = $ha_solve_impulses(m, t, x, &independent);
+    if (status == $MODEL_OK && !independent) {
+        status = $ha_fail(m, $MODEL_RESET_DEPENDENT, $ha_reset_of_round(m), t);
+    }
+    return status;
+}
+
+//end
 //if leaps
 //item ha_take_stored
 /* What storages keep before a condition changes, with the inputs of before. */
@@ -642,22 +940,6 @@ static int ha_take_stored(ha_model *m, double t, const $real *x)
         m->u_crossed[i] = before;
     }
     return status;
-}
-
-//item ha_balance_leaps
-/* What storages keep after ratios have leapt. */
-static int ha_balance_leaps(ha_model *m, double t, $real *x)
-{
-//if clauses
-    int i;
-    for (i = 0; i < $CLAUSES; ++i) {
-        m->clauses[i].fired = 0;
-    }
-//end
-//if resets
-    m->asked = 0;
-//end
-    return $ha_balance_impulses(m, t, x, 0);
 }
 
 //end
@@ -764,48 +1046,134 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     return status;
 }
 
+//entry ha_round
+/* A round of what happens at an instant, of which it may be the first. */
+static int ha_round(ha_model *m, double t, $real *x, int first)
+{
+    int status = $MODEL_OK;
+//if conditional_clauses
+    status = $ha_notice(m, t);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
+//if meets
+    status = $ha_find_contacts(m, t, x);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
+    status = $ha_new_values(m, t, x);
+    if (status == $MODEL_OK) {
+        status = $ha_refuse_conflicts(m, t);
+    }
+    if (status == $MODEL_OK) {
+        status = $ha_change(m, t, x, first);
+    }
+//if newton
+    $ha_leave_solutions(m);
+//end
+//if leaps
+    /* Ratios that leap with discrete variables act by impulses. */
+    if (status == $MODEL_OK) {
+//if held
+        $ha_place(m, t);
+//end
+        status = $ha_stored_code(m, t, x, m->stored);
+    }
+//end
+//if switches
+    if (status == $MODEL_OK) {
+        status = $ha_take_sides(m, t, x);
+    }
+//if leaps
+    if (status == $MODEL_OK) {
+        status = $ha_balance_leaps(m, t, x);
+    }
+    if (status == $MODEL_OK) {
+        status = $ha_take_sides(m, t, x);
+    }
+//end
+//end
+    return status == $MODEL_OK ? $ha_find_fired(m, t, x) : status;
+}
+
+//if bounds
+//if contacts
+//item ha_bound_of
+/* The law and the branch beyond of each clause that is the end of a branch. */
+static const int ha_bound_of[][2] = {
+$BOUND_TABLE
+};
+
+//entry ha_resets
+/* Whether something that happens takes an impulse. */
+static int ha_resets(const ha_model *m)
+{
+//if resets
+    int i;
+    int a;
+    for (i = 0; i < $CLAUSES; ++i) {
+        for (a = $ha_action_starts[i]; m->clauses[i].fired && a < $ha_action_starts[i + 1]; ++a) {
+            if ($ha_action_kinds[a] == HA_MOVED) {
+                return 1;
+            }
+        }
+    }
+//else
+    (void)m;
+//end
+    return 0;
+}
+
+//entry ha_note_fired
+/* Notes what happens, to go on with it in another mode: the clauses of the modeller, and which ends of branches. */
+static int ha_note_fired(ha_model *m)
+{
+    int i;
+    for (i = 0; i < $OWN_CLAUSES; ++i) {
+        m->fired_before[i] = m->clauses[i].fired;
+    }
+    for (i = 0; i < $LAWS; ++i) {
+        m->fired_ends[i] = 0;
+    }
+    for (i = $OWN_CLAUSES; i < $CLAUSES; ++i) {
+        if (m->clauses[i].fired) {
+            m->fired_ends[$ha_bound_of[i - $OWN_CLAUSES][0]] |= 1 << $ha_bound_of[i - $OWN_CLAUSES][1];
+        }
+    }
+    return $MODEL_OK;
+}
+
+//entry ha_fire_again
+/* The same happens in this mode. */
+static int ha_fire_again(ha_model *m)
+{
+    int i;
+    for (i = 0; i < $OWN_CLAUSES; ++i) {
+        m->clauses[i].fired = m->fired_before[i];
+    }
+    for (i = $OWN_CLAUSES; i < $CLAUSES; ++i) {
+        const int *bound = $ha_bound_of[i - $OWN_CLAUSES];
+        m->clauses[i].fired = (m->fired_ends[bound[0]] >> bound[1]) & 1;
+    }
+    return $MODEL_OK;
+}
+
+//end
+//else
 //item ha_run_clauses
 /* Lets happen what has been found to happen, and what follows from that at the same instant. */
 static int ha_run_clauses(ha_model *m, double t, $real *x)
 {
     int turn;
     for (turn = 0; turn < 200 && $ha_first_fired(m) >= 0; ++turn) {
-        int status = $MODEL_OK;
-//if conditional_clauses
-        status = $ha_notice(m, t);
-        if (status != $MODEL_OK) {
-            return status;
-        }
-//end
-        status = $ha_new_values(m, t, x);
-        if (status == $MODEL_OK) {
-            status = $ha_refuse_conflicts(m, t);
-        }
-        if (status == $MODEL_OK) {
-            status = $ha_change(m, t, x, turn == 0);
-        }
-//if newton
-        {
-            int i;
-            for (i = 0; i < $BLOCKS; ++i) {
-                m->following[i] = 0;
-//if sought_positions
-                m->motion_known[i] = 0;
-//end
-            }
-        }
-//end
-//if switches
-        if (status == $MODEL_OK) {
-            status = $ha_take_sides(m, t, x);
-        }
-//end
-        if (status == $MODEL_OK) {
-            status = $ha_find_fired(m, t, x);
-        }
+        const int status = $ha_round(m, t, x, turn == 0);
         if (status != $MODEL_OK) {
             return status;
         }
     }
     return $ha_first_fired(m) < 0 ? $MODEL_OK : $ha_fail(m, $MODEL_ENDLESS_EVENTS, $ha_first_fired(m), t);
 }
+
+//end

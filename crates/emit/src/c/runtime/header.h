@@ -168,6 +168,14 @@ int $model_indicators($model *m, double t, const $real *x, $real *g);
 int $model_switched($model *m, double t, const $real *x, int *switched);
 
 //end
+//if bounds
+/* Whether a branch of a set-valued law has ended where no indicator has told it: the run stands at a switch then. */
+int $model_ended($model *m, double t, const $real *x, int *ended);
+
+/* How great the states of the present mode have been, 0 where that is not known. */
+void $model_sizes(const $model *m, $real *sizes);
+
+//end
 /* The next time after t at which something jumps, infinite if nothing does. */
 double $model_next_jump($model *m, double t);
 

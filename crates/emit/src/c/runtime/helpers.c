@@ -37,6 +37,15 @@ static void ha_fill($real *to, $real value, int n)
     }
 }
 
+//item ha_note
+/* The greatest magnitude of something. */
+static void ha_note($real *most, $real value)
+{
+    if ($ha_finite(value)) {
+        *most = $ha_max(*most, $fabs(value));
+    }
+}
+
 //item ha_is_pivot
 /* Whether an entry can be divided by: not 0 to rounding, and finite. */
 static int ha_is_pivot($real a)

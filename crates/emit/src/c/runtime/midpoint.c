@@ -56,7 +56,12 @@ static $real ha_relative_correction(const ha_model *m)
     $real most = $0.0;
     int i;
     for (i = 0; i < HA_NX; ++i) {
+//if bounds
+        const $real known = i < HA_TRACKED ? m->most_values[$ha_tracked[i]] : $0.0;
+        const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), known);
+//else
         const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), $ha_scales[i]);
+//end
         const $real relative = m->correction[i] == $0.0 ? $0.0 : $fabs(m->correction[i]) / size;
         if (relative > most || relative != relative) {
             most = relative;

@@ -124,6 +124,8 @@ static int ha_bracket(ha_model *m, double before, double after, double finest, d
     return $MODEL_OK;
 }
 
+//if bounds
+//else
 //item ha_extremum
 /* Where, in parts from the middle one, the last three values of an indicator turn round on their way to 0, judged by the parabola
  * through them; beyond 1 if they do not. */
@@ -138,6 +140,7 @@ static double ha_extremum(const ha_model *m, int indicator, int part)
     return bend * b > 0.0 ? -slope / bend : 2.0;
 }
 
+//end
 //item ha_part_of
 /* The end of one of the parts of a step at whose ends signs are looked at. */
 static double ha_part_of(double start, double end, double part)
@@ -146,6 +149,138 @@ static double ha_part_of(double start, double end, double part)
     return start + way;
 }
 
+//if bounds
+//item ha_keep
+/* The values of indicators at a point of a step are kept in a place. */
+static void ha_keep(ha_model *m, int place)
+{
+    $ha_copy(m->seen + place * HA_NG, m->beyond, HA_NG);
+}
+
+//item ha_keep_as
+/* What is kept in one place is kept in another one as well. */
+static void ha_keep_as(ha_model *m, int from, int to)
+{
+    $ha_copy(m->seen + to * HA_NG, m->seen + from * HA_NG, HA_NG);
+}
+
+//item ha_may_hide
+/* Whether an indicator may have been zero twice between two points, as one between them tells: it bends there by more than half of its least
+ * magnitude. */
+static int ha_may_hide(const ha_model *m, int before, int middle, int after)
+{
+    int i;
+    for (i = 0; i < HA_NG; ++i) {
+        const $real a = m->seen[before * HA_NG + i];
+        const $real b = m->seen[middle * HA_NG + i];
+        const $real c = m->seen[after * HA_NG + i];
+        const $real straight = $0.5 * (a + c);
+        const $real bend = $fabs(b - straight);
+        const $real least = $0.5 * $ha_min($ha_min($fabs(a), $fabs(b)), $fabs(c));
+        if (bend > least && bend > $HA_ZERO * m->most_beyond[i]) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+//item ha_may_hide_in_step
+/* Whether an indicator may have been zero twice in a step of this length, whose end has the present values: on the way from the begin of the
+ * step before, it bends by more than half of its least magnitude. */
+static int ha_may_hide_in_step(const ha_model *m, double length)
+{
+    const double part = m->last_step / (m->last_step + length);
+    int i;
+    for (i = 0; i < HA_NG && m->last_step > 0.0; ++i) {
+        const $real a = m->seen[HA_BEFORE * HA_NG + i];
+        const $real b = m->seen[HA_START * HA_NG + i];
+        const $real c = m->beyond[i];
+        const $real way = $narrow part * (c - a);
+        const $real bend = $fabs(b - a - way);
+        const $real least = $0.5 * $ha_min($fabs(b), $fabs(c));
+        if (bend > least && bend > $HA_ZERO * m->most_beyond[i]) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+//item ha_step_ended
+/* A step of this length has ended, whose values are the present ones. */
+static void ha_step_ended(ha_model *m, double length)
+{
+    $ha_keep_as(m, HA_START, HA_BEFORE);
+    $ha_keep(m, HA_START);
+    m->last_step = length;
+}
+
+//item ha_hidden
+/* A crossing inside a part of a step at whose ends there is none, found by halving the part wherever an indicator may hide one: it lies
+ * between the two times. */
+static int ha_hidden(ha_model *m, int part, double begin, double end, int *looks, double *before, double *after, int *crossed)
+{
+    double ends[HA_INSIDE];
+    int open = HA_FIRST;
+    int turn;
+    *before = begin;
+    ends[HA_FIRST] = end;
+    $ha_keep_as(m, part - 1, HA_BEGIN);
+    $ha_keep_as(m, part, HA_FIRST);
+    for (turn = 0; turn < 600 && open >= HA_FIRST; ++turn) {
+        const double half = 0.5 * (ends[open] - *before);
+        const double middle = *before + half;
+        const int inside = middle > *before && middle < ends[open] && *looks < 240;
+        if (inside) {
+            int status;
+            ++*looks;
+            status = $ha_look(m, middle, crossed);
+            if (status != $MODEL_OK || *crossed) {
+                *after = middle;
+                return status;
+            }
+            $ha_keep(m, HA_MIDDLE);
+        }
+        if (inside && open + 1 < HA_INSIDE && $ha_may_hide(m, HA_BEGIN, HA_MIDDLE, open)) {
+            ++open;
+            $ha_keep_as(m, HA_MIDDLE, open);
+            ends[open] = middle;
+        } else {
+            *before = ends[open];
+            $ha_keep_as(m, open, HA_BEGIN);
+            --open;
+        }
+    }
+    return $MODEL_OK;
+}
+
+//item ha_first_crossing
+/* The first time after m->t, up to *end, at which an event indicator has another sign than that held: if there is one, *end is
+ * it then, a rounding error behind the crossing. Two crossings of one function inside one part of the step are found by halving the part
+ * until its values do not bend so any more. */
+static int ha_first_crossing(ha_model *m, double *end, int *crossed)
+{
+    const double start = m->t;
+    const double finest = 2.168404344971009e-19 * (*end - start);
+    int status = $ha_look(m, start, crossed);
+    int looks = 0;
+    int part;
+    $ha_keep(m, 0);
+    for (part = 1; part <= 4 && status == $MODEL_OK; ++part) {
+        double before = $ha_part_of(start, *end, (double)(part - 1));
+        double at = part == 4 ? *end : $ha_part_of(start, *end, (double)part);
+        status = $ha_look(m, at, crossed);
+        if (status == $MODEL_OK && !*crossed) {
+            $ha_keep(m, part);
+            status = $ha_hidden(m, part, before, at, &looks, &before, &at, crossed);
+        }
+        if (status == $MODEL_OK && *crossed) {
+            return $ha_bracket(m, before, at, finest, end);
+        }
+    }
+    return status;
+}
+
+//else
 //item ha_first_crossing
 /* The first time after m->t, up to *end, at which an event indicator has another sign than that held: if there is one, *end is
  * it then, a rounding error behind the crossing. Two crossings of one function inside one part of the step are found where its values bend
@@ -181,7 +316,8 @@ static int ha_first_crossing(ha_model *m, double *end, int *crossed)
     return status;
 }
 
-//item ha_step_to
+//end
+//entry ha_step_to
 /* From m->t to a target, without a jump between them, or to the first crossing of an event indicator on the way. After an event the
  * inside of the step is looked at as well: what has been changed there may come back at once. */
 static int ha_step_to(ha_model *m, double target, int jumps)
@@ -194,13 +330,22 @@ static int ha_step_to(ha_model *m, double target, int jumps)
         status = $model_switched(m, end, m->trial, &switched);
     }
     m->handled = 0;
+//if bounds
+    if (status == $MODEL_OK && (handled || switched || $ha_may_hide_in_step(m, end - m->t))) {
+//else
     if (status == $MODEL_OK && (handled || switched)) {
+//end
         int same;
         status = $ha_first_crossing(m, &end, &switched);
         if (status == $MODEL_OK) {
             status = $ha_look(m, end, &same);
         }
     }
+//if bounds
+    if (status == $MODEL_OK) {
+        $ha_step_ended(m, end - m->t);
+    }
+//end
     if (status != $MODEL_OK) {
         return status;
     }
@@ -217,7 +362,7 @@ static int ha_step_to(ha_model *m, double target, int jumps)
 }
 
 //else
-//item ha_step_to
+//entry ha_step_to
 /* From m->t to a target, without a jump between them. */
 static int ha_step_to(ha_model *m, double target, int jumps)
 {
@@ -246,7 +391,7 @@ static int ha_step_to(ha_model *m, double target, int jumps)
 }
 
 //end
-//always
+//public $model_step_until
 int $model_step_until($model *m, double end)
 {
     const double slack = 1e-9 * m->step;
@@ -268,11 +413,21 @@ int $model_step_until($model *m, double end)
     }
     if (m->cross_due) {
         status = $model_cross(m, m->t, m->x);
+//if bounds
+        if (status == $MODEL_OK) {
+            status = $ha_go_on(m, m->t, m->x);
+        }
+//end
     }
     for (i = 0; i <= $MODEL_MOST_JUMPS && status == $MODEL_OK && m->t + slack < end; ++i) {
         const double jump = $model_next_jump(m, m->t);
         const int jumps = jump <= end + slack;
         status = $ha_step_to(m, jumps ? jump : end, jumps);
+//if bounds
+        if (status == $MODEL_OK) {
+            status = $ha_go_on(m, m->t, m->x);
+        }
+//end
 //if derivatives
         if (status == $MODEL_OK && m->stops && m->crossed == m->t) {
             return $model_observe(m, m->t, m->x, m->y);
@@ -285,12 +440,14 @@ int $model_step_until($model *m, double end)
     return status == $MODEL_OK ? $model_observe(m, m->t, m->x, m->y) : status;
 }
 
+//public $model_step
 int $model_step($model *m)
 {
     $ha_ticks_pass(m, m->t);
     return $model_step_until(m, m->tick_next);
 }
 
+//public $model_align
 void $model_align($model *m)
 {
     $ha_ticks_from(m, m->t);

@@ -88,7 +88,7 @@ static int ha_explain(ha_model *m, double t, const $real *x, int code, int where
 }
 
 //end
-//always
+//public $model_rates
 int $model_rates($model *m, double t, const $real *x, $real *dx)
 {
     const int status = $ha_run(m, $ha_rates_code, t, x, dx, HA_NX);
@@ -108,6 +108,7 @@ int $model_rates($model *m, double t, const $real *x, $real *dx)
     return $MODEL_OK;
 }
 
+//public $model_observe
 int $model_observe($model *m, double t, const $real *x, $real *y)
 {
 //if outputs
@@ -220,7 +221,7 @@ static int ha_derivative_along(ha_model *m, double t, const $real *x, ha_along_c
     }
     return $MODEL_OK;
 }
-//always
+//public $model_tangent
 int $model_tangent($model *m, double t, const $real *x, const $real *v, $real *dv)
 {
     $ha_fill(m->along, $0.0, HA_DIRECTION);
@@ -246,7 +247,7 @@ static int ha_time_derivative(ha_model *m, double t, const $real *x, $real *dv)
 
 //end
 //if derivatives
-//always
+//public $model_directional
 int $model_directional($model *m, double t, const $real *x, const $real *v, const $real *w, $real *dv, $real *dy)
 {
     $real *e = m->along;
@@ -272,7 +273,7 @@ int $model_directional($model *m, double t, const $real *x, const $real *v, cons
 
 //end
 //if switches
-//always
+//public $model_indicators
 int $model_indicators($model *m, double t, const $real *x, $real *g)
 {
     static const int conditions[] = {$SWITCH_CONDITIONS};
@@ -288,9 +289,17 @@ int $model_indicators($model *m, double t, const $real *x, $real *g)
         if ($ha_kinds[conditions[i]] == 0) {
             g[next] = m->operands[i];
             /* Where sides have just been taken, an operand that rounding puts on the other one is on the side taken. */
+//if bounds
+            /* So is one that is zero and watched from further on. */
+            if (t == m->signs_taken || (m->floors[conditions[i]] > $0.0 && $fabs(g[next]) <= m->floors[conditions[i]])) {
+                const $real size = $ha_max($ha_max($fabs(g[next]), $DBL_MIN), m->floors[conditions[i]]);
+                g[next] = m->held[conditions[i]] != 0.0 ? size : -size;
+            }
+//else
             if (t == m->signs_taken) {
                 g[next] = m->held[conditions[i]] != 0.0 ? $ha_max($fabs(g[next]), $DBL_MIN) : -$fabs(g[next]);
             }
+//end
             ++next;
             continue;
         }
@@ -307,6 +316,10 @@ int $model_indicators($model *m, double t, const $real *x, $real *g)
 //end
         next += 2;
     }
+//if bounds
+    /* Other modes have more of them. */
+    $ha_fill(g + HA_NG, $1.0, $MODEL_INDICATORS - HA_NG);
+//end
     return $MODEL_OK;
 }
 
@@ -317,6 +330,12 @@ static int ha_take_sides(ha_model *m, double t, const $real *x)
     static const int conditions[] = {$SWITCH_CONDITIONS};
     int status;
     int i;
+//if bounds
+    status = $ha_watch_margins(m, t, x);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
     m->state_hold = HA_TAKE;
 //if held
     $ha_place(m, t);
@@ -341,12 +360,15 @@ static int ha_take_sides(ha_model *m, double t, const $real *x)
             break;
         }
     }
+//if bounds
+    (void)$ha_hold_ended(m);
+//end
     m->state_hold = HA_KEEP;
     m->signs_taken = t;
     return status;
 }
 
-//always
+//public $model_switched
 int $model_switched($model *m, double t, const $real *x, int *switched)
 {
     const int status = $model_indicators(m, t, x, m->beyond);
@@ -359,6 +381,9 @@ int $model_switched($model *m, double t, const $real *x, int *switched)
         if (m->beyond[i] != m->beyond[i]) {
             return $ha_fail(m, $MODEL_CONDITION_NOT_FINITE, i, t);
         }
+//if bounds
+        $ha_note(&m->most_beyond[i], m->beyond[i]);
+//end
         if (m->sides[i] != (m->beyond[i] > $0.0)) {
             *switched = 1;
         }
@@ -486,6 +511,21 @@ static int ha_note_motion(ha_model *m, double t, const $real *x, ha_code code, i
 }
 
 //end
+//if newton
+//item ha_leave_solutions
+/* Any solution may come next. */
+static void ha_leave_solutions(ha_model *m)
+{
+    int i;
+    for (i = 0; i < $BLOCKS; ++i) {
+        m->following[i] = 0;
+//if sought_positions
+        m->motion_known[i] = 0;
+//end
+    }
+}
+
+//end
 //if follows
 //item ha_follow_solutions
 /* Goes on with the Newton solutions at (t, x). */
@@ -531,7 +571,7 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
 }
 
 //end
-//always
+//public $model_accept
 int $model_accept($model *m, double t, const $real *x)
 {
 //if delays
@@ -558,6 +598,7 @@ int $model_accept($model *m, double t, const $real *x)
 //end
 }
 
+//public $model_next_jump
 double $model_next_jump($model *m, double t)
 {
     double next = HUGE_VAL;
@@ -607,7 +648,7 @@ double $model_next_jump($model *m, double t)
 }
 
 //if rates_motion
-//always
+//public $model_follow
 /* An importer may not tell of every step: positions are followed from each point at which it asks for rates, which have just
  * been found. */
 int $model_follow($model *m, double t, const $real *x)

@@ -15,14 +15,20 @@ $OBLIGATION_LINES
 #error "results need arithmetic by the standard: compile without -ffast-math"
 #endif
 
+//always
 typedef $model ha_model;
 
+//always
 enum {
     HA_NX = $MODEL_STATES,
     HA_NU = $MODEL_INPUTS,
     HA_NP = $MODEL_PARAMETERS,
     HA_NY = $MODEL_OUTPUTS,
-    HA_NZ = $COUNT_HELD,
+    HA_NZ = $COUNT_HELD
+};
+
+//always
+enum {
     HA_NK = $COUNT_CONSERVED,
     HA_NQ = $COUNT_POSITIONS,
     HA_NG = $COUNT_INDICATORS,
@@ -34,3 +40,15 @@ enum {
     HA_POSITIONS_AT = $LAYOUT_POSITIONS
 };
 
+//if impulses
+//always
+enum {
+    /* What storages keep; balances of impulses; states and constants by which storages tell what they keep; impulses. */
+    HA_STORED = $JUMP_STORED,
+    HA_BALANCES = $JUMP_BALANCES,
+    HA_UNKNOWNS = $JUMP_UNKNOWNS,
+    HA_IMPULSES = $JUMP_IMPULSES,
+    /* Where what resets change begins among what is computed. */
+    HA_FIRST_MOVED = $FIRST_MOVED
+};
+//end

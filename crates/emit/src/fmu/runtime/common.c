@@ -65,6 +65,10 @@ typedef struct ha_fmu {
 //if clauses
     /* Whether the last event has changed states, and whether the step completed last asks for one. */
     int moved;
+//if bounds
+    /* Whether the last event has led to another mode. */
+    int renewed;
+//end
     int event_due;
 //end
     char name[128];
@@ -330,8 +334,14 @@ static int ha_event(ha_fmu *f, double *next)
 {
 //if clauses
     double before[HA_NX > 0 ? HA_NX : 1];
+//if bounds
+    const int mode = f->s.m.mode;
+//end
     memcpy(before, f->s.m.x, sizeof before);
     f->moved = 0;
+//end
+//if bounds
+    f->s.m.outside = f->exchange;
 //end
     if (!f->s.fresh) {
 //if leaps
@@ -355,6 +365,11 @@ static int ha_event(ha_fmu *f, double *next)
         for (i = 0; i < HA_NX; ++i) {
             f->moved = f->moved || f->s.m.x[i] != before[i];
         }
+//if bounds
+        /* States are others in another mode. */
+        f->renewed = f->s.m.mode != mode;
+        f->moved = f->moved || f->renewed;
+//end
     }
 //end
     *next = $model_next_jump(&f->s.m, f->s.m.t);
@@ -388,6 +403,16 @@ static int ha_stepped(ha_fmu *f)
         ha_changed(f);
 //end
     }
+//if bounds
+    {
+        /* A branch may have ended where no indicator has told it. */
+        int ended;
+        if ($model_ended(m, m->t, m->x, &ended) != $MODEL_OK) {
+            return ha_failed(f);
+        }
+        f->event_due = f->event_due || ended;
+    }
+//end
     return ha_scale(f);
 }
 
@@ -531,15 +556,23 @@ static int ha_deserialise(ha_fmu *f, const void *bytes, size_t size, void **save
     return 1;
 }
 
-static void ha_nominals(double *values)
+static void ha_nominals(const ha_fmu *f, double *values)
 {
     static const double nominals[] = {
 $NOMINALS
     };
     int i;
+//if bounds
+    $model_sizes(&f->s.m, values);
+    for (i = 0; i < HA_NX; ++i) {
+        values[i] = values[i] > 0.0 ? values[i] : nominals[i];
+    }
+//else
+    (void)f;
     for (i = 0; i < HA_NX; ++i) {
         values[i] = nominals[i];
     }
+//end
 }
 
 static ha_fmu *ha_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *))

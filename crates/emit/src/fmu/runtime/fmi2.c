@@ -265,7 +265,11 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
     }
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
+//if bounds
+    eventInfo->nominalsOfContinuousStatesChanged = f->renewed ? fmi2True : fmi2False;
+//else
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
+//end
 //if clauses
     eventInfo->valuesOfContinuousStatesChanged = f->moved ? fmi2True : fmi2False;
 //else
@@ -350,7 +354,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
     if (c == NULL || nx != HA_NX) {
         return fmi2Error;
     }
-    ha_nominals(x_nominal);
+    ha_nominals((const ha_fmu *)c, x_nominal);
     return fmi2OK;
 }
 

@@ -368,7 +368,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     }
     *discreteStatesNeedUpdate = fmi3False;
     *terminateSimulation = fmi3False;
+//if bounds
+    *nominalsOfContinuousStatesChanged = f->renewed != 0;
+//else
     *nominalsOfContinuousStatesChanged = fmi3False;
+//end
 //if clauses
     *valuesOfContinuousStatesChanged = f->moved != 0;
 //else
@@ -456,7 +460,7 @@ fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 
     if (instance == NULL || nContinuousStates != HA_NX) {
         return fmi3Error;
     }
-    ha_nominals(nominals);
+    ha_nominals((const ha_fmu *)instance, nominals);
     return fmi3OK;
 }
 

@@ -1,0 +1,209 @@
+//! Set-valued laws in exported C: the modes that a run comes to, and all that is recorded, to the bits of a run by the same
+//! steps.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use halfarrow::{Export, FixedMethod, Method, Model, Record, Run, Target};
+
+use super::set_valued_random::{circuit, row};
+
+/// What a machine is, how it is stepped, and how far.
+struct Case {
+    name: &'static str,
+    text: String,
+    method: FixedMethod,
+    step: f64,
+    to: f64,
+}
+
+fn case(name: &'static str, text: impl Into<String>, method: FixedMethod, to: f64) -> Case {
+    Case { name, text: text.into(), method, step: 1e-3, to }
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("modes_in_c").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+fn model(text: &str) -> Model {
+    Model::from_text("machine.bond", text, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+/// The rows that the exported program prints, and what it says at its end.
+fn by_c(case: &Case) -> (Vec<String>, Vec<Vec<f64>>, String) {
+    let options = Export { target: Target::C, method: case.method, step: case.step, ..Export::default() };
+    let written = model(&case.text).export(&options).unwrap_or_else(|e| panic!("{}: {}", case.name, e.render(false)));
+    let folder = folder(case.name);
+    for file in &written.files {
+        std::fs::write(folder.join(&file.path), &file.bytes).expect("a file");
+    }
+    let sources = written.files.iter().filter(|f| f.path.ends_with(".c")).map(|f| f.path.as_str());
+    let flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"];
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_string());
+    let mut compile = Command::new(compiler);
+    let compile = compile.current_dir(&folder).args(flags).args(sources).args(["-o", "program", "-lm"]);
+    let out = compile.output().expect("a C compiler: cc, or what CC names");
+    assert!(out.status.success(), "{}: {}", case.name, String::from_utf8_lossy(&out.stderr));
+    let out = Command::new(folder.join("program")).arg(case.to.to_string()).output().expect("it runs");
+    let text = String::from_utf8(out.stdout).expect("text");
+    let mut lines = text.lines();
+    let names = lines.next().expect("names").split(',').skip(1).map(str::to_string).collect();
+    let rows = lines.map(|line| line.split(',').map(|v| v.parse().expect("a number")).collect()).collect();
+    (names, rows, String::from_utf8_lossy(&out.stderr).into_owned())
+}
+
+/// Where C and a run by the same steps differ.
+fn difference(case: &Case) -> Option<String> {
+    let (names, rows, said) = by_c(case);
+    let run = Run {
+        to: case.to,
+        method: Method::Fixed(case.method),
+        step: Some(case.step),
+        every: Some(case.step),
+        record: Record::Names(names.clone()),
+        ..Run::default()
+    };
+    let result = match model(&case.text).simulate(&run, &mut |_| true) {
+        Ok(result) => result,
+        Err(why) => return (said.is_empty()).then(|| format!("{}: only `simulate` stops: {}", case.name, why.render(false))),
+    };
+    if !said.is_empty() || rows.len() != result.trace.times.len() {
+        return Some(format!("{}: {} rows for {}: {said}", case.name, rows.len(), result.trace.times.len()));
+    }
+    for (k, row) in rows.iter().enumerate() {
+        let expected = result.trace.columns.iter().map(|c| c.values[k]);
+        if let Some((j, wanted)) = expected.enumerate().find(|(j, wanted)| row[j + 1] != *wanted) {
+            return Some(format!("{} at {}: {} is {:?}, not {wanted:?}", case.name, row[0], names[j], row[j + 1]));
+        }
+    }
+    None
+}
+
+fn check(cases: &[Case]) {
+    let half = cases.len().div_ceil(2);
+    let faults: Vec<String> = std::thread::scope(|scope| {
+        let parts: Vec<_> = cases
+            .chunks(half)
+            .map(|part| scope.spawn(|| part.iter().filter_map(difference).collect::<Vec<_>>()))
+            .collect();
+        parts.into_iter().flat_map(|part| part.join().expect("it ends")).collect()
+    });
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Three phases and six diodes: no storage, nothing but modes.
+fn three_phases() -> String {
+    let mut text = String::from("model Three\nSe:ground(0) -> 0:star\n0:p\n0:n\n");
+    for k in 0..3 {
+        text += &format!("star -> 1:phase{k} -> 0:line{k}\nSe:u{k}(100*sin(300*t - {k}*2*pi/3)) -> phase{k}\n");
+        text += &format!("line{k} -> 1:up{k} -> p\nup{k} -> R:du{k}(0 <= f, 0 <= -e)\n");
+        text += &format!("n -> 1:down{k} -> line{k}\ndown{k} -> R:dd{k}(0 <= f, 0 <= -e)\n");
+    }
+    text + "p -> 1:out -> n\nout -> R:load(10)\noutput u = load.e\n"
+}
+
+/// Diodes, switches, friction, clutches, contacts that open, close, bounce, accumulate and share out impulses.
+#[test]
+fn machines() {
+    use FixedMethod::{Heun, ImplicitMidpoint, LinearlyImplicitEuler, Rk4, Rosenbrock};
+    check(&[
+        case(
+            "coil",
+            "model Coil\nSe:src(10*sin(300*t)) -> 1:loop\nloop -> R:d(0 <= f, 0 <= -e)\nloop -> I:coil(0.1)\n\
+             loop -> R:load(20)\noutput i = coil.f, u = d.e\n",
+            Rk4,
+            0.1,
+        ),
+        case("three", three_phases(), Heun, 0.05),
+        case(
+            "buck",
+            "model Buck\nSe:src(24) -> 1:in -> 0:sw\nin -> Sw:s(on = mod(t, 1e-2) < 0.4e-2)\nsw -> 1:free\n\
+             free -> R:d(0 <= -f, 0 <= e)\nsw -> 1:coil -> 0:out\ncoil -> I:l(1e-1)\nout -> C:c(1e-2)\n\
+             out -> R:load(20)\n",
+            Rosenbrock,
+            1.0,
+        ),
+        case(
+            "belt",
+            "model Belt\nSf:belt(0.1) -> 0:contact\ncontact -> 1:rub -> R:pad(friction = 1, stiction = 1.5)\n\
+             contact -> 1:block\nblock -> I:mass(1)\nblock -> C:spring(k = 10)\ndiscrete n = 0\n\
+             when spring.e > 1.5 - 1e-9 { n = n + 1 }\n",
+            Rk4,
+            6.0,
+        ),
+        case(
+            "clutch",
+            "model Clutch\n1:a -> I:j1(1, f0 = 30)\n1:b -> I:j2(2)\na -> 0:slip -> b\nslip -> R:pad(friction = 10)\n",
+            LinearlyImplicitEuler,
+            3.0,
+        ),
+        case(
+            "ball",
+            "model Ball\nSe:weight(-9.81) -> 1:v -> I:m(1)\nstate x' = v.f from 1\n\
+             constraint floor: x >= 0 (restitution = 0.8)\noutput force = floor.e\n",
+            Rk4,
+            5.0,
+        ),
+        case(
+            "stack",
+            "model Stack\nSe:w1(-10) -> 1:v1 -> I:m1(1)\nSe:w2(-20) -> 1:v2 -> I:m2(2)\nstate x1' = v1.f from 0.5\n\
+             state x2' = v2.f from 1\nconstraint floor: x1 >= 0 (restitution = 0.5)\n\
+             constraint between: x2 - x1 >= 0.25 (restitution = 0.5)\n",
+            Heun,
+            4.0,
+        ),
+        case(
+            "walls",
+            "model Walls\n1:a -> I:ma(1, f0 = 3)\n1:b -> I:mb(2)\n1:c -> I:mc(1)\nstate xa' = a.f from 0\n\
+             state xb' = b.f from 1\nstate xc' = c.f from 2\nconstraint ab: xb - xa >= 1\nconstraint bc: xc - xb >= 1\n\
+             constraint left: xa >= 0\nconstraint right: xc <= 2\n",
+            ImplicitMidpoint,
+            1.0,
+        ),
+        case(
+            "cubes",
+            "model Cubes\nSe:src(8*sin(20*t)) -> 1:in -> 0:n\nin -> R:rs(e = 2*f + f^3)\nn -> 1:up\n\
+             up -> R:d(0 <= f, 0 <= 0.7 - e)\nup -> R:rd(e = f^3 + f)\nn -> C:cap(0.01)\n",
+            Rk4,
+            2.0,
+        ),
+        case(
+            "brief",
+            "model Brief\n1:v -> I:m(1)\nv -> C:spring(k = 1, q0 = 1)\nstate x' = v.f from 1\n\
+             constraint wall: x >= -0.9999 (restitution = 1)\n",
+            Rk4,
+            5.0,
+        ),
+    ]);
+}
+
+/// Random circuits and rows of bodies.
+#[test]
+fn random() {
+    let machines = |seed: u64| [("circuit", circuit(seed)), ("row", row(seed, false)), ("bouncing", row(seed, true))];
+    let methods = [FixedMethod::Rk4, FixedMethod::Heun, FixedMethod::Rosenbrock];
+    for seed in 3000..3003u64 {
+        let cases = machines(seed).into_iter().map(|(name, (text, _))| Case {
+            step: 5e-3,
+            ..case(name, text, methods[seed as usize % methods.len()], 3.0)
+        });
+        check(&cases.collect::<Vec<_>>());
+    }
+}
+
+/// What exported code does not know is refused.
+#[test]
+fn refusals() {
+    let many: String = (0..9).map(|k| format!("v -> R:d{k}(friction = 1)\n")).collect();
+    let text = format!("model Many\nSe:pull(3*sin(2*t)) -> 1:v -> I:m(1)\n{many}");
+    let told = model(&text).export(&Export::default()).expect_err("a refusal").render(false);
+    assert!(told.contains("more than 256 combinations"), "{told}");
+    let text = "model Single\nSe:pull(3*sin(2*t)) -> 1:v -> I:m(1)\nv -> R:pad(friction = 1)\n";
+    let single = Export { real: halfarrow::Real::Float, ..Export::default() };
+    let told = model(text).export(&single).expect_err("a refusal").render(false);
+    assert!(told.contains("double precision"), "{told}");
+}
