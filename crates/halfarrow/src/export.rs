@@ -157,6 +157,7 @@ pub struct CostReport {
     pub most_jumps: u64,
     pub delay_points: u64,
     pub memory: u64,
+    pub modes: u64,
 }
 
 /// Combinations of branches of set-valued laws at most in exported code.
@@ -307,6 +308,7 @@ impl<'a> ExportedProgram<'a> {
             most_jumps: c.most_jumps,
             delay_points: c.delay_points,
             memory: c.memory,
+            modes: c.modes,
         };
         ExportReport {
             name: name.to_string(),

@@ -69,7 +69,9 @@ fn difference(case: &Case) -> Option<String> {
     };
     let result = match model(&case.text).simulate(&run, &mut |_| true) {
         Ok(result) => result,
-        Err(why) => return (said.is_empty()).then(|| format!("{}: only `simulate` stops: {}", case.name, why.render(false))),
+        Err(why) => {
+            return (said.is_empty()).then(|| format!("{}: only `simulate` stops: {}", case.name, why.render(false)));
+        }
     };
     if !said.is_empty() || rows.len() != result.trace.times.len() {
         return Some(format!("{}: {} rows for {}: {said}", case.name, rows.len(), result.trace.times.len()));

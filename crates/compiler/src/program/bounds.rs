@@ -57,7 +57,8 @@ impl Program {
         let groups: Vec<[usize; 2]> = (0..self.set_valued.len())
             .map(|law| [Measure::Effort, Measure::Flow].map(|measure| self.group(law, measure, &mut kinds)))
             .collect();
-        let mut bounds = Bounds { branches: self.set_valued.iter().map(|law| law.present).collect(), ..Bounds::default() };
+        let mut bounds =
+            Bounds { branches: self.set_valued.iter().map(|law| law.present).collect(), ..Bounds::default() };
         let mut numbers = vec![0; self.set_valued.len()];
         let mut place = 0;
         for (clause, c) in self.clauses.iter().enumerate() {
@@ -107,9 +108,7 @@ impl Program {
     /// The condition of the state that a truth value is.
     fn condition_of(&self, value: Value) -> Option<ConditionId> {
         match self.values.op(value) {
-            Op::Sign(condition, _) => {
-                Some(condition).filter(|c| self.conditions[*c].trigger == EventTrigger::State)
-            }
+            Op::Sign(condition, _) => Some(condition).filter(|c| self.conditions[*c].trigger == EventTrigger::State),
             _ => None,
         }
     }

@@ -16,13 +16,13 @@
 mod op;
 
 mod angles;
+mod bounds;
 pub mod calculus;
 mod checks;
 mod dataflow;
 mod dependence;
 mod derive;
 pub mod elimination;
-mod bounds;
 mod events;
 mod idle;
 mod jacobian;

@@ -200,7 +200,9 @@ impl<'f> Composition<'f> {
         text += &fragment.text[from..];
         match &fragment.kind {
             Kind::Public(name) if self.differing.contains(name.as_ref()) => {
-                let head = text.find(&format!("{name}{}(", behind(mode))).map_or(0, |at| text[..at].rfind('\n').map_or(0, |n| n + 1));
+                let head = text
+                    .find(&format!("{name}{}(", behind(mode)))
+                    .map_or(0, |at| text[..at].rfind('\n').map_or(0, |n| n + 1));
                 text.insert_str(head, "static ");
                 text
             }
@@ -237,7 +239,9 @@ impl<'f> Composition<'f> {
         }
         parts.push("/* ---- of all modes ---- */\n".to_string());
         parts.extend(self.stands(self.modes.len()).map(|f| self.of_mode(f, 0, &entries)));
-        parts.extend(self.differing.iter().filter(|name| entries.contains(*name)).map(|name| self.dispatch(name, &heads[name])));
+        parts.extend(
+            self.differing.iter().filter(|name| entries.contains(*name)).map(|name| self.dispatch(name, &heads[name])),
+        );
         parts.retain(|part| !part.is_empty());
         parts.join("\n")
     }
@@ -261,7 +265,11 @@ impl<'f> Composition<'f> {
         let mut text = format!("{}\n{{\n    switch (m->mode) {{\n", head.head);
         for mode in (0..self.modes.len()).filter(has) {
             let end = if gives.is_empty() { "\n        break;" } else { "" };
-            text += &format!("    case {mode}:\n        {gives}{name}{}({});{end}\n", behind(mode), head.arguments.join(", "));
+            text += &format!(
+                "    case {mode}:\n        {gives}{name}{}({});{end}\n",
+                behind(mode),
+                head.arguments.join(", ")
+            );
         }
         let unused: String = head.arguments.iter().map(|a| format!("        (void){a};\n")).collect();
         let last = match gives {
@@ -294,7 +302,11 @@ impl Head {
         let head = text[start..end].to_string();
         let inside = &text[at + name.len() + 1..end - 1];
         let argument = |one: &str| names(one).last().map(|n| n.1.to_string());
-        Head { is_static: head.starts_with("static "), arguments: inside.split(',').filter_map(argument).collect(), head }
+        Head {
+            is_static: head.starts_with("static "),
+            arguments: inside.split(',').filter_map(argument).collect(),
+            head,
+        }
     }
 }
 

@@ -76,7 +76,8 @@ fn bounds(plans: &[Plan]) -> String {
     }
     if let Some(tables) = &plan.bounds {
         let (modes, combinations) = tables.modes.counts();
-        bounds.push(format!("{modes} modes tried at an instant, of {combinations} combinations of branches, 200 times"));
+        bounds
+            .push(format!("{modes} modes tried at an instant, of {combinations} combinations of branches, 200 times"));
     }
     if plan.export.method == Method::ImplicitMidpoint {
         bounds.push("20 iterations of the method".into());

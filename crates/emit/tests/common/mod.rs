@@ -129,7 +129,8 @@ pub fn export_as(
     };
     let recorded = model.recorded().to_vec();
     let modes = &[];
-    let export = Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real, modes };
+    let export =
+        Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real, modes };
     let written = write(&export)?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());

@@ -169,7 +169,8 @@ impl ModeTables<'_> {
         let (modes, bounds) = (self.modes, &self.bounds);
         let symbols = |all: &[Symbol]| all.iter().map(|s| modes.symbol(s).to_string()).collect::<Vec<_>>();
         let rows = |rows: Vec<Vec<i64>>, columns: usize| {
-            let row = |row: &Vec<i64>| format!("    {{{}}}", row.iter().map(i64::to_string).collect::<Vec<_>>().join(", "));
+            let row =
+                |row: &Vec<i64>| format!("    {{{}}}", row.iter().map(i64::to_string).collect::<Vec<_>>().join(", "));
             match rows.is_empty() {
                 true => row(&vec![0; columns]),
                 false => rows.iter().map(row).collect::<Vec<_>>().join(",\n"),

@@ -145,11 +145,11 @@ static int ha_first_of(int first, int combination, int leaping)
     return leaping >= 0 && $ha_distance(combination, first) > 2 ? -1 : combination;
 }
 
-//item ha_search
+//item ha_search_mode
 /* The mode in which the run goes on, from the one that was left: by exchanging the branch with the least number that has ended (Murty's
  * principal pivoting), and where that leads in a circle or to a mode that cannot be, by the number of exchanges. The combination, or
  * -1. */
-static int ha_search(ha_model *m, double t, $real *x, const int *ended)
+static int ha_search_mode(ha_model *m, double t, $real *x, const int *ended)
 {
     const int from = m->mode;
     int first = $ha_combination($ha_branches[from]);
@@ -235,7 +235,7 @@ static int ha_settle(ha_model *m, double t, $real *x, int *switched)
     }
     *switched = 1;
     status = $ha_leave(m, t, x);
-    if (status == $MODEL_OK && $ha_search(m, t, x, ended) < 0) {
+    if (status == $MODEL_OK && $ha_search_mode(m, t, x, ended) < 0) {
         status = $ha_fail(m, $MODEL_NO_MODE, first, t);
     }
     return status;
