@@ -43,6 +43,7 @@ fn written(one: &Exported, version: Version) -> fmu::Written {
         derivatives: true,
         real: halfarrow_emit::Real::Double,
         modes: &[],
+        independent: &[],
     };
     fmu::write(&export, version).expect("an explicit program")
 }

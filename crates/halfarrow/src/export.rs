@@ -3,6 +3,7 @@
 
 use std::ops::ControlFlow;
 
+use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
 use halfarrow_compiler::textbook::show;
@@ -162,6 +163,8 @@ pub struct CostReport {
 
 /// Combinations of branches of set-valued laws at most in exported code.
 const MOST_MODES: usize = 256;
+/// Choices of independent variables at most in it: where there are more it keeps its own.
+const MOST_SETS: usize = 16;
 
 impl Model {
     /// Writes the model, in memory.
@@ -251,8 +254,9 @@ struct ExportedProgram<'a> {
     program: Program,
     start: emit::Start,
     recorded: Vec<usize>,
-    /// The other modes of set-valued laws.
+    /// The other modes, and what is independent in the first one.
     modes: Vec<emit::c::Mode>,
+    independent: Vec<Symbol>,
 }
 
 impl<'a> ExportedProgram<'a> {
@@ -265,8 +269,8 @@ impl<'a> ExportedProgram<'a> {
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
         let recorded = system.recorded().to_vec();
-        let modes = modes(model, &system)?;
-        Ok(ExportedProgram { export, program: system.program().clone(), system, start, recorded, modes })
+        let (independent, modes) = modes(model, export, &system, &start)?;
+        Ok(ExportedProgram { export, program: system.program().clone(), system, start, recorded, modes, independent })
     }
 
     fn asked(&self, derivatives: bool) -> Result<emit::c::Export<'_>, Problem> {
@@ -279,6 +283,7 @@ impl<'a> ExportedProgram<'a> {
             derivatives,
             real: self.export.real,
             modes: &self.modes,
+            independent: &self.independent,
         })
     }
 
@@ -323,12 +328,17 @@ impl<'a> ExportedProgram<'a> {
     }
 }
 
-/// The modes that runs may come to from the first one.
-fn modes(model: &Model, system: &exec::Model) -> Result<Vec<emit::c::Mode>, Error> {
-    if model.graph.set_valued.is_empty() {
-        return Ok(Vec::new());
-    }
-    let all = system.programs_of_modes(MOST_MODES).ok_or_else(|| {
+/// The modes that runs may come to from the first one, and what is independent in that.
+fn modes(
+    model: &Model,
+    export: &Export,
+    system: &exec::Model,
+    start: &emit::Start,
+) -> Result<(Vec<Symbol>, Vec<emit::c::Mode>), Error> {
+    // Single precision does not tell what is carried over, and functions of CasADi have no memory of a mode.
+    let one = export.real == Real::Float || export.target == Target::Casadi;
+    let sets = if one { 0 } else { MOST_SETS };
+    let all = system.clone().programs_of_modes((0.0, &start.states), MOST_MODES, sets).ok_or_else(|| {
         let laws = model.graph.set_valued.len();
         let reason = format!(
             "{laws} set-valued laws have more than {MOST_MODES} combinations of branches: exported code knows each of them as \
@@ -336,7 +346,12 @@ fn modes(model: &Model, system: &exec::Model) -> Result<Vec<emit::c::Mode>, Erro
         );
         Error::from(Problem::BadOption { reason })
     })?;
-    Ok(all.into_iter().skip(1).map(|(program, recorded)| emit::c::Mode { program, recorded }).collect())
+    let mut all = all.into_iter().map(|mode| emit::c::Mode {
+        program: mode.program,
+        recorded: mode.recorded,
+        independent: mode.independent,
+    });
+    Ok((all.next().map(|first| first.independent).unwrap_or_default(), all.collect()))
 }
 
 /// Everything at the start of a run.

@@ -58,9 +58,6 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
         return Exchanges::default();
     }
     let d = &mut assembled.d;
-    if std::env::var("XD").is_ok() {
-        eprintln!("exchanges");
-    }
     let ports = &causal.ports;
     let mut rows = rows_of(d, causal);
     let storages = ports.ports.iter().filter(|p| p.role == Role::Independent);
@@ -106,13 +103,6 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
         let counts = |x: &Exprs, t: &(Symbol, Expr)| stored.contains_key(&t.0) || divides(x, t.1, &divisors);
         let ratios: Vec<_> = row.0.iter().filter(|t| independent.contains(&t.0)).collect();
         let none = !ratios.iter().any(|t| !d.is_constant(t.1) && counts(&d.x, t));
-        if std::env::var("XD").is_ok() {
-            eprintln!(
-                "dep {} none {none} ratios {:?}",
-                d.x.name(symbol),
-                ratios.iter().map(|t| (d.x.name(t.0), d.is_constant(t.1), counts(&d.x, t))).collect::<Vec<_>>()
-            );
-        }
         if none || !seen.insert(d.x.untwinned(symbol)) {
             continue;
         }

@@ -274,7 +274,7 @@ impl<'f> Composition<'f> {
         let unused: String = head.arguments.iter().map(|a| format!("        (void){a};\n")).collect();
         let last = match gives {
             "" => "        break;\n".to_string(),
-            _ if head.head.contains("char *") => "        return \"\";\n".to_string(),
+            _ if head.head.starts_with("const char") => "        return \"\";\n".to_string(),
             _ if head.head.starts_with("double") => "        return HUGE_VAL;\n".to_string(),
             _ => "        return 0;\n".to_string(),
         };

@@ -206,7 +206,7 @@ impl Cost {
     pub(super) fn of_modes(plans: &[Plan]) -> Cost {
         let all: Vec<Cost> = plans.iter().map(Plan::cost).collect();
         let most = |of: fn(&Cost) -> u64| all.iter().map(of).max().unwrap_or(0);
-        let tried = plans[0].bounds.as_ref().map_or(0, |tables| tables.modes.counts().0 as u64);
+        let tried = plans[0].mode.as_ref().map_or(0, |tables| tables.modes.counts().0 as u64);
         Cost {
             operations: most(|c| c.operations),
             divisions: most(|c| c.divisions),
@@ -251,7 +251,7 @@ impl Cost {
         }
         if self.modes > 0 {
             lines.push(format!(
-                "{} modes of set-valued laws in a table, of which each may be tried where a branch ends",
+                "{} modes in a table, each with equations of its own; where one ends each may be tried",
                 self.modes
             ));
         }

@@ -109,6 +109,13 @@ flags! {
     solves_start
     guesses
     start_groups
+    /// Events may change states: clauses, or modes. Of FMUs alone.
+    moves
+    /// Several modes.
+    modes
+    /// Such with other independent variables, in any mode and from this one.
+    exchanges
+    ratios
     /// Set-valued laws.
     bounds
     /// Gaps among their bounds; such whose sides meet with an impulse, in this mode and in any.

@@ -2,7 +2,7 @@
 
 use halfarrow_compiler::program::EventTrigger;
 
-use super::plan::{Plan, StepOrder};
+use super::plan::{ModeTables, Plan, StepOrder};
 use crate::{Method, Real};
 
 /// What a member is.
@@ -162,7 +162,7 @@ fn of_events(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Wide, &["clock_operand", "clock_rate"], clocks, "");
     }
     let switches = plan.switches.len();
-    if switches > 0 || plan.bounds.is_some() {
+    if switches > 0 || plan.mode.is_some() {
         list.one(Kind::Int, &["state_hold"], "what is done with those of the state");
         list.one(Kind::Wide, &["signs_taken"], "when their sides were taken last");
         list.arrays(Kind::Int, &["sides"], s.indicators, "sides of the indicators");
@@ -187,7 +187,7 @@ fn of_clauses(list: &mut List, plan: &Plan) {
     }
     if plan.locates() {
         list.one(Kind::Int, &["handled"], "whether an event has been handled at the present time");
-        let places = if plan.bounds.is_some() { 20 } else { 3 };
+        let places = if plan.mode.as_ref().is_some_and(ModeTables::has_laws) { 20 } else { 3 };
         list.arrays(Kind::Real, &["seen"], places * plan.sizes.indicators, "the last values of indicators in a step");
     }
     if let Some(jumps) = &p.jumps {
@@ -212,7 +212,7 @@ fn of_clauses(list: &mut List, plan: &Plan) {
 }
 
 fn of_modes(list: &mut List, plan: &Plan) {
-    let Some(tables) = &plan.bounds else { return };
+    let Some(tables) = &plan.mode else { return };
     let (p, modes) = (plan.program, tables.modes);
     let (margins, values, laws, symbols) =
         (tables.bounds.margins.len(), tables.margin_values(), modes.laws(), modes.symbols());
@@ -220,6 +220,14 @@ fn of_modes(list: &mut List, plan: &Plan) {
     list.one(Kind::Int, &["mode"], "the mode: which branch each set-valued law has");
     if plan.export.derivatives {
         list.one(Kind::Int, &["outside"], "whether an importer integrates, and locates where a branch ends");
+    }
+    if modes.exchanged() > 0 {
+        list.one(Kind::Wide, &["exchanged_at"], "where a step has failed and others were tried");
+        list.one(Kind::Int, &["exchange_due"], "whether others should be independent");
+        list.one(Kind::Int, &["pivots_known"], "whether it is known what ratios of speeds are divided by");
+        let pivots = tables.ratios.as_ref().map_or(0, |ratios| ratios.pivots.len());
+        list.arrays(Kind::Real, &["pivots"], pivots, "what they were divided by when they were last looked at");
+        list.arrays(Kind::Real, &["left_x"], p.states.len(), "");
     }
     list.one(Kind::Int, &["switched"], "whether it has changed since the last step");
     let about = "of margins, of their rates and of the rates of these, how great they have been";

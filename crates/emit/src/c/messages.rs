@@ -43,7 +43,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         all
     };
     let laws = |text: &dyn Fn(&str) -> String| p.set_valued.iter().map(|l| text(&l.name)).collect::<Vec<_>>();
-    let kept = match p.exchanges.independent.is_empty() {
+    let kept = match p.exchanges.independent.is_empty() || plan.mode.is_some() {
         true => "",
         false => {
             ", or where these variables do not tell the motion name others with `prefer`: exported code keeps its own"
@@ -228,7 +228,7 @@ fn can_happen(code: &str, plan: &Plan) -> bool {
         "OUT_OF_RANGE" => plan.export.real == Real::Float,
         "EVENT_NOT_FINITE" | "CONFLICT" | "ENDLESS_EVENTS" | "ACCUMULATION" => !plan.program.clauses.is_empty(),
         "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
-        "NO_MODE" | "STUCK" | "OVERLAP" => plan.bounds.is_some(),
+        "NO_MODE" | "STUCK" | "OVERLAP" => !plan.program.set_valued.is_empty(),
         "CONSTRAINT_BROKEN" => !plan.events.positions.is_empty(),
         _ => true,
     }

@@ -29,6 +29,7 @@ pub(crate) mod written;
 
 pub use cost::Cost;
 
+use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::Program;
 
 use plan::Plan;
@@ -55,17 +56,28 @@ pub struct Export<'a> {
     pub derivatives: bool,
     /// Its real numbers.
     pub real: Real,
-    /// The other modes of a model with set-valued laws: those that have equations.
+    /// The other modes: with other branches of set-valued laws, or with other independent variables.
     pub modes: &'a [Mode],
+    /// The variables that are independent in the first mode, where there are others.
+    pub independent: &'a [Symbol],
 }
 
-/// A mode of a model with set-valued laws, besides that in which runs begin.
+/// A mode of a model besides that in which runs begin.
 #[derive(Debug, Clone)]
 pub struct Mode {
     /// Its program.
     pub program: Program,
     /// What is computed after each step, the same variables as in the first mode.
     pub recorded: Vec<usize>,
+    /// The variables that are independent in it, in ascending order.
+    pub independent: Vec<Symbol>,
+}
+
+impl Export<'_> {
+    /// Whether a run may come to other modes than the first one.
+    pub(crate) fn has_modes(&self) -> bool {
+        !(self.program.set_valued.is_empty() && self.modes.is_empty())
+    }
 }
 
 /// What was written.
@@ -121,10 +133,10 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     }
     range::check(export)?;
     let program = export.program;
-    if export.real == Real::Float && !program.set_valued.is_empty() {
+    let in_modes = export.has_modes();
+    if export.real == Real::Float && in_modes {
         return Err(EmitError::SingleModes);
     }
-    let in_modes = !program.set_valued.is_empty();
     let name = names::of_model(&program.name);
     let list = |names: &mut dyn Iterator<Item = &str>| names::unique(names.collect::<Vec<_>>().into_iter());
     let names = Names {
@@ -137,10 +149,15 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
         parameters: list(&mut program.parameters.iter().map(|p| p.name.as_str())),
         outputs: list(&mut export.recorded.iter().map(|&i| program.observed[i].name.as_str())),
     };
-    let others = export.modes.iter().map(|mode| Export { program: &mode.program, recorded: &mode.recorded, ..*export });
+    let others = export.modes.iter().map(|mode| Export {
+        program: &mode.program,
+        recorded: &mode.recorded,
+        independent: &mode.independent,
+        ..*export
+    });
     let exports: Vec<Export> = std::iter::once(*export).chain(others).collect();
-    let programs: Vec<&Program> = exports.iter().map(|export| export.program).collect();
-    let modes = plan::Modes::of(&programs);
+    let programs: Vec<(&Program, &[Symbol])> = exports.iter().map(|e| (e.program, e.independent)).collect();
+    let modes = in_modes.then(|| plan::Modes::of(&programs));
     let plans: Vec<Plan> = exports
         .iter()
         .enumerate()

@@ -74,7 +74,7 @@ fn bounds(plans: &[Plan]) -> String {
     if plan.program.jumps.is_some() {
         bounds.push("50 iterations of the balance of impulses".into());
     }
-    if let Some(tables) = &plan.bounds {
+    if let Some(tables) = plan.mode.as_ref().filter(|tables| tables.has_laws()) {
         let (modes, combinations) = tables.modes.counts();
         bounds
             .push(format!("{modes} modes tried at an instant, of {combinations} combinations of branches, 200 times"));

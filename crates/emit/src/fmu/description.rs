@@ -60,8 +60,8 @@ fn interfaces(export: &Export, version: Version, name: &str) -> String {
     // Solutions and delays go on from step to step.
     let follows =
         p.blocks.values().any(|b| matches!(b, Block::Newton { .. })) || p.held.iter().any(|h| !h.kind.is_discrete());
-    // Margins of set-valued laws are compared with what they have been.
-    let follows = follows || !p.set_valued.is_empty();
+    // Modes may be over where no indicator tells it, and margins are compared with what they have been.
+    let follows = follows || export.has_modes();
     match version {
         Version::V2 => {
             let common =

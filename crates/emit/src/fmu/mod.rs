@@ -138,9 +138,9 @@ pub fn binary_path(version: Version, name: &str, os: &str, architecture: &str) -
     Some(format!("binaries/{folder}/{name}.{ending}"))
 }
 
-/// A program whose states have numbers for names, where they are others in each mode of set-valued laws.
+/// A program whose states have numbers for names, where they are others in each mode.
 fn without_names_of_states(export: &c::Export) -> Option<Program> {
-    if export.program.set_valued.is_empty() {
+    if !export.has_modes() {
         return None;
     }
     let mut program = export.program.clone();
@@ -152,7 +152,7 @@ fn without_names_of_states(export: &c::Export) -> Option<Program> {
 
 /// The functions of the interface around a model.
 fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model: &str, token: &str) -> String {
-    let bounds = !export.program.set_valued.is_empty();
+    let modes = export.has_modes();
     let of_state = |p: &Program| p.conditions.values().any(|c| c.trigger == EventTrigger::State);
     let switches = of_state(export.program) || export.modes.iter().any(|mode| of_state(&mode.program));
     let clauses = !export.program.clauses.is_empty();
@@ -168,7 +168,7 @@ fn wrapper(text: &'static str, export: &c::Export, variables: &Variables, model:
     ];
     let words = words.map(|(word, text)| (word, Text::of(text)));
     let mut filling = Filling {
-        flags: Flags { switches, clauses, bounds, ..Flags::default() },
+        flags: Flags { switches, clauses, modes, moves: clauses || modes, ..Flags::default() },
         words: Words::from(words),
         model,
         real: Real::Double,

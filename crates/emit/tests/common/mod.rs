@@ -134,7 +134,7 @@ pub fn export_as(
     let written = write(&export)?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());
-    Ok(Exported { model, start: x, at_start: start, written, method, step, outputs })
+    Ok(Exported { model, start: x, at_start: start.clone(), written, method, step, outputs })
 }
 
 struct Collect(Rows);

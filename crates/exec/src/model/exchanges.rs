@@ -9,9 +9,9 @@ use super::system::What;
 use super::{Model, clauses::EventWork};
 use crate::bytecode::{Frame, Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Reads, Value};
+use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Told, Value};
 use halfarrow_sim::Failure;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Variables are exchanged where one moves so many times as fast as the one that stays independent,
@@ -41,28 +41,17 @@ pub(super) struct Ratios {
 
 impl Ratios {
     pub fn of(program: &Program, layout: &Layout) -> Option<Ratios> {
-        let value = |e: &Exchanged| program.variables.get(&e.symbol).copied();
-        let of = |symbols: &[Symbol], e: &Exchanged| symbols.iter().position(|s| *s == e.told_by).map(|k| k as u32);
-        let register = |e: &Exchanged| {
-            let state = of(&program.tracked, e).map(|k| layout.states + k);
-            state.or_else(|| of(&program.replaced, e).map(|k| layout.conserved + k))
+        let ratios = program.ratios()?;
+        let register = |told: Told| match told {
+            Told::State(k) => layout.states + k,
+            Told::Conserved(k) => layout.conserved + k,
         };
-        let known = program.exchanges.independent.iter().filter_map(|e| Some((*e, value(e)?, register(e)?)));
-        let known: Vec<(Exchanged, Value, u32)> = known.collect();
-        let others = program.exchanges.dependent.iter().filter_map(|e| Some((*e, value(e)?)));
-        let others: Vec<(Exchanged, Value)> = others.collect();
-        // All of them, or the rest would be looked at as if it stood still.
-        let all = known.len() == program.exchanges.independent.len();
-        let wanted: Vec<Value> = known.iter().map(|k| k.1).chain(others.iter().map(|o| o.1)).collect();
-        let pivots: BTreeSet<Value> = program.pivot_guards.iter().map(|guard| guard.pivot).collect();
-        let varies = |pivot: &Value| program.values.reads(*pivot) != Reads::PARAMETERS;
-        let pivots: Vec<Value> = pivots.into_iter().filter(varies).collect();
-        (all && !known.is_empty() && !others.is_empty()).then(|| Ratios {
-            registers: known.iter().map(|k| k.2).collect(),
-            independent: known.into_iter().map(|k| k.0).collect(),
-            dependent: others.into_iter().map(|o| o.0).collect(),
-            routine: layout.routine(program, &wanted),
-            pivots: layout.routine(program, &pivots),
+        Some(Ratios {
+            registers: ratios.independent.iter().map(|k| register(k.2)).collect(),
+            routine: layout.routine(program, &ratios.values()),
+            pivots: layout.routine(program, &ratios.pivots),
+            independent: ratios.independent.into_iter().map(|k| k.0).collect(),
+            dependent: ratios.dependent.into_iter().map(|o| o.0).collect(),
         })
     }
 

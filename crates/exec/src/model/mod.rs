@@ -41,6 +41,7 @@ pub use implicit::{ImplicitMemory, ImplicitModel};
 pub use linear::Linearised;
 pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
+pub use modes::ModeProgram;
 pub use operations::Operations;
 pub use sensitivity::{Quantity, Tape, Taped, Varied};
 pub use setup::Setup;

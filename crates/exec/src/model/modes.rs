@@ -9,7 +9,7 @@ use super::compiled::ModeId;
 use super::margins::Bounds;
 use crate::bytecode::Hold;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Clause, Program, Target};
+use halfarrow_compiler::program::{Clause, Exchanged, Program, Target};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -21,6 +21,35 @@ const FAR: usize = 2;
 pub(super) const AT_REST: f64 = 1e-9;
 /// What storages change by without a leap, as part of the most that they have kept.
 const NO_LEAP: f64 = 1e-7;
+
+/// A mode of a model as a program, with the variables that are independent in it where they may change.
+#[derive(Debug, Clone)]
+pub struct ModeProgram {
+    /// The program.
+    pub program: Program,
+    /// What is recorded, in [`Program::observed`].
+    pub recorded: Vec<usize>,
+    /// The independent variables by which the mode is known, in ascending order.
+    pub independent: Vec<Symbol>,
+}
+
+/// The sets of so many of these, if there are no more than `most`.
+fn subsets(all: &[Symbol], size: usize, most: usize) -> Option<Vec<Vec<Symbol>>> {
+    let mut sets: Vec<Vec<Symbol>> = vec![Vec::new()];
+    for (i, &symbol) in all.iter().enumerate() {
+        let left = all.len() - i;
+        let with = sets.iter().filter(|set| set.len() < size).map(|set| [&set[..], &[symbol]].concat());
+        let with: Vec<Vec<Symbol>> = with.collect();
+        sets.extend(with);
+        // What cannot be filled any more is left out.
+        sets.retain(|set| set.len() + left > size);
+        if sets.len() > 64 * most {
+            return None;
+        }
+    }
+    sets.retain(|set| set.len() == size);
+    (sets.len() <= most).then_some(sets)
+}
 
 /// What a run remembers of set-valued laws: how great things have been.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -125,21 +154,49 @@ impl Model {
         Some((all.len(), all.iter().filter(|branches| self.compiled.in_mode(branches).is_some()).count()))
     }
 
-    /// The programs of all modes that set-valued laws can have, if these are no more than `most`: of each mode that has
-    /// equations, and a value for all that is recorded, its program and what is recorded. The first is the present one.
-    pub fn programs_of_modes(&self, most: usize) -> Option<Vec<(Program, Vec<usize>)>> {
+    /// The programs of all modes that a run from `(t, x)` may come to, the present one first: of each combination of branches
+    /// that has equations and a value for all that is recorded, and with other independent variables where these may change
+    /// and there are no more than `most_sets` choices of them. `None` if there are more than `most` combinations.
+    pub fn programs_of_modes(
+        &mut self,
+        (t, x): (f64, &[f64]),
+        most: usize,
+        most_sets: usize,
+    ) -> Option<Vec<ModeProgram>> {
         let all = self.combinations(most)?;
-        let observed = &self.code.program.observed;
-        let names: Vec<&str> = self.recorded.chosen.iter().map(|&i| observed[i].name.as_str()).collect();
-        let mode = |branches: &Vec<u32>| {
-            let code = self.compiled.mode(self.compiled.in_mode(branches)?);
-            let place = |name: &&str| code.program.observed.iter().position(|o| o.name == *name && o.value.is_ok());
-            let recorded: Option<Vec<usize>> = names.iter().map(place).collect();
-            Some((code.program.clone(), recorded?))
-        };
         let present: Vec<u32> = self.code.program.set_valued.iter().map(|law| law.present).collect();
         let others = all.iter().filter(|branches| **branches != present);
-        Some(std::iter::once(&present).chain(others).filter_map(mode).collect())
+        let point = self.values_of_all(t, x).unwrap_or_default();
+        let mut modes = Vec::new();
+        for branches in std::iter::once(&present).chain(others) {
+            let Some(first) = self.compiled.in_mode(branches) else { continue };
+            let code = self.compiled.mode(first);
+            let of = |exchanged: &[Exchanged]| exchanged.iter().map(|e| e.symbol).collect::<BTreeSet<Symbol>>();
+            let exchanges = &code.program.exchanges;
+            let (own, dependent) = (of(&exchanges.independent), of(&exchanges.dependent));
+            modes.extend(self.program_of(first, own.iter().copied().collect()));
+            let symbols: Vec<Symbol> = own.union(&dependent).copied().collect();
+            if !self.compiled.has_alternatives() || code.exchanges.is_none() {
+                continue;
+            }
+            for wanted in subsets(&symbols, own.len(), most_sets).into_iter().flatten() {
+                if !wanted.iter().copied().eq(own.iter().copied()) {
+                    let mode = self.compiled.with_independent(&code, &wanted, &point);
+                    modes.extend(mode.and_then(|mode| self.program_of(mode, wanted)));
+                }
+            }
+        }
+        Some(modes)
+    }
+
+    /// The program of a mode, if all that is recorded has a value there.
+    fn program_of(&self, mode: ModeId, independent: Vec<Symbol>) -> Option<ModeProgram> {
+        let code = self.compiled.mode(mode);
+        let observed = &self.code.program.observed;
+        let names = self.recorded.chosen.iter().map(|&i| observed[i].name.as_str());
+        let place = |name: &str| code.program.observed.iter().position(|o| o.name == name && o.value.is_ok());
+        let recorded = names.map(place).collect::<Option<Vec<usize>>>()?;
+        Some(ModeProgram { program: code.program.clone(), recorded, independent })
     }
 
     /// All combinations of branches, if they are no more than `most`.

@@ -51,8 +51,8 @@ pub(super) struct Plan<'a> {
     pub discretes: Vec<usize>,
     /// What happens at events.
     pub events: EventTables,
-    /// Where the branches of set-valued laws end, if the model has such laws.
-    pub bounds: Option<ModeTables<'a>>,
+    /// Where this mode ends, and what is carried to the next one, if the model has several.
+    pub mode: Option<ModeTables<'a>>,
     /// Whether runs begin in this mode.
     first: bool,
     /// Newton blocks in use.
@@ -117,7 +117,11 @@ impl<'a> Plan<'a> {
         first: bool,
     ) -> Result<Plan<'a>, EmitError> {
         let program = export.program;
-        let bounds = modes.zip(program.bounds()).map(|(modes, bounds)| ModeTables { modes, bounds });
+        let mode = modes.map(|modes| ModeTables {
+            modes,
+            bounds: program.bounds().unwrap_or_default(),
+            ratios: program.ratios().filter(|_| modes.exchanged() > 0),
+        });
         let of = |wanted: fn(EventTrigger) -> bool| -> Vec<ConditionId> {
             program.conditions.iter().filter(|(_, c)| wanted(c.trigger)).map(|(id, _)| id).collect()
         };
@@ -132,7 +136,7 @@ impl<'a> Plan<'a> {
             samples: held(program, |kind| kind == HeldKind::Sample),
             discretes: held(program, HeldKind::is_discrete),
             events: EventTables::of(program),
-            bounds,
+            mode,
             first,
             newton: Vec::new(),
             patterns: Rc::new(Patterns::of(program)),
@@ -195,9 +199,14 @@ impl<'a> Plan<'a> {
             functions.extend(plain(&mut writer, &events::code_of(i), clause));
         }
         functions.extend(plain(&mut writer, "ha_stored_code", &routines.stored));
-        if self.bounds.is_some() {
-            functions.extend(plain(&mut writer, "ha_compared_code", &routines.compared));
+        if let Some(mode) = &self.mode {
             functions.extend(plain(&mut writer, "ha_values_code", &routines.carried));
+            if mode.has_laws() {
+                functions.extend(plain(&mut writer, "ha_compared_code", &routines.compared));
+            }
+            if mode.ratios.is_some() {
+                functions.extend(plain(&mut writer, "ha_pivots_code", &routines.pivots));
+            }
         }
         functions.extend(self.domain_checks(&writer));
         functions.extend(self.assumption_checks(&writer));
@@ -212,7 +221,7 @@ impl<'a> Plan<'a> {
         let run =
             Moving { time: Some(TimeRate::OfDirection), inputs: true, held: true, states: true, ..Moving::default() };
         functions.extend(along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run));
-        if self.bounds.is_some() {
+        if self.mode.as_ref().is_some_and(ModeTables::has_laws) {
             functions.extend(along(&mut writer, "ha_margins_along", ALONG, &routines.margins, run));
         }
         let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
@@ -227,6 +236,12 @@ impl<'a> Plan<'a> {
         let begin = Moving { conserved: true, states: true, ..Moving::default() };
         for (name, routine) in &routines.starts {
             functions.extend(along(&mut writer, name, ALONG, routine, begin));
+        }
+        if let Some(mode) = &self.mode {
+            functions.extend(along(&mut writer, "ha_open_along", ALONG, &routines.open, begin));
+            if mode.ratios.is_some() {
+                functions.extend(along(&mut writer, "ha_ratios_along", ALONG, &routines.ratios, begin));
+            }
         }
         functions.extend(along(&mut writer, "ha_impulses_along", ALONG, &routines.impulses, begin));
         functions.extend(along(&mut writer, "ha_positions_along", ALONG, &routines.positions, begin));

@@ -1,9 +1,10 @@
-//! Set-valued laws: the modes that a program knows, and what is carried from one to the next, in tables.
+//! The modes that a program knows, with other branches of set-valued laws or other independent variables, and what is carried
+//! from one to the next, in tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Block, BlockId, Bounds, Op, Program, Value};
+use halfarrow_compiler::program::{Block, BlockId, Bounds, Exchanges, Op, Program, Ratios, Told, Value};
 
 use crate::Real;
 
@@ -22,20 +23,28 @@ pub(in crate::c) struct Modes {
     symbols: Vec<Symbol>,
     groups: usize,
     contacts: bool,
+    /// Variables that may be independent; which of them are, in each mode.
+    exchanged: Vec<Symbol>,
+    independent: Vec<Vec<usize>>,
 }
 
 impl Modes {
-    /// Of the programs of all modes, the first one that in which runs begin.
-    pub fn of(programs: &[&Program]) -> Option<Modes> {
-        let all: Vec<Bounds> = programs.iter().map(|p| p.bounds()).collect::<Option<_>>()?;
+    /// Of the programs of all modes, with their independent variables; the first one is that in which runs begin.
+    pub fn of(modes: &[(&Program, &[Symbol])]) -> Modes {
+        let programs: Vec<&Program> = modes.iter().map(|m| m.0).collect();
+        let all: Vec<Bounds> = programs.iter().map(|p| p.bounds().unwrap_or_default()).collect();
         let laws = |p: &&Program| p.set_valued.iter().map(|law| law.released).collect();
+        let exchanged: BTreeSet<Symbol> = programs.iter().flat_map(|p| may_be_independent(p)).collect();
+        let exchanged: Vec<Symbol> = exchanged.into_iter().collect();
+        let place = |symbol: &Symbol| exchanged.binary_search(symbol).ok();
+        let independent = modes.iter().map(|m| m.1.iter().filter_map(place).collect()).collect();
         let commanded = |bounds: &Bounds| {
             let law = |law: usize| bounds.commands.iter().any(|(_, bound)| bound.law as usize == law);
             (0..bounds.branches.len()).map(law).collect()
         };
         let keys: BTreeSet<(u32, u32, u32)> = all.iter().flat_map(|b| &b.margins).map(|m| m.key).collect();
         let symbols: BTreeSet<Symbol> = programs.iter().flat_map(|p| carried(p)).collect();
-        Some(Modes {
+        Modes {
             laws: programs[0].set_valued.iter().map(|law| law.branches.len()).collect(),
             branches: all.iter().map(|b| b.branches.clone()).collect(),
             free: programs.iter().map(laws).collect(),
@@ -44,12 +53,19 @@ impl Modes {
             symbols: symbols.into_iter().collect(),
             groups: all[0].compared.len(),
             contacts: all.iter().flat_map(|b| &b.margins).any(|m| m.meets),
-        })
+            exchanged,
+            independent,
+        }
     }
 
     /// How many modes there are, and how many combinations of branches.
     pub fn counts(&self) -> (usize, usize) {
         (self.branches.len(), self.laws.iter().product())
+    }
+
+    /// Whether independent variables may change, and how many there are that may be independent.
+    pub fn exchanged(&self) -> usize {
+        self.exchanged.len()
     }
 
     /// Whether sides of contacts meet with impulses in any mode.
@@ -95,7 +111,12 @@ impl Modes {
             })
             .collect();
         let number = |branches: &[u32]| branches.iter().zip(&places).map(|(b, p)| *b as usize * p).sum::<usize>();
-        let of: BTreeMap<usize, usize> = self.branches.iter().enumerate().map(|(mode, b)| (number(b), mode)).collect();
+        // Branches lead to the first mode that has them.
+        let all = self.branches.iter().enumerate().rev();
+        let of: BTreeMap<usize, usize> = all.map(|(mode, b)| (number(b), mode)).collect();
+        let held =
+            |set: &Vec<usize>| (0..self.exchanged.len()).map(|k| u8::from(set.contains(&k)).to_string()).collect();
+        let independent: Vec<Vec<String>> = self.independent.iter().map(held).collect();
         let mode = |i: usize| of.get(&i).map_or("-1".to_string(), usize::to_string);
         let rows = |rows: Vec<Vec<String>>| {
             rows.iter().map(|row| format!("    {{{}}}", row.join(", "))).collect::<Vec<_>>().join(",\n")
@@ -105,6 +126,9 @@ impl Modes {
         let modes: Vec<String> = (0..combinations).map(mode).collect();
         let lines: Vec<String> = modes.chunks(20).map(|row| format!("    {}", row.join(", "))).collect();
         vec![
+            ("MODES", self.branches.len().to_string()),
+            ("EXCHANGED", self.exchanged.len().to_string()),
+            ("MODE_INDEPENDENT", rows(independent)),
             ("COMBINATIONS", combinations.to_string()),
             ("LAW_BRANCHES", ints(&self.laws)),
             ("LAW_PLACES", ints(&places)),
@@ -117,6 +141,12 @@ impl Modes {
             ),
         ]
     }
+}
+
+/// The variables of which a mode may choose.
+fn may_be_independent(program: &Program) -> impl Iterator<Item = Symbol> + '_ {
+    let Exchanges { independent, dependent } = &program.exchanges;
+    independent.iter().chain(dependent).map(|e| e.symbol)
 }
 
 /// The variables that a mode begins with: states, constants, solutions of laws, what storages keep.
@@ -139,9 +169,63 @@ fn solutions(program: &Program) -> impl Iterator<Item = (Symbol, BlockId, u32)> 
 pub(in crate::c) struct ModeTables<'a> {
     pub modes: &'a Modes,
     pub bounds: Bounds,
+    /// Variables that could change places.
+    pub ratios: Option<Ratios>,
 }
 
 impl ModeTables<'_> {
+    /// Whether there are set-valued laws.
+    pub fn has_laws(&self) -> bool {
+        self.modes.laws() > 0
+    }
+
+    /// States and constants that are no variables of the machine, of which these follow: the place of each in a direction, the
+    /// variable, and its value.
+    pub fn open(&self, program: &Program, directions: &[usize; 6]) -> Vec<(usize, usize, Value)> {
+        let [_, _, conserved, states, ..] = *directions;
+        let value = |symbol: &Symbol| program.variables.get(symbol).copied();
+        let of_states = program.tracked.iter().enumerate().filter_map(|(k, symbol)| {
+            let own = |value: &Value| program.values.op(*value) == Op::State(k as u32);
+            value(symbol).filter(|v| !own(v)).map(|value| (states + k, self.modes.symbol(symbol), value))
+        });
+        let of_constants = program.replaced.iter().enumerate();
+        let of_constants = of_constants
+            .filter_map(|(k, symbol)| value(symbol).map(|value| (conserved + k, self.modes.symbol(symbol), value)));
+        of_states.chain(of_constants).collect()
+    }
+
+    /// Words of what could change places in a mode.
+    pub fn words_of_exchanges(
+        &self,
+        program: &Program,
+        directions: &[usize; 6],
+        list: &dyn Fn(Vec<String>) -> String,
+    ) -> Vec<(&'static str, String)> {
+        let [_, _, conserved, states, ..] = *directions;
+        let open = self.open(program, directions);
+        let place = |symbol: &Symbol| self.modes.exchanged.binary_search(symbol).expect("it may be independent");
+        let ratios = self.ratios.as_ref();
+        let told = |told: Told| match told {
+            Told::State(k) => states + k as usize,
+            Told::Conserved(k) => conserved + k as usize,
+        };
+        let independent = ratios.map_or(&[][..], |r| &r.independent);
+        let dependent = ratios.map_or(&[][..], |r| &r.dependent);
+        let all = || independent.iter().map(|k| k.0).chain(dependent.iter().map(|o| o.0));
+        let numbers = |all: &mut dyn Iterator<Item = usize>| list(all.map(|n| n.to_string()).collect());
+        vec![
+            ("OPEN", open.len().to_string()),
+            ("OPEN_PLACES", numbers(&mut open.iter().map(|o| o.0))),
+            ("OPEN_SYMBOLS", numbers(&mut open.iter().map(|o| o.1))),
+            ("INDEPENDENT", independent.len().to_string()),
+            ("DEPENDENT", dependent.len().to_string()),
+            ("TOLD", numbers(&mut independent.iter().map(|k| told(k.2)))),
+            ("RATIO_SYMBOLS", numbers(&mut all().map(|e| place(&e.symbol)))),
+            ("RATIO_WEIGHTS", list(all().map(|e| Real::Double.number(e.weighs())).collect())),
+            ("PIVOTS", ratios.map_or(0, |r| r.pivots.len()).to_string()),
+        ]
+    }
+
     /// Places of what is computed of margins.
     pub fn margin_values(&self) -> usize {
         self.bounds.values().len()

@@ -29,6 +29,11 @@ pub(super) struct Routines {
     pub margins: Routine,
     pub compared: Routine,
     pub carried: Routine,
+    /// What follows from states and constants that are no variables themselves; variables that could change places, and what
+    /// ratios between them are divided by.
+    pub open: Routine,
+    pub ratios: Routine,
+    pub pivots: Routine,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -60,11 +65,14 @@ impl Routines {
         let read: Vec<BlockId> = newton_of(&guarded.code).map(|solve| solve.block).collect();
         let shown_blocks = newton_of(&observe.code).map(|solve| solve.block);
         let shown_alone: Vec<BlockId> = shown_blocks.filter(|block| !read.contains(block)).collect();
-        let bounds = plan.bounds.as_ref();
+        let bounds = plan.mode.as_ref();
         let carried = bounds.map_or_else(Vec::new, |b| b.modes.values(p));
         let wanted: Vec<Value> = carried.iter().map(|v| v.1).collect();
         let of_bounds = |values: &dyn Fn(&ModeTables) -> Vec<Value>| p.routine(&bounds.map_or_else(Vec::new, values));
         Routines {
+            open: of_bounds(&|b| b.open(p, &[0; 6]).into_iter().map(|o| o.2).collect()),
+            ratios: of_bounds(&|b| b.ratios.iter().flat_map(|r| r.values()).collect()),
+            pivots: of_bounds(&|b| b.ratios.iter().flat_map(|r| r.pivots.iter().copied()).collect()),
             margins: of_bounds(&|b| b.bounds.values()),
             compared: of_bounds(&|b| b.bounds.compared.concat()),
             carried: p.routine(&wanted),
@@ -89,6 +97,7 @@ impl Routines {
     fn all(&self) -> impl Iterator<Item = &Routine> {
         let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, margins, compared, carried, .. } = self;
+        let Routines { open, ratios, pivots, .. } = self;
         let all = [
             preamble,
             rates,
@@ -106,6 +115,9 @@ impl Routines {
             margins,
             compared,
             carried,
+            open,
+            ratios,
+            pivots,
         ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }

@@ -113,7 +113,8 @@ impl Plan<'_> {
     /// What the model has.
     pub(in crate::c) fn flags(&self) -> Flags {
         let Plan { export, program: p, .. } = *self;
-        let bounds = self.bounds.as_ref();
+        let mode = self.mode.as_ref();
+        let bounds = mode.filter(|mode| mode.has_laws());
         let held = !(self.delays.is_empty() && self.samples.is_empty());
         let time_derivative = export.method.is_linearly_implicit();
         let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
@@ -164,6 +165,10 @@ impl Plan<'_> {
             derivatives: export.derivatives,
             time_derivative,
             time_passes: time_derivative || held || bounds.is_some(),
+            moves: !p.clauses.is_empty() || mode.is_some(),
+            modes: mode.is_some(),
+            exchanges: mode.is_some_and(|mode| mode.modes.exchanged() > 0),
+            ratios: mode.is_some_and(|mode| mode.ratios.is_some()),
             bounds: bounds.is_some(),
             gaps: bounds.is_some_and(ModeTables::has_gaps),
             meets: bounds.is_some_and(ModeTables::meets),

@@ -131,9 +131,10 @@ impl Plan<'_> {
             order.tables().into_iter().chain([places]).map(|(word, values)| (word, ints(values)))
         });
         let places: BTreeMap<BlockId, usize> = self.newton.iter().copied().zip(self.memory_places()).collect();
-        let bounds = self.bounds.iter().flat_map(|bounds| {
+        let bounds = self.mode.iter().flat_map(|bounds| {
             let own = bounds.words(program, &self.events.conditional, &places, &lines, &join);
-            own.into_iter().chain(bounds.modes.words()).chain(super::modes::tolerances(real))
+            let exchanges = bounds.words_of_exchanges(program, &self.sizes.directions, &join);
+            own.into_iter().chain(exchanges).chain(bounds.modes.words()).chain(super::modes::tolerances(real))
         });
         let more = linearly_implicit(self.export.method, real);
         let tables = [

@@ -27,7 +27,7 @@ static int ha_start_values(ha_model *m, double t)
 //end
 }
 
-//if bounds
+//if modes
 //item ha_return
 /* A run begins in the first mode. */
 static int ha_return(ha_model *m)
@@ -45,7 +45,7 @@ static int ha_return(ha_model *m)
 int $model_start_from($model *m, double t, const $real *x)
 {
     int status;
-//if bounds
+//if modes
     status = $ha_return(m);
     if (status != $MODEL_OK) {
         return status;
@@ -73,7 +73,7 @@ int $model_start($model *m, double t)
 {
     int status;
     m->failure.code = $MODEL_OK;
-//if bounds
+//if modes
     status = $ha_return(m);
     if (status != $MODEL_OK) {
         return status;

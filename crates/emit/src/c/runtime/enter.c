@@ -1,4 +1,4 @@
-//if bounds
+//if modes
 
 //section
 /* ---- from one mode to the next ---- */
@@ -7,7 +7,6 @@
 /* Notes the variables of the machine at (t, x), what storages keep there, and the contacts whose sides are apart. */
 static int ha_leave(ha_model *m, double t, const $real *x)
 {
-    static const int storages[] = {$STORAGE_SYMBOLS};
     static const int symbols[] = {$VALUE_SYMBOLS};
     int status;
     int i;
@@ -18,16 +17,18 @@ static int ha_leave(ha_model *m, double t, const $real *x)
 //if held
     $ha_place(m, t);
 //end
-    status = $ha_stored_code(m, t, x, m->stored);
+    status = $ha_values_code(m, t, x, m->carried);
+    for (i = 0; i < $VALUES && status == $MODEL_OK; ++i) {
+        m->left_values[symbols[i]] = m->carried[i];
+    }
+//if bounds
     if (status == $MODEL_OK) {
-        status = $ha_values_code(m, t, x, m->carried);
+        status = $ha_stored_code(m, t, x, m->stored);
     }
     if (status == $MODEL_OK) {
+        static const int storages[] = {$STORAGE_SYMBOLS};
         for (i = 0; i < HA_STORED; ++i) {
             m->left_stored[storages[i]] = m->stored[i];
-        }
-        for (i = 0; i < $VALUES; ++i) {
-            m->left_values[symbols[i]] = m->carried[i];
         }
         status = $ha_weigh_margins(m, t, x);
     }
@@ -40,6 +41,7 @@ static int ha_leave(ha_model *m, double t, const $real *x)
             m->apart[$ha_bounds[i].law] = 1;
         }
     }
+//end
     return status;
 }
 
@@ -47,7 +49,6 @@ static int ha_leave(ha_model *m, double t, const $real *x)
 /* States and constants of this mode from the variables that were left; what storages kept. Whether all are known. */
 static int ha_carry(ha_model *m, $real *x)
 {
-    static const int storages[] = {$STORAGE_SYMBOLS};
     int i;
     $ha_fill(x, $0.0, HA_NX);
     for (i = 0; i < HA_TRACKED; ++i) {
@@ -78,7 +79,9 @@ $SOLUTION_TABLE
         }
     }
 //end
+//if bounds
     for (i = 0; i < HA_STORED; ++i) {
+        static const int storages[] = {$STORAGE_SYMBOLS};
         /* A spring whose displacement follows from others keeps nothing by itself, but has a displacement. */
         const $real kept = m->left_stored[storages[i]];
         m->stored[i] = kept == kept ? kept : m->left_values[storages[i]];
@@ -86,9 +89,11 @@ $SOLUTION_TABLE
             return 0;
         }
     }
+//end
     return 1;
 }
 
+//if bounds
 //item ha_begin_bounds
 /* Clauses of another mode: those of the modeller go on, bounds begin anew. */
 static int ha_begin_bounds(ha_model *m, double t, const $real *x)
@@ -170,4 +175,259 @@ static int ha_enter(ha_model *m, double t, $real *x, $real *leap)
     return status == $MODEL_OK ? $ha_begin_bounds(m, t, x) : status;
 }
 
+//end
+//if exchanges
+//item ha_take_open
+/* States and constants that are no variables of the machine: those at which these have the values that were left, by Newton's method.
+ * Whether there are such. */
+static int ha_take_open(ha_model *m, double t, $real *x)
+{
+    static const int places[] = {$OPEN_PLACES};
+    static const int symbols[] = {$OPEN_SYMBOLS};
+    $real out[$OPEN + 1];
+    $real rates[$OPEN + 1];
+    $real matrix[$OPEN * $OPEN + 1];
+    $real step[$OPEN + 1];
+    int iteration;
+    int row;
+    int column;
+    for (iteration = 0; iteration < 20; ++iteration) {
+        int met = 1;
+        int moved = 0;
+        for (column = 0; column < $OPEN; ++column) {
+            $ha_fill(m->along, $0.0, HA_DIRECTION);
+            m->along[places[column]] = $1.0;
+//if held
+            $ha_place(m, t);
+//end
+            if ($ha_open_along(m, t, x, m->along, out, rates) != $MODEL_OK) {
+                return 0;
+            }
+            for (row = 0; row < $OPEN; ++row) {
+                matrix[row * $OPEN + column] = rates[row];
+            }
+        }
+        for (row = 0; row < $OPEN; ++row) {
+            const $real wanted = m->left_values[symbols[row]];
+            step[row] = wanted - out[row];
+            met = met && $fabs(step[row]) <= $4.0 * $DBL_EPSILON * $fabs(wanted);
+        }
+        if (met) {
+            return 1;
+        }
+        if (!$ha_solve_square(matrix, step, $OPEN, 1)) {
+            return 0;
+        }
+        for (row = 0; row < $OPEN; ++row) {
+            const int place = places[row];
+//if conserved
+            $real *value = place >= HA_STATES_AT ? &x[place - HA_STATES_AT] : &m->k[place - HA_CONSERVED_AT];
+//else
+            $real *value = &x[place - HA_STATES_AT];
+//end
+            moved = moved || $fabs(step[row]) > $4.0 * $DBL_EPSILON * $fabs(*value);
+            *value += step[row];
+        }
+        if (!moved) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+//entry ha_enter_at
+/* Goes on in this mode where the variables of the machine have the values that were left. */
+static int ha_enter_at(ha_model *m, double t, $real *x)
+{
+    int status;
+    m->failure.code = $MODEL_OK;
+    m->pivots_known = 0;
+//if bounds
+    $ha_fill(m->floors, $0.0, $CONDITIONS);
+//end
+    status = $ha_parameters(m);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//if holds
+    m->state_hold = HA_FOLLOW;
+//end
+//if clocks
+    $ha_clock_cross(m, m->crossed);
+//end
+    if (!$ha_carry(m, x) || !$ha_take_open(m, t, x)) {
+        return $ha_fail(m, $MODEL_SINGULAR, 0, t);
+    }
+//if switches
+    status = $ha_take_sides(m, t, x);
+//end
+//if follows
+    if (status == $MODEL_OK) {
+        status = $ha_follow_solutions(m, t, x);
+    }
+//end
+    return status;
+}
+
+//if ratios
+//item ha_is_pivot_smaller
+/* Whether something that ratios are divided by is smaller than when they were last looked at, or has changed its sign. */
+static int ha_is_pivot_smaller(ha_model *m, double t, const $real *x)
+{
+    $real now[$PIVOTS + 1];
+    int smaller = !m->pivots_known;
+    int i;
+//if held
+    $ha_place(m, t);
+//end
+    if ($ha_pivots_code(m, t, x, now) != $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
+        return 1;
+    }
+    for (i = 0; i < $PIVOTS && !smaller; ++i) {
+        const $real part = now[i] / m->pivots[i];
+        smaller = part != part || part <= $0.95;
+    }
+    if (smaller) {
+        $ha_copy(m->pivots, now, $PIVOTS);
+        m->pivots_known = 1;
+    }
+    return smaller;
+}
+
+//item ha_find_ratios
+/* How the dependent variables move with the independent ones, a row for each, all in their weights; whether that has values. */
+static int ha_find_ratios(ha_model *m, double t, const $real *x, $real *ratios)
+{
+    static const int told[] = {$TOLD};
+    static const $real weights[] = {$RATIO_WEIGHTS};
+    $real out[$INDEPENDENT + $DEPENDENT];
+    $real rates[$INDEPENDENT + $DEPENDENT];
+    $real matrix[$INDEPENDENT * $INDEPENDENT];
+    $real right[$INDEPENDENT * $DEPENDENT];
+    int row;
+    int k;
+    for (k = 0; k < $INDEPENDENT; ++k) {
+        $ha_fill(m->along, $0.0, HA_DIRECTION);
+        m->along[told[k]] = $1.0;
+//if held
+        $ha_place(m, t);
+//end
+        if ($ha_ratios_along(m, t, x, m->along, out, rates) != $MODEL_OK) {
+            return 0;
+        }
+        for (row = 0; row < $INDEPENDENT; ++row) {
+            matrix[k * $INDEPENDENT + row] = rates[row];
+        }
+        for (row = 0; row < $DEPENDENT; ++row) {
+            right[k * $DEPENDENT + row] = rates[$INDEPENDENT + row];
+        }
+    }
+    if (!$ha_solve_square(matrix, right, $INDEPENDENT, $DEPENDENT)) {
+        return 0;
+    }
+    for (row = 0; row < $DEPENDENT; ++row) {
+        for (k = 0; k < $INDEPENDENT; ++k) {
+            const $real part = weights[$INDEPENDENT + row] / weights[k];
+            ratios[row * $INDEPENDENT + k] = right[k * $DEPENDENT + row] * part;
+        }
+    }
+    return $ha_all_finite(ratios, $INDEPENDENT * $DEPENDENT);
+}
+
+//item ha_greatest_ratio
+/* The greatest ratio, and its place. */
+static $real ha_greatest_ratio(const $real *ratios, int *place)
+{
+    $real most = $0.0;
+    int i;
+    *place = 0;
+    for (i = 0; i < $INDEPENDENT * $DEPENDENT; ++i) {
+        if ($fabs(ratios[i]) > most) {
+            most = $fabs(ratios[i]);
+            *place = i;
+        }
+    }
+    return most;
+}
+
+//item ha_exchange_ratios
+/* The variables of a row and a column change places. */
+static void ha_exchange_ratios($real *ratios, int row, int column)
+{
+    const $real pivot = ratios[row * $INDEPENDENT + column];
+    int i;
+    int k;
+    for (i = 0; i < $DEPENDENT; ++i) {
+        const $real factor = ratios[i * $INDEPENDENT + column] / pivot;
+        for (k = 0; k < $INDEPENDENT && i != row; ++k) {
+            const $real part = factor * ratios[row * $INDEPENDENT + k];
+            const $real left = ratios[i * $INDEPENDENT + k] - part;
+            const int rounding = $fabs(left) <= $1e-12 * $fabs(ratios[i * $INDEPENDENT + k]);
+            ratios[i * $INDEPENDENT + k] = k == column ? factor : (rounding ? $0.0 : left);
+        }
+    }
+    for (k = 0; k < $INDEPENDENT; ++k) {
+        const $real part = ratios[row * $INDEPENDENT + k] / pivot;
+        ratios[row * $INDEPENDENT + k] = k == column ? $1.0 / pivot : -part;
+    }
+}
+
+//end
+//entry ha_find_wanted
+/* Which variables should be independent instead of those that are; whether any should. A step from here has failed, or not. */
+static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, unsigned char *wanted)
+{
+//if ratios
+    static const int symbols[] = {$RATIO_SYMBOLS};
+    $real ratios[$INDEPENDENT * $DEPENDENT];
+    int inside[$INDEPENDENT];
+    int outside[$DEPENDENT];
+    int place;
+    int turn;
+    int i;
+    const int smaller = $ha_is_pivot_smaller(m, t, x);
+    if (!(failed || smaller) || !$ha_find_ratios(m, t, x, ratios)) {
+        m->failure.code = $MODEL_OK;
+        return 0;
+    }
+    if ($ha_greatest_ratio(ratios, &place) <= (failed ? $1.2 : $10.0)) {
+        return 0;
+    }
+    for (i = 0; i < $INDEPENDENT; ++i) {
+        inside[i] = symbols[i];
+    }
+    for (i = 0; i < $DEPENDENT; ++i) {
+        outside[i] = symbols[$INDEPENDENT + i];
+    }
+    for (turn = 0; turn < 4 * ($INDEPENDENT + $DEPENDENT); ++turn) {
+        const $real most = $ha_greatest_ratio(ratios, &place);
+        const int row = place / $INDEPENDENT;
+        const int column = place % $INDEPENDENT;
+        const int kept = outside[row];
+        if (!(most > $1.1)) {
+            break;
+        }
+        $ha_exchange_ratios(ratios, row, column);
+        outside[row] = inside[column];
+        inside[column] = kept;
+    }
+    for (i = 0; i < $EXCHANGED; ++i) {
+        wanted[i] = 0;
+    }
+    for (i = 0; i < $INDEPENDENT; ++i) {
+        wanted[inside[i]] = 1;
+    }
+    return 1;
+//else
+    (void)m;
+    (void)t;
+    (void)x;
+    (void)failed;
+    (void)wanted;
+    return 0;
+//end
+}
+
+//end
 //end

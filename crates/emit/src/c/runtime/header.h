@@ -168,9 +168,13 @@ int $model_indicators($model *m, double t, const $real *x, $real *g);
 int $model_switched($model *m, double t, const $real *x, int *switched);
 
 //end
-//if bounds
-/* Whether a branch of a set-valued law has ended where no indicator has told it: the run stands at a switch then. */
-int $model_ended($model *m, double t, const $real *x, int *ended);
+//if modes
+/* Whether the present mode is over where no indicator has told it: a branch of a set-valued law has ended, or other variables should be
+ * independent. The run stands at a jump then, behind which $model_go_on leads to the next mode. */
+int $model_is_over($model *m, double t, const $real *x, int *over);
+
+/* A step has ended, or a jump has been crossed, at (t, x): goes on in another mode if the present one is over, which changes x. */
+int $model_go_on($model *m, double t, $real *x);
 
 /* How great the states of the present mode have been, 0 where that is not known. */
 void $model_sizes(const $model *m, $real *sizes);

@@ -65,6 +65,54 @@ static int ha_fail(ha_model *m, int code, int where, double t)
     return code;
 }
 
+//if exchanges
+//item ha_solve_square
+/* Solves n equations for several right sides, in place, by elimination with the greatest pivot of a column; whether all pivots are more
+ * than rounding. */
+static int ha_solve_square($real *a, $real *b, int n, int sides)
+{
+    int i;
+    int j;
+    int k;
+    for (k = 0; k < n; ++k) {
+        int best = k;
+        for (i = k + 1; i < n; ++i) {
+            best = $fabs(a[i * n + k]) > $fabs(a[best * n + k]) ? i : best;
+        }
+        if (!$ha_finite(a[best * n + k]) || a[best * n + k] == $0.0) {
+            return 0;
+        }
+        for (j = 0; j < n; ++j) {
+            const $real kept = a[k * n + j];
+            a[k * n + j] = a[best * n + j];
+            a[best * n + j] = kept;
+        }
+        for (j = 0; j < sides; ++j) {
+            const $real kept = b[k * sides + j];
+            b[k * sides + j] = b[best * sides + j];
+            b[best * sides + j] = kept;
+        }
+        for (i = 0; i < n; ++i) {
+            const $real factor = a[i * n + k] / a[k * n + k];
+            for (j = k + 1; j < n && i != k; ++j) {
+                const $real part = factor * a[k * n + j];
+                a[i * n + j] -= part;
+            }
+            for (j = 0; j < sides && i != k; ++j) {
+                const $real part = factor * b[k * sides + j];
+                b[i * sides + j] -= part;
+            }
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        for (j = 0; j < sides; ++j) {
+            b[i * sides + j] /= a[i * n + i];
+        }
+    }
+    return 1;
+}
+
+//end
 //item ha_pivot_row
 /* The row of a matrix of n rows to bring to place k, and its weight there: the diagonal stays if it is good enough. */
 static int ha_pivot_row(const $real *a, const $real *scale, int n, int k, $real *weight)

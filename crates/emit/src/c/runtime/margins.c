@@ -1,3 +1,30 @@
+//if modes
+//always
+enum {
+    /* States that do not stand still. */
+    HA_TRACKED = $TRACKED_COUNT
+};
+
+//item ha_tracked
+/* Of each state the variable that it is. */
+static const int ha_tracked[] = {
+$TRACKED
+};
+
+//public $model_sizes
+void $model_sizes(const $model *m, $real *sizes)
+{
+    int i;
+    for (i = 0; i < HA_NX; ++i) {
+//if bounds
+        sizes[i] = i < HA_TRACKED ? m->most_values[$ha_tracked[i]] : $0.0;
+//else
+        sizes[i] = m->mode == 0 ? $0.0 : $fabs(m->x[i]);
+//end
+    }
+}
+
+//end
 //if bounds
 
 //section
@@ -7,9 +34,7 @@
 enum {
     HA_MARGINS = $MARGINS,
     /* The same, with the rates of gaps. */
-    HA_MARGIN_VALUES = $MARGIN_VALUES,
-    /* States that do not stand still. */
-    HA_TRACKED = $TRACKED_COUNT
+    HA_MARGIN_VALUES = $MARGIN_VALUES
 };
 
 //always
@@ -33,12 +58,6 @@ enum {
 //item ha_bounds
 static const ha_bound ha_bounds[] = {
 $MARGIN_TABLE
-};
-
-//item ha_tracked
-/* Of each state the variable that it is. */
-static const int ha_tracked[] = {
-$TRACKED
 };
 
 //item ha_run_margins
@@ -319,17 +338,9 @@ static int ha_note_compared(ha_model *m, double t, const $real *x)
     return $MODEL_OK;
 }
 
-//public $model_sizes
-void $model_sizes(const $model *m, $real *sizes)
-{
-    int i;
-    for (i = 0; i < HA_NX; ++i) {
-        sizes[i] = i < HA_TRACKED ? m->most_values[$ha_tracked[i]] : $0.0;
-    }
-}
-
-//public $model_ended
-int $model_ended($model *m, double t, const $real *x, int *ended)
+//entry ha_is_margin_below
+/* Whether a margin is below zero where no event has told it. */
+static int ha_is_margin_below(ha_model *m, double t, const $real *x, int *ended)
 {
     int status = $ha_note_margins(m, t, x);
     int any = 0;

@@ -2,6 +2,7 @@
 //section
 /* ---- modes: which branch each set-valued law has; each mode has equations of its own, told by m->mode ---- */
 
+//if bounds
 //always
 enum {
     HA_LAWS = $LAWS,
@@ -327,14 +328,117 @@ static int ha_settle_all(ha_model *m, double t, $real *x)
     return status == $MODEL_OK ? $ha_fail(m, $MODEL_NO_MODE, 0, t) : status;
 }
 
-//entry ha_go_on
-/* A step has ended: goes on in another mode where a margin is below zero and no event has told it. */
-static int ha_go_on(ha_model *m, double t, $real *x)
+//end
+//if exchanges
+//item ha_independent
+/* Which variables are independent in each mode. */
+static const unsigned char ha_independent[][$EXCHANGED] = {
+$MODE_INDEPENDENT
+};
+
+//item ha_mode_with
+/* The mode with the branches of the present one in which these variables are independent; -1 if there is none. */
+static int ha_mode_with(const ha_model *m, const unsigned char *wanted)
 {
-    int below = 0;
+    int mode;
+    int i;
+    for (mode = 0; mode < $MODES; ++mode) {
+        int same = 1;
+//if bounds
+        for (i = 0; i < HA_LAWS; ++i) {
+            same = same && $ha_branches[mode][i] == $ha_branches[m->mode][i];
+        }
+//else
+        (void)m;
+//end
+        for (i = 0; i < $EXCHANGED; ++i) {
+            same = same && $ha_independent[mode][i] == wanted[i];
+        }
+        if (same) {
+            return mode;
+        }
+    }
+    return -1;
+}
+
+//item ha_exchange
+/* Goes on with other independent variables where these move many times as fast, as near a dead centre; whether it does. Then x is the same
+ * position and motion in the new ones. */
+static int ha_exchange(ha_model *m, double t, $real *x, int failed, int *exchanged)
+{
+    unsigned char wanted[$EXCHANGED];
+    const int from = m->mode;
+    int status;
+    int to;
+    *exchanged = 0;
+    if (!$ha_find_wanted(m, t, x, failed, wanted)) {
+        return $MODEL_OK;
+    }
+    to = $ha_mode_with(m, wanted);
+    if (to < 0 || to == from) {
+        return $MODEL_OK;
+    }
+    status = $ha_leave(m, t, x);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+    $ha_copy(m->left_x, x, HA_NX);
+    m->mode = to;
+    if ($ha_enter_at(m, t, x) == $MODEL_OK) {
+        *exchanged = 1;
+        return $MODEL_OK;
+    }
+    /* It goes on as it was. */
+    m->mode = from;
+    status = $ha_enter_at(m, t, x);
+    $ha_copy(x, m->left_x, HA_NX);
+    return status;
+}
+
+//entry ha_go_on_from
+/* A step has failed: tries to go on from its beginning with other independent variables, once; whether it does. */
+static int ha_go_on_from(ha_model *m, double t, $real *x)
+{
+    const $model_failure failure = m->failure;
+    int exchanged = 0;
+    if (m->exchanged_at == t || m->t != t) {
+        return failure.code;
+    }
+    m->exchanged_at = t;
+    m->failure.code = $MODEL_OK;
+    if ($ha_exchange(m, t, x, 1, &exchanged) != $MODEL_OK || !exchanged || $ha_hold_sides(m, t, x) != $MODEL_OK) {
+        m->failure = failure;
+    }
+    return m->failure.code;
+}
+
+//end
+//public $model_is_over
+int $model_is_over($model *m, double t, const $real *x, int *over)
+{
     int status = $MODEL_OK;
+    *over = 0;
+//if bounds
+    status = $ha_is_margin_below(m, t, x, over);
+//end
+//if exchanges
+    if (status == $MODEL_OK && !*over) {
+        unsigned char wanted[$EXCHANGED];
+        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted) && $ha_mode_with(m, wanted) >= 0;
+        *over = m->exchange_due;
+    }
+//end
+    return status;
+}
+
+//public $model_go_on
+int $model_go_on($model *m, double t, $real *x)
+{
+    int status = $MODEL_OK;
+//if bounds
+    int below = 0;
     if (!m->switched) {
-        status = $model_ended(m, t, x, &below);
+        status = $ha_is_margin_below(m, t, x, &below);
         if (status == $MODEL_OK && below) {
             status = $ha_find_fired(m, t, x);
         }
@@ -342,6 +446,13 @@ static int ha_go_on(ha_model *m, double t, $real *x)
             status = $ha_settle_all(m, t, x);
         }
     }
+//end
+//if exchanges
+    if (status == $MODEL_OK && !m->switched) {
+        status = $ha_exchange(m, t, x, m->exchange_due, &m->switched);
+        m->exchange_due = 0;
+    }
+//end
     if (status == $MODEL_OK && m->switched) {
         status = $ha_hold_sides(m, t, x);
     }

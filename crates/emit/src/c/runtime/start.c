@@ -23,8 +23,15 @@ $START_POSITIONS
 /* Forgets a run: the next crossing is its start. */
 static void ha_restart(ha_model *m)
 {
-//if bounds
+//if modes
     m->switched = 0;
+//end
+//if exchanges
+    m->exchanged_at = (double)NAN;
+    m->pivots_known = 0;
+    m->exchange_due = 0;
+//end
+//if bounds
     m->gaps_at = (double)NAN;
     m->last_step = 0.0;
     $ha_fill(m->floors, $0.0, $CONDITIONS);

@@ -413,19 +413,28 @@ int $model_step_until($model *m, double end)
     }
     if (m->cross_due) {
         status = $model_cross(m, m->t, m->x);
-//if bounds
+//if modes
         if (status == $MODEL_OK) {
-            status = $ha_go_on(m, m->t, m->x);
+            status = $model_go_on(m, m->t, m->x);
         }
 //end
     }
     for (i = 0; i <= $MODEL_MOST_JUMPS && status == $MODEL_OK && m->t + slack < end; ++i) {
         const double jump = $model_next_jump(m, m->t);
         const int jumps = jump <= end + slack;
+//if exchanges
+        const double from = m->t;
+//end
         status = $ha_step_to(m, jumps ? jump : end, jumps);
-//if bounds
+//if exchanges
+        if (status != $MODEL_OK) {
+            status = $ha_go_on_from(m, from, m->x);
+            continue;
+        }
+//end
+//if modes
         if (status == $MODEL_OK) {
-            status = $ha_go_on(m, m->t, m->x);
+            status = $model_go_on(m, m->t, m->x);
         }
 //end
 //if derivatives

@@ -316,7 +316,7 @@ int $model_indicators($model *m, double t, const $real *x, $real *g)
 //end
         next += 2;
     }
-//if bounds
+//if modes
     /* Other modes have more of them. */
     $ha_fill(g + HA_NG, $1.0, $MODEL_INDICATORS - HA_NG);
 //end

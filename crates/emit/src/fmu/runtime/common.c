@@ -62,10 +62,10 @@ typedef struct ha_fmu {
     int discarded;
     /* Whether what is said last is a warning. */
     int warned;
-//if clauses
+//if moves
     /* Whether the last event has changed states, and whether the step completed last asks for one. */
     int moved;
-//if bounds
+//if modes
     /* Whether the last event has led to another mode. */
     int renewed;
 //end
@@ -332,15 +332,15 @@ static int ha_initialised(ha_fmu *f)
 /* A jump at the present point, and the time of the next one. All that happens at one instant happens in it. */
 static int ha_event(ha_fmu *f, double *next)
 {
-//if clauses
+//if moves
     double before[HA_NX > 0 ? HA_NX : 1];
-//if bounds
+//if modes
     const int mode = f->s.m.mode;
 //end
     memcpy(before, f->s.m.x, sizeof before);
     f->moved = 0;
 //end
-//if bounds
+//if modes
     f->s.m.outside = f->exchange;
 //end
     if (!f->s.fresh) {
@@ -353,19 +353,24 @@ static int ha_event(ha_fmu *f, double *next)
         if ($model_cross(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
             return ha_failed(f);
         }
+//if modes
+        if ($model_go_on(&f->s.m, f->s.m.t, f->s.m.x) != $MODEL_OK) {
+            return ha_failed(f);
+        }
+//end
         f->s.fresh = 1;
         ha_changed(f);
     }
     if (!ha_scale(f)) {
         return 0;
     }
-//if clauses
+//if moves
     {
         int i;
         for (i = 0; i < HA_NX; ++i) {
             f->moved = f->moved || f->s.m.x[i] != before[i];
         }
-//if bounds
+//if modes
         /* States are others in another mode. */
         f->renewed = f->s.m.mode != mode;
         f->moved = f->moved || f->renewed;
@@ -381,13 +386,13 @@ static int ha_event(ha_fmu *f, double *next)
 static int ha_stepped(ha_fmu *f)
 {
     $model *m = &f->s.m;
-//if clauses
+//if moves
     f->event_due = 0;
 //end
     if ($model_accept(m, m->t, m->x) != $MODEL_OK) {
         const $model_failure failure = m->failure;
         m->failure.code = $MODEL_OK;
-//if clauses
+//if moves
         /* What happens at events may be due there: the importer is asked for one. */
         (void)failure;
         f->event_due = 1;
@@ -403,14 +408,14 @@ static int ha_stepped(ha_fmu *f)
         ha_changed(f);
 //end
     }
-//if bounds
+//if modes
     {
-        /* A branch may have ended where no indicator has told it. */
-        int ended;
-        if ($model_ended(m, m->t, m->x, &ended) != $MODEL_OK) {
+        /* A mode may be over where no indicator has told it. */
+        int over;
+        if ($model_is_over(m, m->t, m->x, &over) != $MODEL_OK) {
             return ha_failed(f);
         }
-        f->event_due = f->event_due || ended;
+        f->event_due = f->event_due || over;
     }
 //end
     return ha_scale(f);
@@ -562,7 +567,7 @@ static void ha_nominals(const ha_fmu *f, double *values)
 $NOMINALS
     };
     int i;
-//if bounds
+//if modes
     $model_sizes(&f->s.m, values);
     for (i = 0; i < HA_NX; ++i) {
         values[i] = values[i] > 0.0 ? values[i] : nominals[i];

@@ -265,12 +265,12 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
     }
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
-//if bounds
+//if modes
     eventInfo->nominalsOfContinuousStatesChanged = f->renewed ? fmi2True : fmi2False;
 //else
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
 //end
-//if clauses
+//if moves
     eventInfo->valuesOfContinuousStatesChanged = f->moved ? fmi2True : fmi2False;
 //else
     eventInfo->valuesOfContinuousStatesChanged = fmi2False;
@@ -292,7 +292,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
     HA_CHECK(HA_IN(HA_CONTINUOUS), "fmi2CompletedIntegratorStep")
     (void)noSetFMUStatePriorToCurrentPoint;
     *terminateSimulation = fmi2False;
-//if clauses
+//if moves
     {
         const int good = ha_stepped(f);
         *enterEventMode = f->event_due ? fmi2True : fmi2False;

@@ -368,12 +368,12 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     }
     *discreteStatesNeedUpdate = fmi3False;
     *terminateSimulation = fmi3False;
-//if bounds
+//if modes
     *nominalsOfContinuousStatesChanged = f->renewed != 0;
 //else
     *nominalsOfContinuousStatesChanged = fmi3False;
 //end
-//if clauses
+//if moves
     *valuesOfContinuousStatesChanged = f->moved != 0;
 //else
     *valuesOfContinuousStatesChanged = fmi3False;
@@ -398,7 +398,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
     HA_CHECK(HA_IN(HA_CONTINUOUS), "fmi3CompletedIntegratorStep")
     (void)noSetFMUStatePriorToCurrentPoint;
     *terminateSimulation = fmi3False;
-//if clauses
+//if moves
     {
         const int good = ha_stepped(f);
         *enterEventMode = f->event_due ? fmi3True : fmi3False;
