@@ -80,7 +80,8 @@ fn difference(case: &Case, within: f64) -> Option<String> {
     let allowed: Vec<f64> = result.trace.columns.iter().map(|c| within * most(&c.values)).collect();
     for (k, row) in rows.iter().enumerate() {
         let expected = result.trace.columns.iter().map(|c| c.values[k]);
-        let off = |(j, wanted): &(usize, f64)| !((row[j + 1] - wanted).abs() <= allowed[*j]);
+        let met = |j: usize, wanted: f64| (row[j + 1] - wanted).abs() <= allowed[j];
+        let off = |(j, wanted): &(usize, f64)| !met(*j, *wanted);
         if let Some((j, wanted)) = expected.enumerate().find(off) {
             return Some(format!("{} at {}: {} is {:?}, not {wanted:?}", case.name, row[0], names[j], row[j + 1]));
         }

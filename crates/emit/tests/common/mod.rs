@@ -128,13 +128,20 @@ pub fn export_as(
         observed: vec![f64::NAN; model.observed()],
     };
     let recorded = model.recorded().to_vec();
-    let modes = &[];
-    let export =
-        Export { program: &program, start: &start, method, step, recorded: &recorded, derivatives, real, modes };
-    let written = write(&export)?;
+    let written = write(&Export {
+        program: &program,
+        start: &start,
+        method,
+        step,
+        recorded: &recorded,
+        derivatives,
+        real,
+        modes: &[],
+        independent: &[],
+    })?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());
-    Ok(Exported { model, start: x, at_start: start.clone(), written, method, step, outputs })
+    Ok(Exported { model, start: x, at_start: start, written, method, step, outputs })
 }
 
 struct Collect(Rows);
