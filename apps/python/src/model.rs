@@ -308,9 +308,18 @@ impl Model {
     }
 
     /// A run by steps.
-    fn stepper(&self, py: Python<'_>, method: &str, step: f64, start: &str, values: Values) -> PyResult<Stepper> {
+    fn stepper(
+        &self,
+        py: Python<'_>,
+        method: &str,
+        step: f64,
+        start: &str,
+        project: bool,
+        values: Values,
+    ) -> PyResult<Stepper> {
         let (method, start) = (fixed(method)?, crate::options::start(start)?);
-        tried(py, || self.compiled_with(Form::Minimal, &values)?.stepper(method, step, start)).map(Stepper::of)
+        let begun = || self.compiled_with(Form::Minimal, &values)?.stepper_projecting(method, step, start, project);
+        tried(py, begun).map(Stepper::of)
     }
 
     /// Matrices near a point.

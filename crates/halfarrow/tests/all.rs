@@ -44,6 +44,8 @@ mod gradient;
 mod growth;
 #[path = "iltis.rs"]
 mod iltis;
+#[path = "lanes_in_modes.rs"]
+mod lanes_in_modes;
 #[path = "library_std.rs"]
 mod library_std;
 #[path = "linearize.rs"]
@@ -86,3 +88,5 @@ mod sweep;
 mod vehicles;
 #[path = "velocity.rs"]
 mod velocity;
+#[path = "velocity_many.rs"]
+mod velocity_many;
