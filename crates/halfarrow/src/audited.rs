@@ -34,6 +34,9 @@ pub struct AuditReport {
     pub power: Option<Deviation>,
     /// Stored less initial, supplied plus dissipated energy.
     pub energy: Option<Deviation>,
+    /// Energy that appears or vanishes within so many steps; below the resolution it may have flowed.
+    #[serde(skip)]
+    pub at_once: Vec<(usize, Deviation)>,
     /// Laws of junctions and elements.
     pub residual: Option<Deviation>,
     /// Stored quantities and integrated signals against the integrals of their rates.
@@ -445,6 +448,7 @@ impl From<Audit> for AuditReport {
         AuditReport {
             power: miss(a.power),
             energy: miss(a.energy),
+            at_once: a.at_once.into_iter().map(|(steps, found)| (steps, found.into())).collect(),
             residual: miss(a.residual),
             rates: miss(a.rates),
             drift: a.drift.into_iter().map(DriftReport::from).collect(),

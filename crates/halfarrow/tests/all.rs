@@ -6,6 +6,8 @@ mod animation;
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "crawls.rs"]
+mod crawls;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]
