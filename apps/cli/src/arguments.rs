@@ -824,6 +824,9 @@ pub struct Export {
     /// The real numbers of C
     #[arg(long, default_value = "double")]
     pub real: Real,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
     /// FMUs: no binary for this machine, sources alone
     #[arg(long)]
     pub source_only: bool,

@@ -12,14 +12,14 @@ use halfarrow_emit::fmu::Version;
 use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Events as _, Options, Sink, System as _, simulate};
+use halfarrow_sim::{Events as _, Method, Options, Sink, System as _, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
 #[cfg(feature = "fmu")]
 use crate::library::library;
 use crate::model::Model;
-use crate::run::Start;
+use crate::run::{Start, projected};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +62,9 @@ pub struct Export {
     pub step: f64,
     /// The real numbers of C; FMUs have `double`.
     pub real: Real,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step; of C and
+    /// FMUs, which steps by themselves, in `double`.
+    pub project: bool,
     /// FMUs: whether a binary for this machine stands in it, made by its C compiler; sources always do.
     pub binary: bool,
 }
@@ -75,6 +78,7 @@ impl Default for Export {
             method: FixedMethod::Rk4,
             step: 1e-3,
             real: Real::Double,
+            project: false,
             binary: true,
         }
     }
@@ -262,6 +266,11 @@ impl<'a> ExportedProgram<'a> {
             return Err(refused(EmitError::Implicit));
         }
         let mut system = model.system(&model.equations_in(export.form)?)?;
+        projected(system.program(), export.project, Method::Fixed(export.method))?;
+        if export.project && export.real == Real::Float && export.target == Target::C {
+            let reason = "project is for double: what float makes of positions is no drift".into();
+            return Err(Problem::BadOption { reason }.into());
+        }
         system.record_impulses();
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
@@ -278,6 +287,7 @@ impl<'a> ExportedProgram<'a> {
             recorded: &self.recorded,
             derivatives,
             real: self.export.real,
+            project: self.export.project,
         })
     }
 

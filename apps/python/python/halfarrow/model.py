@@ -975,6 +975,7 @@ class Model:
         step: float = 1e-3,
         form: Literal["minimal", "kane"] = "minimal",
         real: Literal["double", "float"] = "double",
+        project: bool = False,
         binary: bool = True,
     ) -> dict[str, Any]:
         """Writes the model as code for elsewhere.
@@ -984,6 +985,7 @@ class Model:
             path: The folder, or the file, which ends in ``.fmu`` or ``.tex``.
             method: The method of a step.
             step: The length of a step in s.
+            project: Whether steps put positions back that only speeds keep, as in ``simulate``.
             form: The form of the equations.
             real: The numbers of C.
             binary: Whether an FMU has a binary, made by the C compiler of this computer, besides its sources.
@@ -1001,7 +1003,7 @@ class Model:
             raise UsageError(f"the name {path} does not say what to write: let it end in {ending}")
         files, report = self._core.export(
             target, choice("form", form, _FORMS), choice("method", method, _FIXED), step,
-            choice("real", real, ("double", "float")), binary,
+            choice("real", real, ("double", "float")), project, binary,
         )  # fmt: skip
         written = []
         for name, content in files:

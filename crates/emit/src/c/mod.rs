@@ -52,6 +52,8 @@ pub struct Export<'a> {
     pub derivatives: bool,
     /// Its real numbers.
     pub real: Real,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step.
+    pub project: bool,
 }
 
 /// What was written.

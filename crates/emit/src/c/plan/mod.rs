@@ -2,6 +2,7 @@
 
 mod checks;
 mod events;
+mod relations;
 mod routines;
 mod shapes;
 mod source;
@@ -178,6 +179,7 @@ impl<'a> Plan<'a> {
             functions.extend(plain(&mut writer, &events::code_of(i), clause));
         }
         functions.extend(plain(&mut writer, "ha_stored_code", &routines.stored));
+        functions.extend(plain(&mut writer, "ha_relations_code", &routines.relations));
         functions.extend(self.domain_checks(&writer));
         functions.extend(self.assumption_checks(&writer));
 

@@ -25,6 +25,8 @@ pub(super) struct Routines {
     pub stored: Routine,
     pub impulses: Routine,
     pub positions: Routine,
+    /// Relations onto which positions are put back.
+    pub relations: Routine,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -68,13 +70,14 @@ impl Routines {
             clock: p.routine(&operands(&plan.clocks)),
             sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
             domains: p.routine(&p.domains.iter().map(|d| d.argument).collect::<Vec<_>>()),
+            relations: plan.relations_routine(),
             starts: passes.chain(groups).chain(guesses).map(start).collect(),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
         let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
-        let Routines { becomes, clauses, stored, impulses, positions, starts, .. } = self;
+        let Routines { becomes, clauses, stored, impulses, positions, relations, starts, .. } = self;
         let all = [
             preamble,
             rates,
@@ -89,6 +92,7 @@ impl Routines {
             stored,
             impulses,
             positions,
+            relations,
         ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }

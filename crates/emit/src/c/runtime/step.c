@@ -209,10 +209,20 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     $ha_copy(m->rest, m->trial_rest, HA_NX);
 //end
     m->t = end;
+//if relations
+    status = $ha_put_back(m, end, m->x);
+    if (status == $MODEL_OK) {
+        status = $model_accept(m, end, m->x);
+    }
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $ha_cross_keeping(m, end, m->x);
+    }
+//else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
     }
+//end
     return status;
 }
 
@@ -238,10 +248,20 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     }
 //end
     m->t = end;
+//if relations
+    status = $ha_put_back(m, end, m->x);
+    if (status == $MODEL_OK) {
+        status = $model_accept(m, end, m->x);
+    }
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $ha_cross_keeping(m, end, m->x);
+    }
+//else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
     }
+//end
     return status;
 }
 
@@ -268,6 +288,11 @@ int $model_step_until($model *m, double end)
     }
     if (m->cross_due) {
         status = $model_cross(m, m->t, m->x);
+//if relations
+        if (status == $MODEL_OK) {
+            status = $ha_keep(m, m->t, m->x);
+        }
+//end
     }
     for (i = 0; i <= $MODEL_MOST_JUMPS && status == $MODEL_OK && m->t + slack < end; ++i) {
         const double jump = $model_next_jump(m, m->t);
