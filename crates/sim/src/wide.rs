@@ -109,6 +109,9 @@ struct Batch<'a> {
     system: &'a mut dyn WideSystem,
     lanes: Vec<Lane<'a>>,
     failures: [Option<Failure>; LANES],
+    /// Lanes that take part in the present step; a failure for each of the others, and for those whose step fails.
+    stepped: [bool; LANES],
+    out_of_step: [Option<Failure>; LANES],
     stages: Vec<Wide>,
     trial: Vec<Wide>,
     out: Vec<Wide>,
@@ -149,6 +152,8 @@ impl<'a> Batch<'a> {
             lanes,
             system,
             failures: [const { None }; LANES],
+            stepped: [true; LANES],
+            out_of_step: [const { None }; LANES],
             stages: vec![[0.0; LANES]; 4 * states],
             trial: vec![[0.0; LANES]; states],
             state: vec![0.0; states],
@@ -158,19 +163,20 @@ impl<'a> Batch<'a> {
     /// Who goes on next; nobody where all are over.
     fn next(&self) -> Option<Next> {
         let open: [bool; LANES] = std::array::from_fn(|l| !self.lanes[l].over);
-        let first = (0..LANES)
-            .filter(|&l| open[l])
-            .min_by(|&a, &b| self.lanes[a].run.time.total_cmp(&self.lanes[b].run.time))?;
+        if !open.contains(&true) {
+            return None;
+        }
         if !self.system.may_change_mode() {
             return Some(Next::Together(open));
         }
         let mut modes: BTreeMap<u32, usize> = BTreeMap::new();
         (0..LANES).filter(|&l| open[l]).for_each(|l| *modes.entry(self.system.mode(l)).or_default() += 1);
         let (mode, count) = modes.into_iter().rev().max_by_key(|&(_, count)| count)?;
-        Some(match count >= TOGETHER {
-            true => Next::Together(std::array::from_fn(|l| open[l] && self.system.mode(l) == mode)),
-            false => Next::Alone(first),
-        })
+        if count >= TOGETHER {
+            return Some(Next::Together(std::array::from_fn(|l| open[l] && self.system.mode(l) == mode)));
+        }
+        let time = |l: &usize| self.lanes[*l].run.time;
+        (0..LANES).filter(|&l| open[l]).min_by(|a, b| time(a).total_cmp(&time(b))).map(Next::Alone)
     }
 
     /// A step of these lanes.
@@ -182,14 +188,12 @@ impl<'a> Batch<'a> {
             }
             (t[i], h[i]) = (lane.run.time, lane.target - lane.run.time);
         }
-        let out_of = |l: usize| (!lanes[l]).then_some(Failure::Interrupted { time: t[l] });
-        let mut failures = std::array::from_fn(out_of);
-        self.explicit(tableau, (&t, &h), x, &mut failures);
+        self.only(lanes);
+        self.explicit(tableau, (&t, &h), x);
         let mut due = [None; LANES];
-        for (i, failure) in failures.into_iter().enumerate() {
-            if lanes[i] {
-                due[i] = self.arrive(i, x, failure.map_or(Ok(()), Err));
-            }
+        for i in (0..LANES).filter(|&l| lanes[l]) {
+            let outcome = self.out_of_step[i].take().map_or(Ok(()), Err);
+            due[i] = self.arrive(i, x, outcome);
         }
         if due.iter().any(Option::is_some) {
             self.record(due, x);
@@ -200,19 +204,21 @@ impl<'a> Batch<'a> {
         }
     }
 
-    fn explicit(
-        &mut self,
-        tableau: &Tableau,
-        (t, h): (&Wide, &Wide),
-        x: &[Wide],
-        failures: &mut [Option<Failure>; LANES],
-    ) {
+    /// Only these lanes take part in the next step.
+    fn only(&mut self, lanes: [bool; LANES]) {
+        if self.stepped != lanes {
+            let out_of = |l: usize| (!lanes[l]).then(|| Failure::Interrupted { time: self.lanes[l].run.time });
+            (self.out_of_step, self.stepped) = (std::array::from_fn(out_of), lanes);
+        }
+    }
+
+    fn explicit(&mut self, tableau: &Tableau, (t, h): (&Wide, &Wide), x: &[Wide]) {
         let n = x.len();
         for (stage, (node, weights)) in tableau.nodes.iter().zip(tableau.stages).enumerate() {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
             self.arch.dispatch(Advance { x, h, weights, rates: earlier, out: &mut self.trial });
             let at: Wide = std::array::from_fn(|l| t[l] + node * h[l]);
-            self.system.rates(&at, &self.trial, &mut rest[..n], failures);
+            self.system.rates(&at, &self.trial, &mut rest[..n], &mut self.out_of_step);
         }
         let Self { stages, trial, .. } = self;
         self.arch.dispatch(Advance { x, h, weights: tableau.weights, rates: stages, out: trial });
