@@ -663,6 +663,9 @@ pub struct Sweep {
     /// Relative error allowed in a step of a method with variable step
     #[arg(long, default_value_t = 1e-6, allow_negative_numbers = true)]
     pub rtol: f64,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
     /// Give an input by a CSV file: a column `t` and one named as the input; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = pair)]
     pub input: Vec<(String, String)>,
@@ -724,6 +727,9 @@ pub struct RunArguments {
     /// What to do when a tick takes too long
     #[arg(long, default_value = "catch-up")]
     pub on_miss: OnMiss,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
     /// Evaluations at most each time nonlinear equations are solved; more stop the run
     #[arg(long, default_value_t = 50)]
     pub bound: usize,
@@ -818,6 +824,9 @@ pub struct Export {
     /// The real numbers of C
     #[arg(long, default_value = "double")]
     pub real: Real,
+    /// Put positions that only speeds keep together back onto the relations between them after each step
+    #[arg(long)]
+    pub project: bool,
     /// FMUs: no binary for this machine, sources alone
     #[arg(long)]
     pub source_only: bool,

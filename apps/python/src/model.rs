@@ -308,9 +308,18 @@ impl Model {
     }
 
     /// A run by steps.
-    fn stepper(&self, py: Python<'_>, method: &str, step: f64, start: &str, values: Values) -> PyResult<Stepper> {
+    fn stepper(
+        &self,
+        py: Python<'_>,
+        method: &str,
+        step: f64,
+        start: &str,
+        project: bool,
+        values: Values,
+    ) -> PyResult<Stepper> {
         let (method, start) = (fixed(method)?, crate::options::start(start)?);
-        tried(py, || self.compiled_with(Form::Minimal, &values)?.stepper(method, step, start)).map(Stepper::of)
+        let begun = || self.compiled_with(Form::Minimal, &values)?.stepper_projecting(method, step, start, project);
+        tried(py, begun).map(Stepper::of)
     }
 
     /// Matrices near a point.
@@ -335,6 +344,7 @@ impl Model {
         method: &str,
         step: f64,
         real: &str,
+        project: bool,
         binary: bool,
     ) -> PyResult<Files<'py>> {
         let targets = [Target::C, Target::Fmu2, Target::Fmu3, Target::Casadi, Target::Latex];
@@ -343,7 +353,7 @@ impl Model {
             .into_iter()
             .find(|known| known.name() == real)
             .ok_or_else(|| none("real", real))?;
-        let export = Export { target, form: form(form_name)?, method: fixed(method)?, step, real, binary };
+        let export = Export { target, form: form(form_name)?, method: fixed(method)?, step, real, project, binary };
         let exported = tried(py, || self.model.export(&export))?;
         let files = exported.files.iter().map(|file| (file.path.clone(), PyBytes::new(py, &file.bytes))).collect();
         Ok((files, pythonize(py, &exported.report)?))

@@ -2,6 +2,8 @@
 
 use halfarrow::Error;
 use pyo3::prelude::*;
+use pyo3::types::PyAny;
+use pythonize::pythonize;
 
 use crate::errors::{raised, refused};
 use crate::threads::apart;
@@ -80,6 +82,11 @@ impl Stepper {
     /// The present value of a variable.
     fn read(&mut self, py: Python<'_>, name: &str) -> PyResult<f64> {
         self.run.read(name).map_err(|error| raised(py, error))
+    }
+
+    /// How far positions have drifted by now from what only their speeds keep, a dict for each relation.
+    fn drift<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(pythonize(py, &self.run.drift())?)
     }
 
     fn save(&self) -> Snapshot {

@@ -94,3 +94,46 @@ def test_control_c(cart: ha.Model) -> None:
 def test_what_is_no_number_of_steps(cart: ha.Model, steps: Any) -> None:
     with cart.stepper(step=1e-3) as run, pytest.raises(ha.UsageError, match="give a whole number of them"):
         run.step(steps)
+
+
+SLIDER_CRANK = """model SliderCrank
+param j = 0.002 kg.m2
+state theta' = w.f from 0.3 rad
+state phi' = v.f from asin(sin(0.3 rad)/3)
+state x' = slide.f from 0.1*cos(0.3 rad) + 0.3*cos(asin(sin(0.3 rad)/3))
+1:w -> I:crank(j, f0 = 200 rad/s)
+1:v -> I:rod(0.001 kg.m2)
+w -> TF:wx(f_out = -0.1*sin(theta)) -> 0:along
+v -> TF:vx(f_out = -0.3*sin(phi)) -> along -> 1:slide -> I:slider(0.5 kg)
+w -> TF:wy(f_out = 0.1*cos(theta)) -> 0:across
+v -> TF:vy(f_out = -0.3*cos(phi)) -> across -> ZC:guide
+"""
+
+
+@pytest.mark.parametrize("project", [False, True])
+def test_positions_that_only_speeds_keep(project: bool) -> None:
+    model = ha.model(SLIDER_CRANK)
+    alone = model.simulate(to=0.3, step=5e-4, method="rk4", project=project)
+    told = {drift.relation: drift for drift in alone.audit.drift}
+    assert len(told) == 2
+    with model.stepper(step=5e-4, project=project) as run:
+        run.step(600)
+        assert run["x"] == alone["x"][-1]
+        for drift in run.drift:
+            assert drift.kind == "closed" and drift.greatest is None and drift.value is not None
+            value = told[drift.relation].value
+            assert value is not None and abs(drift.value - value) < 1e-15
+            assert (abs(drift.value) < 1e-14) == project
+    swept = model.sweep(to=0.3, step=5e-4, j=[0.001, 0.002, 0.004], project=project)
+    assert swept["final(x)"][1] == alone["x"][-1]
+    assert [drift["sets"] for drift in swept.drift] == [3, 3]
+    assert all((drift["greatest"] < 1e-14) == project for drift in swept.drift)
+    f = model.function("j", ["x"], to=0.3, every=0.1, step=5e-4, method="rk4", project=project)
+    assert f([[0.002]])[0, -1, 0] == pytest.approx(alone["x"][-1], abs=1e-12)
+    (of_set,) = f.drift([[0.002]])
+    assert set(of_set) == set(told)
+    if project:
+        with pytest.raises(ha.UsageError, match="not differentiated"):
+            f.jacobian([[0.002]])
+    else:
+        assert f.jacobian([[0.002]]).shape == (1, 4, 1, 1)

@@ -1,5 +1,6 @@
 //! What is stored changes by what flows in.
 
+use crate::at_once::{AtOnce, STRETCHES};
 use crate::laws::sensitivities;
 use crate::quadrature::gauss;
 use crate::regions::Classes;
@@ -146,6 +147,7 @@ pub(crate) struct Balance {
     /// Where impulses can only take energy and have given some: when most of it at once, to which storage above all, and all
     /// of it.
     given: Option<(f64, String, f64)>,
+    at_once: AtOnce,
 }
 
 /// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
@@ -157,6 +159,7 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     let (mut any, mut held, mut by_impulses) = (false, 0.0f64, Vec::new());
     let mut gains: Vec<Vec<(String, f64)>> = vec![Vec::new(); n];
     let mut told = true;
+    let mut at_once = AtOnce::new(n);
     for port in graph.outer_ports() {
         let element = &graph.elements[port.element];
         if pseudo.contains(&parts.of(graph.bond_of(port))) {
@@ -175,10 +178,12 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
                     by_impulses.push((name.clone(), gained.iter().map(|(_, gain)| gain).sum()));
                     gained.into_iter().for_each(|(k, gain)| gains[k].push((name.clone(), gain)));
                 }
+                at_once.stores(&energy);
                 energy
             }
             None => {
                 told &= !matches!(element.kind, Kind::Inertance(_) | Kind::Compliance(_));
+                at_once.passes(&power);
                 let through = values.quadrature.integrate(&power);
                 uncertainty.iter_mut().zip(&through.uncertainty).for_each(|(sum, own)| *sum += own);
                 through.values
@@ -191,7 +196,7 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     }
     let moved = moved.into_iter().fold(held, f64::max);
     let given = if told && takes_only(graph) { given(values.times, &gains) } else { None };
-    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses, given })
+    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses, given, at_once })
 }
 
 /// Whether all impulses come from set-valued laws at rest, which take energy or leave it as it is: no event resets anything,
@@ -231,6 +236,15 @@ impl Balance {
             let place = format!("{name}: what impulses give that can only take");
             let terms = vec![Term::of(Quantity::Energy, 1.0)];
             worst.keep(Raw { miss: *all, resolution: 0.0, time: *time, place, terms }, settled);
+        }
+    }
+
+    /// Takes note of where most is gained or lost at once, in as many steps as each of [`STRETCHES`].
+    pub(crate) fn compare_at_once(&self, times: &[f64], settled: &Settled, worst: &mut [Worst]) {
+        for (worst, steps) in worst.iter_mut().zip(STRETCHES) {
+            if let Some(raw) = self.at_once.worst(times, steps) {
+                worst.keep(raw, settled);
+            }
         }
     }
 }

@@ -15,6 +15,7 @@
 //! from power and energy.
 #![forbid(unsafe_code)]
 
+mod at_once;
 mod constraints;
 mod drift;
 mod energy;
@@ -33,6 +34,7 @@ use halfarrow_compiler::bond_graph::BondGraph;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+use at_once::STRETCHES;
 pub use drift::{Drift, DriftKind};
 pub use values::wanted;
 
@@ -69,6 +71,9 @@ pub struct Audit {
     pub energy: Option<Finding>,
     /// Laws of junctions and elements, relative to the greatest effort or flow in the joined region.
     pub residual: Option<Finding>,
+    /// Energy that appears or vanishes within so many samples one after the other, beyond what can flow meanwhile, which is the
+    /// resolution.
+    pub at_once: Vec<(usize, Finding)>,
     /// Stored quantities and integrated signals against the integrals of their rates, relative to their range.
     pub rates: Option<Finding>,
     /// How far positions have drifted from relations that their speeds keep.
@@ -116,6 +121,7 @@ pub struct Auditor {
     scales: scales::Scales,
     power: worst::Worst,
     energy: worst::Worst,
+    at_once: [worst::Worst; STRETCHES.len()],
     residual: worst::Worst,
     rates: worst::Worst,
     /// What storages have gained by impulses, in J.
@@ -140,6 +146,7 @@ impl Auditor {
             relations,
             power: none(),
             energy: none(),
+            at_once: std::array::from_fn(|_| none()),
             residual: none(),
             rates: none(),
             by_impulses: BTreeMap::new(),
@@ -169,12 +176,12 @@ impl Auditor {
         set_valued::residual(graph, &values, scales, &mut self.residual, &mut unchecked);
         energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
+        balance.iter().for_each(|balance| balance.compare_at_once(run.times, &settled, &mut self.at_once));
         for (name, gained) in balance.into_iter().flat_map(|b| b.by_impulses) {
             *self.by_impulses.entry(name).or_default() += gained;
         }
-        for worst in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
-            worst.end_part();
-        }
+        let kinds = [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates];
+        kinds.into_iter().chain(&mut self.at_once).for_each(worst::Worst::end_part);
         self.unchecked.extend(unchecked);
     }
 
@@ -192,6 +199,11 @@ impl Auditor {
         Audit {
             power: self.power.finding(&settled),
             energy: self.energy.finding(&settled),
+            at_once: STRETCHES
+                .into_iter()
+                .zip(&self.at_once)
+                .filter_map(|(steps, worst)| Some((steps, worst.finding(&settled)?)))
+                .collect(),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
             drift: self.relations.into_iter().map(drift::Relation::finish).collect(),

@@ -137,6 +137,26 @@ fn c_passes_positions_where_motions_meet() {
     check("flat", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.step(STEPS));
 }
 
+/// Positions that only speeds keep are put back to the bits of the interpreter, also where events move them, and where relations
+/// repeat each other.
+#[test]
+fn c_puts_positions_back_as_the_interpreter_does() {
+    let twice = "model Twice\nstate th' = w.f from 0.4\nstate a' = u.f\nstate b' = v.f\n1:w -> I:wheel(1, f0 = 3)\n\
+        w -> TF:one(f_out = 0.5*cos(th)) -> 1:u -> I:first(0.2)\nw -> TF:two(f_out = cos(th)*(1 + sin(th))) -> 1:v -> I:second(0.3)\n\
+        v -> C:spring(k = 5)\n";
+    let folder = common::folder("put_back_models");
+    let mut all = Vec::new();
+    let path = folder.join("twice.bond");
+    std::fs::write(&path, twice).expect("a model");
+    for (path, step) in [(common::speeds(), 4e-3), (path, 2e-2)] {
+        for method in [Method::Rk4, Method::Heun, Method::Rosenbrock, Method::ImplicitMidpoint] {
+            all.push(common::export_projecting(&path, method, step));
+        }
+    }
+    assert!(all.iter().all(|one| one.written.header.contains("double drift[2];")), "it can be read");
+    check("put_back", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.step(STEPS));
+}
+
 /// What goes wrong at events stops the run where it stops in the interpreter, and says why.
 #[test]
 fn c_says_what_fails_at_events() {
@@ -253,6 +273,7 @@ fn c_is_clean() {
             "unsteady_ratio",
         ])
         .map(|name| export(&own(name), Method::ImplicitMidpoint, 1e-3))
+        .chain([common::export_projecting(&common::speeds(), Method::ImplicitMidpoint, 4e-3)])
         .collect();
     let driver = driver(&all, &|_| (-1, 0.0));
     let checked =

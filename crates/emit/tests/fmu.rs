@@ -41,6 +41,7 @@ fn written(one: &Exported, version: Version) -> fmu::Written {
         step: one.step,
         recorded: &recorded,
         derivatives: true,
+        project: false,
         real: halfarrow_emit::Real::Double,
         modes: &[],
         independent: &[],

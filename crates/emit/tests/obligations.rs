@@ -48,6 +48,7 @@ fn models() -> Vec<Exported> {
     ] {
         all.push(export_single(&own(name), method, 1e-3));
     }
+    all.push(common::export_projecting(&common::speeds(), Method::Rk4, 4e-3));
     all
 }
 

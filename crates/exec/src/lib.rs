@@ -15,7 +15,8 @@ mod model;
 pub use halfarrow_compiler::algebra::math;
 pub use machine::MachineError;
 pub use model::{
-    Alternatives, Compiled, Equilibrium, EquilibriumError, Evaluated, Executed, Execution, Expected, ImplicitMemory,
-    ImplicitModel, InputError, Linearised, Memory, ModeId, ModeProgram, Model, Operations, ParameterError, Quantity,
-    Reason, RecordError, Setup, StartConflict, StartError, StartValue, Tape, Taped, Varied, WideModel,
+    Alternatives, Compiled, Drifted, Equilibrium, EquilibriumError, Evaluated, Executed, Execution, Expected,
+    ImplicitMemory, ImplicitModel, InputError, Linearised, Memory, ModeId, ModeProgram, Model, Operations,
+    ParameterError, Quantity, Reason, RecordError, Setup, StartConflict, StartError, StartValue, Tape, Taped, Varied,
+    WideModel,
 };

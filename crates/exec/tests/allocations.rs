@@ -146,6 +146,36 @@ fn takes_no_memory_at_events(text: &str, method: FixedMethod) {
     assert!(values[0] != 0.0 && values[1] >= 1.0, "all of them happen: {values:?}");
 }
 
+/// Positions that only speeds keep, put back after each step, and moved by an event.
+#[test]
+fn putting_positions_back_takes_no_memory() {
+    let text = "model Crank
+state th' = w.f from 0.3
+state ph' = v.f from 0.09866525406
+state x' = slide.f from 0.39407462
+1:w -> I:crank(0.002, f0 = 20)
+1:v -> I:rod(0.001)
+w -> TF:wx(f_out = -0.1*sin(th)) -> 0:along
+v -> TF:vx(f_out = -0.3*sin(ph)) -> along -> 1:slide -> I:slider(0.5)
+w -> TF:wy(f_out = 0.1*cos(th)) -> 0:across
+v -> TF:vy(f_out = -0.3*cos(ph)) -> across -> ZC:guide
+when every 50 ms { reset x = x + 0.001 }
+";
+    let text = Text { name: "p.bond", text, files: &NoFiles, overrides: &[] };
+    let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+    let mut model = Model::new(program).unwrap();
+    let mut x = model.initialise(0.0).unwrap();
+    let mut run = Stepwise::new(FixedMethod::Rk4, 0.0, &model).projecting(true);
+    run.start(&mut model, &mut x).unwrap();
+    let taken = allocations_during(|| {
+        for tick in 1..500 {
+            run.advance(&mut model, f64::from(tick) * 1e-3, &mut x).unwrap();
+        }
+    });
+    assert_eq!(taken, 0);
+    assert!(run.summary().projections > 250, "{}", run.summary().projections);
+}
+
 /// What it takes to elaborate a row of cells, counted in pieces of memory, grows with its length.
 #[test]
 fn large_rows_take_memory_in_proportion_to_their_length() {

@@ -128,3 +128,17 @@ fn jumps_switches_delays_and_samples_are_each_lanes_own() {
         assert_eq!(compare("switching", &model, &options, every.is_none()), LANES - 1);
     }
 }
+
+/// Conditions of the state that change states or variables are met inside a step, by each lane where it comes to them.
+#[test]
+fn crossings_are_located_by_each_lane() {
+    let text = "model B\nparam g = 9.81, e = 0.8, d = 0.01\nSe:weight(-g) -> 1:fall -> I:ball(1)\nfall -> R:air(d)\n\
+        state h' = fall.f from 1\ndiscrete n = 0\nwhen h < 0 {\n    reset ball.f = -e*ball.f\n    n = n + 1\n}\n";
+    let text = Text { name: "b.bond", text, files: &NoFiles, overrides: &[] };
+    let program = compile(text, Form::Minimal).unwrap_or_else(|found| panic!("{}", found.render(false))).ir;
+    let model = Model::new(program).expect("parameters that fit");
+    for (method, every) in [(FixedMethod::Rk4, None), (FixedMethod::Heun, Some(0.03)), (FixedMethod::Euler, None)] {
+        let options = Options { method: Method::Fixed(method), step: Some(7e-3), to: 1.5, every, ..Options::default() };
+        assert_eq!(compare("bouncing", &model, &options, every.is_none()), LANES - 1);
+    }
+}

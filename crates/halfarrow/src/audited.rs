@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::rc::Rc;
 
-use halfarrow_audit::{self as audit, Audit, Auditor, DriftKind, Finding, wanted};
+use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
 use halfarrow_sim::{
@@ -13,6 +13,7 @@ use halfarrow_sim::{
 };
 use serde::Serialize;
 
+use crate::drift::DriftReport;
 use crate::run::Recording;
 use crate::verdict::Verdict;
 
@@ -33,6 +34,9 @@ pub struct AuditReport {
     pub power: Option<Deviation>,
     /// Stored less initial, supplied plus dissipated energy.
     pub energy: Option<Deviation>,
+    /// Energy that appears or vanishes within so many steps; below the resolution it may have flowed.
+    #[serde(skip)]
+    pub at_once: Vec<(usize, Deviation)>,
     /// Laws of junctions and elements.
     pub residual: Option<Deviation>,
     /// Stored quantities and integrated signals against the integrals of their rates.
@@ -45,23 +49,6 @@ pub struct AuditReport {
     pub notes: Vec<String>,
     /// What could not be checked, and why.
     pub unchecked: Vec<String>,
-}
-
-/// How far positions have drifted from a relation that their speeds keep.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DriftReport {
-    /// The relation: an expression of positions that keeps its value (`closed`), else a sum of rates that vanishes.
-    pub relation: String,
-    /// `closed`: the relation is one of positions in closed form; `open`: it is one of positions, without a closed form;
-    /// `nonholonomic`: it binds speeds and no positions; `undecided`.
-    pub kind: &'static str,
-    /// What the expression has changed by at the end of the run, in SI units; without a closed form, what the positions
-    /// have left their rates by, times their factors. `None` where there is none, or something was not recorded.
-    pub value: Option<f64>,
-    /// The greatest such change on the run.
-    pub greatest: Option<f64>,
-    /// Below this a drift says nothing.
-    pub resolution: f64,
 }
 
 /// The greatest miss of a kind.
@@ -461,6 +448,7 @@ impl From<Audit> for AuditReport {
         AuditReport {
             power: miss(a.power),
             energy: miss(a.energy),
+            at_once: a.at_once.into_iter().map(|(steps, found)| (steps, found.into())).collect(),
             residual: miss(a.residual),
             rates: miss(a.rates),
             drift: a.drift.into_iter().map(DriftReport::from).collect(),
@@ -469,19 +457,6 @@ impl From<Audit> for AuditReport {
             unchecked: a.unchecked,
             ..AuditReport::default()
         }
-    }
-}
-
-impl From<audit::Drift> for DriftReport {
-    fn from(d: audit::Drift) -> DriftReport {
-        let kind = match d.kind {
-            DriftKind::Closed => "closed",
-            DriftKind::Open => "open",
-            DriftKind::Nonholonomic => "nonholonomic",
-            DriftKind::Undecided => "undecided",
-        };
-        let audit::Drift { relation, value, greatest, resolution, .. } = d;
-        DriftReport { relation, kind, value, greatest, resolution }
     }
 }
 

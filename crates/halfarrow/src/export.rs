@@ -13,14 +13,14 @@ use halfarrow_emit::fmu::Version;
 use halfarrow_emit::{self as emit, EmitError, File, Real, latex};
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Events as _, Options, Sink, System as _, simulate};
+use halfarrow_sim::{Events as _, Method, Options, Sink, System as _, simulate};
 use serde::Serialize;
 
 use crate::error::{Error, Problem};
 #[cfg(feature = "fmu")]
 use crate::library::library;
 use crate::model::Model;
-use crate::run::Start;
+use crate::run::{Start, projected};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +63,9 @@ pub struct Export {
     pub step: f64,
     /// The real numbers of C; FMUs have `double`.
     pub real: Real,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step; of C and
+    /// FMUs, which steps by themselves, in `double`.
+    pub project: bool,
     /// FMUs: whether a binary for this machine stands in it, made by its C compiler; sources always do.
     pub binary: bool,
 }
@@ -76,6 +79,7 @@ impl Default for Export {
             method: FixedMethod::Rk4,
             step: 1e-3,
             real: Real::Double,
+            project: false,
             binary: true,
         }
     }
@@ -265,6 +269,11 @@ impl<'a> ExportedProgram<'a> {
             return Err(refused(EmitError::Implicit));
         }
         let mut system = model.system(&model.equations_in(export.form)?)?;
+        projected(system.program(), export.project, Method::Fixed(export.method))?;
+        if export.project && export.real == Real::Float && export.target == Target::C {
+            let reason = "project is for double: what float makes of positions is no drift".into();
+            return Err(Problem::BadOption { reason }.into());
+        }
         system.record_impulses();
         let states = model.start(&mut system, Start::Given)?;
         let start = start(&system, states).map_err(|failure| model.stopped(failure))?;
@@ -284,6 +293,7 @@ impl<'a> ExportedProgram<'a> {
             real: self.export.real,
             modes: &self.modes,
             independent: &self.independent,
+            project: self.export.project,
         })
     }
 
@@ -335,8 +345,9 @@ fn modes(
     system: &exec::Model,
     start: &emit::Start,
 ) -> Result<(Vec<Symbol>, Vec<emit::c::Mode>), Error> {
-    // Single precision does not tell what is carried over, and functions of CasADi have no memory of a mode.
-    let one = export.real == Real::Float || export.target == Target::Casadi;
+    // Single precision does not tell what is carried over, functions of CasADi have no memory of a mode, and what relations keep
+    // is known in one of them.
+    let one = export.real == Real::Float || export.target == Target::Casadi || export.project;
     let sets = if one { 0 } else { MOST_SETS };
     let all = system.clone().programs_of_modes((0.0, &start.states), MOST_MODES, sets).ok_or_else(|| {
         let laws = model.graph.set_valued.len();
@@ -346,6 +357,11 @@ fn modes(
         );
         Error::from(Problem::BadOption { reason })
     })?;
+    if export.project && !model.graph.set_valued.is_empty() {
+        let reason = "exported code does not put positions back while set-valued laws hold some of them: leave out `--project`, or \
+                      write the loop as a `constraint`";
+        return Err(Problem::BadOption { reason: reason.into() }.into());
+    }
     let mut all = all.into_iter().map(|mode| emit::c::Mode {
         program: mode.program,
         recorded: mode.recorded,

@@ -18,11 +18,12 @@ use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
 use crate::cost;
+use crate::drift::{DriftReport, drifts_at};
 use crate::error::{Error, Problem};
 use crate::input::{Input, connect};
 use crate::model::Model;
 use crate::names::listed;
-use crate::run::{Record, Run, Start, choose, units};
+use crate::run::{Record, Run, Start, choose, projected, units};
 use crate::verdict::Made;
 use crate::wall_clock::WallClock;
 
@@ -60,6 +61,8 @@ pub struct RealTimeRun {
     pub on_miss: OnMiss,
     /// Evaluations of a block of nonlinear equations at most in one solution; `None`: 50.
     pub bound: Option<usize>,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step.
+    pub project: bool,
     /// Bytecode or machine code; `Auto`: machine code wherever there is any, made before the clock starts.
     pub execution: Execution,
 }
@@ -113,6 +116,12 @@ pub struct RealTimeReport {
     pub outputs: Vec<String>,
     /// The modes of set-valued laws, if there are any.
     pub modes: Option<ModesReport>,
+    /// How often positions were put back onto relations that their speeds keep.
+    pub projections: usize,
+    /// How far positions have drifted from such relations at the end.
+    pub drift: Vec<DriftReport>,
+    /// What is to be known of the run.
+    pub notes: Vec<String>,
     /// What the audit found in the first steps, taken before the run and without its live inputs.
     pub audit: AuditReport,
     /// Why it stopped before its end, if it did.
@@ -179,22 +188,26 @@ impl Model {
         }
         connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
         choose(&mut system, &run.record)?;
+        let notes = projected(system.program(), run.project, Method::Fixed(run.method))?;
         cost::held(&system, TICKS / run.rate)?;
         let mut x = self.start(&mut system, run.start)?;
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
         let modes = self.prepared_modes(&system);
         let audit = self.rehearse(&system, run, &x)?;
         let machine = make_ready(&mut system, run)?;
+        system.tell_drift(true);
         let mut ports = Channels::open(run, &system, stop)?;
         let mut clock = WallClock::new(SPIN);
         let end = run_real_time(&mut system, run.method, &pace, &mut x, &mut clock, &mut ports, statistics);
+        let projections = end.as_ref().map_or_else(|stopped| stopped.summary.projections, |done| done.projections);
+        let drift = drifts_at(&mut system, statistics.time(), &x);
         let error = match end {
             Err(stopped) if statistics.ticks() == 0 => return Err(self.stopped_at(stopped)),
             Err(stopped) => Some(stopped.to_string()),
-            Ok(()) if pace.ticks.is_some_and(|ticks| statistics.ticks() < ticks) => {
+            Ok(_) if pace.ticks.is_some_and(|ticks| statistics.ticks() < ticks) => {
                 Some(Failure::Interrupted { time: statistics.time() }.to_string())
             }
-            Ok(()) => None,
+            Ok(_) => None,
         };
         Ok(RealTimeReport {
             model: self.name().to_string(),
@@ -216,6 +229,9 @@ impl Model {
             machine,
             outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
             modes,
+            projections,
+            drift,
+            notes,
             audit,
             error,
         })
@@ -237,7 +253,13 @@ impl Model {
         let _ = system.record(&[]);
         let step = 1.0 / run.rate;
         let to = run.length.unwrap_or(f64::INFINITY).min(REHEARSED * step).max(step);
-        let options = Options { method: Method::Fixed(run.method), to, step: Some(step), ..Options::default() };
+        let options = Options {
+            method: Method::Fixed(run.method),
+            to,
+            step: Some(step),
+            project: run.project,
+            ..Options::default()
+        };
         let mut audited = Audited::new(&mut system, &self.graph);
         // What stops it stops the run itself, which tells it.
         let _ = audited.simulate(&options, &mut x, &mut Nobody);
@@ -263,7 +285,7 @@ fn pace(run: &RealTimeRun) -> Result<Pace, Problem> {
         return bad("the length of the run has to be above 0 s".into());
     }
     let ticks = run.length.map(|length| (length * run.rate).round().max(1.0) as u64);
-    Ok(Pace { step: 1.0 / run.rate, ticks, on_miss: run.on_miss })
+    Ok(Pace { step: 1.0 / run.rate, ticks, on_miss: run.on_miss, project: run.project })
 }
 
 /// Makes all machine code that a tick may need; whether there is any. Without it for this processor the bytecode runs on,

@@ -345,7 +345,7 @@ impl Model {
         }
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
         let mut notes = choose(system, &run.record)?;
-        notes.extend(projected(system.program(), run)?);
+        notes.extend(projected(system.program(), run.project, run.method)?);
         let by = quantities(system, run)?;
         vary(system, &by)?;
         let start = self.start(system, run.start)?;
@@ -375,7 +375,7 @@ impl Model {
         set_up(&mut system, run)?;
         let mut notes = choose(&mut system, &run.record)?;
         match explicit {
-            true => notes.extend(projected(system.program(), run)?),
+            true => notes.extend(projected(system.program(), run.project, run.method)?),
             false if run.project => {
                 let reason = format!(
                     "project is for explicit equations: the form {} holds its constraints itself (try minimal)",
@@ -832,11 +832,11 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
 }
 
 /// What is to be known of the relations onto which positions are put back, if that is asked for.
-fn projected(program: &Program, run: &Run) -> Result<Vec<String>, Problem> {
-    if !run.project {
+pub(crate) fn projected(program: &Program, project: bool, method: Method) -> Result<Vec<String>, Problem> {
+    if !project {
         return Ok(Vec::new());
     }
-    if run.method == Method::Bdf {
+    if method == Method::Bdf {
         let reason = "project does not go with bdf, whose steps go on with their history: take radau or another solver";
         return Err(Problem::BadOption { reason: reason.into() });
     }

@@ -5,12 +5,13 @@ use halfarrow_compiler::program::Program;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
 use halfarrow_sim::fixed_step::FixedMethod;
-use halfarrow_sim::{Events as _, Position, Stepwise, tick};
+use halfarrow_sim::{Events as _, Method, Position, Stepwise, tick};
 
 use crate::compiled::Compiled;
+use crate::drift::{DriftReport, drifts_at};
 use crate::error::{Error, Problem};
 use crate::model::Model;
-use crate::run::{Start, refused};
+use crate::run::{Start, projected, refused};
 use crate::sweep::known_parameter;
 
 /// A run by a method of fixed step that goes on as far as it is told, and can be read and set in between. Values of inputs
@@ -37,6 +38,7 @@ pub struct Stepper {
     system: exec::Model,
     run: Stepwise,
     method: FixedMethod,
+    project: bool,
     step: f64,
     /// Steps of this length since `from`.
     steps: u64,
@@ -67,6 +69,21 @@ impl Compiled {
     /// # Errors
     /// The form is another one, the step is no time, or there is no start.
     pub fn stepper(&self, method: FixedMethod, step: f64, start: Start) -> Result<Stepper, Error> {
+        self.stepper_projecting(method, step, start, false)
+    }
+
+    /// The same run with positions that only speeds keep together put back onto the relations between them after each step,
+    /// if it is to `project`.
+    ///
+    /// # Errors
+    /// As [`stepper`](Compiled::stepper), or something cannot be put back.
+    pub fn stepper_projecting(
+        &self,
+        method: FixedMethod,
+        step: f64,
+        start: Start,
+        project: bool,
+    ) -> Result<Stepper, Error> {
         let bad = |reason: String| Err(Problem::BadOption { reason }.into());
         if self.form() != Form::Minimal {
             return bad(format!("step by step a model runs in the form minimal, not in {}", self.form().name()));
@@ -78,11 +95,13 @@ impl Compiled {
         let mut x = self.model().start(&mut system, start)?;
         // Nothing is recorded unless it is read, which cannot fail.
         let _ = system.record(&[]);
-        let mut run = Stepwise::new(method, 0.0, &system);
+        projected(system.program(), project, Method::Fixed(method))?;
+        system.tell_drift(true);
+        let mut run = Stepwise::new(method, 0.0, &system).projecting(project);
         run.start(&mut system, &mut x).map_err(|stopped| self.model().stopped_at(stopped))?;
         let inputs = vec![None; system.program().inputs.len()];
         let model = self.model().clone();
-        Ok(Stepper { model, system, run, method, step, steps: 0, from: 0.0, x, inputs, values: Vec::new() })
+        Ok(Stepper { model, system, run, method, project, step, steps: 0, from: 0.0, x, inputs, values: Vec::new() })
     }
 }
 
@@ -171,6 +190,12 @@ impl Stepper {
         Ok(unit.filter(|unit| !unit.is_si()).map_or(self.values[place], |unit| unit.from_si_f64(self.values[place])))
     }
 
+    /// How far positions have drifted by now from what only their speeds keep, since the start or the last parameter that was
+    /// set.
+    pub fn drift(&mut self) -> Vec<DriftReport> {
+        drifts_at(&mut self.system, self.run.time(), &self.x)
+    }
+
     /// Names of all that can be read, with their units.
     pub fn readable(&self) -> impl Iterator<Item = (&str, Option<&Unit>)> {
         let program: &Program = self.system.program();
@@ -210,7 +235,7 @@ impl Stepper {
     fn take_up(&mut self) -> Result<(), Error> {
         self.place_inputs();
         (self.from, self.steps) = (self.time(), 0);
-        self.run = Stepwise::new(self.method, self.from, &self.system);
+        self.run = Stepwise::new(self.method, self.from, &self.system).projecting(self.project);
         self.run.start(&mut self.system, &mut self.x).map_err(|stopped| self.model.stopped_at(stopped))
     }
 

@@ -21,19 +21,20 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
-use halfarrow_sim::{Failure, Options, Stopped, simulate};
+use halfarrow_sim::{Options, Stopped, Summary, simulate};
 use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compiled::Compiled;
+use crate::drift::{SetDrift, SweepDrift, of_sweep};
 use crate::error::{Error, Problem};
 use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Record, Run, choose, options, units};
+use crate::run::{Record, Run, choose, options, projected, units};
 use journal::{Journal, JournalChunk};
 use plan::Plan;
-use reduce::Reducers;
+use reduce::{Reducers, Reducing};
 use structures::{Structures, set_all};
 
 /// Sets of a chunk: what is computed in one go, written at once, and lost when the program is killed.
@@ -97,6 +98,10 @@ pub struct SweepReport {
     pub failures: Vec<SetFailure>,
     /// Number of such sets.
     pub failed: usize,
+    /// How far positions have drifted from relations that only their speeds keep.
+    pub drift: Vec<SweepDrift>,
+    /// What is to be known of all runs.
+    pub notes: Vec<String>,
     /// What the audit found of a sample of the sets.
     pub audit: SweepAudit,
 }
@@ -110,8 +115,8 @@ pub struct SetFailure {
     pub reason: String,
 }
 
-/// Failures that are told; all are counted.
-const TOLD: usize = 100;
+/// Told that are told; all are counted.
+const MOST_TOLD: usize = 100;
 
 impl Model {
     /// Runs a sweep on all cores and writes a row for each set to `out`, `.parquet` or `.csv`: the number of the set from 1,
@@ -145,9 +150,9 @@ impl Model {
             return Err(Error::Interrupted { done: journal.sets(), sets: plan.sets() });
         }
         let audit = audit::sample_of(&work, &sweep.run);
-        let failures = kind.write(out, columns, sweep.units, &mut journal).map_err(unwritable)?;
+        let told = kind.write(out, columns, sweep.units, &mut journal).map_err(unwritable)?;
         journal.remove();
-        Ok(self.sweep_report(&prepared, resumed, failures, audit))
+        Ok(self.sweep_report(&prepared, resumed, told, audit))
     }
 
     /// Runs a sweep on all cores and keeps its rows in memory: the columns that [`sweep`](Model::sweep) writes.
@@ -183,8 +188,8 @@ impl Model {
         // Memory takes whatever comes.
         let complete = kept.unwrap_or(false);
         let audit = if complete { audit::sample_of(&work, &sweep.run) } else { SweepAudit::default() };
-        let mut failures = Failures::default();
-        entries.values().for_each(|entry| failures.note(entry));
+        let mut told = Told::default();
+        entries.values().for_each(|entry| told.note(entry));
         let width = columns.len();
         let values = |c: usize| entries.values().flat_map(move |e| e.values.iter().skip(c).step_by(width)).copied();
         let column = |(c, (name, unit)): (usize, &(String, String))| Column {
@@ -193,7 +198,7 @@ impl Model {
             values: values(c).collect(),
         };
         let columns = columns.iter().enumerate().map(column).collect();
-        SweepTable { columns, report: self.sweep_report(prepared, 0, failures, audit), complete }
+        SweepTable { columns, report: self.sweep_report(prepared, 0, told, audit), complete }
     }
 
     /// All that a sweep needs before its first run.
@@ -211,22 +216,25 @@ impl Model {
         let reducers = reducers(sweep, &mut system)?;
         let options = options(&sweep.run)?;
         options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
+        let notes = projected(system.program(), sweep.run.project, sweep.run.method)?;
         crate::cost::check_stops(&system, &options)?;
         let columns = columns(&plan, &reducers, &system);
         let structures = Structures::of(self, &system, sweep, &plan);
         let execution = sweep.run.execution;
         system.execute(execution, None).map_err(|why| Problem::BadOption { reason: why.to_string() })?;
-        Ok(Prepared { plan, reducers, options, columns, structures, execution })
+        Ok(Prepared { plan, reducers, options, columns, structures, execution, notes })
     }
 
-    fn sweep_report(&self, prepared: &Prepared, resumed: usize, failures: Failures, audit: SweepAudit) -> SweepReport {
+    fn sweep_report(&self, prepared: &Prepared, resumed: usize, told: Told, audit: SweepAudit) -> SweepReport {
         SweepReport {
             model: self.name().to_string(),
             sets: prepared.plan.sets(),
             resumed,
             columns: prepared.columns.iter().map(|c| c.0.clone()).collect(),
-            failed: failures.count,
-            failures: failures.first,
+            failed: told.count,
+            failures: told.first,
+            drift: of_sweep(told.drifts, &audit.greatest.drift, audit.sets),
+            notes: prepared.notes.clone(),
             audit,
         }
     }
@@ -268,6 +276,7 @@ struct Prepared {
     columns: Vec<(String, String)>,
     structures: Structures,
     execution: Execution,
+    notes: Vec<String>,
 }
 
 impl Prepared {
@@ -277,19 +286,22 @@ impl Prepared {
     }
 }
 
-/// Sets that came to no end.
+/// What is told of sets beside their rows: that they came to no end, and how far positions have drifted.
 #[derive(Default)]
-struct Failures {
+struct Told {
     count: usize,
     /// The first of them.
     first: Vec<SetFailure>,
+    /// How far positions have drifted in the others.
+    drifts: Vec<SetDrift>,
 }
 
-impl Failures {
+impl Told {
     fn note(&mut self, entry: &JournalChunk) {
         self.count += entry.failures.len();
-        let room = TOLD.saturating_sub(self.first.len());
+        let room = MOST_TOLD.saturating_sub(self.first.len());
         self.first.extend(entry.failures.iter().take(room).cloned());
+        entry.drifts.iter().for_each(|drift| SetDrift::gather(&mut self.drifts, drift.clone()));
     }
 }
 
@@ -373,8 +385,21 @@ struct Copies<'a> {
     system: exec::Model,
 }
 
-/// What became of a set: what is kept of its run, or why there is none.
-type Outcome = Result<Vec<f64>, String>;
+/// What became of a set, or why its run came to no end.
+type Outcome = Result<Ended, String>;
+
+/// A set whose run came to its end: what is kept of it, and how far its positions have drifted.
+struct Ended {
+    kept: Vec<f64>,
+    drifted: Vec<exec::Drifted>,
+}
+
+impl Ended {
+    fn of(kept: Reducing<'_>, system: &mut exec::Model, to: f64, x: &[f64]) -> Ended {
+        // What has no value there was not measured.
+        Ended { kept: kept.finish(), drifted: system.drift(to, x).unwrap_or_default() }
+    }
+}
 
 impl<'a> Worker<'a> {
     fn new(work: &'a SweepContext<'a>) -> Worker<'a> {
@@ -383,7 +408,8 @@ impl<'a> Worker<'a> {
 
     fn chunk(&mut self, chunk: usize, start: crate::run::Start) -> JournalChunk {
         let sets: Vec<usize> = (chunk * CHUNK..self.work.plan.sets().min((chunk + 1) * CHUNK)).collect();
-        let mut entry = JournalChunk { chunk, rows: sets.len(), values: Vec::new(), failures: Vec::new() };
+        let mut entry =
+            JournalChunk { chunk, rows: sets.len(), values: Vec::new(), drifts: Vec::new(), failures: Vec::new() };
         let mut outcomes: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut alike: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for &set in &sets {
@@ -409,7 +435,11 @@ impl<'a> Worker<'a> {
         entry.values.extend(self.work.plan.values(set));
         let failed = outcome.is_err();
         match outcome {
-            Ok(kept) => entry.values.extend(kept),
+            Ok(Ended { kept, drifted }) => {
+                entry.values.extend(kept);
+                let number = self.work.plan.number(set);
+                drifted.into_iter().for_each(|d| SetDrift::gather(&mut entry.drifts, SetDrift::of(d, number)));
+            }
             Err(reason) => {
                 let kept = self.work.reducers.iter().map(|r| r.reductions()).sum();
                 entry.values.extend(std::iter::repeat_n(f64::NAN, kept));
@@ -424,12 +454,11 @@ impl<'a> Copies<'a> {
     fn of(work: &SweepContext<'a>, number: usize) -> Copies<'a> {
         let structure = work.structures.get(number);
         let mut system = structure.system.clone();
+        system.tell_drift(true);
+        let wide = is_wide(work.options.method) && work.execution != Execution::Machine;
+        let wide = wide.then(|| exec::WideModel::new(&system));
         // That there is machine code where it is asked for was made sure of before. Evaluations of all sets count together.
         let _ = system.execute(work.execution, None);
-        // Lanes share their code: each would have to change its mode at another time.
-        let alike = !structure.system.may_change_mode();
-        let wide = is_wide(work.options.method) && work.execution != Execution::Machine && alike;
-        let wide = wide.then(|| exec::WideModel::new(&structure.system));
         Copies { model: &structure.model, wide, system }
     }
 
@@ -439,9 +468,7 @@ impl<'a> Copies<'a> {
             Some(mut wide) => {
                 let outcomes = self.together(work, &mut wide, sets, start);
                 self.wide = Some(wide);
-                // Beside positions where motions meet a run by itself takes shorter steps.
-                let all = outcomes.into_iter().zip(sets);
-                all.map(|(outcome, &set)| outcome.unwrap_or_else(|| self.alone(work, set, start))).collect()
+                outcomes
             }
             None => sets.iter().map(|&set| self.alone(work, set, start)).collect(),
         }
@@ -452,17 +479,17 @@ impl<'a> Copies<'a> {
         let mut x = prepare(&mut self.system, self.model, work.plan, set, start)?;
         let mut sink = Reducers::begin(work.reducers);
         simulate(&mut self.system, work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
-        Ok(sink.finish())
+        Ok(Ended::of(sink, &mut self.system, work.options.to, &x))
     }
 
-    /// Several sets on vectors; `None` where a set has to run by itself.
+    /// Several sets on vectors.
     fn together(
         &self,
         work: &SweepContext<'_>,
         wide: &mut exec::WideModel,
         sets: &[usize],
         start: crate::run::Start,
-    ) -> Vec<Option<Outcome>> {
+    ) -> Vec<Outcome> {
         let states = self.system.program().states.len();
         let mut x = vec![[0.0; LANES]; states];
         let mut prepared: Vec<Result<(), String>> = Vec::with_capacity(sets.len());
@@ -475,13 +502,14 @@ impl<'a> Copies<'a> {
         wide.begin();
         let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers));
         let ends = simulate_wide(wide, work.options, &mut x, &mut sinks, wanted);
-        let outcome = |((prepared, end), sink): ((Result<(), String>, Result<_, Stopped>), _)| match (prepared, end) {
-            (Err(why), _) => Some(Err(why)),
-            (_, Err(Stopped { failure: Failure::OffMotion { .. }, .. })) => None,
-            (_, Err(stopped)) => Some(Err(stopped.to_string())),
-            (_, Ok(_)) => Some(Ok(reduce::Reducing::finish(sink))),
+        let mut outcome = |lane: usize, prepared: Result<(), String>, end: Result<Summary, Stopped>, sink| {
+            prepared?;
+            end.map_err(|stopped| stopped.to_string())?;
+            let x: Vec<f64> = x.iter().map(|x| x[lane]).collect();
+            Ok(Ended::of(sink, wide.model(lane), work.options.to, &x))
         };
-        prepared.into_iter().zip(ends).zip(sinks).map(outcome).collect()
+        let all = prepared.into_iter().zip(ends).zip(sinks).enumerate();
+        all.map(|(lane, ((prepared, end), sink))| outcome(lane, prepared, end, sink)).collect()
     }
 }
 
@@ -556,14 +584,8 @@ impl Kind {
     }
 
     /// Writes all rows in the order of the sets, a chunk at a time. Gives how many failed, and the first of them.
-    fn write(
-        self,
-        path: &Path,
-        columns: &[(String, String)],
-        units: bool,
-        journal: &mut Journal,
-    ) -> io::Result<Failures> {
-        let mut failures = Failures::default();
+    fn write(self, path: &Path, columns: &[(String, String)], units: bool, journal: &mut Journal) -> io::Result<Told> {
+        let mut told = Told::default();
         let names: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), unit.as_str())).collect();
         let written = write_whole(path, |out| {
             let mut table = match self {
@@ -575,7 +597,7 @@ impl Kind {
             }
             for chunk in 0..journal.chunks() {
                 let entry = journal.entry(chunk)?;
-                failures.note(&entry);
+                told.note(&entry);
                 let column = |c: usize| entry.values.iter().skip(c).step_by(names.len()).copied().collect();
                 let columns: Vec<Vec<f64>> = (0..names.len()).map(column).collect();
                 let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -590,7 +612,7 @@ impl Kind {
             }
         });
         written.map_err(|error| error.source)?;
-        Ok(failures)
+        Ok(told)
     }
 }
 

@@ -15,6 +15,10 @@ pub(crate) const SAID: f64 = 1e-6;
 pub(crate) const REFUSED: f64 = 1e-2;
 /// Errors of steps add up over a run: as many times the tolerance of a step are what was asked for.
 const STEPS: f64 = 1000.0;
+/// A result that misses this part of what is there is refused whatever was asked for, and one that misses [`REFUSED`] is said to.
+const MOST: f64 = 0.2;
+/// One step errs by so many times its tolerance at most: it holds for each state, and is estimated.
+const STEP: f64 = 10.0;
 /// Unknowns of equations that a step solves to the tolerance miss laws by some of it.
 const SOLVED: f64 = 30.0;
 /// The form `stiff`: its springs give by so much of the ratio of speeds.
@@ -72,13 +76,21 @@ impl Made {
 
     /// The same for what is integrated: of a tolerance as much as was asked for.
     fn integrals(&self) -> (f64, f64) {
-        self.granted(if matches!(self.method, Method::Fixed(_)) { 0.0 } else { STEPS * self.rtol })
+        let asked = if matches!(self.method, Method::Fixed(_)) { 0.0 } else { STEPS * self.rtol };
+        let (said, refused) = self.granted(asked.min(MOST));
+        (said.min(REFUSED.max(self.granted(0.0).0)), refused)
     }
 
     /// Bounds that grant this much. The springs of the form `stiff` give.
     fn granted(&self, asked: f64) -> (f64, f64) {
         let give = if self.form == Form::Stiff { GIVE / self.stiffness.sqrt() } else { 0.0 };
         (SAID.max(asked).max(give), REFUSED.max(asked).max(GIVE * give))
+    }
+
+    /// By how much energy may change in so many steps without a cause: by what the tolerance leaves open of each.
+    fn at_once(&self, steps: usize) -> f64 {
+        let fixed = matches!(self.method, Method::Fixed(_));
+        self.granted(if fixed { 0.0 } else { STEP * self.rtol * steps as f64 }).1
     }
 
     /// What to do where laws are missed.
@@ -90,6 +102,15 @@ impl Made {
                 .into(),
             _ => "take the form minimal, or see with `compare` which form holds".into(),
         }
+    }
+
+    /// What to do where energy is made or lost at once.
+    fn remedy_for_leaps(&self) -> String {
+        let variables = match self.form {
+            Form::Minimal => "see which position it is, and keep variables by `prefer` that tell the motion there",
+            _ => "take the form minimal, which goes on in other variables",
+        };
+        format!("its variables may tell nothing there: {variables}, or {}", self.remedy_for_integrals())
     }
 
     /// What to do where integrals are missed.
@@ -132,6 +153,13 @@ impl AuditReport {
         Some(Failure::Untrue { time, what: place, miss: value, remedy: refused.remedy })
     }
 
+    /// Energy that is gained or lost at once by more than its steps may miss, in the fewest steps that show it.
+    fn beyond_at_once(&self, made: &Made) -> Option<Beyond<'_>> {
+        let stands_out = |(steps, miss): &&(usize, Deviation)| miss.value - miss.resolution > made.at_once(*steps);
+        let (_, miss) = self.at_once.iter().find(stands_out)?;
+        Some(Beyond { miss, verdict: Verdict::Refused, remedy: made.remedy_for_leaps() })
+    }
+
     /// What is missed by more than may be: laws first.
     fn beyond(&self, made: &Made) -> Vec<Beyond<'_>> {
         let laws = [&self.residual, &self.power].map(|m| (m, made.laws(), made.remedy_for_laws()));
@@ -155,11 +183,11 @@ impl AuditReport {
             Some((verdict, if blown_up && fixed { made.remedy_for_integrals() } else { remedy }))
         };
         let all = laws.into_iter().chain(integrals);
-        all.filter_map(|(miss, bounds, remedy)| {
+        let found = all.filter_map(|(miss, bounds, remedy)| {
             let (verdict, remedy) = judged((miss, bounds, remedy))?;
             Some(Beyond { miss: miss.as_ref()?, verdict, remedy })
-        })
-        .collect()
+        });
+        found.chain(self.beyond_at_once(made)).collect()
     }
 }
 
@@ -213,6 +241,23 @@ mod tests {
         assert_eq!(verdict(rates(1e-4, 1e-8), &fixed), Verdict::Doubtful);
         assert_eq!(verdict(rates(1e-4, 1e-8), &made(Form::Minimal, Method::Auto)), Verdict::Holds);
         assert_eq!(verdict(rates(0.5, 1e-8), &made(Form::Minimal, Method::Auto)), Verdict::Refused);
+    }
+
+    #[test]
+    fn no_tolerance_excuses_energy_that_vanishes_at_once() {
+        let lost = |value, steps| {
+            let at_once = vec![(1, miss(1e-9, 0.0).unwrap()), (steps, miss(value, 1e-6).unwrap())];
+            AuditReport { at_once, ..AuditReport::default() }
+        };
+        let coarse = Made { rtol: 1e-3, ..made(Form::Kane, Method::Radau) };
+        for (value, steps, wanted) in [(0.5, 8, Verdict::Refused), (0.05, 8, Verdict::Holds), (0.5, 64, Verdict::Holds)]
+        {
+            assert_eq!(verdict(lost(value, steps), &coarse), wanted, "{value} {steps}");
+        }
+        assert_eq!(verdict(lost(0.05, 64), &made(Form::Minimal, Method::Bdf)), Verdict::Refused);
+        let integral = |value| AuditReport { energy: miss(value, 0.0), ..AuditReport::default() };
+        assert_eq!(verdict(integral(0.05), &coarse), Verdict::Doubtful);
+        assert_eq!(verdict(integral(0.5), &coarse), Verdict::Refused);
     }
 
     #[test]

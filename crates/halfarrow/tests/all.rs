@@ -6,6 +6,8 @@ mod animation;
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "crawls.rs"]
+mod crawls;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]
@@ -44,6 +46,8 @@ mod gradient;
 mod growth;
 #[path = "iltis.rs"]
 mod iltis;
+#[path = "lanes_in_modes.rs"]
+mod lanes_in_modes;
 #[path = "library_std.rs"]
 mod library_std;
 #[path = "linearize.rs"]
@@ -88,3 +92,5 @@ mod sweep;
 mod vehicles;
 #[path = "velocity.rs"]
 mod velocity;
+#[path = "velocity_many.rs"]
+mod velocity_many;

@@ -238,6 +238,7 @@ fn compare_and_real_time_and_reports_obey_the_audit() {
         record: Record::Default,
         start: halfarrow::Start::Given,
         on_miss: halfarrow::OnMiss::CatchUp,
+        project: false,
         bound: None,
         execution: halfarrow::Execution::Auto,
     };

@@ -31,6 +31,13 @@ impl Stepwise {
         }
     }
 
+    /// The same with the state [projected](crate::Events::project) where a step ends.
+    #[must_use]
+    pub fn projecting(mut self, project: bool) -> Stepwise {
+        self.options.project = project;
+        self
+    }
+
     /// The start, which counts as an event.
     ///
     /// # Errors

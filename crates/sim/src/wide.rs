@@ -1,15 +1,24 @@
 //! Several runs of one system at once, each with parameters of its own: explicit methods of fixed step on vectors of lanes.
 //!
-//! Every lane goes its own way in time: its steps end at its own events and samples. A lane does to the last bit what its
-//! system does alone.
+//! Every lane goes its own way in time: its steps end at its own events and samples. What is not the same arithmetic for all,
+//! as events, exchanges of independent variables or steps that have to end sooner, a lane does by itself, by the driver's own
+//! functions. So it does to the last bit what its system does alone.
+//!
+//! Lanes whose modes differ cannot be computed together. Those of the mode that most are in go on, and the others wait until
+//! theirs has the most; where few are left in each, one goes on alone until it changes its mode.
 
-use crate::driver::{Grid, Run, Stop, StopReason};
-use crate::fixed_step::{FixedMethod, Tableau, target};
+use crate::driver::{Flow, Grid, Run, Stop, StopReason};
+use crate::fixed_step::{FixedMethod, FixedStep, Tableau, Ticks, target};
+use crate::shared::Counted;
 use crate::simulate::check_start;
-use crate::{Affected, Failure, HybridSystem, Method, Options, Sink, Stopped, Summary};
+use crate::{Failure, HybridSystem, Method, Options, Sink, Stopped, Summary};
+use std::collections::BTreeMap;
 
 /// Runs at once.
 pub const LANES: usize = 16;
+
+/// So many lanes of one mode at least are computed together: fewer are sooner done one by one.
+const TOGETHER: usize = 6;
 
 /// A number for each lane.
 pub type Wide = [f64; LANES];
@@ -17,10 +26,14 @@ pub type Wide = [f64; LANES];
 /// A system for each lane, whose rates and recorded values are computed together.
 ///
 /// `failures` holds a failure for each lane that is out: its numbers mean nothing, and nobody looks at them. A lane that
-/// fails puts its own there.
+/// fails puts its own there. The others are in one mode.
 pub trait WideSystem {
     /// The system of a lane: its events and memory, and all that is not done together.
     fn lane(&mut self, lane: usize) -> &mut dyn HybridSystem;
+    /// The number of the mode that a lane is in.
+    fn mode(&self, lane: usize) -> u32;
+    /// Whether lanes may change their modes.
+    fn may_change_mode(&self) -> bool;
     /// Rates at `(t, x)`, as [`System::rates`](crate::System::rates).
     fn rates(&mut self, t: &Wide, x: &[Wide], dx: &mut [Wide], failures: &mut [Option<Failure>; LANES]);
     /// Recorded values at `(t, x)`, as [`Events::observe`](crate::Events::observe).
@@ -32,7 +45,7 @@ pub trait WideSystem {
 /// Integrates all lanes from the states `x`; a method of fixed step that is explicit. `wanted` says which lanes count.
 ///
 /// Gives what came of each lane, as [`simulate`](crate::simulate) does, though without the number of evaluations, which are
-/// shared, and without asking sinks after each step whether to go on; lanes that do not count have done nothing.
+/// shared, and without asking all sinks after each step whether to go on; lanes that do not count have done nothing.
 ///
 /// # Panics
 /// If the method is not explicit with a step of fixed length, or the options make no sense.
@@ -47,7 +60,7 @@ pub fn simulate_wide<S: Sink>(
         panic!("lanes need a method of fixed step, and its step")
     };
     let tableau = method.tableau().expect("lanes need an explicit method");
-    let mut batch = Batch::new(system, options, step, x.len(), sinks);
+    let mut batch = Batch::new(system, options, (method, step), x.len(), sinks);
     for (lane, wanted) in wanted.into_iter().enumerate() {
         if wanted {
             batch.alone(lane, x, Lane::start);
@@ -55,8 +68,11 @@ pub fn simulate_wide<S: Sink>(
             batch.lanes[lane].over = true;
         }
     }
-    while batch.lanes.iter().any(|lane| !lane.over) {
-        batch.step(tableau, x);
+    while let Some(next) = batch.next() {
+        match next {
+            Next::Together(lanes) => batch.step(tableau, x, lanes),
+            Next::Alone(lane) => batch.go_on_alone(lane, x),
+        }
     }
     batch.outcomes()
 }
@@ -64,6 +80,14 @@ pub fn simulate_wide<S: Sink>(
 /// Whether lanes can take this method.
 pub fn is_wide(method: Method) -> bool {
     matches!(method, Method::Fixed(FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4))
+}
+
+/// Who goes on.
+enum Next {
+    /// These lanes, by a step.
+    Together([bool; LANES]),
+    /// This one, to its end or to another mode.
+    Alone(usize),
 }
 
 /// One lane on its way.
@@ -74,8 +98,9 @@ struct Lane<'a> {
     /// Where its step ends.
     target: f64,
     ticks: Grid,
-    /// Whether what happens where it stands is done with, samples included.
-    settled: bool,
+    step: f64,
+    /// What happens where it stands.
+    reason: StopReason,
     over: bool,
 }
 
@@ -84,12 +109,17 @@ struct Batch<'a> {
     system: &'a mut dyn WideSystem,
     lanes: Vec<Lane<'a>>,
     failures: [Option<Failure>; LANES],
+    /// Lanes that take part in the present step; a failure for each of the others, and for those whose step fails.
+    stepped: [bool; LANES],
+    out_of_step: [Option<Failure>; LANES],
     stages: Vec<Wide>,
     trial: Vec<Wide>,
     out: Vec<Wide>,
-    /// The state of one lane.
+    /// The state of one lane, and the method by which it goes on alone.
     state: Vec<f64>,
-    remembers: bool,
+    method: FixedStep,
+    /// Whether each lane looks at what happens where each step ends.
+    looks: bool,
     arch: pulp::Arch,
 }
 
@@ -100,7 +130,7 @@ impl<'a> Batch<'a> {
     fn new<S: Sink>(
         system: &'a mut dyn WideSystem,
         options: &'a Options,
-        step: f64,
+        (method, step): (FixedMethod, f64),
         states: usize,
         sinks: &'a mut [S; LANES],
     ) -> Batch<'a> {
@@ -109,52 +139,86 @@ impl<'a> Batch<'a> {
             stop: Stop { time: options.from, is_event: false },
             target: options.from,
             ticks: Grid::new(options.from, step),
-            settled: false,
+            step,
+            reason: StopReason::StepEnd,
             over: false,
         };
         let lanes: Vec<Lane<'a>> = sinks.iter_mut().enumerate().map(lane).collect();
         Batch {
-            remembers: system.remembers(),
+            looks: system.remembers() || system.may_change_mode() || options.project,
             arch: pulp::Arch::new(),
             out: vec![[0.0; LANES]; system.lane(0).observed()],
+            method: FixedStep::new(method, system.lane(0).sparsity()),
             lanes,
             system,
             failures: [const { None }; LANES],
+            stepped: [true; LANES],
+            out_of_step: [const { None }; LANES],
             stages: vec![[0.0; LANES]; 4 * states],
             trial: vec![[0.0; LANES]; states],
             state: vec![0.0; states],
         }
     }
 
-    /// A step of every lane that is not over.
-    fn step(&mut self, tableau: &Tableau, x: &mut [Wide]) {
+    /// Who goes on next; nobody where all are over.
+    fn next(&self) -> Option<Next> {
+        let open: [bool; LANES] = std::array::from_fn(|l| !self.lanes[l].over);
+        if !open.contains(&true) {
+            return None;
+        }
+        if !self.system.may_change_mode() {
+            return Some(Next::Together(open));
+        }
+        let mut modes: BTreeMap<u32, usize> = BTreeMap::new();
+        (0..LANES).filter(|&l| open[l]).for_each(|l| *modes.entry(self.system.mode(l)).or_default() += 1);
+        let (mode, count) = modes.into_iter().rev().max_by_key(|&(_, count)| count)?;
+        if count >= TOGETHER {
+            return Some(Next::Together(std::array::from_fn(|l| open[l] && self.system.mode(l) == mode)));
+        }
+        let time = |l: &usize| self.lanes[*l].run.time;
+        (0..LANES).filter(|&l| open[l]).min_by(|a, b| time(a).total_cmp(&time(b))).map(Next::Alone)
+    }
+
+    /// A step of these lanes.
+    fn step(&mut self, tableau: &Tableau, x: &mut [Wide], lanes: [bool; LANES]) {
         let (mut t, mut h) = ([0.0; LANES], [0.0; LANES]);
         for (i, lane) in self.lanes.iter_mut().enumerate() {
-            if !lane.over {
+            if lanes[i] {
                 lane.target = target(&mut lane.ticks, lane.run.time, lane.run.next_sample(), lane.stop.time);
             }
             (t[i], h[i]) = (lane.run.time, lane.target - lane.run.time);
         }
-        self.explicit(tableau, &t, &h, x);
+        self.only(lanes);
+        self.explicit(tableau, (&t, &h), x);
         let mut due = [None; LANES];
-        for (i, due) in due.iter_mut().enumerate() {
-            self.lanes[i].over |= self.failures[i].is_some();
-            if !self.lanes[i].over {
-                *due = self.arrive(i, x);
-            }
+        for i in (0..LANES).filter(|&l| lanes[l]) {
+            let outcome = self.out_of_step[i].take().map_or(Ok(()), Err);
+            due[i] = self.arrive(i, x, outcome);
         }
         if due.iter().any(Option::is_some) {
             self.record(due, x);
         }
+        if self.system.may_change_mode() {
+            let good: Vec<usize> = (0..LANES).filter(|&l| lanes[l] && self.failures[l].is_none()).collect();
+            good.into_iter().for_each(|l| self.alone(l, x, Lane::exchange));
+        }
     }
 
-    fn explicit(&mut self, tableau: &Tableau, t: &Wide, h: &Wide, x: &[Wide]) {
+    /// Only these lanes take part in the next step.
+    fn only(&mut self, lanes: [bool; LANES]) {
+        if self.stepped != lanes {
+            let out_of = |l: usize| (!lanes[l]).then(|| Failure::Interrupted { time: self.lanes[l].run.time });
+            (self.out_of_step, self.stepped) = (std::array::from_fn(out_of), lanes);
+        }
+    }
+
+    fn explicit(&mut self, tableau: &Tableau, (t, h): (&Wide, &Wide), x: &[Wide]) {
         let n = x.len();
         for (stage, (node, weights)) in tableau.nodes.iter().zip(tableau.stages).enumerate() {
             let (earlier, rest) = self.stages.split_at_mut(stage * n);
             self.arch.dispatch(Advance { x, h, weights, rates: earlier, out: &mut self.trial });
             let at: Wide = std::array::from_fn(|l| t[l] + node * h[l]);
-            self.system.rates(&at, &self.trial, &mut rest[..n], &mut self.failures);
+            self.system.rates(&at, &self.trial, &mut rest[..n], &mut self.out_of_step);
         }
         let Self { stages, trial, .. } = self;
         self.arch.dispatch(Advance { x, h, weights: tableau.weights, rates: stages, out: trial });
@@ -162,34 +226,46 @@ impl<'a> Batch<'a> {
 
     /// A lane has come to the end of its step. Gives as which time a sample is due there that can be taken with those of
     /// others.
-    fn arrive(&mut self, i: usize, x: &mut [Wide]) -> Option<f64> {
-        let target = self.lanes[i].target;
-        if let Some(state) = self.trial.iter().position(|value| !value[i].is_finite()) {
-            let what = Affected::variable(self.system.lane(i).state_name(state));
-            self.fail(i, Failure::NotFinite { time: target, what });
-            return None;
-        }
-        x.iter_mut().zip(&self.trial).for_each(|(x, trial)| x[i] = trial[i]);
+    fn arrive(&mut self, i: usize, x: &mut [Wide], outcome: Result<(), Failure>) -> Option<f64> {
         let lane = &mut self.lanes[i];
-        lane.run.counts.steps += 1;
-        lane.settled = false;
-        let at_event = lane.stop.is_event && lane.stop.time == target;
-        if at_event || self.remembers || lane.run.looks_at_every_step() {
-            self.alone(i, x, Lane::arrive);
+        let at_event = lane.stop.is_event && lane.stop.time == lane.target;
+        let finite = outcome.is_ok() && self.trial.iter().all(|value| value[i].is_finite());
+        if !finite || at_event || self.looks || lane.run.looks_at_every_step() {
+            self.method.take_over(self.trial.iter().map(|value| value[i]));
+            self.by_itself(i, x, |lane, system, method, x| {
+                let target = lane.target;
+                lane.arrive(&mut Ticks::made(method, Counted::new(system), target, outcome), x)
+            });
         } else {
-            lane.run.time = target;
+            x.iter_mut().zip(&self.trial).for_each(|(x, trial)| x[i] = trial[i]);
+            lane.run.counts.steps += 1;
+            (lane.run.time, lane.reason) = (lane.target, StopReason::StepEnd);
         }
         let lane = &self.lanes[i];
-        if lane.over || lane.settled { None } else { lane.run.due() }
+        if lane.over || lane.reason != StopReason::StepEnd { None } else { lane.run.due() }
+    }
+
+    /// Lets a lane go on alone, to its end or to another mode.
+    fn go_on_alone(&mut self, i: usize, x: &mut [Wide]) {
+        self.by_itself(i, x, Lane::drive);
     }
 
     /// Lets a lane act on its own, and puts its state back.
     fn alone(&mut self, i: usize, x: &mut [Wide], act: Act<'a>) {
-        let mut state = std::mem::take(&mut self.state);
+        self.by_itself(i, x, |lane, system, _, x| act(lane, system, x));
+    }
+
+    /// The same with a method to go on by.
+    fn by_itself(
+        &mut self,
+        i: usize,
+        x: &mut [Wide],
+        act: impl FnOnce(&mut Lane<'a>, &mut dyn HybridSystem, &mut FixedStep, &mut [f64]) -> Result<(), Failure>,
+    ) {
+        let Batch { state, lanes, system, method, .. } = self;
         state.iter_mut().zip(&*x).for_each(|(state, x)| *state = x[i]);
-        let done = act(&mut self.lanes[i], self.system.lane(i), &mut state);
-        x.iter_mut().zip(&state).for_each(|(x, state)| x[i] = *state);
-        self.state = state;
+        let done = act(&mut lanes[i], system.lane(i), method, state);
+        x.iter_mut().zip(&*state).for_each(|(x, state)| x[i] = *state);
         if let Err(failure) = done {
             self.fail(i, failure);
         }
@@ -233,17 +309,40 @@ impl Lane<'_> {
         Ok(())
     }
 
-    /// The end of a step of a lane that has events or memory.
-    fn arrive(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Failure> {
-        let crossed = self.run.has_crossed(system, self.target, x)?;
-        let reason = self.run.arrive(system, self.target, self.stop, crossed, x)?;
-        if reason == StopReason::StepEnd {
-            return Ok(());
+    /// The end of a step that has been made, of a lane that has something to look at there, or whose step has failed.
+    fn arrive(&mut self, made: &mut Ticks<'_, '_>, x: &mut [f64]) -> Result<(), Failure> {
+        self.reason = self.run.reach(made, self.stop, x)?;
+        match self.reason {
+            StopReason::StepEnd => return Ok(()),
+            StopReason::Exchange => self.begin_again(),
+            _ => self.run.handle_stop(made.system().events(), self.reason, x)?,
         }
-        self.run.handle_stop(system, reason, x)?;
-        self.settled = true;
-        self.stop = self.run.next_stop(system);
+        self.stop = self.run.next_stop(made.system().events());
         self.over = self.run.time >= self.run.to;
+        Ok(())
+    }
+
+    /// Looks whether it goes on in another mode.
+    fn exchange(&mut self, system: &mut dyn HybridSystem, x: &mut [f64]) -> Result<(), Failure> {
+        if self.reason != StopReason::Exchange && self.run.exchange(system, x, false)? {
+            self.begin_again();
+            self.stop = self.run.next_stop(system);
+        }
+        Ok(())
+    }
+
+    /// Another mode begins: ticks are sought anew, as a run by itself does.
+    fn begin_again(&mut self) {
+        self.ticks = Grid::new(self.run.options.from, self.step);
+    }
+
+    /// Goes on alone, to its end or to another mode.
+    fn drive(&mut self, system: &mut dyn HybridSystem, method: &mut FixedStep, x: &mut [f64]) -> Result<(), Failure> {
+        let every = (self.run.options.from, self.step);
+        let flow = self.run.drive(&mut Ticks::new(method, Counted::new(&mut *system), every), x)?;
+        self.over = flow == Flow::GoOn;
+        self.begin_again();
+        self.stop = self.run.next_stop(system);
         Ok(())
     }
 }

@@ -56,10 +56,10 @@ fn run(system: &mut Known, pace: Pace, clock: &mut Script, statistics: &Statisti
     let mut last = Last { t: 0.0, value: 0.0, end: f64::INFINITY };
     let mut x = system.start.clone();
     let end = run_real_time(system, FixedMethod::Rk4, &pace, &mut x, clock, &mut last, statistics);
-    (last, end.map_err(|stopped| stopped.failure))
+    (last, end.map(drop).map_err(|stopped| stopped.failure))
 }
 
-const PACE: Pace = Pace { step: 0.01, ticks: Some(100), on_miss: OnMiss::CatchUp };
+const PACE: Pace = Pace { step: 0.01, ticks: Some(100), on_miss: OnMiss::CatchUp, project: false };
 
 #[test]
 fn a_tick_a_step() {

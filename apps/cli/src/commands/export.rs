@@ -58,6 +58,7 @@ fn asked(arguments: &arguments::Export) -> Export {
             arguments::Real::Double => Real::Double,
             arguments::Real::Float => Real::Float,
         },
+        project: arguments.project,
         binary: !arguments.source_only,
     }
 }

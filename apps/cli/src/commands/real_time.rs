@@ -8,7 +8,7 @@ use std::time::Duration;
 use halfarrow::{Durations, Feed, Form, Method, OnMiss, Problem, RealTimeReport, RealTimeRun, Statistics, frequency};
 use serde_json::json;
 
-use super::run::{execution, method, record, start};
+use super::run::{drifts, execution, method, record, start};
 use super::{warn_of_step, with_model};
 use crate::arguments::{self, RunArguments};
 use crate::page::Page;
@@ -34,14 +34,18 @@ pub fn run(arguments: &RunArguments) -> u8 {
             outcome
         });
         let report = outcome?;
-        report.audit.warnings.iter().for_each(|warning| screen::note(&format!("warning: {warning}")));
+        report
+            .notes
+            .iter()
+            .chain(&report.audit.warnings)
+            .for_each(|warning| screen::note(&format!("warning: {warning}")));
         if let Some(error) = &report.error {
             screen::note(&format!("error: {error}"));
         }
         match arguments.model.model.json {
             true => {
                 let mut object = json!(report);
-                object["notes"] = json!(notes);
+                object["notes"] = notes.iter().chain(&report.notes).map(|note| json!(note)).collect();
                 screen::print_json(&object)
             }
             false => screen::print(&text(&report, Page::of(&arguments.page))),
@@ -70,6 +74,7 @@ fn asked(arguments: &RunArguments) -> Result<RealTimeRun, Problem> {
             arguments::OnMiss::Skip => OnMiss::Skip,
         },
         bound: Some(arguments.bound),
+        project: arguments.project,
         execution: execution(arguments.exec),
     })
 }
@@ -154,7 +159,10 @@ fn text(report: &RealTimeReport, page: Page) -> String {
     if report.sent + report.lost > 0 {
         text += &format!("outputs: {} sent, {} lost: t,{}\n", report.sent, report.lost, report.outputs.join(","));
     }
-    text
+    if report.projections > 0 {
+        text += &format!("positions put back {} times\n", report.projections);
+    }
+    text + &drifts(&report.drift)
 }
 
 /// A histogram with a line for each factor of 2.

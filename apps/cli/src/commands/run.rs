@@ -357,28 +357,34 @@ fn summary(report: &RunReport) -> String {
         true => String::new(),
         false => format!("; events changed the energy by {gained:.6} J"),
     };
-    text + &format!("\naudit: {}{events}\n{}", misses(&report.audit), drifts(&report.audit))
+    text + &format!("\naudit: {}{events}\n{}", misses(&report.audit), drifts(&report.audit.drift))
 }
 
 /// How far positions have drifted from what only their speeds keep.
-fn drifts(audit: &AuditReport) -> String {
+pub(super) fn drifts(all: &[DriftReport]) -> String {
     let line = |drift: &DriftReport| {
-        let open = match drift.kind {
-            "nonholonomic" => {
-                return format!("nonholonomic: {} = 0 binds speeds and no positions\n", brief(&drift.relation));
-            }
-            "closed" => "",
-            "open" => " = 0, of positions without a closed form,",
-            _ => " = 0, which may or may not bind positions,",
+        let end = match (drift.value, drift.greatest) {
+            (None, _) => "is not known".into(),
+            (Some(value), _) if value.abs() < drift.resolution => format!("below {:.0e}", drift.resolution),
+            (Some(value), None) => format!("{value:.1e} at the end"),
+            (Some(value), Some(greatest)) => format!("{value:.1e} at the end, {greatest:.1e} at most"),
         };
-        let end = match drift.value {
-            None => "is not known".into(),
-            Some(value) if value.abs() < drift.resolution => format!("below {:.0e}", drift.resolution),
-            Some(value) => format!("{value:.1e} at the end, {:.1e} at most", drift.greatest.unwrap_or(f64::NAN)),
-        };
-        format!("drift: {}{open} {end}\n", brief(&drift.relation))
+        relation(&drift.relation, drift.kind, Some(end).filter(|_| drift.kind != "nonholonomic"))
     };
-    audit.drift.iter().map(line).collect()
+    all.iter().map(line).collect()
+}
+
+/// A line about a relation of some kind: how far positions have drifted from it, if it binds positions.
+pub(super) fn relation(text: &str, kind: &str, drifted: Option<String>) -> String {
+    let Some(drifted) = drifted else {
+        return format!("nonholonomic: {} = 0 binds speeds and no positions\n", brief(text));
+    };
+    let open = match kind {
+        "closed" => "",
+        "open" => " = 0, of positions without a closed form,",
+        _ => " = 0, which may or may not bind positions,",
+    };
+    format!("drift: {}{open} {drifted}\n", brief(text))
 }
 
 /// A relation by its beginning where it is long; the whole of it is in JSON.

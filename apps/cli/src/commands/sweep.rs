@@ -2,10 +2,10 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use halfarrow::{Error, Method, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepReport, Vary};
+use halfarrow::{Error, Method, Problem, Reduce, Run, Samples, Sweep, SweepAudit, SweepDrift, SweepReport, Vary};
 use serde_json::json;
 
-use super::run::{all_listed, execution, method, misses, start};
+use super::run::{all_listed, execution, method, misses, relation, start};
 use super::{warn_of_step, with_model};
 use crate::arguments;
 use crate::screen::{self, Progress};
@@ -32,11 +32,12 @@ pub fn sweep(arguments: &arguments::Sweep) -> u8 {
             bar.finish();
         }
         let report = outcome?;
+        report.notes.iter().for_each(|note| screen::note(&format!("warning: {note}")));
         let wrong = told(&report.audit);
         match arguments.model.model.json {
             true => {
                 let mut object = json!(report);
-                object["notes"] = json!(notes);
+                object["notes"] = notes.iter().chain(&report.notes).map(|note| json!(note)).collect();
                 screen::print_json(&object)
             }
             false => screen::print(&text(&report, arguments)),
@@ -70,6 +71,7 @@ fn asked(arguments: &arguments::Sweep) -> Result<Sweep, Error> {
         method: method(arguments.solver),
         step: arguments.step,
         rtol: arguments.rtol,
+        project: arguments.project,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         execution: execution(arguments.exec),
@@ -107,5 +109,19 @@ fn text(report: &SweepReport, arguments: &arguments::Sweep) -> String {
     if audit.doubtful + audit.refused > 0 {
         text += &format!("; {} doubtful, {} refused", audit.doubtful, audit.refused);
     }
-    text + "\n"
+    text += "\n";
+    report.drift.iter().for_each(|drift| text += &drifted(drift));
+    text
+}
+
+/// How far positions have drifted from what only their speeds keep, in the set where they have most.
+fn drifted(drift: &SweepDrift) -> String {
+    let end = match (drift.greatest, drift.set) {
+        _ if drift.kind == "nonholonomic" => None,
+        (None, _) => Some("is not known".to_string()),
+        (Some(value), _) if value < drift.resolution => Some(format!("below {:.0e} at the end", drift.resolution)),
+        (Some(value), Some(set)) => Some(format!("{value:.1e} at the end of set {set}, which has the most")),
+        (Some(value), None) => Some(format!("{value:.1e} at the end, of the {} sets that were audited", drift.sets)),
+    };
+    relation(&drift.relation, drift.kind, end)
 }

@@ -15,7 +15,7 @@ from . import _halfarrow
 from ._errors import RunError, UsageError, choice, needed, unknown
 from ._inputs import InputLike, given, numbers
 from ._tables import as_html, as_text
-from .result import Result
+from .result import Drift, Result
 
 if TYPE_CHECKING:
     from .model import Model
@@ -51,7 +51,7 @@ class Function:
     def __init__(
         self, model: Model, parameters: Sequence[str], outputs: Sequence[str], to: float, every: float | None,
         at: npt.ArrayLike | None, fixed: Mapping[str, float], inputs: Mapping[str, InputLike], options: Mapping[str, Any],
-        threads: int | None,
+        threads: int | None, project: bool = False,
     ) -> None:  # fmt: skip
         self.model: Model = model
         """The model that runs."""
@@ -75,7 +75,8 @@ class Function:
         self._fixed = dict(fixed)
         # A function of time is called once, not in every run.
         self._inputs = {n: given(n, v, to, sample) if callable(v) else v for n, v in inputs.items()}
-        self._made = (to, every, at, dict(options), threads)
+        self._made = (to, every, at, dict(options), threads, project)
+        self._project = project
         self._options = {"to": float(to), "every": every, "at": None if every else self.t, **options}
         # Derivatives by inputs come by SI units.
         self._scale = np.array([_per_unit(model, n) if i else 1.0 for n, i in zip(self.parameters, self._is_input)])
@@ -121,6 +122,22 @@ class Function:
         """
         x = self._given(values)
         return self._each(self._value, [x], (len(self.t), len(self.outputs)))
+
+    def drift(self, values: npt.ArrayLike) -> list[dict[str, Drift]]:
+        """Runs the model and tells how far positions have drifted in each set from relations that only their speeds keep.
+
+        Args:
+            values: Of the shape ``(..., parameters)``.
+
+        Returns:
+            For each set, in order, what ``Audit.drift`` tells of its run, by the relations.
+
+        Raises:
+            UsageError, RunError: as in a call.
+        """
+        sets = self._given(values).reshape(-1, len(self.parameters))
+        runs = (self._started.simulate(**self._run(x), project=self._project) for x in sets)
+        return [{drift.relation: drift for drift in run.audit.drift} for run in runs]
 
     def jacobian(self, values: npt.ArrayLike) -> Array:
         """All derivatives, by ``sensitivities``: one run with a set of variational equations for each parameter.
@@ -295,14 +312,19 @@ class Function:
         return column
 
     def _value(self, x: Array, stop: _Stop | None) -> Array:
-        run = self._started.simulate(**self._run(x), progress=stop)
+        run = self._started.simulate(**self._run(x), project=self._project, progress=stop)
         return np.stack([self._column(run, name) for name in self.outputs], axis=-1)
 
     def _jacobian(self, x: Array, stop: _Stop | None) -> Array:
         return self._slopes(x, range(len(self.parameters)), stop)
 
+    def _smooth(self) -> None:
+        if self._project:
+            raise UsageError("runs whose positions are put back are not differentiated: make the function without `project`")
+
     def _slopes(self, x: Array, some: Sequence[int], stop: _Stop | None) -> Array:
         """Derivatives by some of the parameters."""
+        self._smooth()
         by = [self.parameters[i] for i in some]
         found = self._started.sensitivities(by, **self._run(x), progress=stop)
         self._column(found.result, self.outputs[0])
@@ -319,15 +341,17 @@ class Function:
     def _back(self, x: Array, w: Array, stop: _Stop | None) -> Array:
         if not np.isfinite(w).all():
             return np.full(len(x), np.nan)
+        self._smooth()
         weights = {name: np.ascontiguousarray(w[:, i]) for i, name in enumerate(self.outputs)}
         found = self._started.gradient(weights, by=self.parameters, **self._run(x), progress=stop)
         slopes: Array = np.array([found[name] for name in self.parameters]) * self._scale
         return slopes
 
     def __reduce__(self) -> tuple[Any, ...]:
-        to, every, at, options, threads = self._made
+        to, every, at, options, threads, project = self._made
         return Function, (
             self.model, self.parameters, self.outputs, to, every, at, self._fixed, self._inputs, options, threads,
+            project,
         )  # fmt: skip
 
     def _rows(self) -> list[tuple[Any, ...]]:

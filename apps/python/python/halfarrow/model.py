@@ -563,6 +563,7 @@ class Model:
         rtol: float = 1e-8,
         atol: float | None = None,
         start: Literal["given", "equilibrium"] = "given",
+        project: bool = False,
         execution: Literal["auto", "bytecode", "machine"] = "auto",
         threads: int | None = None,
         fixed: Mapping[str, Value] | None = None,
@@ -579,6 +580,8 @@ class Model:
             to: End of the runs in s.
             every, at: As in ``simulate``; one of them, that every run has as many samples. The end is the last sample.
             method, step, rtol, atol, start, execution: As in ``simulate``; derivatives have no linearly implicit method.
+            project: Whether positions that only speeds keep are put back onto their relations, as in ``simulate``. There are no
+                derivatives then: they are asked for in vain.
             threads: Runs at the same time, where there are several sets; nothing: as many as there are processors.
             fixed: Values of other parameters by name.
             inputs: Other inputs over time, as in ``simulate``; a function of time is called once.
@@ -601,7 +604,7 @@ class Model:
         )  # fmt: skip
         asked = [parameters] if isinstance(parameters, str) else parameters
         named = [outputs] if isinstance(outputs, str) else outputs
-        return Function(self, asked, named, to, every, at, dict(set_values), given, options, threads)
+        return Function(self, asked, named, to, every, at, dict(set_values), given, options, threads, project)
 
     def fit(
         self,
@@ -756,6 +759,7 @@ class Model:
         every: float | None = None,
         rtol: float = 1e-6,
         start: Literal["given", "equilibrium"] = "given",
+        project: bool = False,
         record: str | Sequence[str] | None = None,
         also: str | Sequence[str] = (),
         reduce: Mapping[str, tuple[str, str]] | Sequence[str] | None = None,
@@ -781,7 +785,8 @@ class Model:
             step: Step of a method with fixed step in s.
             method: As in ``simulate``; nothing: ``rk4`` where there is a step, which runs sixteen sets at once on vectors,
                 else ``auto``.
-            every, rtol, start, record, also, execution, sample, inputs: As in ``simulate``. Reductions go over the samples.
+            every, rtol, start, project, record, also, execution, sample, inputs: As in ``simulate``. Reductions go over the
+                samples.
             reduce: What is kept of each run: by the name of its column a variable and one of ``initial``, ``final``,
                 ``min``, ``max``, ``max_abs``, ``mean``, ``rms``, ``time_of_max``; or texts such as ``"max(body.f)"``.
                 Nothing: the last value of what is recorded.
@@ -821,7 +826,7 @@ class Model:
         options = _options(
             to=to, every=every, at=[], sensitivities=[], method=method or ("auto" if step is None else "rk4"), step=step,
             rtol=rtol, atol=None,
-            form="minimal", start=start, record=_recorded(record, also), project=False, minimum_norm=False, stiffness=None,
+            form="minimal", start=start, record=_recorded(record, also), project=project, minimum_norm=False, stiffness=None,
             damping=None, execution=execution,
         )  # fmt: skip
         plan = sweeps.Plan(
@@ -939,6 +944,7 @@ class Model:
         step: float,
         method: FixedMethod = "rk4",
         start: Literal["given", "equilibrium"] = "given",
+        project: bool = False,
         parameters: Mapping[str, Value] | None = None,
         **values: Any,
     ) -> Stepper:
@@ -947,7 +953,7 @@ class Model:
         Args:
             step: The length of a step in s.
             method: A method of fixed step.
-            start: As in ``simulate``.
+            start, project: As in ``simulate``.
             parameters: Values of parameters by name.
             values: Parameters and inputs whose names are words; an input begins with this number.
         """
@@ -955,7 +961,7 @@ class Model:
         set_values, given = self._split(values, parameters, None)
         names = self._names
         settable = {**{name: False for name, p in names.parameters.items()}, **{name: True for name in names.inputs}}
-        stepper = Stepper(self, self._core.stepper(method, step, _start(start), set_values), settable)
+        stepper = Stepper(self, self._core.stepper(method, step, _start(start), project, set_values), settable)
         for name, value in given.items():
             stepper[name] = _number(name, value)
         return stepper
@@ -969,6 +975,7 @@ class Model:
         step: float = 1e-3,
         form: Literal["minimal", "kane"] = "minimal",
         real: Literal["double", "float"] = "double",
+        project: bool = False,
         binary: bool = True,
     ) -> dict[str, Any]:
         """Writes the model as code for elsewhere.
@@ -978,6 +985,7 @@ class Model:
             path: The folder, or the file, which ends in ``.fmu`` or ``.tex``.
             method: The method of a step.
             step: The length of a step in s.
+            project: Whether steps put positions back that only speeds keep, as in ``simulate``.
             form: The form of the equations.
             real: The numbers of C.
             binary: Whether an FMU has a binary, made by the C compiler of this computer, besides its sources.
@@ -995,7 +1003,7 @@ class Model:
             raise UsageError(f"the name {path} does not say what to write: let it end in {ending}")
         files, report = self._core.export(
             target, choice("form", form, _FORMS), choice("method", method, _FIXED), step,
-            choice("real", real, ("double", "float")), binary,
+            choice("real", real, ("double", "float")), project, binary,
         )  # fmt: skip
         written = []
         for name, content in files:

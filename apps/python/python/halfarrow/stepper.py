@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from . import _halfarrow
 from ._errors import UsageError, unknown
+from .result import Drift, record
 
 if TYPE_CHECKING:
     from .model import Model
@@ -95,6 +96,13 @@ class Stepper:
             self._run().set_input(name, value)
         else:
             self._run().set_parameter(name, value)
+
+    @property
+    def drift(self) -> list[Drift]:
+        """How far positions have drifted by now from relations that only their speeds keep, since the start or the last
+        parameter that was set: ``value`` of those in closed form, which alone are measured here.
+        """
+        return [record(Drift, told) for told in self._run().drift()]
 
     def save(self) -> Snapshot:
         """All that the run needs to go on from here."""

@@ -101,6 +101,9 @@ class SweepResult(Mapping[str, Array]):
         """Why runs failed, by the numbers of the sets; of the first hundred."""
         self.audit: dict[str, Any] = report["audit"]
         """What the audit of some sets has found, as ``docs/json.md`` describes it."""
+        self.drift: list[dict[str, Any]] = report.get("drift", [])
+        """How far positions have drifted at the end of the sets from relations that only their speeds keep, as
+        ``docs/json.md`` describes it."""
         self.complete = complete
         """Whether all sets are there."""
         self.resumed: int = report.get("resumed", 0)
@@ -548,7 +551,10 @@ def _trajectories(
         "misses": [{"set": n, "verdict": a["verdict"], "warnings": a["warnings"]} for n, a in missed],
         "greatest": _greatest_of([audit for _, audit in audits]) if audits else None,
     }
-    return columns, {"sets": len(rows), "failures": failures[:100], "failed": len(failures), "audit": told}
+    drift = _drifts_of_runs(audits)
+    return columns, {
+        "sets": len(rows), "failures": failures[:100], "failed": len(failures), "drift": drift, "audit": told,
+    }  # fmt: skip
 
 
 def _in_parts(model: Model, plan: Plan, way: Way) -> _Ended:
@@ -754,12 +760,44 @@ def _merged(reports: Sequence[dict[str, Any]], sets: int) -> dict[str, Any]:
         "sets": sets,
         "failures": sorted((f for report in reports for f in report["failures"]), key=lambda f: f["set"])[:100],
         "failed": sum(report["failed"] for report in reports),
+        "drift": _drifts([drift for report in reports for drift in report.get("drift", [])]),
         "audit": {
             **{count: sum(audit[count] for audit in audits) for count in ("sets", "doubtful", "refused")},
             "misses": [miss for audit in audits for miss in audit["misses"]],
             "greatest": _greatest_of(found) if found else None,
         },
     }
+
+
+def _drifts(found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The greatest drift from each relation, and in how many sets it was measured."""
+    of: dict[str, dict[str, Any]] = {}
+    for own in found:
+        known = of.setdefault(own["relation"], {**own, "sets": 0})
+        known["sets"] += own["sets"]
+        known["resolution"] = max(known["resolution"], own["resolution"])
+        value = own["greatest"]
+        if value is not None and (known["greatest"] is None or value != value or value > known["greatest"]):
+            known.update(greatest=value, set=own["set"])
+    return list(of.values())
+
+
+def _drifts_of_runs(audits: Sequence[tuple[int, dict[str, Any]]]) -> list[dict[str, Any]]:
+    """The same of runs that were audited, by the numbers of their sets."""
+    told = [(number, drift) for number, audit in audits for drift in audit["drift"]]
+    return _drifts(
+        [
+            {
+                "relation": drift["relation"],
+                "kind": drift["kind"],
+                "greatest": None if drift["value"] is None else abs(drift["value"]),
+                "set": None if drift["value"] is None else number,
+                "sets": int(drift["value"] is not None),
+                "resolution": drift["resolution"],
+            }
+            for number, drift in told
+        ]
+    )
 
 
 def _greatest_of(found: Sequence[dict[str, Any]]) -> dict[str, Any]:

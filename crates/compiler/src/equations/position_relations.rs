@@ -20,6 +20,9 @@ pub struct PositionRelation {
     pub vanishes: bool,
     /// Its derivatives by the states that it reads.
     pub slopes: Vec<(Symbol, Expr)>,
+    /// What keeps its value, as text, where positions may drift from it: not of constraints, which tell their drift
+    /// themselves, nor of what every method keeps.
+    pub told: Option<String>,
 }
 
 /// A relation between speeds onto which states are not put back.
@@ -69,7 +72,7 @@ pub(super) fn position_relations(
             Integral::Constraint(c) if positions.iter().any(|p| p.constraint == c) => continue,
             Integral::Constraint(c) => match in_states(d, states, graph.constraints[c].expr) {
                 Ok(value) => {
-                    kept.push(relation_of(d, states, value, true));
+                    kept.push(relation_of(d, states, value, None));
                     continue;
                 }
                 // It is on inputs and the like as well.
@@ -77,7 +80,7 @@ pub(super) fn position_relations(
             },
             Integral::Closed(value) => match in_states(d, states, value) {
                 Ok(value) => {
-                    kept.push(relation_of(d, states, value, false));
+                    kept.push(relation_of(d, states, value, Some(&relation)));
                     continue;
                 }
                 Err(what) => Unkept::Reads(what),
@@ -105,13 +108,21 @@ fn text_of(d: &mut Definitions, relation: &VelocityRelation) -> String {
     ascii(&d.x, text, &PlainNames(&d.x))
 }
 
-fn relation_of(d: &mut Definitions, states: &[State], value: Expr, vanishes: bool) -> PositionRelation {
+/// `between`: the speeds that it is one of the positions of; a constraint else.
+fn relation_of(
+    d: &mut Definitions,
+    states: &[State],
+    value: Expr,
+    between: Option<&VelocityRelation>,
+) -> PositionRelation {
     let read = d.x.symbols_of(value);
     let moved: Vec<Symbol> = states.iter().map(|s| s.symbol).filter(|s| read.contains(s)).collect();
     let slopes = moved.into_iter().map(|s| (s, d.x.derivative(value, s)));
     let slopes: Vec<_> = slopes.collect();
     let slopes = slopes.into_iter().filter(|s| !d.x.is_zero(s.1)).collect();
-    PositionRelation { value, vanishes, slopes }
+    let drifts = between.filter(|relation| !relation.is_linear(&d.x));
+    let told = drifts.map(|relation| text_of(d, relation));
+    PositionRelation { value, vanishes: between.is_none(), slopes, told }
 }
 
 /// An expression of positions in states, time, what is set from outside and what events set; what it reads else, if it does.

@@ -257,6 +257,8 @@ pub struct PositionRelation {
     pub vanishes: bool,
     /// The states that it reads, by their numbers, with its derivatives by them.
     pub slopes: Vec<(u32, Value)>,
+    /// What keeps its value, as text, where positions may drift from it.
+    pub told: Option<String>,
 }
 
 impl PositionRelation {

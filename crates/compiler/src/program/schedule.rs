@@ -490,6 +490,7 @@ fn position_relations(lower: &mut Lowering, equations: &Equations) -> Vec<Positi
         value: lower.value(r.value),
         vanishes: r.vanishes,
         slopes: r.slopes.iter().filter_map(|&(s, e)| Some((number(s)? as u32, lower.value(e)))).collect(),
+        told: r.told.clone(),
     };
     equations.position_relations.iter().map(relation).collect()
 }

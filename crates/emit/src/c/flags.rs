@@ -106,6 +106,8 @@ flags! {
     step_order
     /// and room for a full one.
     step_full
+    /// Relations between positions onto which these are put back.
+    relations
     solves_start
     guesses
     start_groups

@@ -99,6 +99,9 @@ fn public_of(plan: &Plan) -> Vec<Members> {
     list.arrays(Kind::Real, &["u"], p.inputs.len(), "inputs");
     list.arrays(Kind::Real, &["p"], p.parameters.len(), "parameters");
     list.arrays(Kind::Real, &["y"], plan.export.recorded.len(), "outputs, as they are at t");
+    let about =
+        "how far positions are from what only their speeds keep, since the start, but for what events have changed";
+    list.some(Kind::Real, &["drift"], plan.relations().len(), about);
     list.one(Kind::Failure, &["failure"], "");
     let about = "evaluations at most each time a Newton block is solved, but for the start and jumps";
     list.one(Kind::Int, &["most_evaluations"], about);
@@ -117,7 +120,25 @@ fn private_of(plan: &Plan) -> Vec<Members> {
     of_modes(&mut list, plan);
     of_blocks(&mut list, plan);
     of_steps(&mut list, plan);
+    of_relations(&mut list, plan);
     list.0
+}
+
+/// What putting positions back takes.
+fn of_relations(list: &mut List, plan: &Plan) {
+    let (rows, nx) = (plan.relations().len(), plan.program.states.len());
+    if rows > 0 {
+        list.arrays(
+            Kind::Real,
+            &["kept", "relation_before", "relation_missing"],
+            rows,
+            "what relations of positions keep",
+        );
+        list.arrays(Kind::Real, &["relation_out"], plan.relation_values(), "their values and slopes");
+        list.arrays(Kind::Real, &["relation_slopes", "relation_rows"], rows * nx, "");
+        list.arrays(Kind::Real, &["relation_sizes", "relation_step", "relation_from"], nx, "");
+        list.arrays(Kind::Byte, &["relation_taken"], rows, "");
+    }
 }
 
 fn of_parameters(list: &mut List, plan: &Plan) {

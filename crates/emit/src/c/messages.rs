@@ -68,6 +68,10 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
                 format!("the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or another motion leads through the same position; make the step shorter{kept}")
             }),
         ),
+        (
+            "NOT_PUT_BACK",
+            vec!["no positions near are on the relations that their speeds keep: make the step shorter".into()],
+        ),
         ("BOUND", block(&|what| format!("the equations of {what} are not solved within the bound on evaluations"))),
         ("OUT_OF_DOMAIN", p.domains.iter().map(domain).collect()),
         ("RATE_NOT_FINITE", states(&|name| not_finite(format!("the rate of {name}")))),
@@ -191,6 +195,7 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "SINGULAR" => "linear equations have no unique solution",
         "NO_CONVERGENCE" => "nonlinear equations have no solution, or none was found",
         "BRANCH" => "the solution that was followed ends",
+        "NOT_PUT_BACK" => "positions that cannot be put back onto what their speeds keep",
         "BOUND" => "the bound on evaluations is hit",
         "OUT_OF_DOMAIN" => "a law is asked for a value where it has none",
         "RATE_NOT_FINITE" => "a rate is no finite number",
@@ -229,6 +234,7 @@ fn can_happen(code: &str, plan: &Plan) -> bool {
         "EVENT_NOT_FINITE" | "CONFLICT" | "ENDLESS_EVENTS" | "ACCUMULATION" => !plan.program.clauses.is_empty(),
         "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
         "NO_MODE" | "STUCK" | "OVERLAP" => !plan.program.set_valued.is_empty(),
+        "NOT_PUT_BACK" => !plan.relations().is_empty(),
         "CONSTRAINT_BROKEN" => !plan.events.positions.is_empty(),
         _ => true,
     }

@@ -56,6 +56,8 @@ pub struct Export<'a> {
     pub derivatives: bool,
     /// Its real numbers.
     pub real: Real,
+    /// Whether positions that only speeds keep together are put back onto the relations between them after each step.
+    pub project: bool,
     /// The other modes: with other branches of set-valued laws, or with other independent variables.
     pub modes: &'a [Mode],
     /// The variables that are independent in the first mode, where there are others.

@@ -39,6 +39,8 @@ pub struct Exported {
     pub method: Method,
     pub step: f64,
     pub outputs: Vec<String>,
+    /// Whether positions are put back.
+    pub project: bool,
 }
 
 /// Time and outputs at each step.
@@ -68,6 +70,11 @@ pub fn diodes() -> PathBuf {
 /// A double wishbone: a loop in space that is solved by gains.
 pub fn wishbone() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/wishbone.bond")
+}
+
+/// A slider-crank whose positions only speeds keep.
+pub fn speeds() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/speeds.bond")
 }
 
 /// A model whose structure is another where two of its parameters differ.
@@ -105,12 +112,28 @@ pub fn export_program(
     export_as(program, method, step, (derivatives, Real::Double)).expect("an explicit program")
 }
 
+/// A model whose steps put positions back that only speeds keep.
+pub fn export_projecting(path: &Path, method: Method, step: f64) -> Exported {
+    let mut program = read_program(path);
+    program.name = format!("{}_{}_project", program.name, method.name());
+    export_whole(program, method, step, (false, Real::Double, true)).expect("an explicit program")
+}
+
 /// With derivatives or not, and real numbers of this size.
 pub fn export_as(
     program: halfarrow_compiler::program::Program,
     method: Method,
     step: f64,
     (derivatives, real): (bool, Real),
+) -> Result<Exported, EmitError> {
+    export_whole(program, method, step, (derivatives, real, false))
+}
+
+fn export_whole(
+    program: halfarrow_compiler::program::Program,
+    method: Method,
+    step: f64,
+    (derivatives, real, project): (bool, Real, bool),
 ) -> Result<Exported, EmitError> {
     let mut model = Model::new(program.clone()).expect("parameters have values");
     model.record_impulses();
@@ -138,10 +161,11 @@ pub fn export_as(
         real,
         modes: &[],
         independent: &[],
+        project,
     })?;
     let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
     x.truncate(program.states.len());
-    Ok(Exported { model, start: x, at_start: start, written, method, step, outputs })
+    Ok(Exported { model, start: x, at_start: start, written, method, step, outputs, project })
 }
 
 struct Collect(Rows);
@@ -161,7 +185,7 @@ impl Exported {
     /// The same run, taken from step to step.
     pub fn step(&self, steps: usize) -> (Rows, Option<String>) {
         let (mut model, mut x) = (self.model.clone(), self.start.clone());
-        let mut run = Stepwise::new(self.fixed_method(), 0.0, &model);
+        let mut run = Stepwise::new(self.fixed_method(), 0.0, &model).projecting(self.project);
         let mut values = vec![0.0; model.observed()];
         let mut rows = Vec::new();
         for i in 0..=steps {
@@ -193,7 +217,7 @@ impl Exported {
         let per_second = (1.0 / self.step).round();
         let to = if 1.0 / per_second == self.step { steps as f64 / per_second } else { steps as f64 * self.step };
         let (method, step) = (halfarrow_sim::Method::Fixed(method), Some(self.step));
-        let options = Options { to, every: step, step, method, ..Options::default() };
+        let options = Options { to, every: step, step, method, project: self.project, ..Options::default() };
         let mut sink = Collect(Vec::new());
         let outcome = simulate(&mut model, &options, &mut x, &mut sink);
         (sink.0, outcome.err().map(|stopped| stopped.to_string()))

@@ -1,7 +1,7 @@
 //! A routine for a SIMD batch: several sets of parameters at once, one to a lane.
 //!
 //! The same operations in the same order as one at a time, hence the same bits. Solve blocks, conditions and tables go
-//! through the frame of each lane.
+//! through the frame of each lane that is good: others may be those of another mode.
 
 use super::frame::Frame;
 use super::instruction::{Operation, Routine, Solve};
@@ -103,7 +103,7 @@ impl<const N: usize> WideFrame<N> {
                     let (pivot, scale) = (self.r[*pivot as usize], self.r[*scale as usize]);
                     (0..N).for_each(|l| good[l] &= Frame::is_pivot(pivot[l], scale[l]));
                 }
-                PackedStep::One(operation) => self.step(operation, frames),
+                PackedStep::One(operation) => self.step(operation, frames, good),
             }
         }
     }
@@ -137,7 +137,7 @@ impl<const N: usize> WideFrame<N> {
     /// One operation: what has a way of its own for lanes, else lane by lane as the table says.
     #[inline(always)]
     #[allow(unreachable_patterns, unused_variables, reason = "the table has what has a way of its own as well")]
-    fn step<L: HasFrame>(&mut self, operation: &Operation, frames: &mut [L]) {
+    fn step<L: HasFrame>(&mut self, operation: &Operation, frames: &mut [L], good: &[bool; N]) {
         let out = operation.out;
         macro_rules! compute {
             (($k:ident $value:ident)
@@ -154,13 +154,13 @@ impl<const N: usize> WideFrame<N> {
                     Op::Call(f, a) => self.r[out as usize] = Vector(math::call_lanes(f, &self.r[a as usize].0)),
                     Op::Sign(condition, a) | Op::Floor(condition, a) => {
                         let a = self.r[a as usize];
-                        for (lane, frame) in frames.iter_mut().enumerate() {
+                        for (lane, frame) in frames.iter_mut().enumerate().filter(|(lane, _)| good[*lane]) {
                             self.r[out as usize][lane] = frame.frame().condition_at(condition, a[lane]);
                         }
                     }
-                    Op::Table(table, piece, a) => self.table(frames, (out, a), (table, piece), 0),
-                    Op::TableSlope(table, piece, a) => self.table(frames, (out, a), (table, piece), 1),
-                    Op::TableCurvature(table, piece, a) => self.table(frames, (out, a), (table, piece), 2),
+                    Op::Table(table, piece, a) => self.table((frames, good), (out, a), (table, piece), 0),
+                    Op::TableSlope(table, piece, a) => self.table((frames, good), (out, a), (table, piece), 1),
+                    Op::TableCurvature(table, piece, a) => self.table((frames, good), (out, a), (table, piece), 2),
                     $(Op::$given { .. })|* => unreachable!("given before the routine runs"),
                     $(Op::$plain($($part,)* $($a),*) => {
                         $(let $a = self.r[$a as usize].0;)*
@@ -179,13 +179,13 @@ impl<const N: usize> WideFrame<N> {
     #[inline(never)]
     fn table<L: HasFrame>(
         &mut self,
-        frames: &mut [L],
+        (frames, good): (&mut [L], &[bool; N]),
         (out, a): (u32, u32),
         (table, piece): (u32, Option<ConditionId>),
         order: usize,
     ) {
         let a = self.r[a as usize];
-        for (lane, frame) in frames.iter_mut().enumerate() {
+        for (lane, frame) in frames.iter_mut().enumerate().filter(|(lane, _)| good[*lane]) {
             self.r[out as usize][lane] = frame.frame().table_at(a[lane], table, piece)[order];
         }
     }

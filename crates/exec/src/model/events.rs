@@ -221,8 +221,10 @@ impl Model {
             return Ok(true);
         }
         if !failed && self.is_margin_below(t, x)? {
-            self.find_fired(t, x, &[])?;
-            self.settle_all(t, x)?;
+            self.keeping(t, x, |model, x| {
+                model.find_fired(t, x, &[])?;
+                model.settle_all(t, x)
+            })?;
             if std::mem::take(&mut self.switched) {
                 return Ok(true);
             }
@@ -289,17 +291,11 @@ impl Events for Model {
     }
 
     fn handle_event(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
-        let before = self.before_move(t, x)?;
-        self.handle(t, x, &[])?;
-        self.after_move(before, t, x)
+        self.keeping(t, x, |model, x| model.handle(t, x, &[]))
     }
 
     fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        let exchanged = self.exchange_or_settle(t, x, failed)?;
-        if exchanged {
-            self.renew_projection(t, x)?;
-        }
-        Ok(exchanged)
+        self.exchange_or_settle(t, x, failed)
     }
 
     fn project(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
@@ -362,7 +358,8 @@ impl Events for Model {
                 }
             }
         }
-        self.follow_solutions(t, x)
+        self.follow_solutions(t, x)?;
+        self.note_kept(t, x)
     }
 
     fn indicators(&self) -> usize {

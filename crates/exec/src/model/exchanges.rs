@@ -89,10 +89,11 @@ impl Model {
         };
         let values = self.values_of_all(t, x)?;
         let Some(mode) = self.compiled.with_independent(&code, &wanted, &values) else { return Ok(false) };
+        let drifted = self.drift_before(t, x)?;
         let (before, at) = (self.clone(), x.to_vec());
         let changed = self.enter_at(mode, t, x, &values, before.recorded.chosen.len());
         match changed {
-            Ok(true) => Ok(true),
+            Ok(true) => self.keep_anew(drifted, t, x).map(|()| true),
             // Nothing has changed then.
             Ok(false) | Err(_) => {
                 *self = before;
@@ -222,6 +223,7 @@ impl Model {
         run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
+        self.projection = None;
         (self.frame, self.recorded, self.code) = (frame, recorded, code);
         self.rated = None;
         self.reserve_recorded();

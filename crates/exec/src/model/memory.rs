@@ -7,6 +7,7 @@ use super::compiled::ModeId;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
 use super::modes::Extents;
+use super::projection::Kept;
 use crate::bytecode::{Followed, HeldConditions};
 use halfarrow_compiler::bond_graph::HeldKind;
 
@@ -59,6 +60,8 @@ pub(super) struct Remembered {
     pub floors: Vec<f64>,
     /// What ratios between variables were divided by when it was last seen whether others should be independent.
     pub pivots: Vec<f64>,
+    /// What relations between positions keep.
+    pub kept: Kept,
     /// Conditions that have made something happen and are about to hold no longer.
     pub returns: Vec<Return>,
     /// The piece of each input that holds.

@@ -98,27 +98,6 @@ fn solve(jacobian: &[f64], residual: &[f64], weights: Vec<f64>, sizes: &[f64]) -
     Some(MinimumNormStep { step: solution.iter().zip(sizes).map(|(s, size)| s * size).collect(), rank, weights })
 }
 
-/// The shortest of the steps that meet `jacobian · step + residual = 0` best, where each column counts in parts of its size.
-/// `None` as in [`step`].
-pub(super) fn sized_step(jacobian: &[f64], residual: &[f64], columns: usize, sizes: &[f64]) -> Option<Vec<f64>> {
-    let rows = residual.len();
-    if jacobian.iter().chain(residual).any(|v| !v.is_finite()) || rows == 0 || columns == 0 {
-        return None;
-    }
-    let row = |i: usize| (0..columns).map(move |j| jacobian[i * columns + j] * sizes[j]);
-    let weights: Vec<f64> = (0..rows).map(|i| inverse(greatest(&mut row(i)))).collect();
-    let matrix = Mat::from_fn(rows, columns, |i, j| jacobian[i * columns + j] * weights[i] * sizes[j]);
-    let svd = matrix.thin_svd().ok()?;
-    let (u, values, v) = (svd.U(), svd.S().column_vector(), svd.V());
-    let limit = RANK * values.iter().fold(0.0f64, |most, s| most.max(*s));
-    let mut step = vec![0.0; columns];
-    for k in (0..values.nrows()).filter(|&k| values[k] > limit) {
-        let part = (0..rows).map(|i| -u[(i, k)] * residual[i] * weights[i]).sum::<f64>() / values[k];
-        step.iter_mut().enumerate().for_each(|(j, x)| *x += v[(j, k)] * part * sizes[j]);
-    }
-    Some(step)
-}
-
 fn greatest(values: &mut dyn Iterator<Item = f64>) -> f64 {
     values.fold(0.0f64, |most, v| most.max(v.abs()))
 }

@@ -43,6 +43,7 @@ pub use machine::{Evaluated, Executed, Execution, Expected, Reason};
 pub use memory::Memory;
 pub use modes::ModeProgram;
 pub use operations::Operations;
+pub use projection::Drifted;
 pub use sensitivity::{Quantity, Tape, Taped, Varied};
 pub use setup::Setup;
 pub use wide::WideModel;
@@ -56,7 +57,7 @@ use inputs::InputSignal;
 use machine::Tiers;
 use memory::{DelayOrSample, Remembered};
 use modes::Extents;
-use projection::Projection;
+use projection::{Kept, Projection};
 use recorded::Recorded;
 use shares::Shares;
 use std::sync::Arc;
@@ -79,6 +80,8 @@ pub struct Model {
     events: EventWork,
     /// How positions are put back onto the relations between them, in runs that do so.
     projection: Option<Projection>,
+    /// Whether a run notes what its positions keep.
+    tells_drift: bool,
     /// How reactions that are not unique are shared where they are recorded, if anybody asks for it.
     shares: Option<Box<Shares>>,
     /// How all that the run carries moves with some quantities, if anybody asks for it.
@@ -142,6 +145,7 @@ impl Model {
             returns: Vec::with_capacity(code.clauses.conditional.len()),
             floors: vec![0.0; code.program.conditions.len()],
             pivots: Vec::new(),
+            kept: Kept::default(),
             pieces: vec![None; code.program.inputs.len()],
         };
         let mut model = Model {
@@ -152,6 +156,7 @@ impl Model {
             frame,
             events: EventWork::of(&code),
             projection: None,
+            tells_drift: false,
             shares: None,
             variation: None,
             led: false,
@@ -298,7 +303,7 @@ impl Model {
         if self.run.mode != ModeId::default() {
             self.enter(ModeId::default()).expect("it has run with these parameters");
         }
-        self.projection = None;
+        self.run.kept = Kept::default();
         self.run.begun = false;
         self.run.crossed = f64::NEG_INFINITY;
         self.run.signs_taken = None;

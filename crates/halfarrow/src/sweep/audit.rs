@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{SweepContext, prepare};
 use crate::audited::{AuditReport, Audited, Deviation};
+use crate::drift::widen;
 use crate::run::Run;
 use crate::verdict::{Made, Verdict};
 
@@ -88,6 +89,7 @@ impl AuditReport {
             }
         }
         self.verdict = self.verdict.max(other.verdict);
+        widen(&mut self.drift, other.drift);
         for (all, more) in [(&mut self.notes, other.notes), (&mut self.unchecked, other.unchecked)] {
             all.extend(more);
             all.sort();

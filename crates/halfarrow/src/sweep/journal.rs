@@ -9,6 +9,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::{SetFailure, fingerprint};
+use crate::drift::SetDrift;
 use crate::error::Problem;
 
 /// The rows of a chunk.
@@ -20,6 +21,8 @@ pub struct JournalChunk {
     pub rows: usize,
     /// Row by row.
     pub values: Vec<f64>,
+    /// How far positions have drifted in these sets.
+    pub drifts: Vec<SetDrift>,
     /// Sets that failed.
     pub failures: Vec<SetFailure>,
 }
@@ -48,7 +51,7 @@ impl Journal {
             file.set_len(0).map_err(unwritable)?;
         }
         let mut journal = Journal { file, path: path.clone(), places: BTreeMap::new(), end: 0, columns };
-        let header = format!("halfarrow sweep 1 {:016x}\n", fingerprint(identity.as_bytes()));
+        let header = format!("halfarrow sweep 2 {:016x}\n", fingerprint(identity.as_bytes()));
         let mut found = vec![0; header.len()];
         let there = journal.file.read_exact(&mut found).is_ok();
         if there && found != header.as_bytes() {
@@ -168,12 +171,40 @@ fn bytes(entry: &JournalChunk) -> Vec<u8> {
         all.extend(number.to_le_bytes());
     }
     entry.values.iter().for_each(|value| all.extend(value.to_bits().to_le_bytes()));
+    all.extend((entry.drifts.len() as u64).to_le_bytes());
+    for drift in &entry.drifts {
+        let numbers = [drift.greatest.to_bits(), drift.set as u64, drift.sets as u64, drift.resolution.to_bits()];
+        numbers.iter().for_each(|number| all.extend(number.to_le_bytes()));
+        add_text(&mut all, &drift.relation);
+    }
     for failure in &entry.failures {
         all.extend((failure.set as u64).to_le_bytes());
-        all.extend((failure.reason.len() as u64).to_le_bytes());
-        all.extend(failure.reason.as_bytes());
+        add_text(&mut all, &failure.reason);
     }
     all
+}
+
+fn add_text(all: &mut Vec<u8>, text: &str) {
+    all.extend((text.len() as u64).to_le_bytes());
+    all.extend(text.as_bytes());
+}
+
+fn text(from: &mut &[u8]) -> Option<String> {
+    let length = number(from).ok()? as usize;
+    let (text, rest) = from.split_at_checked(length)?;
+    *from = rest;
+    String::from_utf8(text.to_vec()).ok()
+}
+
+fn drift(from: &mut &[u8]) -> Option<SetDrift> {
+    let [greatest, set, sets, resolution] = std::array::from_fn(|_| number(from).ok());
+    Some(SetDrift {
+        greatest: f64::from_bits(greatest?),
+        set: set? as usize,
+        sets: sets? as usize,
+        resolution: f64::from_bits(resolution?),
+        relation: text(from)?,
+    })
 }
 
 fn from_bytes(mut from: &[u8], columns: usize) -> Option<JournalChunk> {
@@ -183,14 +214,12 @@ fn from_bytes(mut from: &[u8], columns: usize) -> Option<JournalChunk> {
         return None;
     }
     let values = (0..count).map(|_| number(from).ok().map(f64::from_bits)).collect::<Option<Vec<_>>>()?;
+    let drifts = (0..number(from).ok()?).map(|_| drift(from)).collect::<Option<Vec<_>>>()?;
     let mut failures = Vec::new();
     while !from.is_empty() {
-        let (set, length) = (number(from).ok()? as usize, number(from).ok()? as usize);
-        let (text, rest) = from.split_at_checked(length)?;
-        failures.push(SetFailure { set, reason: String::from_utf8(text.to_vec()).ok()? });
-        *from = rest;
+        failures.push(SetFailure { set: number(from).ok()? as usize, reason: text(from)? });
     }
-    Some(JournalChunk { chunk, rows, values, failures })
+    Some(JournalChunk { chunk, rows, values, drifts, failures })
 }
 
 #[cfg(test)]
@@ -199,7 +228,8 @@ mod tests {
 
     fn entry(chunk: usize) -> JournalChunk {
         let failures = vec![SetFailure { set: 2, reason: "no".into() }];
-        JournalChunk { chunk, rows: 2, values: vec![1.0, f64::NAN, -0.0, chunk as f64], failures }
+        let drifts = vec![SetDrift { relation: "x".into(), greatest: 1e-9, set: 1, sets: 2, resolution: 1e-16 }];
+        JournalChunk { chunk, rows: 2, values: vec![1.0, f64::NAN, -0.0, chunk as f64], drifts, failures }
     }
 
     fn open(out: &Path) -> Journal {

@@ -13,7 +13,7 @@ use super::plan::Plan;
 use crate::error::Error;
 use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Record, choose, options};
+use crate::run::{Record, choose, options, projected};
 
 /// A model whose equations hold for some of the sets.
 pub(super) struct Structure {
@@ -82,6 +82,7 @@ fn derived(first: &Structure, sweep: &Sweep, plan: &Plan, set: usize) -> Result<
     let options: Options = options(&sweep.run)?;
     let bad = |failure: halfarrow_sim::Failure| crate::error::Problem::BadOption { reason: failure.to_string() };
     options.check(system.program().states.len()).map_err(bad)?;
+    projected(system.program(), sweep.run.project, sweep.run.method)?;
     Ok(Structure { model, system })
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Run, Stepper};
 use crate::Failure;
-use crate::events::{Events, FINEST, Signs, first_crossing};
+use crate::events::{FINEST, Signs, first_crossing};
 
 /// Parts of a step by which it is made to go beyond a zero crossing.
 const MARGINS: [f64; 2] = [1e-3, 1e-6];
@@ -127,10 +127,5 @@ impl Run<'_> {
     /// Whether there is something to look at where a step ends: event indicators, or a sink that watches.
     pub(crate) fn looks_at_every_step(&self) -> bool {
         !self.signs.is_empty() || self.watched
-    }
-
-    /// Whether an event indicator has another sign at `(t, point)` than that held.
-    pub(crate) fn has_crossed(&mut self, events: &mut dyn Events, t: f64, point: &[f64]) -> Result<bool, Failure> {
-        self.signs.crossed(events, t, point).map(|crossed| crossed.is_some())
     }
 }

@@ -189,6 +189,25 @@ impl<'a> Run<'a> {
 
     /// One step, with what happens at its end.
     fn step<S: Stepper>(&mut self, stepper: &mut S, stop: Stop, point: &mut [f64]) -> Result<StopReason, Failure> {
+        let reason = self.reach(stepper, stop, point)?;
+        if reason == StopReason::Exchange {
+            return Ok(reason);
+        }
+        self.handle_stop(&mut *stepper.events(), reason, point)?;
+        if let StopReason::TimeEvent { corner } = reason {
+            stepper.after_event(corner, point);
+        }
+        let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
+        Ok(if exchanged { StopReason::Exchange } else { reason })
+    }
+
+    /// One step to its end, where nothing has been handled or sampled yet.
+    pub(crate) fn reach<S: Stepper>(
+        &mut self,
+        stepper: &mut S,
+        stop: Stop,
+        point: &mut [f64],
+    ) -> Result<StopReason, Failure> {
         let longest = if S::DENSE { stepper.events().longest_step() } else { f64::INFINITY };
         let latest = f64::min(stop.time, self.time + longest);
         let end = match stepper.step(self.time, self.next_sample(), latest, point) {
@@ -212,12 +231,7 @@ impl<'a> Run<'a> {
         if let StopReason::TimeEvent { corner } = reason {
             stepper.before_event(corner)?;
         }
-        self.handle_stop(&mut *stepper.events(), reason, point)?;
-        if let StopReason::TimeEvent { corner } = reason {
-            stepper.after_event(corner, point);
-        }
-        let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
-        Ok(if exchanged { StopReason::Exchange } else { reason })
+        Ok(reason)
     }
 
     /// Puts the point back onto what its rates keep, if the run is to do so.
@@ -229,7 +243,12 @@ impl<'a> Run<'a> {
     }
 
     /// Goes on in other variables if these tell the motion better.
-    fn exchange(&mut self, events: &mut dyn Events, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
+    pub(crate) fn exchange(
+        &mut self,
+        events: &mut dyn Events,
+        point: &mut [f64],
+        failed: bool,
+    ) -> Result<bool, Failure> {
         let exchanged = events.exchange_independent(self.time, point, failed)?;
         if exchanged {
             self.counts.exchanges += 1;

@@ -138,6 +138,11 @@ impl FixedStep {
         &self.trial
     }
 
+    /// Takes over the state where a step has ended that was made elsewhere.
+    pub(crate) fn take_over(&mut self, state: impl Iterator<Item = f64>) {
+        self.trial.iter_mut().zip(state).for_each(|(trial, value)| *trial = value);
+    }
+
     /// As [`step`](FixedStep::step), but leaves the state to [`advanced`](FixedStep::advanced).
     pub(crate) fn advance(&mut self, system: &mut dyn System, t: f64, h: f64, x: &[f64]) -> Result<(), Failure> {
         match (self.tableau, &mut self.implicit) {
@@ -146,10 +151,15 @@ impl FixedStep {
             (None, Some(Implicit::Linearly(method))) => method.step(system, t, h, x, &mut self.trial)?,
             (None, None) => {}
         }
-        if let Some(state) = self.trial.iter().position(|value| !value.is_finite()) {
-            return Err(Failure::NotFinite { time: t + h, what: Affected::variable(system.state_name(state)) });
+        self.check(system, t + h)
+    }
+
+    /// Whether the state is finite where the last step ended.
+    pub(crate) fn check(&self, system: &dyn System, end: f64) -> Result<(), Failure> {
+        match self.trial.iter().position(|value| !value.is_finite()) {
+            Some(state) => Err(Failure::NotFinite { time: end, what: Affected::variable(system.state_name(state)) }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn explicit(

@@ -18,17 +18,29 @@ pub(crate) struct Ticks<'m, 'a> {
     system: Counted<'a>,
     /// `None`: the run ends at the tick.
     grid: Option<Grid>,
+    /// Where the next step ends, and what came of it, if it has been made elsewhere.
+    made: Option<(f64, Result<(), Failure>)>,
 }
 
 impl<'m, 'a> Ticks<'m, 'a> {
     /// Steps of this length from this time on, in s.
     pub(crate) fn new(method: &'m mut FixedStep, system: Counted<'a>, (from, step): (f64, f64)) -> Ticks<'m, 'a> {
-        Ticks { method, system, grid: Some(Grid::new(from, step)) }
+        Ticks { method, system, grid: Some(Grid::new(from, step)), made: None }
     }
 
     /// One step, if nothing comes before the end of the run.
     pub(crate) fn one(method: &'m mut FixedStep, system: Counted<'a>) -> Ticks<'m, 'a> {
-        Ticks { method, system, grid: None }
+        Ticks { method, system, grid: None, made: None }
+    }
+
+    /// A step that was made elsewhere: the method has the state where it ends.
+    pub(crate) fn made(
+        method: &'m mut FixedStep,
+        system: Counted<'a>,
+        end: f64,
+        outcome: Result<(), Failure>,
+    ) -> Ticks<'m, 'a> {
+        Ticks { method, system, grid: None, made: Some((end, outcome)) }
     }
 
     pub(crate) fn system(&mut self) -> &mut Counted<'a> {
@@ -38,6 +50,14 @@ impl<'m, 'a> Ticks<'m, 'a> {
     /// A step to `end`, which is given back.
     fn advance(&mut self, from: f64, end: f64, x: &[f64]) -> Result<f64, Failure> {
         self.method.advance(&mut self.system, from, end - from, x)?;
+        self.system.events().try_end(end, self.method.advanced())?;
+        Ok(end)
+    }
+
+    /// The same for a step that has been made.
+    fn arrived(&mut self, end: f64, outcome: Result<(), Failure>) -> Result<f64, Failure> {
+        outcome?;
+        self.method.check(&self.system, end)?;
         self.system.events().try_end(end, self.method.advanced())?;
         Ok(end)
     }
@@ -58,8 +78,14 @@ impl Stepper for Ticks<'_, '_> {
         self.system.events()
     }
     fn step(&mut self, from: f64, sample: f64, stop: f64, x: &[f64]) -> Result<f64, Failure> {
-        let end = self.grid.as_mut().map_or(stop, |ticks| target(ticks, from, sample, stop));
-        let failure = match self.advance(from, end, x) {
+        let (end, done) = match self.made.take() {
+            Some((end, outcome)) => (end, self.arrived(end, outcome)),
+            None => {
+                let end = self.grid.as_mut().map_or(stop, |ticks| target(ticks, from, sample, stop));
+                (end, self.advance(from, end, x))
+            }
+        };
+        let failure = match done {
             Err(failure @ Failure::OffMotion { .. }) => failure,
             other => return other,
         };

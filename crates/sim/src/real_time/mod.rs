@@ -10,7 +10,7 @@ pub use clock::Clock;
 pub use statistics::{Histogram, Statistics};
 
 use crate::fixed_step::FixedMethod;
-use crate::{HybridSystem, Stepwise, Stopped};
+use crate::{HybridSystem, Stepwise, Stopped, Summary};
 
 /// What to do when a tick ends after the next one was due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub struct Pace {
     pub ticks: Option<u64>,
     /// What to do when a tick takes too long.
     pub on_miss: OnMiss,
+    /// Whether the state is [projected](crate::Events::project) at the end of each step.
+    pub project: bool,
 }
 
 /// What a run exchanges with the outside.
@@ -43,7 +45,7 @@ pub trait Exchange<S> {
 /// A step is taken in vain if so many times its last length are left before the tick.
 const REHEARSED: f64 = 8.0;
 
-/// Runs `system` from the state `x` at time 0, a step a tick.
+/// Runs `system` from the state `x` at time 0, a step a tick; gives what it took.
 ///
 /// # Errors
 /// What the system reports: the run has stopped there, and `x` holds the last state reached.
@@ -56,9 +58,9 @@ pub fn run_real_time<S: HybridSystem>(
     clock: &mut dyn Clock,
     exchange: &mut dyn Exchange<S>,
     statistics: &Statistics,
-) -> Result<(), Stopped> {
+) -> Result<Summary, Stopped> {
     let mut vain = x.to_vec();
-    let mut run = Stepwise::new(method, 0.0, system);
+    let mut run = Stepwise::new(method, 0.0, system).projecting(pace.project);
     let mut values = vec![0.0; system.observed()];
     run.start(system, x)?;
     let mut due = clock.now();
@@ -93,5 +95,5 @@ pub fn run_real_time<S: HybridSystem>(
             due += left_out * pace.step;
         }
     }
-    Ok(())
+    Ok(run.summary())
 }

@@ -3,6 +3,7 @@
 mod checks;
 mod events;
 mod modes;
+mod relations;
 mod routines;
 mod shapes;
 mod source;
@@ -208,6 +209,7 @@ impl<'a> Plan<'a> {
                 functions.extend(plain(&mut writer, "ha_pivots_code", &routines.pivots));
             }
         }
+        functions.extend(plain(&mut writer, "ha_relations_code", &routines.relations));
         functions.extend(self.domain_checks(&writer));
         functions.extend(self.assumption_checks(&writer));
 

@@ -34,6 +34,8 @@ pub(super) struct Routines {
     pub open: Routine,
     pub ratios: Routine,
     pub pivots: Routine,
+    /// Relations onto which positions are put back.
+    pub relations: Routine,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -90,6 +92,7 @@ impl Routines {
             clock: p.routine(&operands(&plan.clocks)),
             sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
             domains: p.routine(&p.domains.iter().map(|d| d.argument).collect::<Vec<_>>()),
+            relations: plan.relations_routine(),
             starts: passes.chain(groups).chain(guesses).map(start).collect(),
         }
     }
@@ -97,7 +100,7 @@ impl Routines {
     fn all(&self) -> impl Iterator<Item = &Routine> {
         let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, margins, compared, carried, .. } = self;
-        let Routines { open, ratios, pivots, .. } = self;
+        let Routines { open, ratios, pivots, relations, .. } = self;
         let all = [
             preamble,
             rates,
@@ -118,6 +121,7 @@ impl Routines {
             open,
             ratios,
             pivots,
+            relations,
         ];
         all.into_iter().chain(clauses).chain(starts.iter().map(|s| &s.1))
     }

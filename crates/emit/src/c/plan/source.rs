@@ -100,6 +100,9 @@ impl Plan<'_> {
             method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
             _ => include_str!("../runtime/explicit.c"),
         }));
+        if !self.relations().is_empty() {
+            put(filling.fragments(include_str!("../runtime/projection.c")));
+        }
         put(filling.fragments(include_str!("../runtime/step.c")));
         put(filling.fragments(include_str!("../runtime/parameters.c")));
         put(messages::messages(self));
@@ -177,6 +180,7 @@ impl Plan<'_> {
             linear_constant: self.sizes.factored > 0,
             step_order: self.step_order.is_some(),
             step_full: self.step_order.as_ref().is_some_and(StepOrder::has_full),
+            relations: !self.relations().is_empty(),
             solves_start: self.solves_start(),
             guesses: !p.guesses.is_empty(),
             start_groups: self.groups.iter().any(|g| g.together),

@@ -51,7 +51,7 @@ impl Plan<'_> {
         let [_, held, conserved, states, positions, direction] = self.sizes.directions.map(|place| place.to_string());
         let (sought, memory): (Vec<String>, Vec<String>) =
             self.sought_positions().into_iter().map(|(k, place)| (k.to_string(), place.to_string())).unzip();
-        let words: Vec<(&str, String)> = vec![
+        let mut words: Vec<(&str, String)> = vec![
             ("KINDS", lines(self.kinds().map(|k| kind(k).to_string()).collect())),
             ("CLOCK_CONDITIONS", lines(numbers_of(&self.clocks))),
             (
@@ -124,6 +124,8 @@ impl Plan<'_> {
             ("DISCRETES", self.discretes.len().to_string()),
             ("DISCRETE_PLACES", join(self.discretes.iter().map(usize::to_string).collect())),
         ];
+        words.extend(self.relation_sizes().map(|(word, number)| (word, number.to_string())));
+        words.extend(self.relation_words().map(|(word, numbers)| (word, lines(numbers))));
         let events = self.events.words(program, &lines, &join);
         let ints = |values: Vec<u32>| lines(values.iter().map(u32::to_string).collect());
         let order = self.step_order.iter().flat_map(|order| {

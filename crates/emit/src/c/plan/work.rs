@@ -75,7 +75,7 @@ impl Plan<'_> {
         } else {
             w.rates.clone() + w.sources.clone().along()
         };
-        step = step + followed.clone() + sources.clone();
+        step = step + followed.clone() + sources.clone() + self.putting_back();
         let held = (self.delays.len() + self.samples.len()) as u64;
         let curves =
             self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()

@@ -62,6 +62,11 @@ int $model_start_from($model *m, double t, const $real *x)
     $ha_fill(m->rest, $0.0, HA_NX);
 //end
     status = $model_cross(m, t, m->x);
+//if relations
+    if (status == $MODEL_OK) {
+        status = $ha_begin_keeping(m, t, m->x);
+    }
+//end
     if (status == $MODEL_OK) {
         status = $model_accept(m, t, m->x);
     }

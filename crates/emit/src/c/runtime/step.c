@@ -150,9 +150,9 @@ static double ha_part_of(double start, double end, double part)
 }
 
 //if bounds
-//item ha_keep
+//item ha_keep_values
 /* The values of indicators at a point of a step are kept in a place. */
-static void ha_keep(ha_model *m, int place)
+static void ha_keep_values(ha_model *m, int place)
 {
     $ha_copy(m->seen + place * HA_NG, m->beyond, HA_NG);
 }
@@ -210,7 +210,7 @@ static int ha_may_hide_in_step(const ha_model *m, double length)
 static void ha_step_ended(ha_model *m, double length)
 {
     $ha_keep_as(m, HA_START, HA_BEFORE);
-    $ha_keep(m, HA_START);
+    $ha_keep_values(m, HA_START);
     m->last_step = length;
 }
 
@@ -238,7 +238,7 @@ static int ha_hidden(ha_model *m, int part, double begin, double end, int *looks
                 *after = middle;
                 return status;
             }
-            $ha_keep(m, HA_MIDDLE);
+            $ha_keep_values(m, HA_MIDDLE);
         }
         if (inside && open + 1 < HA_INSIDE && $ha_may_hide(m, HA_BEGIN, HA_MIDDLE, open)) {
             ++open;
@@ -264,13 +264,13 @@ static int ha_first_crossing(ha_model *m, double *end, int *crossed)
     int status = $ha_look(m, start, crossed);
     int looks = 0;
     int part;
-    $ha_keep(m, 0);
+    $ha_keep_values(m, 0);
     for (part = 1; part <= 4 && status == $MODEL_OK; ++part) {
         double before = $ha_part_of(start, *end, (double)(part - 1));
         double at = part == 4 ? *end : $ha_part_of(start, *end, (double)part);
         status = $ha_look(m, at, crossed);
         if (status == $MODEL_OK && !*crossed) {
-            $ha_keep(m, part);
+            $ha_keep_values(m, part);
             status = $ha_hidden(m, part, before, at, &looks, &before, &at, crossed);
         }
         if (status == $MODEL_OK && *crossed) {
@@ -354,10 +354,20 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     $ha_copy(m->rest, m->trial_rest, HA_NX);
 //end
     m->t = end;
+//if relations
+    status = $ha_put_back(m, end, m->x);
+    if (status == $MODEL_OK) {
+        status = $model_accept(m, end, m->x);
+    }
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $ha_cross_keeping(m, end, m->x);
+    }
+//else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
     }
+//end
     return status;
 }
 
@@ -383,10 +393,20 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     }
 //end
     m->t = end;
+//if relations
+    status = $ha_put_back(m, end, m->x);
+    if (status == $MODEL_OK) {
+        status = $model_accept(m, end, m->x);
+    }
+    if (status == $MODEL_OK && (switched || (jumps && end == target))) {
+        status = $ha_cross_keeping(m, end, m->x);
+    }
+//else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
     }
+//end
     return status;
 }
 
@@ -413,6 +433,11 @@ int $model_step_until($model *m, double end)
     }
     if (m->cross_due) {
         status = $model_cross(m, m->t, m->x);
+//if relations
+        if (status == $MODEL_OK) {
+            status = $ha_keep(m, m->t, m->x);
+        }
+//end
 //if modes
         if (status == $MODEL_OK) {
             status = $model_go_on(m, m->t, m->x);
