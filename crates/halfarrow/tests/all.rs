@@ -6,6 +6,8 @@ mod animation;
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "contacts.rs"]
+mod contacts;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]
