@@ -249,6 +249,32 @@ constraint above: xc - xa >= 0 (restitution = 0)
     close(column(&done, "floor.impulse")[row], 0.0, 0.0, "the floor");
 }
 
+/// A corner of a body in space: what moves only by rounding, sideways, keeps no impulse from settling.
+#[test]
+fn a_corner_of_a_body_in_space_is_hit() {
+    let text = "import std.multibody
+World:world -> Free:free(x0 = [0, 0, 0.5], e0 = [0.99, 0.08, 0.05, 0.1]) -> 1[frame]:box
+box -> Body:b(m = 2, J = diag([0.02, 0.03, 0.04]))
+constraint corner: box.r[3] + 0.2*box.R[3,1] + 0.1*box.R[3,2] - 0.05*box.R[3,3] >= 0 m (restitution = 0.2)
+";
+    let done = written(text, &Run { to: 0.4, rtol: 1e-11, every: None, ..Run::default() });
+    let rows = impacts(&done, &["corner"]);
+    assert!(rows.len() > 1, "it is hit again");
+    // The way down along the axes of the body, the arm of the corner, and what the corner gives way by for an impulse.
+    let (arm, inertia, [a, b, c, d]) = ([0.2, 0.1, -0.05], [0.02, 0.03, 0.04], [0.99, 0.08, 0.05, 0.1f64]);
+    let double = 2.0 / (a * a + b * b + c * c + d * d);
+    let up = [double * (b * d - a * c), double * (c * d + a * b), 1.0 - double * (b * b + c * c)];
+    let turn = [arm[1] * up[2] - arm[2] * up[1], arm[2] * up[0] - arm[0] * up[2], arm[0] * up[1] - arm[1] * up[0]];
+    let height = 0.5 + (0..3).map(|i| arm[i] * up[i]).sum::<f64>();
+    let way = 0.5 + (0..3).map(|i| turn[i] * turn[i] / inertia[i]).sum::<f64>();
+    let impulse = 1.2 * (2.0 * 9.81 * height).sqrt() / way;
+    close(column(&done, "corner.impulse")[rows[0]], impulse, 1e-9, "the impulse");
+    for (i, axis) in ["x", "y", "z"].iter().enumerate() {
+        let speed = column(&done, &format!("b.inertia.{axis}.f"))[rows[0]];
+        close(speed, turn[i] * impulse / inertia[i], 1e-8, &format!("turning about {axis}"));
+    }
+}
+
 /// The place of a frame decides nothing at the start but whether it is touched: joints begin where they are said to.
 #[test]
 fn contacts_behind_joints_leave_the_start_alone() {

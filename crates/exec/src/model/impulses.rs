@@ -164,6 +164,11 @@ impl ImpulseWork {
         &self.equations
     }
 
+    /// Whether the equations hold to a part of what they add up.
+    fn met_to(&self, part: f64) -> bool {
+        self.equations.residual.iter().zip(&self.sizes).all(|(residual, size)| residual.abs() <= part * size)
+    }
+
     /// How many resets are asked for.
     pub fn resets(&self) -> usize {
         self.asked.len()
@@ -378,7 +383,7 @@ impl Model {
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
-            met = work.equations.residual.iter().all(|r| *r == 0.0);
+            met = work.met_to(0.0);
             if met {
                 break;
             }
@@ -387,6 +392,7 @@ impl Model {
                 Some(rank) if rank < m => return Ok(None),
                 Some(_) => {}
             }
+            let fits = work.met_to(ROUNDING);
             let step = &work.equations.step;
             let mut length = 0.0f64;
             changed = true;
@@ -398,15 +404,16 @@ impl Model {
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
-            met = length <= SETTLED || length < NOISE && length >= 0.5 * last;
+            // What is nothing but rounding never settles; then its equations do.
+            let stays = length >= 0.5 * last;
+            met = length <= SETTLED || stays && (length < NOISE || held && fits);
             if met {
                 break;
             }
             last = length;
         }
         self.balanced(t, x, balance, work)?;
-        let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
-        match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
+        match met && work.met_to(MET) {
             true => Ok(Some(changed)),
             false => Err(self.unmet_resets(t)),
         }
