@@ -8,6 +8,8 @@ mod api;
 mod compare;
 #[path = "contacts.rs"]
 mod contacts;
+#[path = "converters.rs"]
+mod converters;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]
