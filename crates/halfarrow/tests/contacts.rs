@@ -249,6 +249,35 @@ constraint above: xc - xa >= 0 (restitution = 0)
     close(column(&done, "floor.impulse")[row], 0.0, 0.0, "the floor");
 }
 
+/// Newton's cradle of three and five balls. Those that touch act all at once, with the least energy in what they exchange: each
+/// of the others leaves with 2/n of the speed, and a note says so. Those that are a little apart hand it on one by one.
+#[test]
+fn cradles_by_either_rule() {
+    for n in [3, 5] {
+        for gap in [0.0, 1e-9] {
+            let mut text = String::new();
+            for k in 0..n {
+                text += &format!("1:v{k} -> I:m{k}(0.5, f0 = {})\n", u8::from(k == 0));
+                // The first has a way to go.
+                let at = if k == 0 { -0.5 } else { 0.1 * f64::from(k) + gap * f64::from(k) };
+                text += &format!("state x{k}' = v{k}.f from {at:e}\n");
+            }
+            for k in 1..n {
+                text += &format!("constraint c{k}: x{k} - x{} >= 0.1 (restitution = 1)\n", k - 1);
+            }
+            let done = written(&text, &Run { to: 1.0, rtol: 1e-10, ..Run::default() });
+            let together = gap == 0.0;
+            for k in 0..n {
+                let all = if k == 0 { 2.0 / f64::from(n) - 1.0 } else { 2.0 / f64::from(n) };
+                let wanted = if together { all } else { f64::from(u8::from(k == n - 1)) };
+                close(last(&done, &format!("m{k}.f")), wanted, 1e-12, &format!("ball {k} of {n}, {gap} m apart"));
+            }
+            let told = done.report.notes.iter().any(|note| note.contains("are shared out all at once"));
+            assert_eq!(told, together, "{:?}", done.report.notes);
+        }
+    }
+}
+
 /// A corner of a body in space: what moves only by rounding, sideways, keeps no impulse from settling.
 #[test]
 fn a_corner_of_a_body_in_space_is_hit() {

@@ -263,7 +263,10 @@ impl Model {
             let gives = |&k: &usize| !self.events.fired[contacts[k]] && !held[k];
             let open = (0..contacts.len()).filter(gives).map(|k| (k, self.gives_way(contacts[k], balance)));
             let worst = open.filter(|(_, by)| *by > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a });
-            let Some((added, _)) = worst else { return Ok(()) };
+            let Some((added, _)) = worst else {
+                self.note_shared(t, &contacts);
+                return Ok(());
+            };
             self.events.fired[contacts[added]] = true;
             loop {
                 x.copy_from_slice(&start);
@@ -303,6 +306,16 @@ impl Model {
             }
         }
         Err(self.unmet_resets(t))
+    }
+
+    /// Takes notice of contacts that act together.
+    fn note_shared(&mut self, t: f64, contacts: &[usize]) {
+        let acting = contacts.iter().filter(|&&contact| self.events.fired[contact]);
+        let law = |&contact: &usize| self.code.program.clauses[contact].bound.map(|bound| bound.law);
+        let laws: Vec<u32> = acting.filter_map(law).collect();
+        if laws.len() > 1 {
+            self.run.extents.note_shared(t, laws);
+        }
     }
 
     /// Impulses for all that acts; `false` if some of it depends on the rest.

@@ -38,6 +38,8 @@ pub(super) struct Extents {
     pub stored: BTreeMap<Symbol, f64>,
     /// Contacts that were closed and have been opened for impulses, and when that was.
     pub let_go: (f64, Vec<u32>),
+    /// How many times several contacts have shared out impulses at one instant, and when and which that was first.
+    pub shared: (usize, f64, Vec<u32>),
     /// Of states and of their rates, by the variables that they are.
     pub states: BTreeMap<Symbol, f64>,
     pub rates: BTreeMap<Symbol, f64>,
@@ -47,6 +49,15 @@ impl Extents {
     pub fn note(most: &mut BTreeMap<Symbol, f64>, symbol: Symbol, value: f64) {
         let most = most.entry(symbol).or_default();
         *most = if value.is_finite() { most.max(value.abs()) } else { *most };
+    }
+
+    /// Takes notice of contacts that have shared out impulses at one instant.
+    pub fn note_shared(&mut self, t: f64, laws: Vec<u32>) {
+        let (count, first, which) = &mut self.shared;
+        if *count == 0 {
+            (*first, *which) = (t, laws);
+        }
+        *count += 1;
     }
 
     /// Whether impulses of this instant have opened a contact.
@@ -99,6 +110,13 @@ impl Model {
         *self = next;
         x.copy_from_slice(&point);
         Ok(true)
+    }
+
+    /// How many times several contacts have shared out impulses at one instant; when that was first, and which they were.
+    pub fn shared_impulses(&self) -> Option<(usize, f64, Vec<String>)> {
+        let (count, first, laws) = &self.run.extents.shared;
+        let name = |law: &u32| self.code.program.set_valued[*law as usize].name.clone();
+        (*count > 0).then(|| (*count, *first, laws.iter().map(name).collect()))
     }
 
     /// The set-valued laws of which a branch has ended at `(t, x)`, by name.
