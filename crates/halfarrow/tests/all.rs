@@ -10,6 +10,8 @@ mod compare;
 mod contacts;
 #[path = "converters.rs"]
 mod converters;
+#[path = "drawings.rs"]
+mod drawings;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]
