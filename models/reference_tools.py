@@ -155,12 +155,16 @@ def agree(one, other, digits=22):
         assert worst <= size * mpf(10) ** -digits, f"differ by {nstr(worst / size, 3)} of {nstr(size, 3)}"
 
 
-def write(program, times, columns, source, inputs=None, tolerance=1e-9):
-    """Writes reference.json beside the program. `columns`: recorded name -> one value a time."""
+def write(program, times, columns, source, inputs=None, tolerance=1e-9, impacts=None):
+    """Writes reference.json beside the program. `columns`: recorded name -> one value a time. `impacts`: the first ones,
+    each with its time and what there is after it."""
     data = {"t": list(times), "values": {name: [decimal(v) for v in values] for name, values in columns.items()},
             "tolerance": tolerance, "source": source}
     if inputs:
         data["inputs"] = inputs
+    if impacts:
+        after = lambda values: {name: decimal(v) for name, v in values.items()}
+        data["impacts"] = [{"t": decimal(t), "after": after(values)} for t, values in impacts]
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(program).with_name("reference.json")
     target.write_text(json.dumps(data, indent=1) + "\n")
 

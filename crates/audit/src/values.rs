@@ -207,12 +207,16 @@ impl<'a> Values<'a> {
     }
 
     /// On which side of a jump a sample stands. The start is the far side of one, and so is a single sample at the time
-    /// of a jump; the latter cannot be told from others, but a little later is as good there.
+    /// of a jump; the latter cannot be told from others, but a little later is as good there. What stands beside a jump by
+    /// rounding is on the side where it stands.
     fn side(&self, sample: usize) -> Side {
-        let same = |a: usize, b: usize| self.times[a] == self.times[b];
+        let same = |a: usize, b: usize| b < self.times.len() && self.times[a] == self.times[b];
+        let beside = |a: usize, b: usize| self.times[b] - self.times[a] <= reach(self.times[b]);
         match () {
-            () if sample + 1 < self.times.len() && same(sample, sample + 1) => Side::Before,
+            () if same(sample, sample + 1) => Side::Before,
             () if sample > 0 && same(sample - 1, sample) => Side::After,
+            () if sample > 1 && same(sample - 2, sample - 1) && beside(sample - 1, sample) => Side::After,
+            () if same(sample + 1, sample + 2) && beside(sample, sample + 1) => Side::Before,
             () if sample + 1 == self.times.len() => Side::Inside,
             () => Side::After,
         }
@@ -297,6 +301,11 @@ struct Read<'a> {
     sources: Vec<Source<'a>>,
 }
 
+/// How far from a jump in time values are on one side of it for certain.
+fn reach(t: f64) -> f64 {
+    32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE)
+}
+
 /// Where the value of a symbol is.
 enum Source<'a> {
     Time,
@@ -338,11 +347,10 @@ impl Reader<'_, '_> {
             return None;
         }
         let t = values.times[sample];
-        let reach = 32.0 * f64::EPSILON * t.abs().max(f64::MIN_POSITIVE);
         let t = match side {
             // A run that ends at a jump stands before it.
-            Side::Before | Side::Inside if self.timed => t - reach,
-            Side::After if self.timed => t + reach,
+            Side::Before | Side::Inside if self.timed => t - reach(t),
+            Side::After if self.timed => t + reach(t),
             _ => t,
         };
         Some(self.read(&self.wanted, room, sample, t, moved))

@@ -9,6 +9,7 @@ use halfarrow_compiler::causal_paths::{CausalPaths, Path};
 use halfarrow_compiler::ids::Id;
 
 use crate::figure::{Figure, Form, Glyph, Line, Loop};
+use crate::symbol::Symbol;
 use crate::text::{typeset, wrap};
 use crate::{DrawOptions, DrawnPaths};
 
@@ -65,7 +66,8 @@ fn glyph(graph: &BondGraph, element: &Element, derivative: bool, law: bool, long
     let word = branch.map_or_else(|| element.kind.word(), |law| law.word);
     let tip = format!("{word}:{}{value}{causality}", element.name);
     let form = if branch.is_some() { Form::OnePort } else { form(element) };
-    Glyph { kind, name, law, tip, form, derivative, kept: false }
+    let symbol = Symbol::of(graph, element).filter(|_| form != Form::Field);
+    Glyph { symbol, kind, name, law, tip, form, derivative, kept: false }
 }
 
 /// The set-valued law of an element that stands in the text, if it has one.

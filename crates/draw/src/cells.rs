@@ -121,5 +121,5 @@ fn reduced(figure: Figure, drawn: &[bool], legend: Vec<String>) -> Figure {
 fn ellipsis(glyph: &Glyph) -> Glyph {
     let (kind, name) = ("…".to_string(), glyph.name.clone());
     let tip = format!("{}, in a cell that is not drawn", glyph.tip);
-    Glyph { kind, name, law: Vec::new(), tip, form: Form::Junction, derivative: false, kept: false }
+    Glyph { kind, symbol: None, name, law: Vec::new(), tip, form: Form::Junction, derivative: false, kept: false }
 }

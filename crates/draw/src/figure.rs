@@ -2,6 +2,7 @@
 
 use crate::alike::alike;
 use crate::layout::{Network, Node, Role, Room, Side};
+use crate::symbol::Symbol;
 use crate::text::width;
 
 /// Font sizes in px.
@@ -42,6 +43,8 @@ pub struct Figure {
 pub struct Glyph {
     /// Its keyword.
     pub kind: String,
+    /// What is drawn in the place of the keyword, if anything is.
+    pub symbol: Option<Symbol>,
     /// Its name.
     pub name: String,
     /// Its law or value in lines; may be empty.
@@ -142,12 +145,16 @@ impl Glyph {
             Form::Field => {
                 [self.main_width().max(self.law_width()) / 2.0 + 4.0, 10.0 + self.law.len() as f64 * LEADING / 2.0]
             }
-            _ => [width(&self.kind, KIND, true) / 2.0 + 4.0, 10.5],
+            _ => [self.sign_width() / 2.0 + 4.0, 10.5],
         }
+    }
+    /// Width of the keyword, or of the symbol in its place.
+    pub fn sign_width(&self) -> f64 {
+        self.symbol.map_or_else(|| width(&self.kind, KIND, true), |_| Symbol::WIDTH)
     }
     /// Width of `Kind : name`.
     pub fn main_width(&self) -> f64 {
-        width(&self.kind, KIND, true) + self.name_width()
+        self.sign_width() + self.name_width()
     }
     /// Width of ` : name`.
     pub fn name_width(&self) -> f64 {
@@ -194,7 +201,7 @@ impl Glyph {
     }
     /// Where the law of a one-port begins, from the edge of the sign where its name begins.
     pub fn law_indent(&self, neighbour: Side) -> f64 {
-        let sign = width(&self.kind, KIND, true);
+        let sign = self.sign_width();
         match neighbour {
             _ if self.name.is_empty() => sign / 2.0 + 4.0,
             Side::North | Side::South => sign / 2.0 + 8.0,
@@ -203,7 +210,7 @@ impl Glyph {
     }
     fn one_port_room(&self, even: Room, neighbour: Side) -> Room {
         let law = self.law.len() as f64 * LEADING;
-        let sign = width(&self.kind, KIND, true);
+        let sign = self.sign_width();
         let long = self.law_indent(neighbour) + self.law_width();
         let text = if self.law.is_empty() { self.main_width() } else { long.max(self.main_width()) };
         let out = even.east.max(text - sign / 2.0 + 2.0);

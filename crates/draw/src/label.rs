@@ -22,7 +22,7 @@ pub fn to_left(facing: Side, mirrored: bool) -> bool {
 /// Where `Kind : name` stands.
 pub fn main_line(glyph: &Glyph, at: Point, facing: Side, mirrored: bool) -> Placed {
     let y = at[1] + 0.36 * KIND;
-    let half = width(&glyph.kind, KIND, true) / 2.0;
+    let half = glyph.sign_width() / 2.0;
     match glyph.form {
         Form::Field => Placed { at: [at[0], y - glyph.law.len() as f64 * LEADING / 2.0], anchor: "middle" },
         _ if to_left(facing, mirrored) => Placed { at: [at[0] + half, y], anchor: "end" },
@@ -64,7 +64,7 @@ pub fn text_areas(glyph: &Glyph, at: Point, facing: Side, mirrored: bool) -> Vec
     if !matches!(glyph.form, Form::OnePort | Form::Source) {
         return Vec::new();
     }
-    let half = width(&glyph.kind, KIND, true) / 2.0;
+    let half = glyph.sign_width() / 2.0;
     let out = if to_left(facing, mirrored) { -1.0 } else { 1.0 };
     let text = glyph.name_width();
     let name = Area::around([at[0] + out * (half + text / 2.0), at[1]], [text, 16.0]);

@@ -18,6 +18,7 @@ mod paper;
 mod route;
 mod scene;
 mod svg;
+mod symbol;
 pub mod text;
 
 use std::collections::BTreeMap;
@@ -28,6 +29,7 @@ use cells::first_cells;
 pub use kept::positions;
 use multibonds::joined;
 pub use svg::render;
+pub use symbol::parts_with_symbols;
 
 use halfarrow_compiler::causal_graph::CausalGraph;
 use halfarrow_compiler::causal_paths::CausalPaths;
@@ -74,7 +76,7 @@ impl Default for DrawOptions {
 ///
 /// Half arrows have their barb on the side of the flow, strokes sit where the effort runs to, bonds are numbered from 1.
 /// Storages in derivative causality have a dashed frame, junctions whose variable is independent without a storage a
-/// ring, bonds whose stroke is undetermined are dotted. Equal graphs
+/// ring, set-valued laws and parts of the library the symbol of their field in the place of the keyword, bonds whose stroke is undetermined are dotted. Equal graphs
 /// give equal texts.
 pub fn draw(causal: &CausalGraph, paths: &CausalPaths, options: &DrawOptions) -> String {
     let all = figure(causal, paths, options);

@@ -10,6 +10,7 @@ use crate::layout::{Placement, Side};
 use crate::overlay::{course, look};
 use crate::route::Route;
 use crate::scene::{Scene, name_size, scene};
+use crate::symbol::Symbol;
 use crate::text::{FAMILIES, escape, width, wrap};
 
 const MARGIN: f64 = 24.0;
@@ -264,7 +265,11 @@ impl Svg {
             if glyph.kept {
                 self.ring(at, glyph.core());
             }
+            if let Some(symbol) = glyph.symbol {
+                self.symbol(at, symbol);
+            }
             match glyph.form {
+                Form::TwoPort if glyph.symbol.is_some() => {}
                 Form::Junction => self.sign(at, &glyph.kind, JUNCTION),
                 Form::TwoPort => self.sign(at, &glyph.kind, KIND),
                 _ => self.lines(at, glyph, placed.facing[v], placed.mirrored[v]),
@@ -278,6 +283,20 @@ impl Svg {
         let y = at[1] + 0.36 * size;
         let style = format!("font-size=\"{size}\" font-weight=\"bold\" text-anchor=\"middle\"");
         self.text([at[0], y], &style, kind);
+    }
+    /// A symbol in the place of a keyword.
+    fn symbol(&mut self, at: Point, symbol: Symbol) {
+        let [x, y] = at.map(n);
+        _ = write!(
+            self.out,
+            "<g class=\"symbol\" data-symbol=\"{}\" transform=\"translate({x} {y})\" stroke=\"{INK}\" stroke-width=\"1.3\" \
+             stroke-linejoin=\"round\" stroke-linecap=\"round\"><path d=\"{}\" fill=\"none\"/>",
+            symbol.name, symbol.lines
+        );
+        if !symbol.areas.is_empty() {
+            _ = write!(self.out, "<path d=\"{}\"/>", symbol.areas);
+        }
+        self.out.push_str("</g>");
     }
     /// The mark of a storage in derivative causality.
     fn frame(&mut self, at: Point, core: Point) {
@@ -313,8 +332,22 @@ impl Svg {
             self.text(place.at, &style, line);
         }
     }
+    /// The name beside a symbol that stands in the place of a keyword.
+    fn name_beside_symbol(&mut self, at: Point, anchor: &str, glyph: &Glyph) {
+        // Spaces at the ends of a text are not drawn.
+        let off = glyph.sign_width() + width(" ", NAME, false) + if glyph.derivative { FRAME } else { 0.0 };
+        let (x, line) = match anchor {
+            _ if glyph.name.is_empty() => return,
+            "end" => (at[0] - off, format!("{} :", glyph.name)),
+            _ => (at[0] + off, format!(": {}", glyph.name)),
+        };
+        self.text([x, at[1]], &format!("font-size=\"{NAME}\" text-anchor=\"{anchor}\""), &line);
+    }
     /// `Kind : name`, or `name : Kind` if it ends at the bond.
     fn main_line(&mut self, at: Point, anchor: &str, glyph: &Glyph) {
+        if glyph.symbol.is_some() {
+            return self.name_beside_symbol(at, anchor, glyph);
+        }
         let shift = if glyph.derivative { format!(" dx=\"{}\"", n(FRAME)) } else { String::new() };
         let before = if anchor == "end" { &shift } else { "" };
         let kind = format!("<tspan{before} font-weight=\"bold\" font-size=\"{KIND}\">{}</tspan>", escape(&glyph.kind));

@@ -248,6 +248,19 @@ fn floats(names: Vec<String>) -> Option<String> {
     })
 }
 
+/// What to know of contacts that are hit at one instant: by which rule.
+fn shares((count, first, names): (usize, f64, Vec<String>)) -> String {
+    let more = match count {
+        1 => String::new(),
+        2 => ", and once more later".to_string(),
+        _ => format!(", and {} times more later", count - 1),
+    };
+    format!(
+        "impulses of {} at t = {first} s are shared out all at once{more}; sides that are a little apart hand them on one by one, which may be another motion",
+        names.join(", ")
+    )
+}
+
 /// A result that satisfies the model, as the audit found: what is doubtful is said, what is wrong is refused.
 fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, Error> {
     match outcome {
@@ -428,6 +441,7 @@ impl Model {
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
         let audit = audited.finish();
         notes.extend(floats(system.floating()));
+        notes.extend(system.shared_impulses().map(shares));
         kept(self.ended(outcome, options, sink.trace, audit, notes), tolerances, executed(system))
     }
 

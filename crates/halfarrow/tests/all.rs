@@ -6,8 +6,14 @@ mod animation;
 mod api;
 #[path = "compare.rs"]
 mod compare;
+#[path = "contacts.rs"]
+mod contacts;
+#[path = "converters.rs"]
+mod converters;
 #[path = "crawls.rs"]
 mod crawls;
+#[path = "drawings.rs"]
+mod drawings;
 #[path = "equilibria.rs"]
 mod equilibria;
 #[path = "events.rs"]

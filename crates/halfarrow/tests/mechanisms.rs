@@ -637,18 +637,113 @@ fn a_disc_rolls_in_a_circle() {
     }
 }
 
-/// A scissor lift of many stages has one degree of freedom, and each stage adds the same work to a step.
+/// Operations of one evaluation of a linkage of `n` cells.
+fn operations(name: &str, n: usize) -> usize {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages").join(name).join("model.bond");
+    let size = halfarrow::Override { name: "n".into(), value: n.to_string() };
+    let model = Model::load(&path, &[size]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    model.compile(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false))).operations()
+}
+
+/// Compares operations with those of `linkages/operations.txt`, `UPDATE=1` writes these anew; then they grow from one size to
+/// the next as the cells do.
+fn work_grows_with_the_cells(name: &str, sizes: &[usize]) {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages/operations.txt");
+    let mut table: Vec<String> = fs::read_to_string(&golden).unwrap_or_default().lines().map(String::from).collect();
+    let before = table.clone();
+    let counted: Vec<usize> = sizes.iter().map(|&n| operations(name, n)).collect();
+    for (n, count) in sizes.iter().zip(&counted) {
+        let (key, line) = (format!("{name} {n}: "), format!("{name} {n}: {count}"));
+        match table.iter().position(|old| old.starts_with(&key)) {
+            Some(old) => table[old] = line,
+            None => table.push(line),
+        }
+    }
+    if std::env::var_os("UPDATE").is_some() {
+        fs::write(&golden, table.join("\n") + "\n").expect("written");
+    } else {
+        assert_eq!(table, before);
+    }
+    let cell = |k: usize| (counted[k] - counted[k - 1]) as f64 / (sizes[k] - sizes[k - 1]) as f64;
+    let last = sizes.len() - 1;
+    assert!(cell(last) < 1.05 * cell(last - 1), "{name}: {counted:?}");
+}
+
+/// A scissor lift and a row of parallelograms have one degree of freedom, and each cell adds the same work to a step.
 #[test]
-fn the_work_of_a_scissor_lift_grows_with_its_stages() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages/scissors/model.bond");
-    let counted = [1, 5, 10, 20].map(|n| {
-        let size = halfarrow::Override { name: "n".into(), value: n.to_string() };
-        let model = Model::load(&path, &[size]).unwrap_or_else(|e| panic!("{}", e.render(false)));
-        let compiled = model.compile(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
-        compiled.operations()
-    });
-    let stage = |k: usize, from: usize, more: usize| (counted[k] - counted[from]) as f64 / more as f64;
-    assert!(stage(3, 2, 10) < 1.05 * stage(2, 1, 5), "{counted:?}");
+fn the_work_of_linkages_grows_with_their_cells() {
+    work_grows_with_the_cells("scissors", &[1, 5, 10, 20]);
+    work_grows_with_the_cells("n_four_bars", &[1, 10, 20, 40]);
+}
+
+/// The same for long ones; compiling them takes a minute or two.
+#[test]
+#[ignore = "long"]
+fn the_work_of_long_linkages_grows_with_their_cells() {
+    work_grows_with_the_cells("scissors", &[10, 20, 40]);
+    work_grows_with_the_cells("n_four_bars", &[40, 80, 160]);
+}
+
+/// A scissor lift of forty stages against the equation of the one angle at which all its bars stand.
+#[test]
+#[ignore = "long"]
+fn a_long_scissor_lift_moves_by_one_angle() {
+    let n = 40;
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages/scissors/model.bond");
+    // The spring holds a weight that grows with the square of the stages.
+    let set = [("n", n.to_string()), ("k", "300 kN/m".to_string())];
+    let set = set.map(|(name, value)| halfarrow::Override { name: name.into(), value });
+    let options = Run { to: 1.0, rtol: 1e-11, every: Some(0.1), record: Record::All, ..Run::default() };
+    let model = Model::load(&path, &set).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let done = model.simulate(&options, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let squares = f64::from(n * (4 * n * n - 1)) / 3.0;
+    let one = format!(
+        "model One\nlet mass = 2*{n}*(0.5*sin(phi)^2 + 0.1) + {squares:e}*cos(phi)^2\n\
+         let slope = {:e}*sin(phi)*cos(phi)\n\
+         let torque = 300000*sin(phi)*(cos(phi) - 0.65) - 2*9.81*{n}^2*cos(phi)\n\
+         state phi' = w from 0.6\nstate w' = (torque - slope*w^2/2)/mass from 0\n",
+        4.0 * 0.5 * (f64::from(n) - squares)
+    );
+    let reduced = run(&one, &options);
+    for (k, phi) in column(&reduced, "phi").iter().enumerate() {
+        for bar in ["a[1]", "b[1]", "a[40]", "b[40]"] {
+            let found = column(&done, bar)[k];
+            assert!((found - phi).abs() < 1e-8, "{bar} is {found}, not {phi}");
+        }
+    }
+}
+
+/// A row of parallelograms through its flat positions, five turns of which are enough to lie flat six times: all cranks turn as
+/// one, as a pendulum of one angle does, whatever their number.
+#[test]
+fn parallelograms_in_a_row_pass_their_flat_positions() {
+    for (n, methods) in [
+        (1, &[(Method::Explicit, 1e-12, 1e-7), (Method::Radau, 1e-10, 1e-6)][..]),
+        (40, &[(Method::Explicit, 1e-12, 1e-7)][..]),
+    ] {
+        let size = [halfarrow::Override { name: "n".into(), value: n.to_string() }];
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/linkages/n_four_bars/model.bond");
+        let model = Model::load(&path, &size).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        let (inertia, moment) = ((n + 1) as f64 / 3.0 + n as f64, 9.81 * ((n + 1) as f64 / 2.0 + n as f64));
+        let one = format!(
+            "model One\nstate th' = w.f from {:e}\n1:w -> I:J({inertia:e}, f0 = 1)\nSe:load(-{moment:e}*cos(th)) -> w\n",
+            std::f64::consts::FRAC_PI_2
+        );
+        for &(method, rtol, part) in methods {
+            let options = Run { to: 5.0, rtol, method, every: Some(0.25), record: Record::All, ..Run::default() };
+            let reduced = run(&one, &Run { rtol: 1e-12, method: Method::Explicit, ..options.clone() });
+            let done = model.simulate(&options, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+            assert!(last(&done, "th[0]") > 5.0 * std::f64::consts::PI);
+            for (k, th) in column(&reduced, "th").iter().enumerate() {
+                for crank in [0, n] {
+                    let found = column(&done, &format!("th[{crank}]"))[k];
+                    assert!((found - th).abs() < part, "{n}, {method:?}: th[{crank}] is {found}, not {th}");
+                }
+                let tilt = column(&done, &format!("tilt[{n}]"))[k];
+                assert!(tilt.abs() < 1e-9, "{n}, {method:?}: {tilt}");
+            }
+        }
+    }
 }
 
 /// Linkages against their references, which know closed forms of positions and Lagrange's equation alone.
@@ -658,6 +753,7 @@ fn linkages_meet_their_references() {
         "cart_with_chain",
         "double_pendulum_points",
         "moving_base",
+        "n_four_bars",
         "peaucellier",
         "scissors",
         "seven_body",

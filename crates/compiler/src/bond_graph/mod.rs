@@ -242,6 +242,8 @@ pub struct Element {
     pub label: String,
     /// The turn of a repetition that it is made in, if it is.
     pub cell: Option<CellId>,
+    /// The component whose text declares it; empty for the model itself.
+    pub component: String,
     /// Which of how many it is, counted from 0, if it is one of the junctions, sources or sensors of a multibond.
     pub strand: Option<(u32, u32)>,
 }

@@ -41,7 +41,9 @@ impl Builder<'_, '_> {
             Width::Strand(at, of) => Some((at as u32, of as u32)),
             _ => None,
         };
-        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell, strand }
+        let component = self.flat.names.scopes[p.here.scope].instance.map_or("", |(component, _)| &component.name.text);
+        let component = component.to_string();
+        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell, component, strand }
     }
 
     fn bond(&self, wire: usize, w: &Wire) -> Bond {
@@ -60,7 +62,16 @@ impl Builder<'_, '_> {
 impl Structure {
     /// A new element without bonds.
     pub fn add(&mut self, name: String, kind: Kind, span: Span, label: String) -> ElementId {
-        self.elements.push(Element { name, kind, ports: Vec::new(), span, label, cell: None, strand: None })
+        self.elements.push(Element {
+            name,
+            kind,
+            ports: Vec::new(),
+            span,
+            label,
+            cell: None,
+            component: String::new(),
+            strand: None,
+        })
     }
 
     /// A new bond between two elements, at new ports of these names.

@@ -138,6 +138,10 @@ pub(super) struct Net {
 /// Parts with more elements than this are solved by the roles of their ports alone, if they can be: elimination fills the
 /// rows of a chain in.
 const LARGE: usize = 600;
+/// Loops of more variables than this, solved one by one, take more operations than what elimination leaves of them, which
+/// knows their common divisors. Parts with such loops are eliminated up to a larger size.
+const LONG_LOOP: usize = 8;
+const LARGE_WITH_LONG_LOOPS: usize = 1500;
 /// As many elements a wide two-port counts for.
 const WIDE: usize = 60;
 
@@ -153,10 +157,15 @@ pub fn solve_part(
     let before = x.assumed();
     let net = Net::new(x, graph, members, preferences);
     let wide = |e: &&ElementId| matches!(graph.elements[**e].kind, Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_));
-    if members.len() + WIDE * members.iter().filter(wide).count() > LARGE
+    let wide = members.iter().filter(wide).count();
+    if members.len() + WIDE * wide > LARGE
         && let Some(solved) = net.solved_by_roles(x, preferences, point)
     {
-        return solved;
+        let long = solved.loops.iter().any(|rows| rows.len() > LONG_LOOP);
+        if !long || wide > 0 || members.len() > LARGE_WITH_LONG_LOOPS {
+            return solved;
+        }
+        x.suppose(before.clone());
     }
     net.solved_exactly(x, preferences, before)
 }

@@ -184,6 +184,7 @@ fn detect(graph: &mut BondGraph, symbol: Symbol) -> Option<PortRef> {
         span,
         label: String::new(),
         cell: None,
+        component: String::new(),
         strand: None,
     };
     let (inner, outer) = match effort {

@@ -175,6 +175,7 @@ impl Builder<'_> {
                 span: Span::default(),
                 label,
                 cell: None,
+                component: String::new(),
                 strand: None,
             });
         }

@@ -261,15 +261,20 @@ fn of_modes(list: &mut List, plan: &Plan) {
     list.arrays(Kind::Real, &["carried"], modes.values(p).len(), "");
     list.arrays(Kind::Real, &["compared"], tables.bounds.compared.concat().len(), "with what margins are compared");
     list.arrays(Kind::Real, &["entered"], storages, "what storages kept where the mode was entered");
-    list.one(Kind::Wide, &["gaps_at"], "when it was found what is zero of gaps");
+    list.one(
+        Kind::Wide,
+        &["gaps_at", "let_go_at"],
+        "when it was found what is zero of gaps, and impulses opened contacts",
+    );
+    list.one(Kind::Real, &["no_leap"], "by how much storages may change where a mode ends");
     list.arrays(Kind::Real, &["gap_zero"], laws, "");
-    list.arrays(Kind::Int, &["gap_known", "apart", "released", "short_flight", "fired_ends"], laws, "of each law");
+    list.arrays(Kind::Int, &["gap_known", "apart", "let_go", "short_flight", "fired_ends"], laws, "of each law");
     let names = ["margin_values", "margin_rates", "margin_changes", "margin_sizes", "margin_present"];
     list.arrays(Kind::Real, &names, values, "margins");
     list.arrays(Kind::Real, &["margin_way"], p.states.len(), "");
     let names = ["margin_value", "margin_rate", "margin_zero", "margin_still", "margin_rounding"];
     list.arrays(Kind::Real, &names, margins, "how they stand");
-    list.arrays(Kind::Int, &["margin_ended"], margins, "whether their branches have ended");
+    list.arrays(Kind::Int, &["margin_ended", "margin_brief"], margins, "whether their branches have ended");
     list.arrays(Kind::Real, &["floors"], p.conditions.len(), "from where on conditions are watched");
     list.one(Kind::Wide, &["last_step"], "length of the last step, 0 after an event");
     list.arrays(Kind::Real, &["jump_been"], plan.events.columns(), "");

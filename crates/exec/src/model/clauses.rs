@@ -101,8 +101,7 @@ pub(super) struct EventWork {
     pub misses: Vec<f64>,
     /// Contacts that come to rest, since their impacts accumulate.
     pub at_rest: Vec<bool>,
-    /// Laws that have been released for the impulses of the round, and those whose next flight would be too short.
-    pub released: Vec<u32>,
+    /// Laws whose next flight would be too short.
     pub short: Vec<u32>,
     /// The clauses of contacts that take part in impulses.
     pub contacts: Vec<usize>,
@@ -115,7 +114,6 @@ impl EventWork {
             fired: vec![false; clauses.len()],
             at_rest: vec![false; clauses.len()],
             contacts: Vec::new(),
-            released: Vec::new(),
             short: Vec::new(),
             values: vec![0.0; clauses.iter().map(|c| c.actions.len()).sum()],
             misses: vec![0.0; mode.positions.as_ref().map_or(0, PositionConstraints::len)],

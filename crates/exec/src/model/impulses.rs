@@ -164,6 +164,11 @@ impl ImpulseWork {
         &self.equations
     }
 
+    /// Whether the equations hold to a part of what they add up.
+    fn met_to(&self, part: f64) -> bool {
+        self.equations.residual.iter().zip(&self.sizes).all(|(residual, size)| residual.abs() <= part * size)
+    }
+
     /// How many resets are asked for.
     pub fn resets(&self) -> usize {
         self.asked.len()
@@ -258,7 +263,10 @@ impl Model {
             let gives = |&k: &usize| !self.events.fired[contacts[k]] && !held[k];
             let open = (0..contacts.len()).filter(gives).map(|k| (k, self.gives_way(contacts[k], balance)));
             let worst = open.filter(|(_, by)| *by > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a });
-            let Some((added, _)) = worst else { return Ok(()) };
+            let Some((added, _)) = worst else {
+                self.note_shared(t, &contacts);
+                return Ok(());
+            };
             self.events.fired[contacts[added]] = true;
             loop {
                 x.copy_from_slice(&start);
@@ -298,6 +306,16 @@ impl Model {
             }
         }
         Err(self.unmet_resets(t))
+    }
+
+    /// Takes notice of contacts that act together.
+    fn note_shared(&mut self, t: f64, contacts: &[usize]) {
+        let acting = contacts.iter().filter(|&&contact| self.events.fired[contact]);
+        let law = |&contact: &usize| self.code.program.clauses[contact].bound.map(|bound| bound.law);
+        let laws: Vec<u32> = acting.filter_map(law).collect();
+        if laws.len() > 1 {
+            self.run.extents.note_shared(t, laws);
+        }
     }
 
     /// Impulses for all that acts; `false` if some of it depends on the rest.
@@ -378,10 +396,12 @@ impl Model {
         let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
-            met = work.equations.residual.iter().all(|r| *r == 0.0);
+            met = work.met_to(0.0);
             if met {
                 break;
             }
+            // The solution spends the residuals.
+            let fits = work.met_to(ROUNDING);
             match work.equations.solve() {
                 None => break,
                 Some(rank) if rank < m => return Ok(None),
@@ -398,15 +418,16 @@ impl Model {
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
-            met = length <= SETTLED || length < NOISE && length >= 0.5 * last;
+            // What is nothing but rounding never settles; then its equations do.
+            let stays = length >= 0.5 * last;
+            met = length <= SETTLED || stays && (length < NOISE || held && fits);
             if met {
                 break;
             }
             last = length;
         }
         self.balanced(t, x, balance, work)?;
-        let fits = |(residual, size): (&f64, &f64)| residual.abs() <= MET * size;
-        match met && work.equations.residual.iter().zip(&work.sizes).all(fits) {
+        match met && work.met_to(MET) {
             true => Ok(Some(changed)),
             false => Err(self.unmet_resets(t)),
         }

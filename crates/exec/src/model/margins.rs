@@ -57,6 +57,16 @@ pub(super) struct Standing {
     pub change: f64,
     /// Whether the branch has ended.
     pub ended: bool,
+    /// Whether it has because a contact that impulses have opened would fly for no time.
+    pub brief: bool,
+}
+
+impl Standing {
+    /// Whether a flight that begins with a rate, and is pulled back, is too short to be told from rounding at time `t`.
+    fn is_short(&self, t: f64, back: f64) -> bool {
+        let (rate, brief) = (self.rate.abs(), SHORT * ROUNDING * t.abs() * back);
+        back > 0.0 && (rate * rate <= 2.0 * back * SHORT * self.rounding || rate <= brief)
+    }
 }
 
 impl Bounds {
@@ -174,7 +184,16 @@ impl Model {
             let rate = if gap { value(m.place + 1) } else { 0.0 };
             let known = extents.gaps.1.get(&m.bound.law).filter(|_| gap && extents.gaps.0 == t);
             let zero = known.copied().unwrap_or(zero.max(rounding).max(finest));
-            Standing { value: value(m.place), rate, zero, still, rounding, change: f64::NAN, ended: false }
+            Standing {
+                value: value(m.place),
+                rate,
+                zero,
+                still,
+                rounding,
+                change: f64::NAN,
+                ended: false,
+                brief: false,
+            }
         };
         Ok(bounds.margins.iter().map(standing).collect())
     }
@@ -189,7 +208,8 @@ impl Model {
             let gap = m.bound.gap.is_some();
             let over = s.value.is_nan() || s.value < -s.zero || gap && s.value <= s.zero && s.rate < -s.still;
             s.ended = over;
-            if !over && s.value <= s.zero && !(gap && s.rate > s.still) {
+            let rises = gap && s.rate > s.still;
+            if !over && s.value <= s.zero && (!rises || self.run.extents.lets_go(t, m.bound.law)) {
                 open.push(number);
             }
         }
@@ -205,6 +225,11 @@ impl Model {
             let (s, m) = (&mut all[number], &bounds.margins[number]);
             let (place, level) = if m.bound.gap.is_some() { (m.place + 1, 2) } else { (m.place, 1) };
             s.change = changes[place];
+            if m.bound.gap.is_some() && s.rate > s.still {
+                s.brief = s.is_short(t, -s.change);
+                s.ended = s.brief;
+                continue;
+            }
             let most = self.run.extents.margins.entry(m.key).or_default();
             most[level] = most[level].max(s.change.abs());
             // What would not show soon in what it changes is none yet.
@@ -265,11 +290,8 @@ impl Model {
         }
         let changes = self.changes_of_margins(t, x)?;
         let short = |&number: &usize| {
-            let (m, s) = (&bounds.margins[number], &standings[number]);
-            // A flight that begins with the rate at most with which it ends, from end to end.
-            let (rate, back) = (s.rate.abs(), -changes[m.place + 1]);
-            let brief = SHORT * ROUNDING * t.abs() * back;
-            back > 0.0 && (rate * rate <= 2.0 * back * SHORT * s.rounding || rate <= brief)
+            // A flight that begins with the rate at most with which it ends.
+            standings[number].is_short(t, -changes[bounds.margins[number].place + 1])
         };
         let laws = all.iter().filter(|n| short(n)).map(|&n| bounds.margins[n].bound.law).collect();
         Ok((all.into_iter().map(|n| bounds.margins[n].clause).collect(), laws))
@@ -300,7 +322,7 @@ impl Model {
         let standings = self.values_of_margins(t, x)?;
         let mut contacts = Vec::new();
         for (m, s) in bounds.margins.iter().zip(standings).filter(|(m, _)| m.meets) {
-            let was_closed = self.events.released.contains(&m.bound.law);
+            let was_closed = self.run.extents.lets_go(t, m.bound.law);
             if s.value <= s.zero || self.events.fired[m.clause] || was_closed {
                 let most = self.run.extents.margins.get(&m.key).map_or(0.0, |most| most[1]);
                 let slow = s.rate.abs() <= super::modes::AT_REST * most;

@@ -6,10 +6,10 @@
 use super::Model;
 use super::clause_memory::{ClauseMemory, Condition};
 use super::compiled::ModeId;
-use super::margins::Bounds;
+use super::margins::{Bounds, Standing};
 use crate::bytecode::Hold;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Clause, Exchanged, Program, Target};
+use halfarrow_compiler::program::{Clause, Exchanged, Margin, Program, Target};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -21,6 +21,9 @@ const FAR: usize = 2;
 pub(super) const AT_REST: f64 = 1e-9;
 /// What storages change by without a leap, as part of the most that they have kept.
 const NO_LEAP: f64 = 1e-7;
+/// The same where flights end that rounding decides on, in parts of the rates with which these begin, as parts of the greatest
+/// of their gaps.
+const NO_FLIGHT: f64 = 1e2;
 
 /// A mode of a model as a program, with the variables that are independent in it where they may change.
 #[derive(Debug, Clone)]
@@ -62,6 +65,10 @@ pub(super) struct Extents {
     pub gaps: (f64, BTreeMap<u32, f64>),
     /// Of what storages keep.
     pub stored: BTreeMap<Symbol, f64>,
+    /// Contacts that were closed and have been opened for impulses, and when that was.
+    pub let_go: (f64, Vec<u32>),
+    /// How many times several contacts have shared out impulses at one instant, and when and which that was first.
+    pub shared: (usize, f64, Vec<u32>),
     /// Of states and of their rates, by the variables that they are.
     pub states: BTreeMap<Symbol, f64>,
     pub rates: BTreeMap<Symbol, f64>,
@@ -71,6 +78,20 @@ impl Extents {
     pub fn note(most: &mut BTreeMap<Symbol, f64>, symbol: Symbol, value: f64) {
         let most = most.entry(symbol).or_default();
         *most = if value.is_finite() { most.max(value.abs()) } else { *most };
+    }
+
+    /// Takes notice of contacts that have shared out impulses at one instant.
+    pub fn note_shared(&mut self, t: f64, laws: Vec<u32>) {
+        let (count, first, which) = &mut self.shared;
+        if *count == 0 {
+            (*first, *which) = (t, laws);
+        }
+        *count += 1;
+    }
+
+    /// Whether impulses of this instant have opened a contact.
+    pub fn lets_go(&self, t: f64, law: u32) -> bool {
+        self.let_go.0 == t && self.let_go.1.contains(&law)
     }
 }
 
@@ -118,6 +139,13 @@ impl Model {
         *self = next;
         x.copy_from_slice(&point);
         Ok(true)
+    }
+
+    /// How many times several contacts have shared out impulses at one instant; when that was first, and which they were.
+    pub fn shared_impulses(&self) -> Option<(usize, f64, Vec<String>)> {
+        let (count, first, laws) = &self.run.extents.shared;
+        let name = |law: &u32| self.code.program.set_valued[*law as usize].name.clone();
+        (*count > 0).then(|| (*count, *first, laws.iter().map(name).collect()))
     }
 
     /// The set-valued laws of which a branch has ended at `(t, x)`, by name.
@@ -231,8 +259,8 @@ impl Model {
         }
         self.take_stored(t, x)?;
         let (stored, values) = (self.stored_now(), self.values_of_all(t, x)?);
-        let contact = |law: &usize| bounds.branches[*law] != free[*law];
-        let released: Vec<u32> = (0..laws.len()).filter(contact).map(|law| law as u32).collect();
+        let changes = |law: &usize| bounds.branches[*law] != free[*law];
+        let released: Vec<u32> = (0..laws.len()).filter(changes).map(|law| law as u32).collect();
         let fired = std::mem::take(&mut self.events.fired);
         let (mut model, mut point) = (self.clone(), x.to_vec());
         let mode = self.compiled.in_mode(&free);
@@ -254,7 +282,11 @@ impl Model {
                 model.events.fired[place] = fired;
             }
         }
-        model.events.released = released;
+        let let_go = &mut model.run.extents.let_go;
+        if let_go.0 != t {
+            *let_go = (t, Vec::new());
+        }
+        let_go.1.extend(released);
         model.events.short = std::mem::take(&mut self.events.short);
         model.switched = true;
         *self = model;
@@ -283,7 +315,9 @@ impl Instant<'_> {
         let Some(bounds) = &self.model.code.bounds else { return Err([0, 0]) };
         let mut short = 0;
         let commanded = |law: u32| bounds.commands.iter().any(|(_, bound)| bound.law == law);
-        let apart = self.apart(bounds)?;
+        let standings = self.model.clone().standings(self.t, self.x).map_err(|_| [0, 0])?;
+        let apart = apart(bounds, &standings);
+        let no_leap = self.no_leap(bounds, &standings);
         let counts: Vec<u32> = self.model.code.program.set_valued.iter().map(|l| l.branches.len() as u32).collect();
         // Commands are obeyed by whatever mode.
         let mut first = bounds.branches.clone();
@@ -324,7 +358,7 @@ impl Instant<'_> {
             };
             tried.insert(mode.clone());
             match self.try_mode(&mode) {
-                Tried::Fits(found, leap) if leap <= NO_LEAP => return Ok(*found),
+                Tried::Fits(found, leap) if leap <= no_leap => return Ok(*found),
                 Tried::Fits(found, leap) => {
                     if self.may_leap(&mode, bounds) && leaping.as_ref().is_none_or(|(least, _)| leap < *least) {
                         leaping = Some((leap, found));
@@ -348,11 +382,11 @@ impl Instant<'_> {
         leaping.map(|(_, found)| *found).ok_or([tried.len(), short])
     }
 
-    /// The contacts whose sides are apart: no force closes these.
-    fn apart(&self, bounds: &Bounds) -> Result<Vec<u32>, [usize; 2]> {
-        let standings = self.model.clone().values_of_margins(self.t, self.x).map_err(|_| [0, 0])?;
-        let margins = bounds.margins.iter().zip(standings).filter(|(m, _)| m.bound.gap.is_some());
-        Ok(margins.filter(|(_, s)| s.value > s.zero || s.rate.abs() > s.still).map(|(m, _)| m.bound.law).collect())
+    /// What storages may change by where the mode ends: contacts that would fly for no time keep a rate that is rounding.
+    fn no_leap(&self, bounds: &Bounds, standings: &[Standing]) -> f64 {
+        let brief = bounds.margins.iter().zip(standings).filter(|(_, s)| s.brief);
+        let part = |(m, s): (&Margin, &Standing)| s.rate.abs() / self.model.greatest_rate(m.clause);
+        brief.map(part).fold(NO_LEAP, |most, part| most.max(NO_FLIGHT * part))
     }
 
     /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.
@@ -419,6 +453,13 @@ impl Instant<'_> {
         model.begin_bounds(t, x)?;
         Ok(Some(leap))
     }
+}
+
+/// The contacts whose sides are apart: no force closes these.
+fn apart(bounds: &Bounds, standings: &[Standing]) -> Vec<u32> {
+    let contacts = bounds.margins.iter().zip(standings).filter(|(m, _)| m.bound.gap.is_some());
+    let apart = contacts.filter(|(_, s)| s.value > s.zero || s.rate.abs() > s.still && !s.brief);
+    apart.map(|(m, _)| m.bound.law).collect()
 }
 
 impl Model {

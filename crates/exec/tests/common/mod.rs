@@ -99,6 +99,7 @@ impl Sketch {
             span: Span::default(),
             label,
             cell: None,
+            component: String::new(),
             strand: None,
         })
     }

@@ -314,7 +314,7 @@ impl ModeTables<'_> {
 }
 
 /// What is zero of margins and impulses: see `halfarrow_exec::model::{margins, impulses}`.
-pub(super) fn tolerances(real: Real) -> [(&'static str, String); 11] {
+pub(super) fn tolerances(real: Real) -> [(&'static str, String); 12] {
     [
         ("HA_ZERO", 1e-12),
         ("HA_MEETS", 1e-10),
@@ -325,6 +325,7 @@ pub(super) fn tolerances(real: Real) -> [(&'static str, String); 11] {
         ("HA_OVERLAP", 1e-9),
         ("HA_AT_REST", 1e-9),
         ("HA_NO_LEAP", 1e-7),
+        ("HA_NO_FLIGHT", 1e2),
         ("HA_CLOSE", 1e-11),
         ("HA_NOTHING", 1e-4),
     ]

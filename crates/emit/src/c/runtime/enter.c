@@ -4,7 +4,7 @@
 /* ---- from one mode to the next ---- */
 
 //entry ha_leave
-/* Notes the variables of the machine at (t, x), what storages keep there, and the contacts whose sides are apart. */
+/* Notes the variables of the machine at (t, x), and what storages keep there. */
 static int ha_leave(ha_model *m, double t, const $real *x)
 {
     static const int symbols[] = {$VALUE_SYMBOLS};
@@ -30,20 +30,38 @@ static int ha_leave(ha_model *m, double t, const $real *x)
         for (i = 0; i < HA_STORED; ++i) {
             m->left_stored[storages[i]] = m->stored[i];
         }
-        status = $ha_weigh_margins(m, t, x);
-    }
-    for (i = 0; i < $LAWS; ++i) {
-        m->apart[i] = 0;
-    }
-    for (i = 0; i < HA_MARGINS && status == $MODEL_OK; ++i) {
-        const int still = m->margin_value[i] <= m->margin_zero[i] && $fabs(m->margin_rate[i]) <= m->margin_still[i];
-        if ($ha_bounds[i].gap && !still) {
-            m->apart[$ha_bounds[i].law] = 1;
-        }
     }
 //end
     return status;
 }
+
+//if bounds
+//entry ha_find_apart
+/* The contacts whose sides are apart, which no force closes; by how much storages may change where contacts that would fly for no time keep
+ * a rate that is rounding. */
+static int ha_find_apart(ha_model *m, double t, const $real *x)
+{
+    const int status = $ha_stand(m, t, x);
+    int i;
+    for (i = 0; i < $LAWS; ++i) {
+        m->apart[i] = 0;
+    }
+    m->no_leap = $HA_NO_LEAP;
+    for (i = 0; i < HA_MARGINS && status == $MODEL_OK; ++i) {
+        const $real rate = $fabs(m->margin_rate[i]);
+        const int parts = rate > m->margin_still[i] && !m->margin_brief[i];
+        if ($ha_bounds[i].gap && (m->margin_value[i] > m->margin_zero[i] || parts)) {
+            m->apart[$ha_bounds[i].law] = 1;
+        }
+        if (m->margin_brief[i]) {
+            const $real part = rate / $ha_greatest_rate(m, $ha_bounds[i].clause);
+            m->no_leap = $ha_max(m->no_leap, $HA_NO_FLIGHT * part);
+        }
+    }
+    return status;
+}
+
+//end
 
 //item ha_carry
 /* States and constants of this mode from the variables that were left; what storages kept. Whether all are known. */
@@ -134,9 +152,6 @@ static int ha_enter(ha_model *m, double t, $real *x, $real *leap)
     status = $ha_parameters(m);
     if (status != $MODEL_OK) {
         return status;
-    }
-    for (i = 0; i < $LAWS; ++i) {
-        m->released[i] = 0;
     }
     m->state_hold = HA_FOLLOW;
 //if clocks

@@ -145,8 +145,26 @@ static int ha_weigh_margins(ha_model *m, double t, const $real *x)
         m->margin_rounding[i] = rounding;
         m->margin_value[i] = m->margin_values[margin->place];
         m->margin_ended[i] = 0;
+        m->margin_brief[i] = 0;
     }
     return $MODEL_OK;
+}
+
+//item ha_lets_go
+/* Whether impulses of this instant have opened a contact. */
+static int ha_lets_go(const ha_model *m, double t, int law)
+{
+    return m->let_go_at == t && m->let_go[law];
+}
+
+//item ha_is_short
+/* Whether a flight that begins with the rate of a gap, and is pulled back, is too short to be told from rounding. */
+static int ha_is_short(const ha_model *m, int i, double t, $real back)
+{
+    const $real rate = $fabs(m->margin_rate[i]);
+    const $real brief = $HA_SHORT * $HA_ROUNDING * $narrow fabs(t) * back;
+    const $real height = $2.0 * back * $HA_SHORT * m->margin_rounding[i];
+    return back > $0.0 && (rate * rate <= height || rate <= brief);
 }
 
 //item ha_changes_of_margins
@@ -166,10 +184,11 @@ static int ha_changes_of_margins(ha_model *m, double t, const $real *x)
 
 //item ha_is_open
 /* Whether how a margin changes tells whether its branch has ended. */
-static int ha_is_open(const ha_model *m, int i)
+static int ha_is_open(const ha_model *m, double t, int i)
 {
     const int parts = $ha_bounds[i].gap && m->margin_rate[i] > m->margin_still[i];
-    return !m->margin_ended[i] && m->margin_value[i] <= m->margin_zero[i] && !parts;
+    const int kept = !parts || $ha_lets_go(m, t, $ha_bounds[i].law);
+    return !m->margin_ended[i] && m->margin_value[i] <= m->margin_zero[i] && kept;
 }
 
 //item ha_stand
@@ -187,7 +206,7 @@ static int ha_stand(ha_model *m, double t, const $real *x)
         const $real value = m->margin_value[i];
         const int met = $ha_bounds[i].gap && value <= m->margin_zero[i] && m->margin_rate[i] < -m->margin_still[i];
         m->margin_ended[i] = value != value || value < -m->margin_zero[i] || met;
-        open = open || $ha_is_open(m, i);
+        open = open || $ha_is_open(m, t, i);
     }
     if (!open) {
         return $MODEL_OK;
@@ -202,7 +221,7 @@ static int ha_stand(ha_model *m, double t, const $real *x)
     status = $ha_sizes_of_margins(m, t, x, m->margin_way, m->margin_sizes);
     for (i = 0; i < HA_MARGINS && status == $MODEL_OK; ++i) {
         const ha_bound *margin = &$ha_bounds[i];
-        if ($ha_is_open(m, i)) {
+        if ($ha_is_open(m, t, i)) {
             const int place = margin->place + margin->gap;
             const $real change = m->margin_changes[place];
             $real *most = &m->most_margins[3 * margin->key + 1 + margin->gap];
@@ -210,6 +229,12 @@ static int ha_stand(ha_model *m, double t, const $real *x)
             const $real below = margin->gap ? m->margin_still[i] : m->margin_zero[i];
             const $real slow = t == 0.0 ? $0.0 : below / ($HA_SOON * $narrow fabs(t));
             const $real rounding = $HA_ZERO * m->margin_sizes[place];
+            if (margin->gap && m->margin_rate[i] > m->margin_still[i]) {
+                /* A contact that impulses have opened would fly for no time. */
+                m->margin_brief[i] = $ha_is_short(m, i, t, -change);
+                m->margin_ended[i] = m->margin_brief[i];
+                continue;
+            }
             *most = $ha_max(*most, $fabs(change));
             m->margin_ended[i] = change < -$ha_max($ha_max($HA_STEADY * *most, rounding), slow);
         }
@@ -400,6 +425,19 @@ $COMMAND_TABLE
     return $MODEL_OK;
 }
 
+//item ha_greatest_rate
+/* The greatest rate that the gap of a contact has had. */
+static $real ha_greatest_rate(const ha_model *m, int clause)
+{
+    int i;
+    for (i = 0; i < HA_MARGINS; ++i) {
+        if ($ha_bounds[i].clause == clause) {
+            return m->most_margins[3 * $ha_bounds[i].key + 1];
+        }
+    }
+    return $0.0;
+}
+
 //if meets
 //item ha_is_gap
 /* Whether a clause is that of a contact. */
@@ -438,12 +476,8 @@ static int ha_find_meeting(ha_model *m, double t, const $real *x)
     for (i = 0; i < HA_MARGINS && status == $MODEL_OK; ++i) {
         const ha_bound *margin = &$ha_bounds[i];
         if (margin->meets && m->clauses[margin->clause].fired) {
-            /* A flight that begins with the rate at most with which it ends, from end to end. */
-            const $real rate = $fabs(m->margin_rate[i]);
-            const $real back = -m->margin_changes[margin->place + 1];
-            const $real brief = $HA_SHORT * $HA_ROUNDING * $narrow fabs(t) * back;
-            const $real height = $2.0 * back * $HA_SHORT * m->margin_rounding[i];
-            m->short_flight[margin->law] = back > $0.0 && (rate * rate <= height || rate <= brief);
+            /* A flight that begins with the rate at most with which it ends. */
+            m->short_flight[margin->law] = $ha_is_short(m, i, t, -m->margin_changes[margin->place + 1]);
         }
     }
     return status;
@@ -461,7 +495,7 @@ static int ha_find_contacts(ha_model *m, double t, const $real *x)
     for (i = 0; i < HA_MARGINS && status == $MODEL_OK; ++i) {
         const ha_bound *margin = &$ha_bounds[i];
         const int closed = m->margin_value[i] <= m->margin_zero[i] || m->clauses[margin->clause].fired;
-        if (margin->meets && (closed || m->released[margin->law])) {
+        if (margin->meets && (closed || $ha_lets_go(m, t, margin->law))) {
             const $real most = m->most_margins[3 * margin->key + 1];
             if ($fabs(m->margin_rate[i]) <= $HA_AT_REST * most || m->short_flight[margin->law]) {
                 m->at_rest[margin->clause] = 1;
@@ -470,19 +504,6 @@ static int ha_find_contacts(ha_model *m, double t, const $real *x)
         }
     }
     return status;
-}
-
-//item ha_greatest_rate
-/* The greatest rate that the gap of a contact has had. */
-static $real ha_greatest_rate(const ha_model *m, int clause)
-{
-    int i;
-    for (i = 0; i < HA_MARGINS; ++i) {
-        if ($ha_bounds[i].clause == clause) {
-            return m->most_margins[3 * $ha_bounds[i].key + 1];
-        }
-    }
-    return $0.0;
 }
 
 //end

@@ -200,7 +200,7 @@ static int ha_search_mode(ha_model *m, double t, $real *x, const int *ended)
         m->tried_modes[combination] = 1;
         $ha_copy(m->most_kept, m->most_margins, $MOST_MARGINS);
         fits = $ha_try_mode(m, t, x, combination, next, &leap);
-        if (fits == 1 && leap <= $HA_NO_LEAP) {
+        if (fits == 1 && leap <= m->no_leap) {
             return combination;
         }
         $ha_copy(m->most_margins, m->most_kept, $MOST_MARGINS);
@@ -236,6 +236,9 @@ static int ha_settle(ha_model *m, double t, $real *x, int *switched)
     }
     *switched = 1;
     status = $ha_leave(m, t, x);
+    if (status == $MODEL_OK) {
+        status = $ha_find_apart(m, t, x);
+    }
     if (status == $MODEL_OK && $ha_search_mode(m, t, x, ended) < 0) {
         status = $ha_fail(m, $MODEL_NO_MODE, first, t);
     }
@@ -277,8 +280,10 @@ static int ha_release(ha_model *m, double t, $real *x)
         return $ha_fail(m, $MODEL_STUCK, 0, t);
     }
     for (law = 0; law < HA_LAWS; ++law) {
-        m->released[law] = branches[law] != $ha_branches[from][law];
+        const int kept = m->let_go_at == t && m->let_go[law];
+        m->let_go[law] = kept || branches[law] != $ha_branches[from][law];
     }
+    m->let_go_at = t;
     m->switched = 1;
     return $ha_fire_again(m);
 }

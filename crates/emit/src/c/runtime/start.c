@@ -33,6 +33,7 @@ static void ha_restart(ha_model *m)
 //end
 //if bounds
     m->gaps_at = (double)NAN;
+    m->let_go_at = (double)NAN;
     m->last_step = 0.0;
     $ha_fill(m->floors, $0.0, $CONDITIONS);
     $ha_fill(m->most_beyond, $0.0, HA_NG);
