@@ -126,7 +126,8 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
         let name = |k: &(u32, _)| export.program.states[k.0 as usize].name.clone();
         return Err(EmitError::Jumps(export.program.kept.iter().map(name).collect()));
     }
-    let balanced = plan::EventTables::of(export.program).columns();
+    let programs = std::iter::once(export.program).chain(export.modes.iter().map(|mode| &mode.program));
+    let balanced = programs.map(|p| plan::EventTables::of(p).columns()).max().unwrap_or(0);
     if balanced > MOST_BALANCED {
         return Err(EmitError::Impulses(balanced));
     }

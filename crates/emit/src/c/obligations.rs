@@ -94,5 +94,5 @@ fn stack(plan: &Plan) -> usize {
     let most = |of: &dyn Fn(&super::start::Group) -> usize| plan.groups.iter().map(of).max().unwrap_or(1);
     let (rows, columns) = (most(&|g| g.conditions.len()), most(&|g| g.unknowns.len()));
     let start = 8 * (rows * rows + 4 * rows * columns + 8 * (rows + columns) + 8 * plan.program.start.len());
-    OWN_STACK + generated + start
+    OWN_STACK + generated + start + plan.mode.as_ref().map_or(0, |mode| mode.stack(plan.program))
 }

@@ -8,6 +8,9 @@ use halfarrow_compiler::program::{Block, BlockId, Bounds, Exchanges, Op, Program
 
 use crate::Real;
 
+/// Bytes of stack for functions that go from one mode to the next.
+const OWN_STACK: usize = 2048;
+
 /// What all modes of a model have in common.
 #[derive(Debug, Clone, Default)]
 pub(in crate::c) struct Modes {
@@ -192,6 +195,15 @@ impl ModeTables<'_> {
         let of_constants = of_constants
             .filter_map(|(k, symbol)| value(symbol).map(|value| (conserved + k, self.modes.symbol(symbol), value)));
         of_states.chain(of_constants).collect()
+    }
+
+    /// Bytes of stack for the search of a mode.
+    pub fn stack(&self, program: &Program) -> usize {
+        let open = self.open(program, &[0; 6]).len();
+        let (n, m) = self.ratios.as_ref().map_or((0, 0), |r| (r.independent.len(), r.dependent.len()));
+        let pivots = self.ratios.as_ref().map_or(0, |r| r.pivots.len());
+        let laws = self.modes.laws();
+        8 * (open * open + 4 * (open + 1) + n * n + 2 * n * m + 4 * (n + m) + pivots + 1 + 4 * laws) + OWN_STACK
     }
 
     /// Words of what could change places in a mode.

@@ -23,6 +23,14 @@ const NEWTON: &str = concat!(
     include_str!("../runtime/newton/search.c"),
 );
 
+/// What happens at events.
+const EVENTS: &str = concat!(
+    include_str!("../runtime/events.c"),
+    include_str!("../runtime/impulses.c"),
+    include_str!("../runtime/contacts.c"),
+    include_str!("../runtime/rounds.c"),
+);
+
 impl Plan<'_> {
     /// With what templates are filled, and with what those that compute in double precision whatever real numbers are.
     fn fillings(&self, obligations: String) -> [Filling<'_>; 2] {
@@ -86,8 +94,9 @@ impl Plan<'_> {
         put(filling.fragments(include_str!("../runtime/held.c")));
         put(filling.fragments(include_str!("../runtime/system.c")));
         put(filling.fragments(include_str!("../runtime/margins.c")));
+        put(filling.fragments(include_str!("../runtime/branches.c")));
         if !self.program.clauses.is_empty() || self.program.jumps.is_some() {
-            put(filling.fragments(include_str!("../runtime/events.c")));
+            put(filling.fragments(EVENTS));
         }
         put(filling.fragments(include_str!("../runtime/enter.c")));
         put(filling.fragments(include_str!("../runtime/cross.c")));
