@@ -56,6 +56,9 @@ MODELS = [
     (HERE.parent / "models/unsteady_ratio.bond", 1e-5),
     (ROOT / "models/when_bouncing_ball/model.bond", 1e-5),
     (ROOT / "models/when_rimless_wheel/model.bond", 1e-5),
+    (HERE / "belt.bond", 1e-5),
+    (HERE / "drop.bond", 1e-5),
+    (HERE / "phases.bond", 1e-5),
 ]
 # Points of those that take longer.
 LONGER = {"controlled": 100, "when_bouncing_ball": 300, "when_rimless_wheel": 1500}
@@ -405,7 +408,10 @@ def derivatives(where, file):
             x = [known[v] if v is not variable else value for v in states]
             fmu.api.setContinuousStates((ctypes.c_double * len(x))(*x), len(x))
 
-    structure = {u.variable.name: {d.name for d in u.dependencies} for u in fmu.description.derivatives + fmu.description.outputs}
+    # Where modes change what depends on what is not told.
+    everything = {v.name for v in fmu.description.modelVariables}
+    unknown = fmu.description.derivatives + fmu.description.outputs
+    structure = {u.variable.name: everything if u.dependencies is None else {d.name for d in u.dependencies} for u in unknown}
     if fmu.version == 3:
         # Weighted sums of the columns.
         references, weights = [v.valueReference for v in known], [math.cos(1.0 + 3.0 * i) for i in range(len(unknowns))]
@@ -614,7 +620,7 @@ def main():
                 events_by_hand(where, file)
             if name == "when_bouncing_ball":
                 impact_by_hand(where, file)
-            if name in ("tuned", "controlled", "series_springs", "gearbox_ratio", "sampled", "slider_crank"):
+            if name in ("tuned", "controlled", "series_springs", "gearbox_ratio", "sampled"):
                 initial_unknowns(where, file)
             if name in ("contact", "quarter_car"):
                 sources(where + " from source", file, reference, scratch)

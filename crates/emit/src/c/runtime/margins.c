@@ -162,8 +162,17 @@ static int ha_lets_go(const ha_model *m, double t, int law)
 static int ha_is_short(const ha_model *m, int i, double t, $real back)
 {
     const $real rate = $fabs(m->margin_rate[i]);
-    const $real brief = $HA_SHORT * $HA_ROUNDING * $narrow fabs(t) * back;
-    const $real height = $2.0 * back * $HA_SHORT * m->margin_rounding[i];
+//if derivatives
+    /* An importer locates impacts less sharply: sides overlap by what it is late. */
+    const $real parts = m->outside ? $1e5 : $HA_SHORT;
+    const $real late = m->outside ? $fabs(m->margin_value[i]) : $0.0;
+    const $real rounding = $ha_max(m->margin_rounding[i], late);
+//else
+    const $real parts = $HA_SHORT;
+    const $real rounding = m->margin_rounding[i];
+//end
+    const $real brief = parts * $HA_ROUNDING * $narrow fabs(t) * back;
+    const $real height = $2.0 * back * parts * rounding;
     return back > $0.0 && (rate * rate <= height || rate <= brief);
 }
 
