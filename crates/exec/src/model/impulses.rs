@@ -393,15 +393,14 @@ impl Model {
             let value = self.unknown_mut(x, balance.jumps.unknowns[k]).abs();
             work.been[k] = if held { work.been[k].max(value) } else { 0.0 };
         }
-        let (mut last, mut met, mut changed) = (f64::INFINITY, false, false);
+        let (mut last, mut stays, mut met, mut changed) = (f64::INFINITY, false, false, false);
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
-            met = work.met_to(0.0);
+            // What is nothing but rounding never settles; then its equations hold to that.
+            met = work.met_to(0.0) || held && stays && work.met_to(ROUNDING);
             if met {
                 break;
             }
-            // The solution spends the residuals.
-            let fits = work.met_to(ROUNDING);
             match work.equations.solve() {
                 None => break,
                 Some(rank) if rank < m => return Ok(None),
@@ -418,9 +417,8 @@ impl Model {
                 *value += s;
             }
             work.impulses.iter_mut().zip(&step[n..]).for_each(|(p, s)| *p += s);
-            // What is nothing but rounding never settles; then its equations do.
-            let stays = length >= 0.5 * last;
-            met = length <= SETTLED || stays && (length < NOISE || held && fits);
+            stays = length >= 0.5 * last;
+            met = length <= SETTLED || stays && length < NOISE;
             if met {
                 break;
             }

@@ -370,7 +370,7 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
     int status;
     int i;
 //if bounds
-    int fits;
+    int stays = 0;
 //end
     *independent = 1;
 //if bounds
@@ -400,15 +400,16 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
         for (i = 0; i < rows; ++i) {
             met = met && m->jump_residual[i] == $0.0;
         }
+//if bounds
+        /* What is nothing but rounding never settles; then its equations hold to that. */
+        for (i = 0; i < rows && stays; ++i) {
+            stays = $fabs(m->jump_residual[i]) <= $HA_CLOSE * m->jump_sizes[i];
+        }
+        met = met || stays;
+//end
         if (met) {
             break;
         }
-//if bounds
-        fits = 1;
-        for (i = 0; i < rows; ++i) {
-            fits = fits && $fabs(m->jump_residual[i]) <= $HA_CLOSE * m->jump_sizes[i];
-        }
-//end
         rank = $ha_solve_balances(m, rows, columns);
         if (rank < 0) {
             break;
@@ -418,11 +419,9 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
             return $MODEL_OK;
         }
         length = $ha_move_unknowns(m, x);
-//if bounds
-        /* What is nothing but rounding never settles; then its equations do. */
-        met = length <= $4.0 * $DBL_EPSILON || ((length < $CLOSE_TO_ROUNDING || fits) && length >= $0.5 * last);
-//else
         met = length <= $4.0 * $DBL_EPSILON || (length < $CLOSE_TO_ROUNDING && length >= $0.5 * last);
+//if bounds
+        stays = length >= $0.5 * last;
 //end
         last = length;
     }
