@@ -249,6 +249,7 @@ fn of_modes(list: &mut List, plan: &Plan) {
         let pivots = tables.ratios.as_ref().map_or(0, |ratios| ratios.pivots.len());
         list.arrays(Kind::Real, &["pivots"], pivots, "what they were divided by when they were last looked at");
         list.arrays(Kind::Real, &["left_x"], p.states.len(), "");
+        list.arrays(Kind::Byte, &["taken_over"], modes.exchanged(), "those that have taken over last");
     }
     list.one(Kind::Int, &["switched"], "whether it has changed since the last step");
     let about = "of margins, of their rates and of the rates of these, how great they have been";

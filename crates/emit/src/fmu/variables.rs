@@ -111,7 +111,9 @@ impl Variables {
     /// same unit is what rounding has left of it: that of the other one is taken.
     pub fn nominals(&self, export: &Export) -> Vec<f64> {
         let states = &export.program.states;
-        let known = |scales: &[f64], i: usize| scales.get(i).copied().filter(|s| *s > 0.0 && s.is_finite());
+        // In another mode a state may be of another size: what is next to nothing at the start says nothing.
+        let least = if export.has_modes() { SMALL } else { 0.0 };
+        let known = |scales: &[f64], i: usize| scales.get(i).copied().filter(|s| *s > least && s.is_finite());
         let scale = |i: usize| known(&export.start.scales, i).or(known(&export.start.grown, i)).unwrap_or(0.0);
         let unit = |i: usize| states[i].unit.as_ref().map(|u| u.dimension);
         let nominal = |i: usize| {

@@ -119,6 +119,21 @@ impl Compiled {
         self.mode_of((branches.to_vec(), Vec::new()), &BTreeMap::new())
     }
 
+    /// The mode in which set-valued laws have these branches and the variables stay independent that `present` was entered
+    /// with, where other ones than the first have taken over; made at a point if it is not there yet.
+    pub(super) fn in_mode_from(
+        &self,
+        present: ModeId,
+        branches: &[u32],
+        point: &BTreeMap<Symbol, f64>,
+    ) -> Option<ModeId> {
+        let entered =
+            |(key, mode): (&(Vec<u32>, Vec<Symbol>), &Option<ModeId>)| (*mode == Some(present)).then(|| key.1.clone());
+        let wanted = self.others().of.iter().find_map(entered).filter(|wanted| !wanted.is_empty());
+        let mode = wanted.and_then(|wanted| self.mode_of((branches.to_vec(), wanted), point));
+        mode.or_else(|| self.in_mode(branches))
+    }
+
     fn mode_of(&self, key: (Vec<u32>, Vec<Symbol>), point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
         if let Some(known) = self.others().of.get(&key) {
             return *known;

@@ -263,7 +263,7 @@ impl Model {
         let released: Vec<u32> = (0..laws.len()).filter(changes).map(|law| law as u32).collect();
         let fired = std::mem::take(&mut self.events.fired);
         let (mut model, mut point) = (self.clone(), x.to_vec());
-        let mode = self.compiled.in_mode(&free);
+        let mode = self.compiled.in_mode_from(self.run.mode, &free, &values);
         let entered = match mode {
             Some(mode) => Instant { model: self, t, x, values, stored }.enter(&mut model, mode, &mut point)?,
             None => None,
@@ -391,14 +391,16 @@ impl Instant<'_> {
 
     /// Whether storages may leap on the way to a mode: not by what is bounded, nor by contacts, whose impulses are told.
     fn may_leap(&self, mode: &[u32], bounds: &Bounds) -> bool {
-        let Some(id) = self.model.compiled.in_mode(mode) else { return false };
+        let found = self.model.compiled.in_mode_from(self.model.run.mode, mode, &self.values);
+        let Some(id) = found else { return false };
         let code = self.model.compiled.mode(id);
         let laws = code.program.set_valued.iter().zip(&bounds.branches);
         laws.clone().all(|(law, before)| law.released.is_none() || law.present == *before)
     }
 
     fn try_mode(&self, branches: &[u32]) -> Tried {
-        let Some(mode) = self.model.compiled.in_mode(branches) else { return Tried::Impossible };
+        let mode = self.model.compiled.in_mode_from(self.model.run.mode, branches, &self.values);
+        let Some(mode) = mode else { return Tried::Impossible };
         let mut model = self.model.clone();
         let mut x = self.x.to_vec();
         match self.enter(&mut model, mode, &mut x) {

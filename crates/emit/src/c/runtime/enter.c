@@ -148,6 +148,9 @@ static int ha_enter(ha_model *m, double t, $real *x, $real *leap)
     int i;
     *leap = $0.0;
     m->failure.code = $MODEL_OK;
+//if exchanges
+    m->pivots_known = 0;
+//end
     $ha_fill(m->floors, $0.0, $CONDITIONS);
     status = $ha_parameters(m);
     if (status != $MODEL_OK) {

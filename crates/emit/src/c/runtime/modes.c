@@ -41,6 +41,55 @@ static const unsigned char ha_commanded[][HA_LAWS] = {
 $MODE_COMMANDED
 };
 
+//end
+//if exchanges
+//item ha_independent
+/* Which variables are independent in each mode. */
+static const unsigned char ha_independent[][$EXCHANGED] = {
+$MODE_INDEPENDENT
+};
+
+//item ha_mode_with
+/* The mode with the branches of another one in which these variables are independent; -1 if there is none. */
+static int ha_mode_with(int like, const unsigned char *wanted)
+{
+    int mode;
+    int i;
+    for (mode = 0; mode < $MODES; ++mode) {
+        int same = 1;
+//if bounds
+        for (i = 0; i < HA_LAWS; ++i) {
+            same = same && $ha_branches[mode][i] == $ha_branches[like][i];
+        }
+//else
+        (void)like;
+//end
+        for (i = 0; i < $EXCHANGED; ++i) {
+            same = same && $ha_independent[mode][i] == wanted[i];
+        }
+        if (same) {
+            return mode;
+        }
+    }
+    return -1;
+}
+
+//end
+//if bounds
+//item ha_mode_like
+/* The mode of a combination of branches with the independent variables that have taken over last, or with its own. */
+static int ha_mode_like(const ha_model *m, int combination)
+{
+    const int first = $ha_mode_of[combination];
+//if exchanges
+    const int like = first >= 0 ? $ha_mode_with(first, m->taken_over) : -1;
+    return like >= 0 ? like : first;
+//else
+    (void)m;
+    return first;
+//end
+}
+
 //item ha_combination
 static int ha_combination(const int *branches)
 {
@@ -68,7 +117,7 @@ static int ha_try_mode(ha_model *m, double t, $real *x, int combination, int *ne
     if ($ha_mode_of[combination] < 0) {
         return -1;
     }
-    m->mode = $ha_mode_of[combination];
+    m->mode = $ha_mode_like(m, combination);
     if ($ha_enter(m, t, x, leap) != $MODEL_OK || $ha_ended(m, t, x, next) != $MODEL_OK) {
         return -1;
     }
@@ -271,7 +320,7 @@ static int ha_release(ha_model *m, double t, $real *x)
     if (status != $MODEL_OK) {
         return status;
     }
-    to = $ha_mode_of[$ha_combination(branches)];
+    to = $ha_mode_like(m, $ha_combination(branches));
     if (to < 0) {
         return $ha_fail(m, $MODEL_STUCK, 0, t);
     }
@@ -335,37 +384,6 @@ static int ha_settle_all(ha_model *m, double t, $real *x)
 
 //end
 //if exchanges
-//item ha_independent
-/* Which variables are independent in each mode. */
-static const unsigned char ha_independent[][$EXCHANGED] = {
-$MODE_INDEPENDENT
-};
-
-//item ha_mode_with
-/* The mode with the branches of the present one in which these variables are independent; -1 if there is none. */
-static int ha_mode_with(const ha_model *m, const unsigned char *wanted)
-{
-    int mode;
-    int i;
-    for (mode = 0; mode < $MODES; ++mode) {
-        int same = 1;
-//if bounds
-        for (i = 0; i < HA_LAWS; ++i) {
-            same = same && $ha_branches[mode][i] == $ha_branches[m->mode][i];
-        }
-//else
-        (void)m;
-//end
-        for (i = 0; i < $EXCHANGED; ++i) {
-            same = same && $ha_independent[mode][i] == wanted[i];
-        }
-        if (same) {
-            return mode;
-        }
-    }
-    return -1;
-}
-
 //item ha_exchange
 /* Goes on with other independent variables where these move many times as fast, as near a dead centre; whether it does. Then x is the same
  * position and motion in the new ones. */
@@ -379,7 +397,7 @@ static int ha_exchange(ha_model *m, double t, $real *x, int failed, int *exchang
     if (!$ha_find_wanted(m, t, x, failed, wanted)) {
         return $MODEL_OK;
     }
-    to = $ha_mode_with(m, wanted);
+    to = $ha_mode_with(m->mode, wanted);
     if (to < 0 || to == from) {
         return $MODEL_OK;
     }
@@ -390,6 +408,10 @@ static int ha_exchange(ha_model *m, double t, $real *x, int failed, int *exchang
     $ha_copy(m->left_x, x, HA_NX);
     m->mode = to;
     if ($ha_enter_at(m, t, x) == $MODEL_OK) {
+        int i;
+        for (i = 0; i < $EXCHANGED; ++i) {
+            m->taken_over[i] = wanted[i];
+        }
         *exchanged = 1;
         return $MODEL_OK;
     }
@@ -429,7 +451,7 @@ int $model_is_over($model *m, double t, const $real *x, int *over)
 //if exchanges
     if (status == $MODEL_OK && !*over) {
         unsigned char wanted[$EXCHANGED];
-        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted) && $ha_mode_with(m, wanted) >= 0;
+        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted) && $ha_mode_with(m->mode, wanted) >= 0;
         *over = m->exchange_due;
     }
 //end

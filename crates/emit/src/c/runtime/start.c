@@ -30,6 +30,12 @@ static void ha_restart(ha_model *m)
     m->exchanged_at = (double)NAN;
     m->pivots_known = 0;
     m->exchange_due = 0;
+    {
+        int i;
+        for (i = 0; i < $EXCHANGED; ++i) {
+            m->taken_over[i] = 0;
+        }
+    }
 //end
 //if bounds
     m->gaps_at = (double)NAN;

@@ -570,7 +570,7 @@ $NOMINALS
 //if modes
     $model_sizes(&f->s.m, values);
     for (i = 0; i < HA_NX; ++i) {
-        values[i] = values[i] > 0.0 ? values[i] : nominals[i];
+        values[i] = values[i] > 1e-9 * nominals[i] ? values[i] : nominals[i];
     }
 //else
     (void)f;
