@@ -47,9 +47,9 @@ impl Bounds {
 }
 
 impl Program {
-    /// Where the branches of the set-valued laws end; `None` if there are no such laws.
+    /// Where the branches of the set-valued laws end; `None` if there are no such laws, or another form looks for their ends.
     pub fn bounds(&self) -> Option<Bounds> {
-        if self.set_valued.is_empty() {
+        if self.clauses.iter().all(|clause| clause.bound.is_none()) {
             return None;
         }
         let mut kinds: Vec<(ObservedKind, Option<Unit>)> = Vec::new();

@@ -49,7 +49,7 @@ impl Modes {
         let symbols: BTreeSet<Symbol> = programs.iter().flat_map(|p| carried(p)).collect();
         Modes {
             laws: programs[0].set_valued.iter().map(|law| law.branches.len()).collect(),
-            branches: all.iter().map(|b| b.branches.clone()).collect(),
+            branches: programs.iter().map(|p| p.set_valued.iter().map(|law| law.present).collect()).collect(),
             free: programs.iter().map(laws).collect(),
             commanded: all.iter().map(commanded).collect(),
             keys: keys.into_iter().collect(),
