@@ -40,6 +40,8 @@ pub(super) struct Bounds {
     /// Efforts and flows that are compared: computes them, and the places of each group among them.
     compared: Routine,
     groups: Vec<Vec<usize>>,
+    /// Computes the gaps of contacts that are closed.
+    pub closed: Routine,
 }
 
 /// A bound that is a margin.
@@ -79,7 +81,8 @@ pub(super) struct Standing {
 
 impl Bounds {
     pub fn of(program: &Program, layout: &Layout) -> Option<Bounds> {
-        if program.set_valued.is_empty() {
+        // Another form looks for those of a form that has none.
+        if program.clauses.iter().all(|clause| clause.bound.is_none()) {
             return None;
         }
         let branches: Vec<u32> = program.set_valued.iter().map(|law| law.present).collect();
@@ -140,11 +143,13 @@ impl Bounds {
             groups.push((from..compared.len()).collect());
         }
         let (routine, compared) = (layout.routine(program, &values), layout.routine(program, &compared));
-        Some(Bounds { margins, commands, routine, branches, compared, groups })
+        let closed: Vec<Value> = program.clauses.iter().filter_map(|c| c.bound?.closed).collect();
+        let closed = layout.routine(program, &closed);
+        Some(Bounds { margins, commands, routine, branches, compared, groups, closed })
     }
 
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
-        [&self.routine, &self.compared].into_iter()
+        [&self.routine, &self.compared, &self.closed].into_iter()
     }
 }
 
